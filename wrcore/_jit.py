@@ -1,0 +1,79 @@
+"""The one compile decorator, and a cache folder that never serves stale kernels.
+
+Numba notices edits of the file that holds a kernel, but not of a kernel imported from another file. The cache
+folder is therefore named after the content of all sources in the rooms that hold kernels: an edit there starts a
+fresh cache.
+"""
+
+import hashlib
+import os
+import time
+from pathlib import Path
+
+import numba
+
+FAST = frozenset({"contract", "nsz", "arcp", "reassoc"})
+"""Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
+
+KERNEL_ROOMS = ("geometry", "contact", "creep", "dynamics")
+_KEEP_SECONDS = 14 * 86400
+
+
+def cache_root():
+    """Folder for everything that can be rebuilt: compiled kernels and creep tables.
+
+    ``WRCORE_CACHE`` if set, else ``wrcore`` in the user's cache folder (``XDG_CACHE_HOME`` or ``~/.cache``).
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    if "WRCORE_CACHE" in os.environ:
+        return Path(os.environ["WRCORE_CACHE"])
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wrcore"
+
+
+def source_digest():
+    """Digest (16 hex digits) of the sources of this file and of the rooms that hold kernels."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in [Path(__file__), *sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py"))]:
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _prepare_cache_folder():
+    """Create the kernel cache of this source state and drop those unused for two weeks."""
+    kernels = cache_root() / "kernels"
+    folder = kernels / source_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for old in kernels.iterdir():
+            if time.time() - old.stat().st_mtime > _KEEP_SECONDS:
+                for file in sorted(old.rglob("*"), reverse=True):
+                    file.rmdir() if file.is_dir() else file.unlink()
+                old.rmdir()
+    except OSError:  # read-only home, or another process clears at the same time: compile without our folder
+        return None
+    return str(folder)
+
+
+_FOLDER = _prepare_cache_folder()
+
+
+def jit(function=None, **options):
+    """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
+
+    Keyword arguments are passed on to numba; ``fastmath=FAST`` is meant for scan loops only.
+    """
+    if function is None:
+        return lambda f: jit(f, **options)
+    settings = {"cache": _FOLDER is not None, "error_model": "numpy", **options}
+    before = numba.config.CACHE_DIR
+    try:
+        numba.config.CACHE_DIR = _FOLDER or before
+        return numba.njit(function, **settings)
+    finally:
+        numba.config.CACHE_DIR = before

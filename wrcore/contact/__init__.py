@@ -1,0 +1,1 @@
+"""Where wheel and rail touch, and how hard."""

@@ -1,0 +1,1 @@
+"""The tangential (creep) force: every law behind one signature."""

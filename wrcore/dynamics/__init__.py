@@ -1,0 +1,1 @@
+"""Rigid bodies, joints, force elements and time integration."""

@@ -1,0 +1,1 @@
+"""Where the surfaces are: profiles, track, wheel and rail surfaces."""

@@ -1,0 +1,1 @@
+"""Vehicles from data: bodies, joints and elements."""
