@@ -1,0 +1,121 @@
+"""Run files: nothing is lost, nothing half-written is read, the same run gives the same bytes."""
+
+import h5py
+import numpy as np
+import pytest
+from synthetic import hunting_run
+
+from wrcore import __version__
+from wrcore.errors import InputError
+from wrcore.results import load_run, unit_of, write_run
+from wrcore.simulate import Run
+
+
+@pytest.fixture
+def written(tmp_path):
+    run = hunting_run(flange_at=1.0)
+    path = tmp_path / "deep" / "run.h5"
+    write_run(path, run)
+    return run, path
+
+
+def test_round_trip_keeps_every_value_bit_for_bit(written):
+    run, path = written
+    read = load_run(path)
+    assert (read.scene, read.settings, read.counters) == (run.scene, run.settings, run.counters)
+    assert (read.status, read.reason) == ("completed", "")
+    assert np.array_equal(read.t, run.t)
+    assert read.groups.keys() == run.groups.keys()
+    for group, channels in run.groups.items():
+        assert read.groups[group].keys() == channels.keys()
+        for name, values in channels.items():
+            assert np.array_equal(read.groups[group][name], values, equal_nan=True), (group, name)
+
+
+def test_numpy_numbers_in_counters_come_back_as_plain_numbers(tmp_path):
+    run = hunting_run()
+    run.counters = {"steps": np.int64(7), "wall_s": np.float64(0.25)}
+    write_run(tmp_path / "run.h5", run)
+    assert load_run(tmp_path / "run.h5").counters == {"steps": 7, "wall_s": 0.25}
+
+
+def test_every_dataset_states_unit_and_description(written):
+    with h5py.File(written[1]) as file:
+        names = []
+        file.visit(names.append)
+        seen = {name: dict(file[name].attrs) for name in names if isinstance(file[name], h5py.Dataset)}
+        assert len(seen) == 1 + 11 + 2 * 17
+        assert all(attrs["units"] and attrs["description"] for attrs in seen.values())
+        assert seen["wheelset/left/Mz_Nm"]["units"] == "N m"
+        assert file.attrs["wrcore_version"] == __version__
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit"),
+    [("t", "s"), ("y_m", "m"), ("vy_m_per_s", "m/s"), ("wz_rad_per_s", "rad/s"), ("phi_per_m", "1/m"), ("N_N", "N")]
+    + [("Mz_Nm", "N m"), ("yaw_rad", "rad"), ("xi", "1"), ("p_max_Pa", "Pa")],
+)
+def test_unit_is_read_off_the_name(channel, unit):
+    assert unit_of(channel) == unit
+
+
+def test_same_run_gives_same_bytes(tmp_path):
+    for name in ("one.h5", "two.h5"):
+        write_run(tmp_path / name, hunting_run())
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+
+
+def test_failed_write_leaves_the_old_file_and_no_remains(written):
+    run, path = written
+    before = path.read_bytes()
+    run.settings = {"not": object()}
+    with pytest.raises(TypeError, match="object cannot be written"):
+        write_run(path, run)
+    assert path.read_bytes() == before
+    assert [p.name for p in path.parent.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.parametrize("keep", [0, 100, 0.5, 0.99])
+def test_truncated_file_is_an_input_error_that_names_it(written, keep):
+    path = written[1]
+    data = path.read_bytes()
+    path.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
+    with pytest.raises(InputError, match="run.h5.*complete run file"):
+        load_run(path)
+
+
+def test_foreign_files_are_input_errors(tmp_path, written):
+    (tmp_path / "notes.h5").write_text("not HDF5")
+    with pytest.raises(InputError, match="notes.h5"):
+        load_run(tmp_path / "notes.h5")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["t"] = [1.0]
+    with pytest.raises(InputError, match="expected 'wrcore run', got 'none'"):
+        load_run(tmp_path / "other.h5")
+    with h5py.File(written[1], "a") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(InputError, match="expected 1, got 99"):
+        load_run(written[1])
+    with pytest.raises(InputError, match="no such file"):
+        load_run(tmp_path / "absent.h5")
+
+
+def test_missing_part_of_a_run_is_an_input_error(written):
+    with h5py.File(written[1], "a") as file:
+        del file.attrs["scene"]
+    with pytest.raises(InputError, match="complete run file"):
+        load_run(written[1])
+
+
+def test_group_access_by_attribute_and_error_that_names_the_groups():
+    run = hunting_run()
+    assert run["wheelset"].y_m is run.groups["wheelset"]["y_m"]
+    with pytest.raises(KeyError, match="wheelset/left"):
+        run["wheelsets"]
+
+
+def test_a_run_that_failed_at_once_is_kept_too(tmp_path):
+    empty = Run({}, "failed", "no equilibrium", np.empty(0), {"wheelset": {"y_m": np.empty(0)}})
+    write_run(tmp_path / "run.h5", empty)
+    read = load_run(tmp_path / "run.h5")
+    assert (read.status, read.reason, read.t.size) == ("failed", "no equilibrium", 0)
