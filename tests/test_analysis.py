@@ -1,0 +1,145 @@
+"""Analysis against motions whose answers are known in closed form."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from synthetic import hunting_run
+
+from wrcore import analysis
+
+
+@pytest.mark.parametrize("frequency", [0.7, 2.6, 9.0])
+def test_frequency_of_a_sine_does_not_depend_on_its_growth(frequency):
+    run = hunting_run(growth=0.3, frequency=frequency)
+    # linear interpolation between samples 1/200 s apart: relative error of a period below (pi f / 200)^2 / 6 per end
+    assert analysis.hunting_frequency(run.t, run["wheelset"].y_m) == pytest.approx(frequency, rel=2e-3)
+
+
+def test_frequency_needs_three_crossings():
+    t = np.linspace(0, 1, 201)
+    assert np.isnan(analysis.hunting_frequency(t, np.cos(2 * np.pi * t)))
+    assert analysis.hunting_frequency(t, np.cos(3.2 * np.pi * t)) == pytest.approx(1.6, rel=1e-3)
+
+
+def test_zero_crossings_are_interpolated():
+    assert analysis.zero_crossings([0.0, 1.0, 2.0], [1.0, -3.0, 1.0]) == pytest.approx([0.25, 1.75])
+
+
+@pytest.mark.parametrize("growth", [-0.8, 0.0, 1.3])
+def test_growth_rate_is_the_exponent(growth):
+    run = hunting_run(growth=growth)
+    # a sampled extremum is off by at most (2 pi f / 400)^2 / 2 = 8e-4 of its height
+    assert analysis.growth_rate(run.t, run["wheelset"].y_m) == pytest.approx(growth, abs=2e-3)
+
+
+def test_growth_rate_of_a_monotonic_motion_is_unknown():
+    assert np.isnan(analysis.growth_rate(np.arange(5.0), np.arange(1.0, 6.0)))
+
+
+def test_growth_rate_leaves_out_a_sample_that_only_touches_zero():
+    y = np.array([1.0, -1.0, 0.0, -1.0, 1.0, -1.0])
+    assert analysis.growth_rate(np.arange(6.0), y) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_amplitude_is_half_of_peak_to_peak():
+    assert analysis.amplitude(np.array([-1.0, 0.5, 3.0])) == 2.0
+
+
+def test_first_flange_contact_is_the_first_steep_patch_on_either_side():
+    assert analysis.first_flange_contact(hunting_run(flange_at=1.25)) == 1.25
+    assert np.isnan(analysis.first_flange_contact(hunting_run()))
+    run = hunting_run(flange_at=1.25)
+    run.groups["wheelset/right"]["contact_angle_rad"][100, 2] = -1.2
+    assert analysis.first_flange_contact(run) == 0.5
+
+
+def test_prediction_horizon_is_the_last_time_within_the_bound():
+    run, twin = hunting_run(), hunting_run()
+    twin["wheelset"].y_m[:] += 1e-6 * np.exp(5 * twin.t)
+    expected = np.log(1e-4 / 1e-6) / 5
+    assert analysis.prediction_horizon(run, twin, 1e-4) == pytest.approx(expected, abs=1 / 200)
+    assert analysis.prediction_horizon(run, twin, 1e-4) <= expected
+    assert analysis.prediction_horizon(run, run, 1e-9) == run.t[-1]
+    assert np.isnan(analysis.prediction_horizon(run, twin, 1e-9))
+
+
+def test_prediction_horizon_treats_nan_as_disagreement():
+    run, twin = hunting_run(), hunting_run()
+    twin["wheelset"].y_m[200:] = np.nan
+    assert analysis.prediction_horizon(run, twin, 1.0) == run.t[199]
+
+
+def test_difference_over_the_common_part_only():
+    run, other = hunting_run(duration=2.0), hunting_run(duration=4.0)
+    other["wheelset"].y_m[:] += np.where(other.t <= 1.0, 3e-6, 4e-3)
+    assert analysis.difference(run, other, until=1.0) == pytest.approx((3e-6, 3e-6))
+    assert analysis.difference(run, other)[1] == pytest.approx(4e-3)
+    other.t = other.t + 1e-3
+    with pytest.raises(ValueError, match="no common output times"):
+        analysis.difference(run, other)
+
+
+def test_mirror_defect_sees_a_broken_mirror():
+    run, mirrored = hunting_run(), hunting_run(sign=-1.0)
+    assert analysis.mirror_defect(run, mirrored) == 0.0
+    mirrored["wheelset"].y_m[500] += 1e-9
+    assert analysis.mirror_defect(run, mirrored) == pytest.approx(1e-9)
+    assert analysis.mirror_defect(run, mirrored, until=2.0) == 0.0
+
+
+def test_motion_table_cuts_at_flange_and_horizon():
+    spatial, planar, tight = hunting_run("spatial", flange_at=3.0), hunting_run(flange_at=3.0), hunting_run("spatial")
+    planar["wheelset"].y_m[:] += 1e-6
+    tight["wheelset"].y_m[tight.t > 3.5] += 1.0
+    planar["wheelset"].y_m[planar.t > 3.5] += 1.0
+    table = analysis.motion_table({"free": {"planar": planar, "spatial": spatial, "spatial_tight": tight}}, bound=1e-4)
+    row = table.set_index("detection").loc["spatial"]
+    assert row["first_flange_contact_s"] == 3.0
+    assert row["prediction_horizon_s"] == 3.5
+    assert row["planar_spatial_max_m"] == pytest.approx(1e-6)
+    assert row["wavelength_m"] == pytest.approx(20 / 2.6, rel=1e-3)
+    assert row["growth_per_s"] == pytest.approx(0.1, abs=2e-3)
+    assert row["max_normal_force_N"] == 8.9e3
+
+
+def test_motion_table_without_twin_compares_the_whole_run():
+    table = analysis.motion_table({"free": {"planar": hunting_run(), "spatial": hunting_run("spatial")}}, bound=1e-4)
+    assert table["prediction_horizon_s"].isna().all()
+    assert (table["planar_spatial_max_m"] == 0.0).all()
+
+
+def timing_samples():
+    rows = []
+    for repetition, (planar, spatial) in enumerate([(0.9, 1.0), (1.8, 2.0), (0.5, 1.0)]):
+        for detection, wall in (("planar", planar), ("spatial", spatial)):
+            calls = 5000 if detection == "planar" else 10000
+            rows.append(("free", detection, repetition, 10.0, wall, calls, 700, 9))
+    names = ["scene", "detection", "repetition", "simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def test_timing_table_pairs_planar_with_spatial():
+    table = analysis.timing_table(timing_samples()).set_index("detection")
+    assert table.loc["planar", "wall_s"] == 0.9
+    assert table.loc["planar", "us_per_call"] == pytest.approx(180.0)
+    assert table.loc["spatial", "us_per_call"] == pytest.approx(100.0)
+    assert table.loc["spatial", "real_time_factor"] == pytest.approx(10.0)
+    assert table["runs"].tolist() == [3, 3]
+    # median of 0.9, 0.9, 0.5; the ratio of the medians would be 0.9 / 1.0 as well, of the means 0.8
+    assert table["ratio_per_run"].tolist() == pytest.approx([0.9, 0.9])
+    assert table["ratio_per_call"].tolist() == pytest.approx([1.8, 1.8])
+
+
+def test_comparison_table_says_within_only_where_there_is_a_tolerance_and_a_value():
+    reference = pd.DataFrame(
+        {
+            "quantity": ["lowering", "ratio", "spread", "absent"],
+            "unit": "1",
+            "value": [1.0, 0.9, 2.0, 3.0],
+            "tolerance": [0.1, np.nan, 0.1, 0.1],
+            "source": "test",
+        }
+    )
+    table = analysis.comparison_table(reference, {"lowering": 1.05, "ratio": 0.5, "spread": 2.2})
+    assert table["within"].tolist() == ["yes", "", "no", ""]
+    assert table["ours"].tolist()[:3] == [1.05, 0.5, 2.2]
