@@ -1,0 +1,276 @@
+"""Discretised half-space of one contact patch: panels, influence matrix, prefactored resolvent.
+
+All lengths are divided by c = sqrt(a b), tractions multiplied by c^2/(mu N), so that only the axis ratio g = a/b, the
+shape number psi and Poisson's ratio nu remain. The patch (simple double ellipse, SDEC) spans -1/sqrt(g) < y < 1/sqrt(g)
+and, with t = y - y0, y0 = -psi/sqrt(g), |x| < xl(y) = sqrt(g) sqrt(1 - g t^2/(1 +- psi)^2) for +-t > 0. psi = 0 is the
+ellipse. The bound of the traction is ``3/(2 pi sqrt(g)) sqrt(xl^2 - x^2)``.
+
+Discretisation: ``ny`` equal strips across, each with ``n`` panels along x whose edges are spaced like cosines and which
+follow the strip's own length. Unknown is the force of a panel, whose bound is known exactly. A strip carries its load
+on two sub-strips in proportion to their share of the normal load; the slip of a panel is averaged over the two
+sub-lines with the same weights.
+
+References
+----------
+Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), chapters 1 and 4 (half-space, surface mechanics).
+Love, Phil. Trans. R. Soc. A 228 (1929) 377 (a loaded rectangle on the half-space).
+Vollebregt, User guide for CONTACT, section on the SDEC patch.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+
+from wrcore._jit import jit
+
+SUB_STRIPS = 2
+STEP_SCALE = 2.5
+UPWIND = 0.6
+
+
+class Panels(NamedTuple):
+    """Geometry of the panels of one patch (lengths over c, forces over mu N); strip-major order, N = ny n panels.
+
+    Fields
+    ------
+    n, ny : int
+        Panels per strip (from the leading edge backwards), strips (towards +y).
+    y_edge : (2 ny + 1,) edges of the sub-strips.
+    half_length, y_line, share : (2 ny,) half length, load centroid and share in the strip's load of each sub-strip.
+    bound : (N,) largest force of a panel; sums to 1.
+    x_slip, x_force, y : (N,) where the slip row holds, centroid of the bound, lateral position.
+    ahead, behind : (n,) weights that carry elastic slip from ``x_slip`` to ``x_force`` (see `halfspace`).
+    """
+
+    n: int
+    ny: int
+    y_edge: np.ndarray
+    half_length: np.ndarray
+    y_line: np.ndarray
+    share: np.ndarray
+    bound: np.ndarray
+    x_slip: np.ndarray
+    x_force: np.ndarray
+    y: np.ndarray
+    ahead: np.ndarray
+    behind: np.ndarray
+
+
+class Operator(NamedTuple):
+    """What the iteration of `halfspace` needs, in float32; a kernel argument.
+
+    ``resolvent`` and ``resolvent_odd`` hold transposed blocks of ``M = (H + A)^-1 H``. For psi = 0 the mirror
+    symmetry y -> -y splits M: ``resolvent`` acts on (Fx even, Fy odd) and ``resolvent_odd`` on (Fx odd, Fy even) in y.
+    Otherwise ``resolvent`` is the whole of M and ``resolvent_odd`` is empty.
+    """
+
+    n: int
+    ny: int
+    symmetric: bool
+    resolvent: np.ndarray
+    resolvent_odd: np.ndarray
+    step: np.ndarray
+    bound: np.ndarray
+    x_slip: np.ndarray
+    x_force: np.ndarray
+    y: np.ndarray
+    ahead: np.ndarray
+    behind: np.ndarray
+
+
+def panel_counts(g, level):
+    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all.
+
+    The ratio of the two counts was chosen for least force error at a given total.
+    """
+    ratio = np.exp(np.interp(np.log(g), np.log([0.18, 0.5, 1.0, 2.5, 7.0]), np.log([2.0, 1.15, 0.8, 0.65, 0.7])))
+    ny = max(4, 2 * round(level * np.sqrt(ratio) / 2))
+    return max(4, round(level**2 / ny)), ny
+
+
+def _moments_of_squared_length(y0, y1, g, psi):
+    """Integrals of xl^2 and of y xl^2 from y0 to y1 on one half ellipse, or across y = -psi/sqrt(g)."""
+    b = 1 / np.sqrt(g)
+    middle = -psi * b
+    zeroth = first = 0.0
+    for low, high, width in ((y0, min(y1, middle), b * (1 - psi)), (max(y0, middle), y1, b * (1 + psi))):
+        if high > low:
+            p, q = low - middle, high - middle
+            part = g * ((q - p) - (q**3 - p**3) / (3 * width**2))
+            zeroth += part
+            first += g * ((q**2 - p**2) / 2 - (q**4 - p**4) / (4 * width**2)) + middle * part
+    return zeroth, first
+
+
+def make_panels(g, psi, n, ny):
+    """Lay out ``ny`` strips of ``n`` panels on the patch (g, psi).
+
+    Parameters
+    ----------
+    g, psi : float
+        a/b > 0 and shape number, abs(psi) < 1.
+    n, ny : int
+        Panels per strip, strips.
+
+    Returns
+    -------
+    Panels
+    """
+    edges = np.linspace(-1, 1, SUB_STRIPS * ny + 1) / np.sqrt(g)
+    moments = np.array([_moments_of_squared_length(*pair, g, psi) for pair in zip(edges[:-1], edges[1:], strict=True)])
+    load = 0.75 / np.sqrt(g) * moments[:, 0]
+    strip_load = load.reshape(ny, SUB_STRIPS).sum(axis=1)
+    share = load / np.repeat(strip_load, SUB_STRIPS)
+    half_length = np.sqrt(moments[:, 0] / np.diff(edges))
+    y_line = moments[:, 1] / moments[:, 0]
+
+    theta = np.pi * np.arange(n + 1) / n
+    fraction = np.diff(theta / 2 - np.sin(2 * theta) / 4) / (np.pi / 2)
+    centroid = np.diff(np.sin(theta) ** 3 / 3) / (np.pi / 2) / fraction
+    point = _slip_points(n)
+    slip = (point[1:] + point[:-1]) / 2
+    shift = centroid - slip
+    ahead, behind = np.zeros(n), np.zeros(n)
+    ahead[1:] = shift[1:] / np.diff(slip) * np.where(np.arange(1, n) < n - 1, UPWIND, 1.0)
+    behind[:-1] = shift[:-1] / np.diff(slip) * np.where(np.arange(n - 1) > 0, 1 - UPWIND, 1.0)
+
+    mean_length = (share * half_length).reshape(ny, SUB_STRIPS).sum(axis=1)
+    y_strip = (share * y_line).reshape(ny, SUB_STRIPS).sum(axis=1)
+    return Panels(
+        n, ny, edges, half_length, y_line, share, np.outer(strip_load, fraction).ravel(),
+        np.outer(mean_length, slip).ravel(), np.outer(mean_length, centroid).ravel(), np.repeat(y_strip, n),
+        ahead, behind,
+    )  # fmt: skip
+
+
+def _slip_points(n):
+    """Points between which the slip is a difference, over the half length; the first lies ahead of the patch."""
+    return np.concatenate([[2 - np.cos(np.pi / (2 * n))], np.cos((np.arange(n) + 0.5) * np.pi / n)])
+
+
+@jit
+def _displacement_row(dx0, half_length, cosines, y_far, y_near, nu, out):
+    """Displacements (uxx, uyy, uxy) at one point by unit forces on each panel of one sub-strip.
+
+    The panel has x edges ``half_length cosines`` and lies between y_far and y_near (both relative to the point, the
+    first one larger); dx0 is the point's x. With u = 1/pi int K tau and
+    Kxx = 1/R - nu y^2/R^3, Kyy = 1/R - nu x^2/R^3, Kxy = nu x y/R^3 the indefinite integrals over a rectangle are
+    Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R.
+    """
+    log_far, log_near = np.log(abs(y_far)), np.log(abs(y_near))
+    before_x = before_y = before_r = 0.0
+    for k in range(cosines.size):
+        x = half_length * cosines[k] - dx0
+        r_far = np.sqrt(x * x + y_far * y_far)
+        r_near = np.sqrt(x * x + y_near * y_near)
+        if y_near > 0:
+            ratio = (y_far + r_far) / (y_near + r_near)
+        elif y_far < 0:
+            ratio = (r_near - y_near) / (r_far - y_far)
+        else:
+            ratio = (y_far + r_far) * (r_near - y_near) / (x * x + 1e-300)
+        in_x = x * np.log(ratio)
+        in_y = y_far * (np.log(abs(x) + r_far) - log_far) - y_near * (np.log(abs(x) + r_near) - log_near)
+        in_y = in_y if x > 0 else -in_y
+        in_r = r_far - r_near
+        if k > 0:
+            scale = 1 / (np.pi * half_length * (cosines[k - 1] - cosines[k]) * (y_far - y_near))
+            dx, dy = (before_x - in_x) * scale, (before_y - in_y) * scale
+            out[k - 1, 0] = (1 - nu) * dx + dy
+            out[k - 1, 1] = dx + (1 - nu) * dy
+            out[k - 1, 2] = -nu * (before_r - in_r) * scale
+        before_x, before_y, before_r = in_x, in_y, in_r
+
+
+@jit
+def _slip_matrix(panels, points, cosines, nu, rows):
+    """Slip by unit panel forces for the first ``rows`` strips: (rows n, N, 3) with components xx, yy, xy."""
+    n, ny = panels.n, panels.ny
+    matrix = np.zeros((rows * n, ny * n, 3))
+    now, last = np.empty((n, 3)), np.empty((n, 3))
+    for line in range(SUB_STRIPS * rows):
+        y, length = panels.y_line[line], panels.half_length[line]
+        row = (line // SUB_STRIPS) * n
+        for sub in range(SUB_STRIPS * ny):
+            weight = panels.share[line] * panels.share[sub]
+            column = (sub // SUB_STRIPS) * n
+            y_far, y_near = panels.y_edge[sub + 1] - y, panels.y_edge[sub] - y
+            for k in range(n + 1):
+                x = length * points[k]
+                _displacement_row(x, panels.half_length[sub], cosines, y_far, y_near, nu, now)
+                if k > 0:
+                    factor = weight / (length * (points[k - 1] - points[k]))
+                    for m in range(n):
+                        for part in range(3):
+                            matrix[row + k - 1, column + m, part] += factor * (now[m, part] - last[m, part])
+                now, last = last, now
+    return matrix
+
+
+def slip_matrix(panels, nu, rows=None):
+    """Slip at the panels of the first ``rows`` strips by unit forces, s = w - du/dx with w = 0.
+
+    Parameters
+    ----------
+    panels : Panels
+    nu : float
+        Poisson's ratio, 0 to 0.5.
+    rows : int, optional
+        Strips wanted (default all).
+
+    Returns
+    -------
+    axx, ayy, axy : ndarray (rows n, N)
+        axy is both the x slip by forces in y and the y slip by forces in x.
+    """
+    cosines = np.cos(np.pi * np.arange(panels.n + 1) / panels.n)
+    matrix = _slip_matrix(panels, _slip_points(panels.n), cosines, float(nu), rows or panels.ny)
+    return tuple(np.moveaxis(matrix, 2, 0))
+
+
+def _resolvent(axx, axy, ayx, ayy, step):
+    """Transposed ``(H + A)^-1 H = (I + H^-1 A)^-1`` in float32."""
+    matrix = np.block([[axx, axy], [ayx, ayy]]) / np.concatenate([step, step])[:, None]
+    matrix[np.diag_indices_from(matrix)] += 1
+    matrix = np.asfortranarray(matrix, dtype=np.float32)
+    getrf, getri = get_lapack_funcs(("getrf", "getri"), (matrix,))
+    factors, pivots, _ = getrf(matrix, overwrite_a=True)
+    inverse, _ = getri(factors, pivots, lwork=64 * len(matrix), overwrite_lu=True)
+    return np.ascontiguousarray(inverse.T)
+
+
+def _mirrored(block, n):
+    """Split columns into (y < 0 half, y > 0 half in mirrored strip order)."""
+    half = block.shape[1] // 2
+    other = block[:, half:].reshape(block.shape[0], -1, n)[:, ::-1].reshape(block.shape[0], -1)
+    return block[:, :half], other
+
+
+def make_operator(g, psi, nu, n, ny):
+    """Discretise and factorise one patch.
+
+    Parameters
+    ----------
+    g, psi, nu : float
+        a/b, shape number, Poisson's ratio.
+    n, ny : int
+        Panels per strip; strips, even.
+
+    Returns
+    -------
+    Operator
+    """
+    panels = make_panels(g, psi, n, ny)
+    symmetric = psi == 0
+    axx, ayy, axy = slip_matrix(panels, nu, ny // 2 if symmetric else ny)
+    step = STEP_SCALE * np.sqrt(np.diagonal(axx) * np.diagonal(ayy))
+    if symmetric:
+        (xx, xx_m), (yy, yy_m), (xy, xy_m) = (_mirrored(block, n) for block in (axx, ayy, axy))
+        even = _resolvent(xx + xx_m, xy - xy_m, xy + xy_m, yy - yy_m, step)
+        odd = _resolvent(xx - xx_m, xy + xy_m, xy - xy_m, yy + yy_m, step)
+        step = np.concatenate([step, step.reshape(-1, n)[::-1].ravel()])
+    else:
+        even, odd = _resolvent(axx, axy, axy, ayy, step), np.empty((0, 0), np.float32)
+    single = [np.float32(v) for v in (step, *panels[6:])]
+    return Operator(n, ny, symmetric, even, odd, *single)
