@@ -1,0 +1,222 @@
+"""ProfileCurve: a wheel or rail profile as every later stage sees it.
+
+Positions and slopes at the nodes are those of the exact sections; between them runs a cubic Hermite polynomial. The
+curvature is kept apart from the geometry: sections meet with curvature jumps, which Hertz' theory cannot use, so the
+curvature is averaged along the profile while position and slope stay exact.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.geometry import profile_points, profile_sections
+
+SPACING = 5e-5
+"""Default distance of nodes, m. Hermite error on a 13 mm arc: 0.01 um at slope 5 and 1.2 um at slope 10 (vertical)."""
+
+WINDOW = 1e-3
+"""Default length along the profile over which the curvature is averaged, m."""
+
+STEEPEST = 10.0
+"""The curve ends where its slope exceeds this (84 degrees): beyond, f(u) is no useful description."""
+
+GAUGE_DEPTH = 0.014
+"""Depth below the highest point at which the gauge is measured, m (EN 13848-1)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileCurve:
+    """Wheel or rail profile f(u).
+
+    Parameters
+    ----------
+    name : str
+        Name or file.
+    kind : {"wheel", "rail"}
+        Wheel: f = 0 at the tape circle (u = 0), radius r(u) = r0 - f(u). Rail: as it lies in the track, f(0) = 0 is
+        the highest point.
+    u : (n,) ndarray
+        Nodes, m, increasing and uniform; positive to the field side.
+    f : (n,) ndarray
+        Ordinate, m, positive up.
+    df : (n,) ndarray
+        Slope at the nodes.
+    d2f : (n,) ndarray
+        Second derivative that belongs to the averaged curvature, 1/m (see `averaged_second_derivative`).
+    source : str
+        Where the numbers come from.
+    outline : object, optional
+        Exact sections (tuple) or `profile_points.Outline`; used for the gauge only.
+    """
+
+    name: str
+    kind: str
+    u: np.ndarray
+    f: np.ndarray
+    df: np.ndarray
+    d2f: np.ndarray
+    source: str = ""
+    outline: object = field(default=None, repr=False)
+
+    def __post_init__(self):
+        for array in (self.u, self.f, self.df, self.d2f):
+            array.setflags(write=False)
+
+    @classmethod
+    def from_sections(cls, name, kind, sections, source="", window=WINDOW, spacing=SPACING):
+        """Curve through exact sections.
+
+        Parameters
+        ----------
+        name, kind, source : str
+            See the class.
+        sections : sequence of Arc, Line or Polynomial
+            In order of increasing u, m. Rails: in track pose (`profile_sections.incline`).
+        window : float
+            Averaging length of the curvature, m.
+        spacing : float
+            Distance of the nodes, m; u = 0 is a node.
+
+        Returns
+        -------
+        ProfileCurve
+        """
+        low, high, used = profile_sections.usable_span(sections, STEEPEST)
+        u = _nodes(low, high, spacing)
+        f, df = profile_sections.evaluate(used, u)
+        return cls(name, kind, u, f, df, averaged_second_derivative(u, f, df, window), source, tuple(sections))
+
+    @classmethod
+    def from_points(cls, u, f, kind, name="points", *, lines=None, trim=False, inclination=0.0, smoothing=0.0,
+                    window=WINDOW, spacing=SPACING):  # fmt: skip
+        """Curve through measured points.
+
+        A parametric cubic spline (C2 along the profile) runs through the points and is sampled at uniform nodes.
+
+        Parameters
+        ----------
+        u, f : (m,) array_like
+            Points, m; u strictly increasing or strictly decreasing.
+        kind : {"wheel", "rail"}
+            Wheels are shifted vertically to f(0) = 0, rails to their highest point (a rail whose origin is within
+            0.2 um of the height of its highest point keeps its lateral origin).
+        name : str
+            Named in error messages.
+        lines : sequence of int, optional
+            Line number of each point in its file, for error messages.
+        trim : bool
+            Keep the single-valued portion around the origin instead of refusing a profile that turns back.
+        inclination : float
+            Turns an upright rail into its track pose (0: the points already lie in it).
+        smoothing : float
+            Root mean square distance that the curve may keep from the points, m; 0 interpolates.
+        window, spacing : float
+            As in `from_sections`.
+
+        Returns
+        -------
+        ProfileCurve
+
+        Raises
+        ------
+        InputError
+            Points that are too few, not finite, not monotone, in another unit than stated, or no such profile.
+        """
+        outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing)
+        low, high = outline.span(STEEPEST)
+        nodes = _nodes(low, high, spacing)
+        if nodes.size < profile_points.FEWEST:
+            raise InputError(name, "points", f"expected a profile around u = 0, got {high - low:.3g} m of it")
+        value, slope = outline.evaluate(nodes)
+        d2f = averaged_second_derivative(nodes, value, slope, window)
+        return cls(name, kind, nodes, value, slope, d2f, f"measured points, {name}", outline)
+
+    def __call__(self, u, nu=0):
+        """Ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m, any shape).
+
+        Ordinate and slope are those of the cubic Hermite polynomial, the second derivative is interpolated linearly.
+        NaN outside the curve's range.
+        """
+        u = np.asarray(u, dtype=float)
+        h = self.spacing
+        with np.errstate(invalid="ignore"):
+            i = np.clip(np.nan_to_num((u - self.u[0]) / h), 0, self.u.size - 2).astype(int)
+            inside = (u >= self.u[0]) & (u <= self.u[-1])
+        t = (u - self.u[i]) / h
+        return np.where(inside, self._in_cell(i, t, nu), np.nan)
+
+    def _in_cell(self, i, t, nu):
+        f0, f1, h = self.f[i], self.f[i + 1], self.spacing
+        m0, m1 = h * self.df[i], h * self.df[i + 1]
+        c2, c3 = 3.0 * (f1 - f0) - 2.0 * m0 - m1, 2.0 * (f0 - f1) + m0 + m1
+        if nu == 0:
+            return f0 + t * (m0 + t * (c2 + t * c3))
+        if nu == 1:
+            return (m0 + t * (2.0 * c2 + 3.0 * t * c3)) / h
+        if nu == 2:
+            return (1.0 - t) * self.d2f[i] + t * self.d2f[i + 1]
+        raise ValueError(f"nu must be 0, 1 or 2, got {nu!r}")
+
+    @property
+    def spacing(self):
+        """Distance of the nodes, m."""
+        return (self.u[-1] - self.u[0]) / (self.u.size - 1)
+
+    def gauge_offset(self, depth=GAUGE_DEPTH):
+        """Distance (m, positive) from a rail's origin to its innermost point within ``depth`` (m) of the top.
+
+        NaN if the profile ends above that depth on the gauge side.
+
+        Raises
+        ------
+        InputError
+            For a wheel.
+        """
+        if self.kind != "rail":
+            raise InputError(self.name, "gauge", "expected a rail profile, got a wheel")
+        if isinstance(self.outline, profile_points.Outline):
+            return -self.outline.innermost(depth)
+        return -profile_sections.innermost(self.outline, depth)
+
+    @property
+    def gauge_offset_m(self):
+        """`gauge_offset` at the usual depth of 14 mm, m; NaN for a wheel."""
+        return self.gauge_offset() if self.kind == "rail" else float("nan")
+
+
+def _nodes(low, high, spacing):
+    """Multiples of ``spacing`` from ``low`` to ``high`` (m); the small slack keeps ends that are multiples."""
+    return spacing * np.arange(np.ceil(low / spacing - 1e-9), np.floor(high / spacing + 1e-9) + 1)
+
+
+def averaged_second_derivative(u, f, df, window=WINDOW):
+    """Second derivative that reproduces the curvature's mean over a stretch of the profile.
+
+    The mean of the curvature over the arc length ``window`` centred at a node is the turn of the tangent over that
+    stretch divided by its length. It is returned as f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature
+    f'' / (1 + f'^2)^(3/2) is the mean. On a circular arc this is exact also where the arc is steep, where the mean
+    of f'' over u is not. At the ends the stretch is cut off.
+
+    Parameters
+    ----------
+    u, f, df : (n,) array_like
+        Nodes (m), ordinates (m) and slopes.
+    window : float
+        Length of the stretch along the profile, m.
+
+    Returns
+    -------
+    (n,) ndarray
+        1/m.
+    """
+    if not window > 0.0:
+        raise ValueError(f"window must be positive, got {window!r}")
+    angle = np.arctan(df)
+    half_turn = 0.5 * np.diff(angle)
+    # chord -> arc of a circle that turns by the same angle; np.sinc(x) = sin(pi x) / (pi x)
+    length = np.hypot(np.diff(u), np.diff(f)) / np.sinc(half_turn / np.pi)
+    s = np.concatenate(([0.0], np.cumsum(length)))
+    ahead, behind = np.minimum(s + window / 2, s[-1]), np.maximum(s - window / 2, 0.0)
+    curvature = (np.interp(ahead, s, angle) - np.interp(behind, s, angle)) / (ahead - behind)
+    return curvature * (1.0 + df**2) ** 1.5

@@ -1,0 +1,231 @@
+"""Profile files: CSV or columns of points, SIMPACK .prw/.prr. All conversions to the package's axes happen here.
+
+Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#`` starts a
+comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns may be
+separated by commas, semicolons or blanks. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
+convention without a header: declare ``unit: mm``.
+
+SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down).
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
+
+_UNITS = {"m": 1.0, "mm": 1e-3}
+_KEYS = {"points", "unit", "inclined", "smoothing"}
+_UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
+
+
+def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
+    """Profile from a point file.
+
+    Parameters
+    ----------
+    spec : str, pathlib.Path or dict
+        Path, or ``{"points": path, "unit": "m"|"mm", "inclined": bool, "smoothing": float}``; ``inclined`` (default
+        True) says that a rail's points already lie in the track pose, ``smoothing`` is a distance in m.
+    kind : {"wheel", "rail"}
+        What the profile is used for.
+    inclination : float
+        Applied to a rail whose points are not inclined.
+    window, spacing : float
+        See `ProfileCurve.from_points`.
+
+    Returns
+    -------
+    ProfileCurve
+
+    Raises
+    ------
+    InputError
+        Names the file and the line or key at fault.
+    """
+    spec = _checked(spec if isinstance(spec, dict) else {"points": spec}, kind)
+    path, unit = Path(spec["points"]), spec.get("unit")
+    text = _text(path)
+    simpack = path.suffix.lower() in (".prw", ".prr")
+    if simpack:
+        _check_type(path, text, kind)
+    u, f, lines = read_simpack(path, text, "smoothing" in spec) if simpack else read_columns(path, text, unit)
+    turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
+    return ProfileCurve.from_points(
+        u, f, kind, str(path), lines=lines, trim=simpack, inclination=turn,
+        smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing,
+    )  # fmt: skip
+
+
+def _checked(spec, kind):
+    unknown = sorted(str(k) for k in set(spec) - _KEYS)
+    if unknown:
+        raise InputError(kind, unknown[0], f"expected one of {', '.join(sorted(_KEYS))}")
+    if not isinstance(spec.get("points"), (str, Path)):
+        raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
+    if spec.get("unit") not in (None, *_UNITS):
+        raise InputError(kind, "unit", f"expected m or mm, got {spec['unit']!r}")
+    if not isinstance(spec.get("inclined", True), bool):
+        raise InputError(kind, "inclined", f"expected true or false, got {spec['inclined']!r}")
+    smoothing = spec.get("smoothing", 0.0)
+    if isinstance(smoothing, bool) or not isinstance(smoothing, (int, float)):
+        raise InputError(kind, "smoothing", f"expected a distance in m, got {smoothing!r}")
+    return spec
+
+
+def _text(path):
+    try:
+        return path.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff")
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"expected a readable profile file: {error}") from None
+
+
+def _numbers(path, line, text):
+    try:
+        return [float(word) for word in re.split(r"[,;\s]+", text.strip(" \t,;"))]
+    except ValueError:
+        raise InputError(path, f"line {line}", f"expected two numbers, got {text.strip()[:40]!r}") from None
+
+
+def _pair(path, line, text):
+    numbers = _numbers(path, line, text)
+    if len(numbers) < 2:
+        raise InputError(path, f"line {line}", f"expected two numbers, got {text.strip()[:40]!r}")
+    return numbers[:2]
+
+
+def read_columns(path, text, unit=None):
+    """Points of a CSV or blank-separated file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        For error messages.
+    text : str
+        Content.
+    unit : {"m", "mm"}, optional
+        Declared unit; a header line may state it instead, or must agree.
+
+    Returns
+    -------
+    u, f : (n,) ndarray
+        m.
+    lines : list of int
+        Line number of each point.
+    """
+    points, lines = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        line = line.partition("#")[0].strip()
+        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line)
+        if header and not points:
+            unit = _agreed(path, number, header.groups(), unit)
+        elif line:
+            points.append(_pair(path, number, line))
+            lines.append(number)
+    if unit is None:
+        raise InputError(path, "unit", "expected a header u_m,f_m or u_mm,f_mm, or unit: m or mm beside the path")
+    u, f = np.array(points, dtype=float).reshape(-1, 2).T * _UNITS[unit]
+    return u, f, lines
+
+
+def _agreed(path, line, stated, declared):
+    if stated[0] != stated[1] or declared not in (None, stated[0]):
+        got = f"u in {stated[0]}, f in {stated[1]}" + (f", declared {declared}" if declared else "")
+        raise InputError(path, f"line {line}", f"expected one unit for both columns, got {got}")
+    return stated[0]
+
+
+def _header(path, text):
+    """Keys before the points, as text, and the line numbers of the key lines."""
+    keys = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        line = line.partition("!")[0].strip()
+        if line == "point.begin":
+            return keys, number
+        key, equals, value = line.partition("=")
+        if equals:
+            # "type" appears twice: header (rail or wheel) and spline (format of the original data)
+            keys.setdefault(key.strip(), value.strip().strip("'\""))
+    raise InputError(path, "point.begin", "expected a SIMPACK profile with a line point.begin, got the end of file")
+
+
+def _check_type(path, text, kind):
+    found = {"0": "rail", "1": "wheel"}.get(_header(path, text)[0].get("type"))
+    if found is None:
+        raise InputError(path, "type", "expected 0 (rail) or 1 (wheel) in the header")
+    if found != kind:
+        raise InputError(path, "type", f"expected a {kind} profile, got a {found}")
+
+
+def _value(path, keys, name, default):
+    text = keys.get(name)
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        value = None
+    if value is None or not np.isfinite(value):
+        raise InputError(path, name, f"expected a number, got {text!r}")
+    return value
+
+
+def read_simpack(path, text, smoothed=False):
+    """Points of a SIMPACK .prw or .prr file.
+
+    Applied, in the order of the file's own numbering: shift, bounds, mirroring, inversion, unit. Rotation, minimum
+    distance and SIMPACK's approximation are refused where they are not zero, as their definition is not public.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        For error messages.
+    text : str
+        Content.
+    smoothed : bool
+        The caller smooths by itself: the file's approximation value is not needed.
+
+    Returns
+    -------
+    u, f : (n,) ndarray
+        m; u to the field side, f up.
+    lines : ndarray of int
+        Line number of each point.
+    """
+    keys, begin = _header(path, text)
+    for name in _UNSUPPORTED[: 2 if smoothed else 3]:
+        if _value(path, keys, name, 0.0):
+            raise InputError(path, name, f"expected 0 (export the processed points), got {keys[name]}")
+    y, z, lines = _simpack_points(path, text, begin)
+    y, z = y + _value(path, keys, "shift.y", 0.0), z + _value(path, keys, "shift.z", 0.0)
+    keep = _inside(path, keys, "y", y) & _inside(path, keys, "z", z)
+    y, z, lines = y[keep], z[keep], lines[keep]
+    y = -y if _value(path, keys, "mirror.y", 0.0) else y
+    z = -z if _value(path, keys, "mirror.z", 0.0) else z
+    if _value(path, keys, "inversion", 0.0):
+        y, z, lines = y[::-1], z[::-1], lines[::-1]
+    factor = _value(path, keys, "units.len.f", float("nan"))
+    if not factor > 0.0:
+        raise InputError(path, "units.len.f", f"expected a positive number of units per m, got {factor:g}")
+    return y / factor, -z / factor, lines
+
+
+def _simpack_points(path, text, begin):
+    points, lines = [], []
+    for number, line in enumerate(text.splitlines(), 1):
+        line = line.partition("!")[0].strip()
+        if number <= begin or not line:
+            continue
+        if line == "point.end":
+            y, z = np.array(points, dtype=float).reshape(-1, 2).T
+            return y, z, np.array(lines, dtype=int)
+        points.append(_pair(path, number, line))
+        lines.append(number)
+    raise InputError(path, "point.end", "expected a line point.end after the points, got the end of file (truncated?)")
+
+
+def _inside(path, keys, axis, values):
+    """SIMPACK's bounds; a minimum above the maximum switches them off."""
+    low = _value(path, keys, f"bound.{axis}.min", 1.0)
+    high = _value(path, keys, f"bound.{axis}.max", 0.0)
+    return np.ones(values.size, dtype=bool) if low > high else (values >= low) & (values <= high)

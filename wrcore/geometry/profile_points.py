@@ -1,0 +1,195 @@
+"""Measured points to a smooth outline: checks, parametric spline, origin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline, PPoly, splprep
+
+from wrcore.errors import InputError
+
+FEWEST = 8
+"""Fewest points that make a profile."""
+
+_LARGEST, _SMALLEST = 1.0, 5e-3  # m; a profile is neither wider nor narrower, so the unit must be wrong
+_CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
+_DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
+_LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
+_ANY_SLOPE = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Parametric cubic spline (u(s), f(s)), s in [0, 1].
+
+    Parameters
+    ----------
+    curve : scipy.interpolate.BSpline
+        Two columns u and f, m.
+    name : str
+        Named in error messages.
+    """
+
+    curve: BSpline
+    name: str
+
+    def _component(self, column):
+        return PPoly.from_spline((self.curve.t, self.curve.c[:, column], self.curve.k))
+
+    def _dense(self):
+        knots = np.unique(self.curve.t)
+        return np.unique(np.concatenate([knots[:-1] + k / 8 * np.diff(knots) for k in range(8)] + [knots[-1:]]))
+
+    def span(self, steepest):
+        """Connected range of u (m) around 0 that is single-valued and no steeper than ``steepest``."""
+        s = self._dense()
+        u = self.curve(s)[:, 0]
+        du, df = self.curve(s, nu=1).T
+        good = (du > 0.0) & (np.abs(df) <= steepest * du)
+        home = int(np.argmin(np.abs(u)))
+        if not good[home]:
+            raise InputError(self.name, "points", "expected a smooth profile around u = 0, got one too steep there")
+        bad = np.flatnonzero(~good)
+        first, last = bad[bad < home].max(initial=-1) + 1, bad[bad > home].min(initial=u.size) - 1
+        return float(u[first]), float(u[last])
+
+    def evaluate(self, u):
+        """Ordinate (m) and slope at the abscissae ``u`` (m, inside `span`)."""
+        s = self._parameter(u)
+        du, df = self.curve(s, nu=1).T
+        return self.curve(s)[:, 1], df / du
+
+    def _parameter(self, u):
+        """Solve u(s) = u: Newton from a close start, as u(s) is monotone inside the span."""
+        dense = self._dense()
+        table = self.curve(dense)[:, 0]
+        home = int(np.argmin(np.abs(table)))
+        turn = np.flatnonzero(np.diff(table) <= 0.0)
+        first, last = turn[turn < home].max(initial=-1) + 1, turn[turn >= home].min(initial=table.size - 1)
+        s = np.interp(u, table[first : last + 1], dense[first : last + 1])
+        for _ in range(20):
+            s = np.clip(s - (self.curve(s)[:, 0] - u) / self.curve(s, nu=1)[:, 0], 0.0, 1.0)
+        if not np.all(np.abs(self.curve(s)[:, 0] - u) < 1e-12):
+            raise InputError(self.name, "points", "expected a smooth profile, got one that no spline follows")
+        return s
+
+    def highest(self):
+        """Highest point (u, f), m."""
+        s = np.concatenate(([0.0, 1.0], self._component(1).derivative().roots(extrapolate=False)))
+        points = self.curve(s[np.isfinite(s)])
+        u, f = points[np.argmax(points[:, 1])]
+        return float(u), float(f)
+
+    def shifted(self, du, df):
+        """The outline moved by (``du``, ``df``), m."""
+        return Outline(BSpline(self.curve.t, self.curve.c + (du, df), self.curve.k), self.name)
+
+    def innermost(self, depth):
+        """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0, NaN if not reached."""
+        u, f = self.curve(np.unique(self.curve.t)).T
+        if not np.any((u < 0.0) & (f <= -depth)):
+            return float("nan")
+        crossing = self._component(1).solve(-depth, extrapolate=False)
+        s = np.concatenate((crossing, self._component(0).derivative().roots(extrapolate=False), [0.0, 1.0]))
+        points = self.curve(s[np.isfinite(s)])
+        return float(points[points[:, 1] >= -depth - 1e-12, 0].min())
+
+
+def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0):
+    """Check points and lay a spline through them.
+
+    See `wrcore.geometry.profile.ProfileCurve.from_points` for the arguments.
+
+    Returns
+    -------
+    Outline
+        In its pose: wheel f(0) = 0, rail with its origin at the highest point.
+    """
+    u, f = np.array(u, dtype=float), np.array(f, dtype=float)
+    lines = np.arange(1, u.size + 1) if lines is None else np.asarray(lines)
+    _check_numbers(u, f, name, lines)
+    if not 0.0 <= smoothing < 1e-3:
+        raise InputError(name, "smoothing", f"expected a distance in m, 0 to 0.001, got {smoothing:g}")
+    if u[-1] < u[0]:
+        u, f, lines = u[::-1], f[::-1], lines[::-1]
+    if not trim:
+        _check_monotone(u, name, lines)
+    if inclination:
+        c, s = np.cos(np.arctan(inclination)), np.sin(np.arctan(inclination))
+        u, f = u * c - f * s, u * s + f * c
+    if kind == "rail":
+        _check_rail(f, name)
+        u, f = _head(u, f)
+    outline = _spline(u, f, name, smoothing)
+    return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline, u, f)
+
+
+def _check_numbers(u, f, name, lines):
+    if u.ndim != 1 or u.shape != f.shape:
+        raise InputError(name, "points", f"expected two columns of equal length, got shapes {u.shape} and {f.shape}")
+    if u.size < FEWEST:
+        raise InputError(name, "points", f"expected at least {FEWEST} points, got {u.size}")
+    bad = np.flatnonzero(~(np.isfinite(u) & np.isfinite(f)))
+    if bad.size:
+        i = bad[0]
+        raise InputError(name, f"line {lines[i]}", f"expected finite numbers, got {u[i]:g}, {f[i]:g}")
+    width, height = np.ptp(u), np.ptp(f)
+    if max(width, height) > _LARGEST:
+        got = f"got an extent of {max(width, height):.4g} m"
+        raise InputError(name, "unit", f"expected a profile below 1 m; looks like mm, declare unit: mm; {got}")
+    if width < _SMALLEST:
+        got = f"got an extent of {width:.4g} m"
+        raise InputError(name, "unit", f"expected a profile wider than 5 mm; looks like m, declare unit: m; {got}")
+
+
+def _check_monotone(u, name, lines):
+    back = np.flatnonzero(np.diff(u) <= 0.0)
+    if back.size:
+        i = back[0] + 1
+        got = f"got {u[i]:.9g} m beside {u[i - 1]:.9g} m"
+        where = "leave out side faces and anything below the head or behind the flange"
+        raise InputError(name, f"line {lines[i]}", f"expected strictly monotone u ({where}), {got}")
+
+
+def _check_rail(f, name):
+    if np.argmax(f) in (0, f.size - 1):
+        raise InputError(name, "points", "expected a rail head with f positive up, got its highest point at an end")
+
+
+def _head(u, f):
+    """The connected run of rail points around the highest one, down to where nothing is touched."""
+    top = int(np.argmax(f))
+    low = np.flatnonzero(f < f[top] - _DEEPEST)
+    keep = slice(low[low < top].max(initial=-1) + 1, low[low > top].min(initial=f.size))
+    return u[keep], f[keep]
+
+
+def _spline(u, f, name, smoothing):
+    """Parametric cubic spline over chord length; points that nearly coincide with the one before are left out."""
+    kept = [0]
+    for i in range(1, u.size):
+        if np.hypot(u[i] - u[kept[-1]], f[i] - f[kept[-1]]) > _CLOSE:
+            kept.append(i)
+    if len(kept) < FEWEST:
+        raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(kept)}")
+    (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
+    return Outline(BSpline(knots, np.column_stack(coefficients), degree), name)
+
+
+def _rail_pose(outline):
+    top_u, top_f = outline.highest()
+    low, high = outline.shifted(-top_u, 0.0).span(_ANY_SLOPE)
+    if low < -top_u < high:
+        here = float(outline.shifted(-top_u, 0.0).evaluate(np.array([-top_u]))[0][0])
+        if top_f - here <= _LEVEL:
+            return outline.shifted(0.0, -here)
+    return outline.shifted(-top_u, -top_f)
+
+
+def _wheel_pose(outline, u, f):
+    if not u.min() < 0.0 < u.max():
+        raise InputError(outline.name, "points", "expected u = 0 (tape circle) inside a wheel profile, got it outside")
+    if u[np.argmin(f)] > 0.0:
+        expected = "expected the flange at negative u and f positive up, got the largest radius on the field side"
+        raise InputError(outline.name, "points", expected)
+    outline.span(_ANY_SLOPE)
+    return outline.shifted(0.0, -float(outline.evaluate(np.zeros(1))[0][0]))

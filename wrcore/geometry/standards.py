@@ -1,0 +1,248 @@
+"""Named profiles from their published sections, and one entrance for every way to name a profile."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.geometry import profile_files
+from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
+from wrcore.geometry.profile_sections import Arc, Line, Polynomial, incline
+
+_MM = 1e-3
+
+# S1002, EN 13715 / UIC 510-2 (ORE S1002). Coefficients as in the widely copied definition "courtesy of Dr H. Netter,
+# DLR". mm; y from the tape circle to the field side, z = additional rolling radius (down), so f = -z.
+_S1002_ARCS = (  # y from, y to, centre y, centre z, R, z = zc + side sqrt(R^2 - (y - yc)^2)
+    (-70.0, -62.764705882, -49.5, 9.519259302, 20.5, 1),
+    (-62.764705882, -49.662510381, -55.0, 16.0, 12.0, 1),
+    (-49.662510381, -39.764473993, -58.558326413, 8.834924130, 20.0, 1),
+    (-38.426669071, -35.0, -26.210665, 16.446, 13.0, -1),
+)
+_S1002_FLANGE = (-93.576667419, -2.747477419)
+_S1002_C = (
+    -4320.221063, -1038.384026, -106.5501873, -6.051367875, -0.2054332446, -4.169739389e-3, -4.687195829e-5,
+    -2.252755540e-7,
+)  # fmt: skip
+_S1002_B = (
+    0.0, -3.358537058e-2, 1.565681624e-3, -2.810427944e-5, 5.844240864e-8, -1.562379023e-8, 5.309217349e-15,
+    -5.957839843e-12, 2.646656573e-13,
+)  # fmt: skip
+_S1002_A = (1.364323640, -0.066666667)
+_S1002_TREAD_START, _S1002_TREAD_END = 32.15796, 60.0
+
+_CONE_RANGE = (-0.070, 0.060)  # m; width of S1002
+_CIRCLE_DEPTH = 0.040  # m; a circular rail head ends here: about the height of a rail head
+
+
+@dataclass(frozen=True)
+class RailHead:
+    """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face.
+
+    Parameters
+    ----------
+    radii : tuple of float
+        mm, from the crown to the gauge corner.
+    half_widths : tuple of float
+        mm, half the width of the head where one radius meets the next; one fewer than ``radii``.
+    side : float
+        Inclination of the side face against the vertical (1/20).
+    source : str
+        Origin of the dimensions.
+    """
+
+    radii: tuple
+    half_widths: tuple
+    side: float
+    source: str
+
+
+_EN13674 = "EN 13674-1, dimensions as in github rohrbecka/EN13674"
+RAIL_HEADS = {
+    "UIC60-MBench": RailHead(
+        (300.0, 80.0, 13.0), (10.5, 25.98802), 1 / 20, "UIC60 of the Manchester contact benchmark (SIMPACK UIC_60)"
+    ),
+    "60E1": RailHead((300.0, 80.0, 13.0), (10.228, 26.0265), 1 / 20, _EN13674),
+    "60E2": RailHead((200.0, 70.0, 16.0, 8.0), (11.889, 24.4565, 35.387), 1 / 20, _EN13674),
+    "54E1": RailHead((300.0, 80.0, 13.0), (10.012, 24.8635), 1 / 20, _EN13674),
+    "50E6": RailHead((200.0, 60.0, 13.0), (15.471, 21.919), 1 / 20, _EN13674),
+    "49E1": RailHead((300.0, 80.0, 13.0), (7.6335, 23.4175), 1 / 17.2, _EN13674),
+}
+_SIDE_DEPTH = 0.020  # m below the crown; the side face is needed for the gauge only, which is measured at 14 mm
+_S1002_SOURCE = "S1002 (EN 13715), sections with coefficients by H. Netter, DLR"
+
+
+def s1002_sections():
+    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm).
+
+    The published coefficients leave value jumps of 0.119 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would
+    turn them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
+
+    Returns
+    -------
+    tuple of Arc, Line or Polynomial
+        f in m, f(0) = 0 at the tape circle.
+    """
+    h, g, f, d = (
+        Arc.between(a * _MM, b * _MM, yc * _MM, -zc * _MM, r * _MM, -side) for a, b, yc, zc, r, side in _S1002_ARCS
+    )
+    start, end = _S1002_ARCS[2][1] * _MM, _S1002_ARCS[3][0] * _MM
+    c0, c1 = _S1002_FLANGE
+    e = Line(start, -c0 * _MM - c1 * start, end, -c0 * _MM - c1 * end)
+    c = Polynomial(-0.035, -0.026, tuple(-k for k in _S1002_C))
+    b = Polynomial(-0.026, _S1002_TREAD_START * _MM, tuple(-k for k in _S1002_B))
+    a = Polynomial(_S1002_TREAD_START * _MM, _S1002_TREAD_END * _MM, tuple(-k for k in _S1002_A))
+    return h, g, f, e, d, _closed(c, d.ends[1][1], b.ends[0][1]), b, a
+
+
+def _closed(polynomial, f0, f1):
+    """Add the linear function that makes the polynomial start at ``f0`` and end at ``f1`` (m)."""
+    (u0, own0), (u1, own1) = polynomial.ends
+    slope = ((f1 - own1) - (f0 - own0)) / (u1 - u0)
+    offset = (f0 - own0) - slope * u0
+    first, second, *rest = polynomial.coefficients
+    return Polynomial(u0, u1, (first + offset / polynomial.scale, second + slope, *rest), polynomial.scale)
+
+
+def rail_sections(head):
+    """Sections of an upright rail head from the gauge side to the field side, crown at (0, 0), in m.
+
+    Parameters
+    ----------
+    head : RailHead
+
+    Returns
+    -------
+    tuple of Arc or Line
+    """
+    right, start, uc, fc, before = [], 0.0, 0.0, 0.0, 0.0
+    ends = [w * _MM for w in head.half_widths] + [None]
+    for radius, end in zip((r * _MM for r in head.radii), ends, strict=True):
+        # the centre moves along the common normal, so that the arcs are tangent
+        uc, fc = uc + (before - radius) * np.sin(start), fc + (before - radius) * np.cos(start)
+        stop = np.pi / 2 - np.arctan(head.side) if end is None else float(np.arcsin((end - uc) / radius))
+        right.append(Arc(uc, fc, radius, start, stop))
+        start, before = stop, radius
+    right.append(_side_face(right[-1].ends[1], head.side))
+    crown = Arc(0.0, right[0].fc, right[0].radius, -right[0].last, right[0].last)
+    return (*(_mirrored(s) for s in reversed(right[1:])), crown, *right[1:])
+
+
+def _side_face(top, side):
+    u, f = top
+    return Line(u, f, u + side * (f + _SIDE_DEPTH), -_SIDE_DEPTH)
+
+
+def _mirrored(section):
+    if isinstance(section, Line):
+        return Line(-section.u1, section.f1, -section.u0, section.f0)
+    return Arc(-section.uc, section.fc, section.radius, -section.last, -section.first)
+
+
+def circle_sections(radius):
+    """Upper part of a circle (radius in m) with its top at (0, 0): a circular rail head."""
+    end = np.arccos(max(1.0 - _CIRCLE_DEPTH / radius, 0.0))
+    return (Arc(0.0, -radius, radius, -end, end),)
+
+
+def cone_sections(slope):
+    """Conical wheel: f = slope * u, the larger radius on the flange side (-u)."""
+    low, high = _CONE_RANGE
+    return (Line(low, slope * low, high, slope * high),)
+
+
+def named_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
+    """Profile by name, analytic form or file.
+
+    Parameters
+    ----------
+    spec : str or dict
+        "S1002" (wheel); "UIC60-MBench", "60E1", ... (rails, `RAIL_HEADS`); "cone:1/20" (wheel); "circle:0.3" (rail,
+        radius in m); the path of a point file; or ``{"points": path, "unit": "mm", "inclined": False,
+        "smoothing": 1e-6}`` of which only ``points`` is required. Files: `wrcore.geometry.profile_files`.
+    kind : {"wheel", "rail"}
+        What the profile is used for.
+    inclination : float
+        Of the rail, for instance 1/40. Applied to named rails and to point files with ``inclined: False``; a point
+        file is otherwise taken as lying in its track pose already.
+    window : float
+        Averaging length of the curvature, m.
+    spacing : float
+        Distance of the nodes, m.
+
+    Returns
+    -------
+    ProfileCurve
+
+    Raises
+    ------
+    InputError
+        Unknown name, a wheel used as a rail (or the reverse), or a faulty file.
+    """
+    if kind not in ("wheel", "rail"):
+        raise ValueError(f"kind must be 'wheel' or 'rail', got {kind!r}")
+    if not (isinstance(inclination, (int, float)) and abs(inclination) <= 0.2):
+        raise InputError(kind, "inclination", f"expected a ratio like 1/40 (at most 0.2), got {inclination!r}")
+    options = {"window": window, "spacing": spacing}
+    if isinstance(spec, (dict, Path)) or _is_file(spec):
+        return profile_files.read_profile(spec, kind, inclination, **options)
+    sections, source = _sections(spec, kind)
+    if kind == "rail":
+        sections = incline(sections, inclination)
+    return ProfileCurve.from_sections(spec, kind, sections, source, **options)
+
+
+def _is_file(spec):
+    if not isinstance(spec, str) or spec in RAIL_HEADS or spec == "S1002" or ":" in spec and "/" not in spec[:2]:
+        return False
+    return bool(Path(spec).suffix) or "/" in spec or "\\" in spec
+
+
+def _sections(spec, kind):
+    """Sections and source of a named or analytic profile that suits ``kind``."""
+    form, _, value = str(spec).partition(":")
+    if spec == "S1002":
+        found, build, source = "wheel", s1002_sections, _S1002_SOURCE
+    elif spec in RAIL_HEADS:
+        head = RAIL_HEADS[spec]
+        found, build, source = "rail", lambda: rail_sections(head), head.source
+    elif form == "cone" and value:
+        found, build, source = "wheel", lambda: cone_sections(_number(spec, value, -0.5, 0.5)), "analytic"
+    elif form == "circle" and value:
+        found, build, source = "rail", lambda: circle_sections(_number(spec, value, 0.01, 100.0)), "analytic"
+    else:
+        known = ", ".join(row["name"] for row in list_profiles() if row["kind"] == kind)
+        raise InputError(kind, "profile", f"expected a point file or one of {known}, got {spec!r}")
+    if found != kind:
+        raise InputError(kind, "profile", f"expected a {kind} profile, got {spec!r}, which is a {found}")
+    return build(), source
+
+
+def _number(spec, value, low, high):
+    try:
+        number = float(Fraction(value.strip()))
+    except (ValueError, ZeroDivisionError, OverflowError):
+        number = float("nan")
+    if not low <= number <= high:
+        raise InputError("profile", spec, f"expected a number from {low:g} to {high:g} after the colon, got {value!r}")
+    return number
+
+
+def list_profiles():
+    """Table of the named profiles.
+
+    Returns
+    -------
+    list of dict
+        Keys name, kind, sections (from the flange or from the crown), source.
+    """
+    rows = [{"name": "S1002", "kind": "wheel", "sections": "arcs, line, polynomials", "source": _S1002_SOURCE}]
+    for name, head in RAIL_HEADS.items():
+        radii = ", ".join(f"R{r:g}" for r in head.radii)
+        side = f"side 1:{1 / head.side:g}"
+        rows.append({"name": name, "kind": "rail", "sections": f"{radii}, {side}", "source": head.source})
+    rows.append({"name": "cone:1/20", "kind": "wheel", "sections": "cone of any slope", "source": "analytic"})
+    rows.append({"name": "circle:0.3", "kind": "rail", "sections": "arc of any radius (m)", "source": "analytic"})
+    return rows
