@@ -1,0 +1,44 @@
+# make study    set up .venv, run the whole study: results/figures, results/tables, results/report.zip
+# make test     set up .venv, run the smoke workflow and all tests
+# make smoke    the reduced study alone: results/smoke
+# make report   the study's report anew: results/report.zip
+# make lint     ruff;   make bench   speed measurements;   make clean   remove everything generated
+#
+# PYTHON=python3.12 chooses the interpreter for a new .venv, CORES=4 the cores for the workflow.
+
+PYTHON ?= python3
+CORES ?= 2
+BIN := .venv/bin
+STAMP := .venv/.installed
+SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
+
+.PHONY: study test smoke report lint bench clean
+
+study: $(STAMP)
+	$(SNAKEMAKE)
+
+test: $(STAMP)
+	$(BIN)/python -m pytest
+
+smoke: $(STAMP)
+	$(SNAKEMAKE) --configfile config/smoke.yaml
+
+report: $(STAMP)
+	$(SNAKEMAKE) --forcerun report_archive
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+bench: $(STAMP)
+	@for script in bench/*.py; do echo "$$script"; $(BIN)/python "$$script" || exit 1; done
+
+clean:
+	rm -rf results logs benchmarks .snakemake
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c "import sys; sys.exit(0 if sys.version_info >= (3, 11) else \
+	    'wrcore needs Python 3.11 or newer; this is ' + sys.version.split()[0] + '. Try: make PYTHON=python3.11')"
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,lint]"
+	@touch $@
