@@ -22,7 +22,7 @@ STEEPEST = 10.0
 """The curve ends where its slope exceeds this (84 degrees): beyond, f(u) is no useful description."""
 
 GAUGE_DEPTH = 0.014
-"""Depth below the highest point at which the gauge is measured, m (EN 13848-1)."""
+"""Depth below the highest point at which the gauge is measured, m (CONTACT user guide, Manchester example)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +140,9 @@ class ProfileCurve:
         """
         u = np.asarray(u, dtype=float)
         h = self.spacing
-        with np.errstate(invalid="ignore"):
-            i = np.clip(np.nan_to_num((u - self.u[0]) / h), 0, self.u.size - 2).astype(int)
-            inside = (u >= self.u[0]) & (u <= self.u[-1])
-        t = (u - self.u[i]) / h
-        return np.where(inside, self._in_cell(i, t, nu), np.nan)
+        u = np.where((u >= self.u[0]) & (u <= self.u[-1]), u, np.nan)
+        i = np.clip(np.nan_to_num((u - self.u[0]) / h), 0, self.u.size - 2).astype(int)
+        return self._in_cell(i, (u - self.u[i]) / h, nu)
 
     def _in_cell(self, i, t, nu):
         f0, f1, h = self.f[i], self.f[i + 1], self.spacing

@@ -15,6 +15,7 @@ _CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
 _DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
 _LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
 _ANY_SLOPE = 1e6
+_FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +172,10 @@ def _spline(u, f, name, smoothing):
             kept.append(i)
     if len(kept) < FEWEST:
         raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(kept)}")
-    (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
+    try:
+        (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
+    except ValueError as error:
+        raise InputError(name, "points", f"expected a profile that a cubic spline can follow: {error}") from None
     return Outline(BSpline(knots, np.column_stack(coefficients), degree), name)
 
 
@@ -191,5 +195,7 @@ def _wheel_pose(outline, u, f):
     if u[np.argmin(f)] > 0.0:
         expected = "expected the flange at negative u and f positive up, got the largest radius on the field side"
         raise InputError(outline.name, "points", expected)
+    if max(f[0], f[-1]) < f.max() - _FALSE_FLANGE:
+        raise InputError(outline.name, "points", "expected a wheel, got a profile that falls on both sides like a rail")
     outline.span(_ANY_SLOPE)
     return outline.shifted(0.0, -float(outline.evaluate(np.zeros(1))[0][0]))

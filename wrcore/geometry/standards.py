@@ -77,7 +77,7 @@ _S1002_SOURCE = "S1002 (EN 13715), sections with coefficients by H. Netter, DLR"
 def s1002_sections():
     """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm).
 
-    The published coefficients leave value jumps of 0.119 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would
+    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would
     turn them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
 
     Returns
@@ -195,23 +195,25 @@ def named_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
 
 
 def _is_file(spec):
-    if not isinstance(spec, str) or spec in RAIL_HEADS or spec == "S1002" or ":" in spec and "/" not in spec[:2]:
+    """True for text that is meant as a path: it has a suffix or a folder, or such a file exists."""
+    if not isinstance(spec, str) or spec.startswith(("cone:", "circle:")):
         return False
-    return bool(Path(spec).suffix) or "/" in spec or "\\" in spec
+    return bool(Path(spec).suffix) or "/" in spec or "\\" in spec or Path(spec).is_file()
 
 
 def _sections(spec, kind):
     """Sections and source of a named or analytic profile that suits ``kind``."""
-    form, _, value = str(spec).partition(":")
-    if spec == "S1002":
+    name = str(spec)
+    form, _, value = name.partition(":")
+    if name == "S1002":
         found, build, source = "wheel", s1002_sections, _S1002_SOURCE
-    elif spec in RAIL_HEADS:
-        head = RAIL_HEADS[spec]
+    elif name in RAIL_HEADS:
+        head = RAIL_HEADS[name]
         found, build, source = "rail", lambda: rail_sections(head), head.source
     elif form == "cone" and value:
-        found, build, source = "wheel", lambda: cone_sections(_number(spec, value, -0.5, 0.5)), "analytic"
+        found, build, source = "wheel", lambda: cone_sections(_number(name, value, -0.5, 0.5)), "analytic"
     elif form == "circle" and value:
-        found, build, source = "rail", lambda: circle_sections(_number(spec, value, 0.01, 100.0)), "analytic"
+        found, build, source = "rail", lambda: circle_sections(_number(name, value, 0.01, 100.0)), "analytic"
     else:
         known = ", ".join(row["name"] for row in list_profiles() if row["kind"] == kind)
         raise InputError(kind, "profile", f"expected a point file or one of {known}, got {spec!r}")
