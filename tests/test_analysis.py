@@ -88,15 +88,16 @@ def test_mirror_defect_sees_a_broken_mirror():
 
 
 def test_motion_table_cuts_at_flange_and_horizon():
-    spatial, planar, tight = hunting_run("spatial", flange_at=3.0), hunting_run(flange_at=3.0), hunting_run("spatial")
-    planar["wheelset"].y_m[:] += 1e-6
-    tight["wheelset"].y_m[tight.t > 3.5] += 1.0
-    planar["wheelset"].y_m[planar.t > 3.5] += 1.0
-    table = analysis.motion_table({"free": {"planar": planar, "spatial": spatial, "spatial_tight": tight}}, bound=1e-4)
-    row = table.set_index("detection").loc["spatial"]
+    runs = {name: hunting_run(name, flange_at=3.0) for name in ("planar", "spatial", "spatial_tight")}
+    runs["spatial_mirrored"] = hunting_run("spatial", sign=-1.0)
+    runs["planar"]["wheelset"].y_m[:] += 1e-6
+    for name in ("planar", "spatial_tight", "spatial_mirrored"):
+        runs[name]["wheelset"].y_m[runs[name].t > 3.5] += 1.0
+    row = analysis.motion_table({"free": runs}, bound=1e-4).set_index("detection").loc["spatial"]
     assert row["first_flange_contact_s"] == 3.0
     assert row["prediction_horizon_s"] == 3.5
     assert row["planar_spatial_max_m"] == pytest.approx(1e-6)
+    assert row["mirror_defect_m"] == 0.0
     assert row["wavelength_m"] == pytest.approx(20 / 2.6, rel=1e-3)
     assert row["growth_per_s"] == pytest.approx(0.1, abs=2e-3)
     assert row["max_normal_force_N"] == 8.9e3
@@ -105,7 +106,29 @@ def test_motion_table_cuts_at_flange_and_horizon():
 def test_motion_table_without_twin_compares_the_whole_run():
     table = analysis.motion_table({"free": {"planar": hunting_run(), "spatial": hunting_run("spatial")}}, bound=1e-4)
     assert table["prediction_horizon_s"].isna().all()
+    assert table["mirror_defect_m"].isna().all()
     assert (table["planar_spatial_max_m"] == 0.0).all()
+
+
+def test_horizons_only_where_there_is_a_twin():
+    with_twin = {"spatial": hunting_run(), "spatial_tight": hunting_run()}
+    assert analysis.horizons({"free": with_twin, "suspended": {"spatial": hunting_run()}}, 1e-4) == {"free": 4.0}
+
+
+def test_time_runs_drops_the_warm_up_and_takes_planar_and_spatial_in_turn(monkeypatch):
+    walls = iter([9.0, 9.0, 1.0, 2.0, 3.0, 4.0])
+    order = []
+
+    def fake(scene):
+        order.append(scene)
+        return hunting_run(wall_s=next(walls))
+
+    monkeypatch.setattr(analysis, "simulate", fake)
+    samples = analysis.time_runs({"free": {"planar": "p", "spatial": "s"}}, repetitions=2)
+    assert order == ["p", "s"] * 3
+    assert samples["wall_s"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert samples["simulated_s"].tolist() == [4.0] * 4
+    analysis.timing_table(samples)
 
 
 def timing_samples():
@@ -114,7 +137,7 @@ def timing_samples():
         for detection, wall in (("planar", planar), ("spatial", spatial)):
             calls = 5000 if detection == "planar" else 10000
             rows.append(("free", detection, repetition, 10.0, wall, calls, 700, 9))
-    names = ["scene", "detection", "repetition", "simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected"]
+    names = ["case", "detection", "repetition", "simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected"]
     return pd.DataFrame(rows, columns=names)
 
 
@@ -143,3 +166,16 @@ def test_comparison_table_says_within_only_where_there_is_a_tolerance_and_a_valu
     table = analysis.comparison_table(reference, {"lowering": 1.05, "ratio": 0.5, "spread": 2.2})
     assert table["within"].tolist() == ["yes", "", "no", ""]
     assert table["ours"].tolist()[:3] == [1.05, 0.5, 2.2]
+
+
+def test_our_values_are_the_papers_case_with_spatial_detection():
+    geometry = pd.DataFrame({"y_m": [0.0, 0.003], "lowering_m": [1.8e-4, 1e-4], "radius_difference_m": [0.0, 9.9e-4]})
+    motion = pd.DataFrame({"case": ["a", "free", "free"], "detection": ["spatial", "planar", "spatial"]})
+    for column in ("frequency_Hz", "growth_per_s", "first_flange_contact_s"):
+        motion[column] = [1.0, 2.0, 3.0]
+    timing = pd.DataFrame({"case": ["free", "free"], "ratio_per_run": [0.8, 0.8]})
+    values = analysis.our_values(geometry, motion, timing, "free")
+    assert values["hunting frequency"] == 3.0
+    assert values["time planar / spatial"] == 0.8
+    assert values["rolling radius difference at y = 3 mm"] == 9.9e-4
+    assert values["wheelset lowering at y = 0 mm"] == 1.8e-4

@@ -1,6 +1,7 @@
 """Figures: the numbers behind the lines, units on every axis, and files that are reproducible."""
 
 import re
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -8,17 +9,14 @@ import pytest
 from synthetic import hunting_run
 
 from wrcore import figures
-from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
+from wrcore.scene import load_scene
+
+POSE = {"y": 6.3e-3, "yaw": 0.015, "load": 1e4, "lowered": 4e-4}
 
 
 @pytest.fixture(scope="module")
-def pair():
-    rail = named_profile("UIC60-MBench", "rail", inclination=1 / 40)
-    return figures.ContactPair(named_profile("S1002", "wheel"), rail, Track(1.435), 0.46, 0.75)
-
-
-POSE = {"y": 6.3e-3, "z": 0.4602, "roll": 1.3e-3, "yaw": 0.015}
+def scene():
+    return load_scene(Path(__file__).parent.parent / "config/scenes/wheelset.yaml")
 
 
 def runs(flange_at=2.5):
@@ -31,17 +29,17 @@ def luminance(color):
     return np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
 
 
-def all_figures(pair):
+def all_figures(scene):
     return {
-        "fig2": figures.fig2_profiles(pair.wheel, pair.rail),
-        "fig3": figures.fig3_detection(pair, POSE),
+        "fig2": figures.fig2_profiles(scene.wheel, scene.rail),
+        "fig3": figures.fig3_detection(scene, **POSE),
         "fig4": figures.fig4_lateral_position({"free": runs(), "suspended": runs()}, {"free": 2.0}),
-        "fig5": figures.fig5_contact_points(runs(), pair.wheel, pair.rail, 2.0),
+        "fig5": figures.fig5_contact_points(runs(), scene.wheel, scene.rail, 2.0),
     }
 
 
-def test_every_axis_names_its_unit(pair):
-    for name, figure in all_figures(pair).items():
+def test_every_axis_names_its_unit(scene):
+    for name, figure in all_figures(scene).items():
         for axes in figure.axes:
             labels = [axes.get_xlabel(), axes.get_ylabel()]
             inner = axes.get_subplotspec() is not None and (name == "fig4" or name == "fig5")
@@ -50,7 +48,7 @@ def test_every_axis_names_its_unit(pair):
             assert any(labels) or name == "fig4", name
 
 
-def test_fig4_draws_lateral_position_in_mm(pair):
+def test_fig4_draws_lateral_position_in_mm(scene):
     axes = figures.fig4_lateral_position({"free": runs()}).axes[0]
     planar, spatial = axes.get_lines()
     assert np.array_equal(planar.get_ydata(), 1e3 * runs()["planar"]["wheelset"].y_m)
@@ -66,15 +64,15 @@ def test_fig4_marks_the_horizon_only_where_given():
     assert "prediction horizon" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_fig5_puts_every_patch_on_its_profile(pair):
-    figure = figures.fig5_contact_points(runs(flange_at=2.5), pair.wheel, pair.rail)
+def test_fig5_puts_every_patch_on_its_profile(scene):
+    figure = figures.fig5_contact_points(runs(flange_at=2.5), scene.wheel, scene.rail)
     over_time, on_profile = figure.axes[4], figure.axes[5]
     run = runs(flange_at=2.5)["planar"]
     shown = over_time.collections[0].get_offsets()
     assert len(shown) == run.t.size + int(np.sum(run.t >= 2.5))
     assert shown[:, 1].min() == pytest.approx(-39.0)
     f, u = on_profile.collections[0].get_offsets().T
-    assert np.allclose(f, 1e3 * pair.wheel(u / 1e3))
+    assert np.allclose(f, 1e3 * scene.wheel(u / 1e3))
 
 
 def test_planar_and_spatial_differ_in_grey_too():
@@ -83,16 +81,16 @@ def test_planar_and_spatial_differ_in_grey_too():
     assert (spatial + 0.05) / (planar + 0.05) > 2.0
 
 
-def test_fig2_tangent_and_normal_are_perpendicular_and_normal_points_out_of_the_body(pair):
-    figure = figures.fig2_profiles(pair.wheel, pair.rail)
+def test_fig2_tangent_and_normal_are_perpendicular_and_normal_points_out_of_the_body(scene):
+    figure = figures.fig2_profiles(scene.wheel, scene.rail)
     for axes, outward in zip(figure.axes, (1.0, -1.0), strict=True):
         t, n = (np.subtract(text.xyann, text.xy) for text in axes.texts if text.get_text() in ("t", "n"))
         assert t @ n == pytest.approx(0.0, abs=1e-9)
         assert outward * n[1] > 0
 
 
-def test_fig3_contact_points_lie_on_their_loci(pair):
-    plan = figures.fig3_detection(pair, POSE).axes[1]
+def test_fig3_contact_points_lie_on_their_loci(scene):
+    plan = figures.fig3_detection(scene, **POSE).axes[1]
     generator, strips = (np.column_stack(line.get_data()) for line in plan.get_lines())
     planar, spatial = (c.get_offsets()[0] for c in plan.collections if c.get_label().startswith("contact point"))
     for locus, point in ((generator, planar), (strips, spatial)):
@@ -104,18 +102,18 @@ def test_fig3_contact_points_lie_on_their_loci(pair):
     assert 15.0 < spatial[0] - planar[0] < 25.0
 
 
-def test_fig3_refuses_a_pose_without_contact(pair):
+def test_fig3_refuses_a_pose_without_contact(scene):
     with pytest.raises(ValueError, match="no contact on the left side"):
-        figures.fig3_detection(pair, {**POSE, "z": 0.48})
+        figures.fig3_detection(scene, **{**POSE, "lowered": -0.02})
 
 
-def test_fig1_shows_points_of_the_real_surfaces(pair):
-    detail = figures.fig1_parametrisation(pair, point=(0.015, 0.22, -0.012, 0.07)).axes[1]
+def test_fig1_shows_points_of_the_real_surfaces(scene):
+    detail = figures.fig1_parametrisation(scene, point=(0.015, 0.22, -0.012, 0.07)).axes[1]
     q, p = (np.ravel(c._offsets3d) for c in detail.collections if type(c).__name__ == "Path3DCollection")
-    radius = 460 - 1e3 * float(pair.wheel(0.015))
+    radius = 460 - 1e3 * float(scene.wheel(0.015))
     assert q == pytest.approx([-radius * np.sin(0.22), 765.0, 540 - radius * np.cos(0.22)])
-    rail_distance = 1e3 * pair.track.rail_distance(pair.rail)
-    assert p == pytest.approx([70.0, rail_distance - 12, 1e3 * float(pair.rail(-0.012))])
+    rail_distance = 1e3 * scene.track.rail_distance(scene.rail)
+    assert p == pytest.approx([70.0, rail_distance - 12, 1e3 * float(scene.rail(-0.012))])
 
 
 def test_files_are_reproducible_and_undated(tmp_path):

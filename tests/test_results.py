@@ -7,7 +7,7 @@ from synthetic import hunting_run
 
 from wrcore import __version__
 from wrcore.errors import InputError
-from wrcore.results import load_run, unit_of, write_run
+from wrcore.results import load_run, load_runs, unit_of, write_run
 from wrcore.simulate import Run
 
 
@@ -119,3 +119,15 @@ def test_a_run_that_failed_at_once_is_kept_too(tmp_path):
     write_run(tmp_path / "run.h5", empty)
     read = load_run(tmp_path / "run.h5")
     assert (read.status, read.reason, read.t.size) == ("failed", "no equilibrium", 0)
+
+
+def test_runs_are_sorted_by_folder_and_file(tmp_path):
+    paths = [tmp_path / case / f"{name}.h5" for case in ("free", "suspended") for name in ("planar", "spatial")]
+    for path in paths:
+        write_run(path, hunting_run(path.stem))
+    cases = load_runs(paths)
+    assert {case: list(runs) for case, runs in cases.items()} == {
+        "free": ["planar", "spatial"],
+        "suspended": ["planar", "spatial"],
+    }
+    assert cases["free"]["spatial"].scene["contact"]["detection"] == "spatial"

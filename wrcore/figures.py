@@ -4,7 +4,6 @@ Units change here and nowhere before: lengths to mm, angles to mrad, forces to k
 their colour, line and marker in every figure; they differ in lightness too, so that a grey copy stays readable.
 """
 
-from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 
@@ -14,6 +13,8 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 from wrcore.contact.detection import contact_geometry, detect
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.statics import settle
 from wrcore.geometry.surface import SIDES, rail_surface, wheel_surface, wheelset_transform
 
 MM = 1e3
@@ -75,36 +76,16 @@ def save_figure(figure, *paths):
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
-@dataclass(frozen=True)
-class ContactPair:
-    """A wheelset's wheels and the rails below: what the geometry figures are drawn from.
+def _wheel_points(scene, side, u, s, **pose):
+    """Points of a wheel in the track frame for a pose x, y, z, roll, yaw, shape (..., 3), m."""
+    vehicle = scene.vehicle
+    points = wheel_surface(scene.wheel, vehicle.rolling_radius, vehicle.half_distance, side, u, s)
+    return wheelset_transform(points, **pose)
 
-    Parameters
-    ----------
-    wheel, rail : ProfileCurve
-    track : Track
-    rolling_radius, half_distance : float
-        Radius at the tape circle and its distance from the wheelset's centre, m.
-    """
 
-    wheel: object
-    rail: object
-    track: object
-    rolling_radius: float
-    half_distance: float
-
-    def wheel_points(self, side, u, s, **pose):
-        """Points of a wheel in the track frame for a pose x, y, z, roll, yaw, shape (..., 3), m."""
-        points = wheel_surface(self.wheel, self.rolling_radius, self.half_distance, side, u, s)
-        return wheelset_transform(points, **pose)
-
-    def rail_points(self, side, u, x):
-        """Points of a rail in the track frame, shape (..., 3), m."""
-        return rail_surface(self.rail, self.track, side, u, x)
-
-    def contact_geometry(self):
-        """The pair compiled for the contact search."""
-        return contact_geometry(self.wheel, self.rail, self.track, self.rolling_radius, self.half_distance)
+def _rail_points(scene, side, u, x):
+    """Points of a rail in the track frame, shape (..., 3), m."""
+    return rail_surface(scene.rail, scene.track, side, u, x)
 
 
 def _inside(curve, count, margin=1e-6):
@@ -113,12 +94,12 @@ def _inside(curve, count, margin=1e-6):
 
 
 @styled
-def fig1_parametrisation(pair, point=(0.015, 0.22, -0.012, 0.07)):
+def fig1_parametrisation(scene, point=(0.015, 0.22, -0.012, 0.07)):
     """Fig. 1: the surfaces of wheels and rails and their coordinates.
 
     Parameters
     ----------
-    pair : ContactPair
+    scene : Scene
     point : tuple of float
         u_w (m), s_w (rad), u_r (m) and s_r (m) of the points Q and P that the close-up marks.
 
@@ -129,12 +110,12 @@ def fig1_parametrisation(pair, point=(0.015, 0.22, -0.012, 0.07)):
     figure = Figure(figsize=(6.8, 3.2), layout="none")
     overview = figure.add_axes((-0.16, -0.45, 0.8, 1.8), projection="3d", computed_zorder=False)
     for side in ("right", "left"):
-        _wheel_on_rail(overview, pair, side, reach=0.55, angle=np.pi, lift=0.0)
+        _wheel_on_rail(overview, scene, side, reach=0.55, angle=np.pi, lift=0.0)
     _axis_arrows(overview, 300)
     _view(overview, x=(-550, 550), y=(-850, 850), z=(-20, 980), zoom=0.68)
     detail = figure.add_axes((0.43, -0.6, 0.62, 2.2), projection="3d", computed_zorder=False)
-    _wheel_on_rail(detail, pair, "left", reach=0.12, angle=0.26, lift=0.08)
-    _coordinate_lines(detail, pair, "left", point, lift=0.08)
+    _wheel_on_rail(detail, scene, "left", reach=0.12, angle=0.26, lift=0.08)
+    _coordinate_lines(detail, scene, "left", point, lift=0.08)
     _view(detail, x=(-120, 120), y=(680, 820), z=(-15, 110), zoom=0.78)
     figure.text(0.03, 0.93, "(a) wheels of revolution, swept rails")
     figure.text(0.50, 0.93, "(b) coordinates (left side, wheel lifted by 80 mm)")
@@ -149,13 +130,13 @@ def _view(axes, x, y, z, zoom):
     axes.patch.set_visible(False)
 
 
-def _wheel_on_rail(axes, pair, side, reach, angle, lift):
+def _wheel_on_rail(axes, scene, side, reach, angle, lift):
     """Surfaces of one side: rail over -reach..reach (m) and wheel over -angle..angle (rad)."""
-    u, x = np.meshgrid(_inside(pair.rail, 50), np.linspace(-reach, reach, 12))
-    rail = pair.rail_points(side, u, x)
+    u, x = np.meshgrid(_inside(scene.rail, 50), np.linspace(-reach, reach, 12))
+    rail = _rail_points(scene, side, u, x)
     _surface(axes, rail.swapaxes(0, 1) if side == "left" else rail, "0.8", 1)  # normals up, for the light
-    u, s = np.meshgrid(_inside(pair.wheel, 60), np.linspace(-angle, angle, 73))
-    _surface(axes, pair.wheel_points(side, u, s, z=pair.rolling_radius + lift), "0.9", 2)
+    u, s = np.meshgrid(_inside(scene.wheel, 60), np.linspace(-angle, angle, 73))
+    _surface(axes, _wheel_points(scene, side, u, s, z=scene.vehicle.rolling_radius + lift), "0.9", 2)
 
 
 def _surface(axes, points, color, zorder):
@@ -178,18 +159,18 @@ def _line(axes, points, **kwargs):
     axes.plot(*np.moveaxis(MM * points, -1, 0), **kwargs)
 
 
-def _coordinate_lines(axes, pair, side, point, lift):
+def _coordinate_lines(axes, scene, side, point, lift):
     """Profile and circle through Q on the wheel, profile and path through P on the rail."""
     u_w, s_w, u_r, s_r = point
-    wheel = {"z": pair.rolling_radius + lift}
+    wheel = {"z": scene.vehicle.rolling_radius + lift}
     blue, red = {"color": LINES["planar"]["color"], "zorder": 5}, {"color": ACCENT, "zorder": 5}
-    _line(axes, pair.wheel_points(side, _inside(pair.wheel, 200), 0.0, **wheel), **blue)
-    _line(axes, pair.wheel_points(side, u_w, np.linspace(0.0, s_w, 50), **wheel), **blue)
-    _line(axes, pair.rail_points(side, _inside(pair.rail, 200), 0.0), **red)
-    _line(axes, pair.rail_points(side, u_r, np.linspace(0.0, s_r, 20)), **red)
+    _line(axes, _wheel_points(scene, side, _inside(scene.wheel, 200), 0.0, **wheel), **blue)
+    _line(axes, _wheel_points(scene, side, u_w, np.linspace(0.0, s_w, 50), **wheel), **blue)
+    _line(axes, _rail_points(scene, side, _inside(scene.rail, 200), 0.0), **red)
+    _line(axes, _rail_points(scene, side, u_r, np.linspace(0.0, s_r, 20)), **red)
     for name, at, style in (
-        ("Q ($u_w$, $s_w$)", pair.wheel_points(side, u_w, s_w, **wheel), blue),
-        ("P ($u_r$, $s_r$)", pair.rail_points(side, u_r, s_r), red),
+        ("Q ($u_w$, $s_w$)", _wheel_points(scene, side, u_w, s_w, **wheel), blue),
+        ("P ($u_r$, $s_r$)", _rail_points(scene, side, u_r, s_r), red),
     ):
         axes.scatter(*(MM * at), color=style["color"], s=16, zorder=6, depthshade=False)
         axes.text(*(MM * at + np.array([0.0, 0.0, 6.0])), name, color=style["color"], zorder=7)
@@ -248,14 +229,18 @@ def _profile_with_point(axes, curve, u, names, up):
 
 
 @styled
-def fig3_detection(pair, pose, side="left", window=0.012):
+def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.012):
     """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose.
 
     Parameters
     ----------
-    pair : ContactPair
-    pose : dict
-        y, z, roll, yaw of the wheelset (m, rad), low enough for the overlap to be seen.
+    scene : Scene
+    y, yaw : float
+        Pose of the wheelset, m and rad.
+    load : float
+        Vertical load per wheel at which the wheelset rests, N; gives height and roll.
+    lowered : float
+        Further lowering that makes the overlap visible, m.
     side : {"left", "right"}
     window : float
         Half width of the view about the deepest contact points, m.
@@ -269,7 +254,9 @@ def fig3_detection(pair, pose, side="left", window=0.012):
     ValueError
         If there is no contact on this side at this pose.
     """
-    geometry = pair.contact_geometry()
+    vehicle = scene.vehicle
+    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
+    pose = _resting_pose(scene, geometry, y, yaw, load, lowered)
     found = {}
     for detection in LINES:
         found[detection] = [patch for patch in detect(geometry, **pose, detection=detection) if patch.side == side]
@@ -277,11 +264,18 @@ def fig3_detection(pair, pose, side="left", window=0.012):
             raise ValueError(f"no contact on the {side} side at this pose")
     figure = Figure(figsize=(6.8, 3.3))
     section, plan = figure.subplots(1, 2)
-    _cross_section(section, pair, pose, side, found["planar"], window)
-    _plan_view(plan, pair, pose, side, found, window)
+    _cross_section(section, scene, pose, side, found["planar"], window)
+    _plan_view(plan, scene, pose, side, found, window)
     section.set_title("(a) planar: profiles in one plane", fontsize=9)
     plan.set_title("(b) spatial: overlap from above", fontsize=9)
     return figure
+
+
+def _resting_pose(scene, geometry, y, yaw, load, lowered):
+    material = scene.data["contact"]["material"]
+    modulus = contact_modulus(material["shear_modulus"], material["poisson_ratio"])
+    roll, z = settle(geometry, hertz_table(), modulus, y, yaw, True, load, scene.vehicle.rolling_radius)
+    return {"y": y, "z": z - lowered, "roll": roll, "yaw": yaw}
 
 
 def _middle(patches):
@@ -290,11 +284,11 @@ def _middle(patches):
     return 0.5 * (min(u) + max(u)), 0.5 * (max(u) - min(u))
 
 
-def _cross_section(axes, pair, pose, side, patches, window):
+def _cross_section(axes, scene, pose, side, patches, window):
     centre, spread = _middle(patches)
-    u = np.linspace(max(centre - spread - window, pair.wheel.u[0]), centre + spread + window, 800)
-    _, y_wheel, z_wheel = np.moveaxis(pair.wheel_points(side, u, 0.0, **pose), -1, 0)
-    z_rail = _rail_below(pair, side, y_wheel)
+    u = np.linspace(max(centre - spread - window, scene.wheel.u[0]), centre + spread + window, 800)
+    _, y_wheel, z_wheel = np.moveaxis(_wheel_points(scene, side, u, 0.0, **pose), -1, 0)
+    z_rail = _rail_below(scene, side, y_wheel)
     axes.plot(MM * y_wheel, MM * z_rail, color=RAIL, linewidth=1.6, label="rail profile")
     axes.plot(MM * y_wheel, MM * z_wheel, color=WHEEL, linewidth=1.6, label="wheel profile")
     axes.fill_between(MM * y_wheel, MM * z_wheel, MM * z_rail, where=z_wheel < z_rail, color=ACCENT, alpha=0.5, lw=0)
@@ -303,19 +297,19 @@ def _cross_section(axes, pair, pose, side, patches, window):
     axes.legend(fontsize=7, loc="lower right")
 
 
-def _rail_below(pair, side, y):
+def _rail_below(scene, side, y):
     """Height of the rail's surface at lateral positions y (m); NaN beside the rail."""
-    return pair.rail(SIDES[side] * y - pair.track.rail_distance(pair.rail))
+    return scene.rail(SIDES[side] * y - scene.track.rail_distance(scene.rail))
 
 
-def _plan_view(axes, pair, pose, side, found, window):
+def _plan_view(axes, scene, pose, side, found, window):
     """Overlap over the wheel's surface, the deepest point of each strip and the contact points."""
     centre, spread = _middle(found["spatial"] + found["planar"])
-    u = np.linspace(max(centre - spread - window, pair.wheel.u[0]), centre + spread + window, 300)
+    u = np.linspace(max(centre - spread - window, scene.wheel.u[0]), centre + spread + window, 300)
     s = np.linspace(-0.1, 0.1, 1001)
-    points = pair.wheel_points(side, *np.meshgrid(u, s), **pose)
+    points = _wheel_points(scene, side, *np.meshgrid(u, s), **pose)
     x, y = MM * points[..., 0], MM * points[..., 1]
-    overlap = np.nan_to_num(MM * (_rail_below(pair, side, points[..., 1]) - points[..., 2]), nan=-1.0)
+    overlap = np.nan_to_num(MM * (_rail_below(scene, side, points[..., 1]) - points[..., 2]), nan=-1.0)
     mesh = axes.pcolormesh(
         x, y, np.ma.masked_less(overlap, 0.0), cmap="Greys", vmin=0, shading="gouraud", rasterized=True
     )

@@ -160,6 +160,29 @@ def load_run(path):
         raise InputError(path, "", f"expected a complete run file (HDF5), got: {error}") from None
 
 
+def load_runs(paths):
+    """Read several runs that lie as ``<case>/<name>.h5``.
+
+    Parameters
+    ----------
+    paths : iterable of path-like
+
+    Returns
+    -------
+    dict of str to dict of str to Run
+        Runs by folder name and by file name without its ending, in the order of the paths.
+
+    Raises
+    ------
+    InputError
+        As `load_run`.
+    """
+    cases = {}
+    for path in map(Path, paths):
+        cases.setdefault(path.parent.name, {})[path.stem] = load_run(path)
+    return cases
+
+
 def _check_format(path, file):
     found = file.attrs.get("format", "none")
     if found != FORMAT:

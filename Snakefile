@@ -1,0 +1,25 @@
+# From real profiles to the paper's figures and timing table: snakemake --cores 2
+# The same on a smaller problem, beside it:                   snakemake --cores 2 --configfile config/smoke.yaml
+from snakemake.utils import min_version
+
+min_version("9.20")
+
+
+configfile: "config/study.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/simulate.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
+
+
+report: "workflow/report/overview.rst"
+
+
+rule all:
+    default_target: True
+    input:
+        rules.study.input,
+        rules.report_archive.output,

@@ -1,0 +1,81 @@
+# Checks of the configuration, and which sources each family of rules stands on.
+import os
+from pathlib import Path
+
+import jsonschema
+import yaml
+from snakemake.exceptions import WorkflowError
+
+HERE = Path(workflow.basedir)
+
+
+def check_config():
+    """Stop before any job, with one line that names the key, if the configuration cannot be used."""
+    schema = yaml.safe_load((HERE / "workflow/schemas/config.schema.yaml").read_text())
+    error = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(config))
+    if error is not None:
+        key = ".".join(map(str, error.absolute_path)) or "top level"
+        meaning = error.schema.get("description", "see workflow/schemas/config.schema.yaml")
+        raise WorkflowError(f"configuration: {key}: {error.message} ({meaning})")
+    chosen = {
+        "timing.cases": config["timing"]["cases"],
+        "comparison.case": [config["comparison"]["case"]],
+        "figures.contact_points": [config["figures"]["contact_points"]],
+    }
+    for key, names in chosen.items():
+        for name in set(names) - set(config["cases"]):
+            raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
+    if config["comparison"]["case"] not in config["timing"]["cases"]:
+        raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
+    for key, entry in [*config["cases"].items(), ("contact_geometry", config["contact_geometry"])]:
+        if not Path(entry["scene"]).is_file():
+            raise WorkflowError(f"configuration: {key}: no scene file {entry['scene']}")
+
+
+check_config()
+
+CASES = list(config["cases"])
+WITH_TWINS = [case for case in CASES if config["cases"][case]["twins"]]
+
+
+wildcard_constraints:
+    case="|".join(CASES),
+
+
+def sources(*rooms):
+    """Files of wrcore's rooms. A rule lists them as inputs, else an edit there would go unnoticed."""
+    files = ["wrcore/__init__.py", "wrcore/_jit.py", "wrcore/errors.py"]
+    for room in rooms:
+        files += sorted(str(p) for p in Path("wrcore").glob(f"{room}/*") if p.is_file()) or [f"wrcore/{room}.py"]
+    return files
+
+
+SCENE = ("vehicle", "schemas", "checked_yaml", "scene")
+CORE = {
+    "creep": sources("creep"),
+    "geometry": sources("geometry", "contact", *SCENE),
+    "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, "simulate", "results"),
+    "analysis": sources("simulate", "results", "analysis"),
+    "figures": sources("geometry", "contact", *SCENE, "simulate", "results", "analysis", "figures"),
+}
+SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
+
+
+def case_scene(wildcards):
+    return config["cases"][wildcards.case]["scene"]
+
+
+def overrides(case, table):
+    """Changes to a case's scene, as `wrcore simulate --set` takes them. Scenes name files relative to their folder."""
+    entry = config["cases"][case]
+    table = os.path.relpath(table, Path(entry["scene"]).parent)
+    return [f"{key}={value}" for key, value in (entry["set"] | {"contact.creep.table": table}).items()]
+
+
+def case_overrides(wildcards, input):
+    return overrides(wildcards.case, input.table[0])
+
+
+def timed_cases(wildcards, input):
+    chosen = config["timing"]["cases"]
+    return {case: [config["cases"][case]["scene"], overrides(case, input.table[0])] for case in chosen}

@@ -1,0 +1,106 @@
+# One rule per figure of the paper; the function in wrcore.figures has the rule's name.
+
+
+rule fig1_parametrisation:
+    input:
+        core=CORE["figures"],
+        scenes=SCENES,
+        scene=config["contact_geometry"]["scene"],
+    output:
+        report(
+            "<results>/figures/fig1_parametrisation.png",
+            caption="../report/fig1.rst",
+            category="Geometry",
+            labels={"figure": "1"},
+        ),
+        "<results>/figures/fig1_parametrisation.svg",
+    log:
+        "<logs>/fig1_parametrisation.log",
+    script:
+        "../scripts/fig1_parametrisation.py"
+
+
+rule fig2_profiles:
+    input:
+        core=CORE["figures"],
+        scenes=SCENES,
+        scene=config["contact_geometry"]["scene"],
+    output:
+        report(
+            "<results>/figures/fig2_profiles.png",
+            caption="../report/fig2.rst",
+            category="Geometry",
+            labels={"figure": "2"},
+        ),
+        "<results>/figures/fig2_profiles.svg",
+    log:
+        "<logs>/fig2_profiles.log",
+    script:
+        "../scripts/fig2_profiles.py"
+
+
+rule fig3_detection:
+    input:
+        core=CORE["figures"],
+        scenes=SCENES,
+        scene=config["contact_geometry"]["scene"],
+    output:
+        report(
+            "<results>/figures/fig3_detection.png",
+            caption="../report/fig3.rst",
+            category="Geometry",
+            labels={"figure": "3"},
+        ),
+        "<results>/figures/fig3_detection.svg",
+    log:
+        "<logs>/fig3_detection.log",
+    params:
+        pose=config["figures"]["detection_pose"],
+    script:
+        "../scripts/fig3_detection.py"
+
+
+rule fig4_lateral_position:
+    input:
+        core=CORE["figures"],
+        planar=expand(rules.simulate.output.planar, case=CASES),
+        spatial=expand(rules.simulate.output.spatial, case=CASES),
+        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
+    output:
+        report(
+            "<results>/figures/fig4_lateral_position.png",
+            caption="../report/fig4.rst",
+            category="Wheelset",
+            labels={"figure": "4"},
+        ),
+        "<results>/figures/fig4_lateral_position.svg",
+    log:
+        "<logs>/fig4_lateral_position.log",
+    params:
+        titles={case: config["cases"][case]["title"] for case in CASES},
+        bound=config["twins"]["bound"],
+    script:
+        "../scripts/fig4_lateral_position.py"
+
+
+rule fig5_contact_points:
+    input:
+        core=CORE["figures"],
+        scenes=SCENES,
+        planar=expand(rules.simulate.output.planar, case=config["figures"]["contact_points"]),
+        spatial=expand(rules.simulate.output.spatial, case=config["figures"]["contact_points"]),
+        tight=expand(rules.simulate_twins.output.tight, case=set(WITH_TWINS) & {config["figures"]["contact_points"]}),
+    output:
+        report(
+            "<results>/figures/fig5_contact_points.png",
+            caption="../report/fig5.rst",
+            category="Wheelset",
+            labels={"figure": "5"},
+        ),
+        "<results>/figures/fig5_contact_points.svg",
+    log:
+        "<logs>/fig5_contact_points.log",
+    params:
+        bound=config["twins"]["bound"],
+    script:
+        "../scripts/fig5_contact_points.py"

@@ -1,0 +1,109 @@
+# Tables, the notebook and the report.
+
+
+rule motion_table:
+    input:
+        core=CORE["analysis"],
+        planar=expand(rules.simulate.output.planar, case=CASES),
+        spatial=expand(rules.simulate.output.spatial, case=CASES),
+        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
+        mirrored=expand(rules.simulate_twins.output.mirrored, case=WITH_TWINS),
+    output:
+        report(
+            "<results>/tables/motion.csv",
+            caption="../report/motion.rst",
+            category="Wheelset",
+            labels={"table": "motion"},
+        ),
+    log:
+        "<logs>/motion_table.log",
+    params:
+        bound=config["twins"]["bound"],
+    script:
+        "../scripts/motion_table.py"
+
+
+rule timing_table:
+    input:
+        core=CORE["analysis"],
+        samples=rules.time_runs.output,
+    output:
+        report(
+            "<results>/tables/timing.csv",
+            caption="../report/timing.rst",
+            category="Cost",
+            labels={"table": "timing"},
+        ),
+    log:
+        "<logs>/timing_table.log",
+    script:
+        "../scripts/timing_table.py"
+
+
+rule comparison_table:
+    input:
+        core=CORE["analysis"],
+        reference="reports/reference_values.csv",
+        geometry=rules.contact_geometry.output,
+        motion=rules.motion_table.output,
+        timing=rules.timing_table.output,
+    output:
+        report(
+            "<results>/tables/comparison.csv",
+            caption="../report/comparison.rst",
+            category="Comparison with published values",
+            labels={"table": "comparison"},
+        ),
+        "<results>/tables/comparison.md",
+    log:
+        "<logs>/comparison_table.log",
+    params:
+        case=config["comparison"]["case"],
+    script:
+        "../scripts/comparison_table.py"
+
+
+rule first_light_notebook:
+    input:
+        core=CORE["figures"],
+        notebook="notebooks/first_light.ipynb",
+        runs=expand([rules.simulate.output.planar, rules.simulate.output.spatial], case=CASES),
+        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
+    output:
+        "<results>/notebooks/first_light.ipynb",
+    log:
+        "<logs>/notebook.log",
+    params:
+        runs=lambda wildcards, input: Path(input.runs[0]).parent.parent,
+        folder=subpath(output[0], parent=True),
+    shell:
+        "WRCORE_RUNS=$(realpath {params.runs}) jupyter nbconvert --to notebook --execute"
+        " --ExecutePreprocessor.record_timing=False --output-dir {params.folder} {input.notebook} &> {log}"
+
+
+rule study:
+    input:
+        rules.contact_geometry.output,
+        rules.fig1_parametrisation.output,
+        rules.fig2_profiles.output,
+        rules.fig3_detection.output,
+        rules.fig4_lateral_position.output,
+        rules.fig5_contact_points.output,
+        rules.motion_table.output,
+        rules.timing_table.output,
+        rules.comparison_table.output,
+        rules.first_light_notebook.output,
+
+
+rule report_archive:
+    input:
+        rules.study.input,
+        captions=expand("workflow/report/{name}", name=sorted(p.name for p in (HERE / "workflow/report").glob("*.rst"))),
+    output:
+        "<results>/report.zip",
+    log:
+        "<logs>/report_archive.log",
+    params:
+        config=config,
+    script:
+        "../scripts/report_archive.py"

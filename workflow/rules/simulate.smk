@@ -1,0 +1,60 @@
+# One job per case: a series of runs that share imports and compiled kernels.
+
+
+rule simulate:
+    input:
+        core=CORE["simulation"],
+        scenes=SCENES,
+        scene=case_scene,
+        table=rules.creep_table.output,
+    output:
+        planar="<results>/runs/{case}/planar.h5",
+        spatial="<results>/runs/{case}/spatial.h5",
+    log:
+        "<logs>/simulate/{case}.log",
+    benchmark:
+        "<benchmarks>/simulate/{case}.tsv"
+    params:
+        overrides=case_overrides,
+    script:
+        "../scripts/simulate.py"
+
+
+rule simulate_twins:
+    input:
+        core=CORE["simulation"],
+        scenes=SCENES,
+        scene=case_scene,
+        table=rules.creep_table.output,
+    output:
+        tight="<results>/runs/{case}/spatial_tight.h5",
+        mirrored="<results>/runs/{case}/spatial_mirrored.h5",
+    log:
+        "<logs>/simulate_twins/{case}.log",
+    benchmark:
+        "<benchmarks>/simulate_twins/{case}.tsv"
+    params:
+        overrides=case_overrides,
+        twins=config["twins"],
+    script:
+        "../scripts/simulate_twins.py"
+
+
+rule time_runs:
+    input:
+        core=CORE["simulation"] + CORE["analysis"],
+        scenes=SCENES,
+        table=rules.creep_table.output,
+    output:
+        "<results>/tables/timing_samples.csv",
+    log:
+        "<logs>/time_runs.log",
+    benchmark:
+        "<benchmarks>/time_runs.tsv"
+    params:
+        cases=timed_cases,
+        repetitions=config["timing"]["repetitions"],
+    # all cores: nothing else may run beside it
+    threads: workflow.cores
+    script:
+        "../scripts/time_runs.py"

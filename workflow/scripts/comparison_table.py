@@ -1,0 +1,17 @@
+"""Published values beside ours."""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+from snakemake.script import snakemake
+
+from wrcore.analysis import comparison_table, our_values
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+tables = (pd.read_csv(snakemake.input[name][0]) for name in ("geometry", "motion", "timing"))
+table = comparison_table(
+    pd.read_csv(snakemake.input.reference, comment="#"), our_values(*tables, snakemake.params.case)
+)
+table.to_csv(snakemake.output[0], index=False)
+Path(snakemake.output[1]).write_text(table.to_markdown(index=False) + "\n")

@@ -1,0 +1,12 @@
+"""Fig. 2: points on the profiles."""
+
+import sys
+
+from snakemake.script import snakemake
+
+from wrcore.figures import fig2_profiles, save_figure
+from wrcore.scene import load_scene
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+scene = load_scene(snakemake.input.scene)
+save_figure(fig2_profiles(scene.wheel, scene.rail), *snakemake.output)

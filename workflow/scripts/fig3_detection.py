@@ -1,0 +1,11 @@
+"""Fig. 3: planar and spatial detection at one pose."""
+
+import sys
+
+from snakemake.script import snakemake
+
+from wrcore.figures import fig3_detection, save_figure
+from wrcore.scene import load_scene
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+save_figure(fig3_detection(load_scene(snakemake.input.scene), **snakemake.params.pose), *snakemake.output)

@@ -1,0 +1,17 @@
+"""Fig. 5: contact points on the rail and wheel profiles."""
+
+import sys
+
+from snakemake.script import snakemake
+
+from wrcore.analysis import horizons
+from wrcore.figures import fig5_contact_points, save_figure
+from wrcore.results import load_runs
+from wrcore.scene import load_scene
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+scene = load_scene(snakemake.input.scene)
+cases = load_runs([*snakemake.input.planar, *snakemake.input.spatial, *snakemake.input.tight])
+horizon = horizons(cases, snakemake.params.bound)
+((case, runs),) = cases.items()
+save_figure(fig5_contact_points(runs, scene.wheel, scene.rail, horizon.get(case)), *snakemake.output)
