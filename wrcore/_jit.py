@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numba
 
-FAST = frozenset({"contract", "nsz", "arcp", "reassoc"})
+FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
 
 KERNEL_ROOMS = ("geometry", "contact", "creep", "dynamics")

@@ -1,9 +1,30 @@
-"""From a scene to a run."""
+"""From a scene to a run: compile, integrate, collect the channels."""
 
+import time
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
+
+import wrcore
+from wrcore.contact import detection
+from wrcore.dynamics.body import STATE_SIZE, angles
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.scene import compile_scene
+
+DERAILED_Y = 0.05
+"""A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
+
+SIDES = ("left", "right")
+CONTACT_CHANNELS = {
+    "u_wheel_m": detection.U_WHEEL, "s_wheel_rad": detection.S_WHEEL, "u_rail_m": detection.U_RAIL,
+    "x_m": detection.X, "y_m": detection.Y, "z_m": detection.Z, "contact_angle_rad": detection.ANGLE,
+    "penetration_m": detection.PENETRATION, "a_m": detection.SEMI_A, "b_m": detection.SEMI_B,
+    "N_N": detection.NORMAL, "Fx_N": detection.FX, "Fy_N": detection.FY, "Mz_Nm": detection.MZ,
+    "xi": detection.XI, "eta": detection.ETA, "phi_per_m": detection.PHI,
+}  # fmt: skip
+"""Contact channels and their columns in the patch array."""
 
 
 @dataclass
@@ -46,3 +67,97 @@ class Run:
         if group not in self.groups:
             raise KeyError(f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}")
         return SimpleNamespace(**self.groups[group])
+
+
+def simulate(scene, progress=None):
+    """Run a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From :func:`wrcore.scene.load_scene`.
+    progress : callable, optional
+        Called after each step with the simulated time reached, s.
+
+    Returns
+    -------
+    Run
+        Whatever happened is in ``status`` and ``reason``; what was reached is kept.
+    """
+    started = time.perf_counter()
+    model, state = compile_scene(scene)
+    work = workspace(model)
+    function = right_hand_side(model, work)
+    function(0.0, state)  # compiles, or loads the kernels from the cache
+    compiled = time.perf_counter()
+    settings = scene.data["integration"]
+    count = int(np.floor(settings["duration"] * scene.data["output"]["rate"] + 1e-9))
+    times = np.arange(count + 1) / scene.data["output"]["rate"]
+    if times[-1] < settings["duration"]:
+        times = np.append(times, settings["duration"])
+    trajectory = integrate(
+        function, state, times, settings["method"], settings["rtol"], settings["atol"], _derailment(model), progress
+    )
+    out_of_range = int(work.counters[1])
+    counters = {
+        "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
+        "wall_s": trajectory.wall_s, "compile_s": compiled - started, "table_out_of_range": out_of_range,
+        "simulated_s": float(trajectory.t[-1]),
+    }  # fmt: skip
+    groups = _channels(scene, model, work, function, trajectory)
+    record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **_flat(settings)}
+    return Run(scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters, record)
+
+
+def _flat(settings, prefix=""):
+    """Nested settings as one level, keys joined by dots."""
+    flat = {}
+    for key, value in settings.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return flat
+
+
+def _derailment(model):
+    """Stop condition: the reason once a wheelset has left the rails."""
+
+    def stop(t, state):
+        for body in model.bodies.wheelsets:
+            y = state[STATE_SIZE * body + 1]
+            if abs(y) > DERAILED_Y:
+                return f"a wheelset is {1e3 * abs(y):.0f} mm off the track's centre at t = {t:.6g} s"
+        return ""
+
+    return stop
+
+
+def _channels(scene, model, work, function, trajectory):
+    """Output channels by group; contact forces are evaluated again at the output times."""
+    wanted = scene.data["output"]["channels"]
+    wheelsets = model.bodies.wheelsets
+    shape = (len(trajectory.t), len(wheelsets), 2, detection.MAX_PATCHES, detection.PATCH_COLUMNS)
+    patches = np.full(shape, np.nan)
+    if "contact" in wanted:
+        for i, (t, state) in enumerate(zip(trajectory.t, trajectory.states, strict=True)):
+            function(t, state)
+            present = np.arange(detection.MAX_PATCHES) < work.counts[..., None]
+            patches[i][present] = work.patches[present]
+    groups = {}
+    for body, name in enumerate(scene.vehicle.body_names):
+        state = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        groups[name] = _body_channels(state, wanted)
+        if "contact" in wanted and body in wheelsets:
+            k = int(np.flatnonzero(wheelsets == body)[0])
+            for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
+                groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+    return groups
+
+
+def _body_channels(state, wanted):
+    channels = {}
+    if "pose" in wanted:
+        roll, _, yaw = angles(state[:, 3:7])
+        channels |= {"x_m": state[:, 0], "y_m": state[:, 1], "z_m": state[:, 2], "roll_rad": roll, "yaw_rad": yaw}
+    if "velocity" in wanted:
+        names = ("vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s")
+        channels |= {name: state[:, 7 + i] for i, name in enumerate(names)}
+    return channels

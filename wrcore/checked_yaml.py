@@ -1,0 +1,156 @@
+"""YAML files read strictly: one clear line for whatever is wrong, before any work starts."""
+
+import copy
+import math
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import yaml
+
+from wrcore.errors import InputError
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe loader that refuses repeated keys and reads 1e-6 as a number."""
+
+
+def _mapping(loader, node, deep=False):
+    keys = [loader.construct_object(key, deep=True) for key, _ in node.value]
+    for i, key in enumerate(keys):
+        if key in keys[:i]:
+            raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} is given twice", node.start_mark)
+    return loader.construct_mapping(node, deep)
+
+
+_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    list("-+0123456789."),
+)
+
+
+def read_yaml(path):
+    """Read one YAML mapping.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not UTF-8, not YAML, repeats a key or holds no mapping.
+    """
+    try:
+        data = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_Loader)
+    except OSError as error:
+        raise InputError(path, "", f"expected a readable file: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(path, "", "expected a UTF-8 text file") from None
+    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}" if mark else ""
+        raise InputError(path, where, f"expected YAML: {getattr(error, 'problem', None) or error}") from None
+    if not isinstance(data, dict):
+        raise InputError(path, "", f"expected a mapping of keys, got {type(data).__name__}")
+    return data
+
+
+def parse_value(text):
+    """One value as written on a command line (``--set key=value``), by YAML's rules."""
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError:
+        return text
+
+
+def validate(data, schema_name, source):
+    """Check data against a schema of the package and fill in its defaults.
+
+    Parameters
+    ----------
+    data : dict
+        Left as it is.
+    schema_name : str
+        File in ``wrcore/schemas`` without its ending.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    dict
+        A copy with all defaults.
+
+    Raises
+    ------
+    InputError
+        One line that names the field and what was expected.
+    """
+    schema = yaml.safe_load(files("wrcore").joinpath("schemas", f"{schema_name}.yaml").read_text(encoding="utf-8"))
+    data = copy.deepcopy(data)
+    _refuse_non_finite(data, source, "")
+    errors = sorted(jsonschema.Draft202012Validator(schema).iter_errors(data), key=lambda e: (len(e.path), str(e.path)))
+    if errors:
+        field, expected = _explain(errors[0])
+        raise InputError(source, field, expected)
+    _fill_defaults(data, schema, schema)
+    return data
+
+
+def _refuse_non_finite(value, source, field):
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(source, field, f"expected a finite number, got {value}")
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        _refuse_non_finite(item, source, f"{field}.{key}".lstrip("."))
+
+
+def _explain(error):
+    """Field and expectation of a validation error, from the schema's own descriptions."""
+    field = ".".join(str(part) for part in error.absolute_path)
+    if error.validator == "additionalProperties":
+        known = sorted(error.schema.get("properties", {}))
+        unknown = sorted(str(key) for key in set(error.instance) - set(known))
+        field = ".".join(filter(None, [field, unknown[0]]))
+        return field, f"unknown key; expected one of {', '.join(known)}"
+    if error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        field = ".".join(filter(None, [field, missing[0]]))
+        text = error.schema["properties"].get(missing[0], {}).get("description", "a value")
+        return field, f"expected {text}, but the key is missing"
+    description = error.schema.get("description")
+    if description is None:
+        return field, error.message
+    return field, f"expected {description}, got {_short(error.instance)}"
+
+
+def _short(value):
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def _fill_defaults(data, schema, root):
+    for key, part in schema.get("properties", {}).items():
+        if key not in data and "default" in part:
+            data[key] = copy.deepcopy(part["default"])
+        if key in data:
+            _fill_inside(data[key], part, root)
+    if isinstance(schema.get("additionalProperties"), dict):
+        for item in data.values():
+            _fill_inside(item, schema["additionalProperties"], root)
+
+
+def _fill_inside(value, part, root):
+    if isinstance(value, dict) and part.get("type") == "object":
+        _fill_defaults(value, part, root)
+    if isinstance(value, list) and isinstance(part.get("items"), dict):
+        for item in value:
+            if isinstance(item, dict):
+                _fill_defaults(item, part["items"], root)

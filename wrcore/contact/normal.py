@@ -1,0 +1,151 @@
+"""Normal contact: Hertz's ellipse with exact elliptic integrals, and Eq. (7) with its damping factor.
+
+For the gap A x^2 + B y^2 (x rolling, y lateral) and an approach delta, Hertz's solution is written as
+
+    N = (4/3) E* k(l) (A + B)^(-1/2) delta^(3/2),    a = p(l) sqrt(delta / (A + B)),    b = p(-l) sqrt(delta / (A + B))
+
+with l = ln(B/A). The shape functions k (even) and p are tabulated once from the elliptic integrals and interpolated,
+so that a contact costs no iteration.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipkm1
+
+from wrcore._jit import jit
+
+LOG_RATIO_MAX = 14.0
+_NODES = 561
+
+
+class HertzTable(NamedTuple):
+    """Shape functions of Hertz's ellipse over l = ln(B/A), for kernels."""
+
+    step: float
+    values: np.ndarray
+    """(n, 4): p, dp/dl * step, k, dk/dl * step at l = -LOG_RATIO_MAX + i * step."""
+
+
+def contact_modulus(shear_modulus, poisson_ratio):
+    """Contact modulus E* of two equal bodies, Pa: 1/E* = 2 (1 - nu^2)/E, E = 2 G (1 + nu), so E* = G/(1 - nu)."""
+    return shear_modulus / (1.0 - poisson_ratio)
+
+
+def hertz_shape(ratio):
+    """Exact shape functions of the Hertz ellipse.
+
+    Parameters
+    ----------
+    ratio : float
+        Larger over smaller relative curvature, >= 1.
+
+    Returns
+    -------
+    p_large, p_small, k : float
+        Semi-axis factors (the larger axis lies along the smaller curvature) and stiffness factor of the module's
+        formulas.
+
+    References
+    ----------
+    Johnson, Contact Mechanics (1985), section 4.2, Eqs. (4.28)-(4.32).
+    """
+
+    def curvature_ratio(log_axis_ratio):
+        """ln of (large/small curvature) of the ellipse with axis ratio exp(log_axis_ratio) >= 1."""
+        flat = math.exp(-2.0 * log_axis_ratio)  # (b/a)^2 = 1 - e^2
+        if flat > 1.0 - 1e-6:  # both differences cancel; series in 1 - flat
+            return 1.5 * log_axis_ratio
+        big_k, big_e = ellipkm1(flat), ellipe(1.0 - flat)
+        return math.log((big_e / flat - big_k) / (big_k - big_e))
+
+    log_axis_ratio = brentq(lambda x: curvature_ratio(x) - math.log(ratio), 0.0, 30.0, xtol=1e-14)
+    flat = math.exp(-2.0 * log_axis_ratio)
+    big_k, big_e = ellipkm1(flat), ellipe(1.0 - flat)
+    # With c^3 = 3 F / (4 E* (A + B)): a^3 = (2 E / (pi flat)) c^3, and delta = (p0 / E*) b K, p0 = 3 F / (2 pi a b).
+    a = (2.0 * big_e / (math.pi * flat)) ** (1.0 / 3.0)
+    b = a * math.sqrt(flat)
+    r = 2.0 * big_k / (math.pi * a)
+    return a / math.sqrt(r), b / math.sqrt(r), r**-1.5
+
+
+@lru_cache(maxsize=1)
+def hertz_table():
+    """Tabulate the shape functions (cubic Hermite nodes with slopes of the interpolating spline).
+
+    Returns
+    -------
+    HertzTable
+    """
+    log_ratio = np.linspace(0.0, LOG_RATIO_MAX, _NODES // 2 + 1)
+    p_large, p_small, k = np.array([hertz_shape(ratio) for ratio in np.exp(log_ratio)]).T
+    log_ratio = np.concatenate([-log_ratio[:0:-1], log_ratio])
+    step = log_ratio[1] - log_ratio[0]
+    columns = []
+    for values in (np.concatenate([p_small[:0:-1], p_large]), np.concatenate([k[:0:-1], k])):
+        columns += [values, CubicSpline(log_ratio, values)(log_ratio, 1) * step]
+    return HertzTable(float(step), np.column_stack(columns))
+
+
+@jit
+def _hermite(table, column, position, i):
+    t = position - i
+    s = t - 1.0
+    y0, d0, y1, d1 = table[i, column], table[i, column + 1], table[i + 1, column], table[i + 1, column + 1]
+    return y0 + t * (d0 + t * ((y1 - y0 - d0) + s * (d0 + d1 - 2.0 * (y1 - y0))))
+
+
+@jit
+def hertz_ellipse(table, A, B):
+    """Stiffness and semi-axis factors for relative curvatures A (rolling) and B (lateral), 1/m.
+
+    Returns
+    -------
+    stiffness, a_factor, b_factor : float
+        N = E* stiffness delta^1.5 (stiffness in sqrt(m)); a = a_factor sqrt(delta), b = b_factor sqrt(delta), both
+        factors in sqrt(m).
+    """
+    total = A + B
+    position = (math.log(B / A) + LOG_RATIO_MAX) / table.step
+    last = table.values.shape[0] - 1
+    position = min(max(position, 0.0), last - 1e-9)
+    i = int(position)
+    a_factor = _hermite(table.values, 0, position, i)
+    k = _hermite(table.values, 2, position, i)
+    mirrored = last - position
+    j = min(int(mirrored), last - 1)
+    b_factor = _hermite(table.values, 0, mirrored, j)
+    root = 1.0 / math.sqrt(total)
+    return 4.0 / 3.0 * k * root, a_factor * root, b_factor * root
+
+
+@jit
+def damping_factor(approach_speed, c_e, v0):
+    """Damping factor c_d of Eq. (7): c_e when separating, 1 when approaching, a cubic in |speed| < v0.
+
+    C1 and never negative, so the normal force never pulls. At rest it is (1 + c_e)/2: the static penetration is
+    larger than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e).
+
+    Parameters
+    ----------
+    approach_speed : float
+        Rate of penetration, m/s, positive while approaching.
+    c_e : float
+        Factor of fast separation, 0 < c_e <= 1; 1 switches damping off.
+    v0 : float
+        Speed at which the factor saturates, m/s, > 0.
+
+    References
+    ----------
+    Ambrosio and Pombo, Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020).
+    """
+    if approach_speed >= v0:
+        return 1.0
+    if approach_speed <= -v0:
+        return c_e
+    r = 0.5 * (approach_speed + v0) / v0
+    return c_e + (1.0 - c_e) * r * r * (3.0 - 2.0 * r)

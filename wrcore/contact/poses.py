@@ -1,0 +1,161 @@
+"""Contact of a wheelset at rest in given poses: the table behind ``wrcore contact``."""
+
+import math
+
+import numpy as np
+
+from wrcore.contact import detection as columns
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
+from wrcore.errors import InputError
+from wrcore.geometry.surface import SIDES
+
+PATCH_FIELDS = {
+    "u_wheel_m": columns.U_WHEEL, "s_wheel_rad": columns.S_WHEEL, "u_rail_m": columns.U_RAIL, "x_m": columns.X,
+    "y_m": columns.Y, "z_m": columns.Z, "contact_angle_rad": columns.ANGLE, "penetration_m": columns.PENETRATION,
+    "a_m": columns.SEMI_A, "b_m": columns.SEMI_B, "N_N": columns.NORMAL,
+}  # fmt: skip
+"""Columns of the result and of the patch array."""
+
+
+def read_poses(path):
+    """Read and check a CSV file of poses.
+
+    Parameters
+    ----------
+    path : str or Path
+        Columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m; an empty cell counts as not given.
+
+    Returns
+    -------
+    pandas.DataFrame
+
+    Raises
+    ------
+    InputError
+        Naming the file, the column (and row) and what was expected.
+    """
+    import pandas as pd
+
+    try:
+        frame = pd.read_csv(path, dtype={"pose_id": str}, skipinitialspace=True, comment="#")
+    except OSError as error:
+        raise InputError(path, "", f"expected a readable CSV file: {error.strerror}") from None
+    except (ValueError, pd.errors.ParserError) as error:  # includes EmptyDataError and UnicodeDecodeError
+        raise InputError(path, "", f"expected a CSV table: {error}") from None
+    known = ("pose_id", "y_m", "yaw_rad", "roll_rad", "z_m")
+    for name in known[:3]:
+        if name not in frame:
+            raise InputError(path, name, f"expected this column; found {', '.join(map(str, frame.columns))}")
+    for name in frame.columns:
+        if name not in known:
+            raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
+    for name, limit in (("y_m", 0.1), ("yaw_rad", 0.5), ("roll_rad", 0.5), ("z_m", 2.0)):
+        if name not in frame:
+            frame[name] = np.nan
+            continue
+        values = pd.to_numeric(frame[name], errors="coerce")
+        empty = frame[name].isna()
+        bad = (values.isna() & ~empty) | (values.abs() > limit) | (empty & (name in known[:3]))
+        if bad.any():
+            row = int(np.argmax(bad.to_numpy()))
+            raise InputError(
+                path, f"{name}, row {row + 1}", f"expected a number within {limit:g}, got {frame[name].iloc[row]!r}"
+            )
+        frame[name] = values
+    return frame
+
+
+def solve_poses(poses, geometry, wheel_load, detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28):
+    """Patches of both wheels for every pose, statically (damping factor 1: plain Hertz).
+
+    Parameters
+    ----------
+    poses : pandas.DataFrame
+        As from :func:`read_poses`. Neither roll nor z given: both are solved so that each wheel carries
+        ``wheel_load`` vertically. Roll given, z not: each side is solved by itself. z given, roll not: roll is zero.
+    geometry : ContactGeometry
+    wheel_load : float
+        Vertical load per wheel, N, > 0.
+    detection : {"planar", "spatial"}
+    shear_modulus, poisson_ratio : float
+        Material of both bodies, Pa and -.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per patch; a wheel without contact has none. A pose without equilibrium gives no rows.
+    """
+    import pandas as pd
+
+    hertz, modulus, spatial = hertz_table(), contact_modulus(shear_modulus, poisson_ratio), detection == "spatial"
+    if detection not in columns.DETECTIONS:
+        raise InputError("detection", "", f"expected one of {', '.join(columns.DETECTIONS)}, got {detection!r}")
+    rows = []
+    patches = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    nominal = geometry.rolling_radius
+    for pose in poses.itertuples():
+        y, yaw, roll, heights = pose.y_m, pose.yaw_rad, pose.roll_rad, {side: pose.z_m for side in SIDES}
+        if math.isnan(roll) and math.isnan(pose.z_m):
+            roll, z = settle(geometry, hertz, modulus, y, yaw, spatial, wheel_load, nominal)
+            heights = {side: z for side in SIDES}
+        elif math.isnan(pose.z_m):
+            heights = {
+                side: height_at_load(
+                    geometry, hertz, modulus, sign, y, roll, yaw, spatial, wheel_load, nominal, patches
+                )
+                for side, sign in SIDES.items()
+            }
+        elif math.isnan(roll):
+            roll = 0.0
+        for side, sign in SIDES.items():
+            z = heights[side]
+            if math.isnan(z):
+                continue
+            count, _ = wheel_at_rest(geometry, hertz, modulus, sign, y, z, roll, yaw, spatial, patches)
+            for number, row in enumerate(patches[:count], start=1):
+                values = {name: row[column] for name, column in PATCH_FIELDS.items()}
+                p_max = 1.5 * values["N_N"] / (math.pi * values["a_m"] * values["b_m"])
+                rows.append({"pose_id": pose.pose_id, "side": side, "patch": number, **values, "p_max_Pa": p_max,
+                             "roll_rad": roll, "z_wheelset_m": z})  # fmt: skip
+    names = ["pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def geometry_table(geometry, shifts, detection="planar"):
+    """Rigid contact geometry of a wheelset without load and yaw: what a conicity study starts from.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    shifts : array_like, shape (n,)
+        Lateral positions of the wheelset, m (positive to the left).
+    detection : {"planar", "spatial"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns y_m, roll_rad, lowering_m (of the wheelset against its nominal height), rolling_radius_difference_m
+        (left less right: positive when shifted to the left), u_wheel and contact angle per side. Touching is taken as
+        a wheel load of 1 mN (penetration below 1 nm).
+    """
+    import pandas as pd
+
+    touch = 1e-3
+    poses = pd.DataFrame({"pose_id": [str(i) for i in range(len(shifts))], "y_m": shifts})
+    poses = poses.assign(yaw_rad=0.0, roll_rad=np.nan, z_m=np.nan)
+    table = solve_poses(poses, geometry, touch, detection)
+    rows = []
+    for pose in poses.itertuples():
+        found = table[table.pose_id == pose.pose_id]
+        deepest = {side: found[found.side == side].nlargest(1, "N_N").iloc[0] for side in SIDES}
+        row = {"y_m": pose.y_m, "roll_rad": deepest["left"].roll_rad,
+               "lowering_m": geometry.rolling_radius - deepest["left"].z_wheelset_m}  # fmt: skip
+        radius = {}
+        for side, patch in deepest.items():
+            u, start, step = patch.u_wheel_m, geometry.wheel_start, geometry.wheel_step
+            radius[side] = geometry.rolling_radius + columns._cubic_at(geometry.wheel, start, step, u)[0]
+            row |= {f"u_wheel_{side}_m": u, f"contact_angle_{side}_rad": patch.contact_angle_rad}
+        row["rolling_radius_difference_m"] = radius["left"] - radius["right"]
+        rows.append(row)
+    return pd.DataFrame(rows)

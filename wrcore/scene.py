@@ -1,0 +1,203 @@
+"""Scenes: a validated description becomes a compiled model and its initial state."""
+
+import json
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from wrcore.checked_yaml import parse_value, read_yaml, validate
+from wrcore.contact.detection import axle_direction, contact_geometry, detect
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.statics import settle
+from wrcore.creep.laws import creep_data
+from wrcore.dynamics.body import STATE_SIZE, euler_parameters
+from wrcore.dynamics.system import Model
+from wrcore.dynamics.wheel import ContactModel
+from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.standards import named_profile
+from wrcore.geometry.track import Track
+from wrcore.vehicle.description import Vehicle, load_vehicle
+
+GRAVITY = 9.81
+"""m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
+
+POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
+"""Endings by which a profile given as plain text is taken for a point file."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A checked scene: its data with all defaults, and what its files hold.
+
+    Attributes
+    ----------
+    data : dict
+        The scene file's content after overrides and defaults; plain JSON values.
+    source : str
+        Named in errors.
+    vehicle : Vehicle
+    wheel, rail : ProfileCurve
+    track : Track
+    """
+
+    data: dict
+    source: str
+    vehicle: Vehicle
+    wheel: ProfileCurve
+    rail: ProfileCurve
+    track: Track
+
+    @property
+    def detection(self):
+        """``planar`` or ``spatial``."""
+        return self.data["contact"]["detection"]
+
+
+def load_scene(scene, overrides=()):
+    """Read and check a scene.
+
+    Parameters
+    ----------
+    scene : str, Path or dict
+        Scene file, or the content of one (then paths count from the working directory).
+    overrides : sequence of str
+        ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError
+        One line that names file, field and expectation.
+
+    Examples
+    --------
+    >>> scene = load_scene("config/scenes/wheelset.yaml", ["speed=30", "contact.detection=planar"])
+    >>> scene.data["speed"], scene.detection
+    (30, 'planar')
+    """
+    if isinstance(scene, dict):
+        source, folder, data = "scene", Path("."), json.loads(json.dumps(scene))
+    else:
+        source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
+    for override in overrides:
+        _override(data, override)
+    data = validate(data, "scene", source)
+    vehicle = load_vehicle(_find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters"))
+    wheel = _profile(data, "wheel", folder, source, 0.0)
+    rail = _profile(data, "rail", folder, source, _ratio(data["rail"]["inclination"], source, "rail.inclination"))
+    if "table" in data["contact"]["creep"]:
+        table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
+        data["contact"]["creep"]["table"] = str(table)
+    return Scene(data, source, vehicle, wheel, rail, Track(data["track"]["gauge"]))
+
+
+def _override(data, text):
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError("--set", text, "expected key.path=value")
+    *path, last = key.strip().split(".")
+    for part in path:
+        data = data.setdefault(part, {})
+        if not isinstance(data, dict):
+            raise InputError("--set", text, f"expected a key below a mapping, but {part!r} holds a value")
+    data[last] = parse_value(value)
+
+
+def _find(path, folder, source, field):
+    """A file named in a scene: relative to the scene's folder, else to the folder above it."""
+    for base in (folder, folder.parent):
+        if (base / path).is_file():
+            return base / path
+    raise InputError(source, field, f"expected an existing file, got {path!r}")
+
+
+def _ratio(value, source, field):
+    """Inclination as a ratio: a number or a fraction such as '1/40'."""
+    try:
+        ratio = float(Fraction(value)) if isinstance(value, str) else float(value)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}") from None
+    if abs(ratio) > 0.2:
+        raise InputError(source, field, f"expected a ratio within 1/5, got {value!r}")
+    return ratio
+
+
+def _profile(data, kind, folder, source, inclination):
+    """The scene's wheel or rail profile; files count from the scene's folder."""
+    spec = data[kind]["profile"]
+    field = f"{kind}.profile"
+    if isinstance(spec, dict) and isinstance(spec.get("points"), str):
+        spec = {**spec, "points": str(_find(spec["points"], folder, source, f"{field}.points"))}
+    elif isinstance(spec, str) and Path(spec).suffix.lower() in POINT_FILES:
+        spec = str(_find(spec, folder, source, field))
+    try:
+        return named_profile(spec, kind, inclination)
+    except InputError as error:
+        if error.source in (kind, "profile"):  # not a fault inside a file: name the scene
+            raise InputError(source, field, error.expected) from None
+        raise
+
+
+def compile_scene(scene, progress=None):
+    """Turn a scene into what kernels need.
+
+    Parameters
+    ----------
+    scene : Scene
+    progress : bool, optional
+        Show progress if a creep table has to be built.
+
+    Returns
+    -------
+    model : Model
+    state : numpy.ndarray, shape (13 n,)
+        Initial state: wheelsets at rest on the rails vertically and in roll, rolling forward without slip.
+    """
+    data, vehicle = scene.data, scene.vehicle
+    contact, integration = data["contact"], data["integration"]
+    material, damping = contact["material"], contact["normal"]["damping"]
+    model = Model(
+        vehicle.bodies,
+        ContactModel(
+            contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance),
+            hertz_table(), creep_data(contact["creep"], material["poisson_ratio"], progress), scene.detection == "spatial",
+            float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
+            float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
+        ),
+        vehicle.springs, vehicle.joints, float(data["speed"]), GRAVITY,
+        float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
+    )  # fmt: skip
+    return model, _initial_state(scene, model)
+
+
+def _initial_state(scene, model):
+    data, vehicle, contact = scene.data, scene.vehicle, model.contact
+    state = np.zeros(STATE_SIZE * len(vehicle.body_names))
+    y, yaw, speed = float(data["initial"]["y"]), float(data["initial"]["yaw"]), model.speed
+    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
+    for body in vehicle.bodies.wheelsets:
+        load = 0.5 * vehicle.axle_load(body, GRAVITY)
+        if load <= 0.0:
+            raise InputError(
+                scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
+            )
+        roll, z = settle(
+            contact.geometry, contact.hertz, modulus, y, yaw, contact.spatial, load, vehicle.rolling_radius
+        )
+        if not math.isfinite(z):
+            raise InputError(scene.source, "initial", "expected a position in which both wheels can stand on the rails")
+        patches = detect(contact.geometry, y, z, roll, yaw, scene.detection)
+        radius = np.mean([vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
+        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        part[:3] = vehicle.positions[body, 0], y, z
+        part[3:7] = euler_parameters(roll, 0.0, yaw)
+        part[7] = speed
+        part[10:13] = np.array(axle_direction(roll, yaw)) * speed / radius
+    return state
