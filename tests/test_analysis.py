@@ -1,11 +1,14 @@
 """Analysis against motions whose answers are known in closed form."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from synthetic import hunting_run
 
 from wrcore import analysis
+from wrcore.scene import load_scene
 
 
 @pytest.mark.parametrize("frequency", [0.7, 2.6, 9.0])
@@ -166,6 +169,19 @@ def test_comparison_table_says_within_only_where_there_is_a_tolerance_and_a_valu
     table = analysis.comparison_table(reference, {"lowering": 1.05, "ratio": 0.5, "spread": 2.2})
     assert table["within"].tolist() == ["yes", "", "no", ""]
     assert table["ours"].tolist()[:3] == [1.05, 0.5, 2.2]
+
+
+def test_geometry_table_meets_the_reference_pair():
+    scene = load_scene(Path(__file__).parent.parent / "config/scenes/wheelset.yaml")
+    table = analysis.geometry_table(scene, [0.0, 1e-3, 2e-3, 3e-3, 4e-3, -3e-3])
+    # S1002 on UIC60-MBench 1:40, rigid with roll. Lowering: CONTACT's zero-load start value, given to 0.1 um. Radius
+    # differences: an independent rigid-geometry code, given to 1 um; there 1 um of profile deviation counts double,
+    # because the contact points move along nearly conformal profiles
+    assert table["lowering_m"][0] == pytest.approx(0.1821e-3, abs=0.05e-6)
+    published = [0.637e-3, 0.805e-3, 0.995e-3, 1.235e-3]
+    assert table["radius_difference_m"][1:5].to_numpy() == pytest.approx(published, abs=2e-6)
+    assert table["radius_difference_m"][5] == pytest.approx(-table["radius_difference_m"][3], abs=1e-9)
+    assert table["roll_rad"][5] == pytest.approx(-table["roll_rad"][3], abs=1e-9)
 
 
 def test_our_values_are_the_papers_case_with_spatial_detection():
