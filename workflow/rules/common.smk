@@ -27,9 +27,10 @@ def check_config():
             raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
     if config["comparison"]["case"] not in config["timing"]["cases"]:
         raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
-    for key, entry in [*config["cases"].items(), ("contact_geometry", config["contact_geometry"])]:
+    scenes = {f"cases.{case}": entry for case, entry in config["cases"].items()}
+    for key, entry in (scenes | {"contact_geometry": config["contact_geometry"]}).items():
         if not Path(entry["scene"]).is_file():
-            raise WorkflowError(f"configuration: {key}: no scene file {entry['scene']}")
+            raise WorkflowError(f"configuration: {key}.scene: no such file: {entry['scene']}")
 
 
 check_config()

@@ -1,0 +1,126 @@
+"""The smoke workflow, by the command that a user types: every rule runs, and then nothing is left to do."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from wrcore.results import load_run
+
+ROOT = Path(__file__).parent.parent
+RESULTS = ROOT / "results" / "smoke"
+FIGURES = ("fig1_parametrisation", "fig2_profiles", "fig3_detection", "fig4_lateral_position", "fig5_contact_points")
+
+
+def snakemake(*arguments):
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def smoke():
+    """Results of the smoke workflow; on a fresh checkout this runs it, as ``make smoke`` does."""
+    done = snakemake("--configfile", "config/smoke.yaml")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return RESULTS
+
+
+def test_nothing_is_left_to_do_after_the_smoke_run(smoke):
+    again = snakemake("-n", "--configfile", "config/smoke.yaml")
+    assert again.returncode == 0
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_of_the_paper_is_there_as_png_and_svg(smoke, name):
+    assert (smoke / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (smoke / "figures" / f"{name}.svg").read_text()[:2000]
+
+
+def test_smoke_runs_every_rule_of_the_study(smoke):
+    listed = snakemake("-n", "--forceall", "--quiet", "--configfile", "config/smoke.yaml")
+    full = snakemake("-n", "--forceall", "--quiet")
+    assert listed.returncode == full.returncode == 0
+    jobs = [
+        {line.split()[0] for line in run.stdout.splitlines() if line.endswith(tuple("0123456789"))}
+        for run in (listed, full)
+    ]
+    assert jobs[0] == jobs[1] >= {"creep_table", "simulate", "time_runs", "report_archive", *FIGURES}
+
+
+def test_runs_carry_their_scene_and_no_machine_path(smoke):
+    for path in sorted((smoke / "runs").glob("*/*.h5")):
+        run = load_run(path)
+        assert run.status == "completed"
+        assert run.scene["contact"]["detection"] == ("planar" if path.stem == "planar" else "spatial")
+        assert str(ROOT) not in json.dumps([run.scene, run.settings])
+        assert np.isfinite(run["wheelset"].y_m).all()
+
+
+def test_timing_table_has_both_detections_and_their_ratio(smoke):
+    table = pd.read_csv(smoke / "tables" / "timing.csv")
+    assert table["detection"].tolist() == ["planar", "spatial"]
+    assert (table[["wall_s", "rhs_evaluations", "us_per_call", "ratio_per_run", "ratio_per_call"]] > 0).all(axis=None)
+
+
+def test_comparison_is_within_every_tolerance(smoke):
+    table = pd.read_csv(smoke / "tables" / "comparison.csv", keep_default_na=False)
+    assert "no" not in table["within"].tolist(), table.to_string()
+    assert "yes" in table["within"].tolist()
+
+
+def test_notebook_was_executed_and_holds_fig4(smoke):
+    cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
+    outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
+    assert not [output for output in outputs if output["output_type"] == "error"]
+    assert any("image/png" in output.get("data", {}) for output in outputs)
+
+
+def test_report_holds_the_figures(smoke):
+    with zipfile.ZipFile(smoke / "report.zip") as archive:
+        text = "".join(archive.namelist())
+        assert "report.html" in text
+        assert all(f"{name}.png" in text for name in FIGURES)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"timing": {"repetitions": "five"}}, "timing.repetitions: 'five' is not of type 'integer'"),
+        ({"timing": {"repetition": 5}}, "'repetition' was unexpected"),
+        ({"timing": {"cases": ["absent"]}}, "timing.cases: expected a name under cases, got 'absent'"),
+        ({"twins": {"rtol": "1e-9"}}, "twins.rtol: '1e-9' is not of type 'number'"),
+        ({"cases": {"wheelset_v20": {"scene": "absent.yaml"}}}, "cases.wheelset_v20.scene: no such file: absent.yaml"),
+    ],
+)
+def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(change))
+    run = snakemake("--configfile", tmp_path / "wrong.yaml", "--config", f"pathvars={{results: {tmp_path}/r}}")
+    assert run.returncode != 0
+    assert message in run.stdout + run.stderr
+    assert not (tmp_path / "r").exists()
+
+
+def test_every_key_of_the_study_is_described_and_smoke_adds_none():
+    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+
+    def undescribed(part, key):
+        missing = [key] if part.get("type") != "object" and "description" not in part else []
+        return missing + [
+            m for name, inner in part.get("properties", {}).items() for m in undescribed(inner, f"{key}.{name}")
+        ]
+
+    def keys(data, prefix=""):
+        for key, value in data.items():
+            yield from keys(value, f"{prefix}{key}.") if isinstance(value, dict) else [prefix + key]
+
+    assert undescribed(schema, "") == []
+    study, smoke = (yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()) for name in ("study", "smoke"))
+    del smoke["pathvars"]
+    assert set(keys(smoke)) <= set(keys(study))
