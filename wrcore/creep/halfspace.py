@@ -34,57 +34,112 @@ DEFAULT_LEVEL = 20
 TOLERANCE = 1e-3
 MAX_ITERATIONS = 200
 BATCH = 64
-REFILL_EVERY = 4
+FAST = 100.0
 
-_ONE = np.float32(1)
+_ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _RHO = np.float32(1.8)
 _RAMP = np.float32(10)
-_TINY = np.float32(1e-30)
 
 
 @jit
-def _project(z, bound, force):
-    """F = P(z): scale each two-vector (z_i, z_{i+N}) back to its disk of radius bound_i."""
+def _project(z, bound, force, ramp):
+    """F = P(z): scale each two-vector (z_i, z_{i+N}) back to its disk; ramp from 0 (sticks) to 1 (slides fully)."""
     size = bound.size
     for i in range(size):
-        norm = np.sqrt(z[i] * z[i] + z[i + size] * z[i + size]) + _TINY
-        scale = min(_ONE, bound[i] / norm)
+        ratio = np.sqrt(z[i] * z[i] + z[i + size] * z[i + size]) / bound[i]
+        scale = _ONE / max(_ONE, ratio)
         force[i] = scale * z[i]
         force[i + size] = scale * z[i + size]
+        ramp[i] = min(_ONE, max(_ZERO, (ratio - _ONE) * _RAMP))
 
 
 @jit
-def _rigid_slip(op, creepage, x, slip):
-    """w = (ux - phi y, uy + phi x) at the panels' points x."""
+def _start(op, creepage, slip, z):
+    """Rigid slip w = (ux - phi y, uy + phi x) at the slip points, and z = -w/h, the solution where all slides fast."""
     ux, uy, phi = np.float32(creepage[0]), np.float32(creepage[1]), np.float32(creepage[2])
     size = op.bound.size
     for i in range(size):
         slip[i] = ux - phi * op.y[i]
-        slip[i + size] = uy + phi * x[i]
+        slip[i + size] = uy + phi * op.x_slip[i]
+        z[i] = -slip[i] * op.inverse_step[i]
+        z[i + size] = -slip[i + size] * op.inverse_step[i]
 
 
 @jit
-def _shift_slip(op, phi, z, force, slip, delta, elastic, relaxation):
-    """Move delta towards the change of slip between x_slip and x_force in the sliding panels."""
-    size, n = op.bound.size, op.n
-    for component in range(2):
-        start = component * size
-        for i in range(size):
-            j = start + i
-            elastic[i] = op.step[i] * (force[j] - z[j]) - delta[j] - slip[j]
-        for strip in range(op.ny):
-            for k in range(n):
-                i = strip * n + k
-                gain = np.float32(0)
-                if k > 0:
-                    gain += op.ahead[k] * (elastic[i] - elastic[i - 1])
-                if k < n - 1:
-                    gain += op.behind[k] * (elastic[i + 1] - elastic[i])
-                if component == 1:
-                    gain += phi * (op.x_force[i] - op.x_slip[i])
-                over = np.sqrt(z[i] * z[i] + z[i + size] * z[i + size]) / op.bound[i] - _ONE
-                gain *= min(_ONE, max(np.float32(0), over * _RAMP))
-                delta[start + i] += relaxation * (gain - delta[start + i])
+def _slowed(creepage, slow):
+    """Copy a creepage, reduced to FAST if it is larger, and return the factor of the reduction."""
+    factor = max(1.0, max(abs(creepage[0]), abs(creepage[1]), abs(creepage[2])) / FAST)
+    for i in range(3):
+        slow[i] = creepage[i] / factor
+    return factor
+
+
+@jit
+def _to_faster(op, creepage, factor, result):
+    """From the force at a reduced creepage to the force at ``factor`` times it.
+
+    Where all panels slide fast, the force approaches that of the rigid slip alone like 1/factor.
+    """
+    ux, uy, phi = creepage[0], creepage[1], creepage[2]
+    fx = fy = mz = 0.0
+    size = op.bound.size
+    for i in range(size):
+        sx, sy = ux - phi * op.y[i], uy + phi * op.x_force[i]
+        traction = op.bound[i] / np.sqrt(sx * sx + sy * sy + 1e-30)
+        fx -= traction * sx
+        fy -= traction * sy
+        mz -= traction * (op.x_force[i] * sy - op.y[i] * sx)
+    result[0] = fx + (result[0] - fx) / factor
+    result[1] = fy + (result[1] - fy) / factor
+    result[2] = mz + (result[2] - mz) / factor
+
+
+@jit
+def _elastic_slip(step, force, z, delta, slip, elastic):
+    """Elastic part of the slip, -h (z - F) - delta - w, of one component; ``elastic`` has one ghost at either end."""
+    for i in range(step.size):
+        elastic[i + 1] = step[i] * (force[i] - z[i]) - delta[i] - slip[i]
+
+
+@jit
+def _shift_slip(ahead, behind, rigid, phi, ramp, relaxation, elastic, delta):
+    """Relax delta towards the change of slip between x_slip and x_force, in the sliding panels, of one component."""
+    for i in range(ahead.size):
+        gain = ahead[i] * (elastic[i + 1] - elastic[i]) + behind[i] * (elastic[i + 2] - elastic[i + 1])
+        delta[i] += relaxation * (ramp[i] * (gain + phi * rigid[i]) - delta[i])
+
+
+@jit
+def _right_hand_side(inverse_step, force, z, slip, delta, rhs):
+    """2 F - z - (w + delta)/h of one component."""
+    for i in range(inverse_step.size):
+        rhs[i] = _TWO * force[i] - z[i] - (slip[i] + delta[i]) * inverse_step[i]
+
+
+@jit
+def _before_resolvent(op, phi, count, z, slip, delta, force, rhs, ramp, elastic):
+    """Project one case, move its delta along, and form what the resolvent acts on."""
+    size = op.bound.size
+    _project(z, op.bound, force, ramp)
+    relaxation = np.float32(0.6) if count < 20 else np.float32(0.15)
+    for start in (0, size):
+        part = slice(start, start + size)
+        if count < 32:
+            _elastic_slip(op.step, force[part], z[part], delta[part], slip[part], elastic)
+            spin = phi if start > 0 else _ZERO
+            _shift_slip(op.ahead, op.behind, op.rigid, spin, ramp, relaxation, elastic, delta[part])
+        _right_hand_side(op.inverse_step, force[part], z[part], slip[part], delta[part], rhs[part])
+
+
+@jit
+def _update(y, force, z):
+    """z += rho (y - F); returns the sum of abs(y - F)."""
+    change = _ZERO
+    for j in range(z.size):
+        move = y[j] - force[j]
+        z[j] += _RHO * move
+        change += abs(move)
+    return change
 
 
 @jit
@@ -157,55 +212,50 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
     z, force, delta = np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     rhs, y, slip = np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     half_rows, out_rows = np.zeros(half_shape, np.float32), np.zeros(half_shape, np.float32)
-    elastic = np.empty(size, np.float32)
+    elastic, ramp, change = np.zeros(size + 2, np.float32), np.empty(size, np.float32), np.zeros(width, np.float32)
     case, count = np.empty(width, np.int64), np.zeros(width, np.int64)
+    slow, factor = np.empty((width, 3)), np.ones(width)
     waiting, active = width, width
     for row in range(width):
         case[row] = row
-        _rigid_slip(op, creepages[row], op.x_slip, slip[row])
+        factor[row] = _slowed(creepages[row], slow[row])
+        _start(op, slow[row], slip[row], z[row])
     while active > 0:
-        for _ in range(1 if width == 1 else REFILL_EVERY):
-            for row in range(active):
-                _project(z[row], op.bound, force[row])
-                for i in range(size):
-                    inverse = _ONE / op.step[i]
-                    for j in (i, i + size):
-                        rhs[row, j] = 2 * force[row, j] - z[row, j] - (slip[row, j] + delta[row, j]) * inverse
-            _apply_resolvent(op, rhs[:active], half_rows[:active], out_rows[:active], y[:active])
-            for row in range(active):
-                count[row] += 1
-                for j in range(2 * size):
-                    z[row, j] += _RHO * (y[row, j] - force[row, j])
-                if count[row] < 32:
-                    relaxation = np.float32(0.6) if count[row] < 20 else np.float32(0.15)
-                    phi = np.float32(creepages[case[row], 2])
-                    _shift_slip(op, phi, z[row], force[row], slip[row], delta[row], elastic, relaxation)
+        for row in range(active):
+            phi = np.float32(slow[row, 2])
+            _before_resolvent(
+                op, phi, count[row], z[row], slip[row], delta[row], force[row], rhs[row], ramp, elastic
+            )
+            count[row] += 1
+        _apply_resolvent(op, rhs[:active], half_rows[:active], out_rows[:active], y[:active])
+        for row in range(active):
+            change[row] = _update(y[row], force[row], z[row])
         row = 0
         while row < active:
-            change = np.float32(0)
-            for j in range(2 * size):
-                change += abs(y[row, j] - force[row, j])
-            if change > tolerance and count[row] < max_iterations:
+            if change[row] > tolerance and count[row] < max_iterations:
                 row += 1
                 continue
             done = case[row]
             _resultant(op, force[row], results[done])
-            iterations[done] = count[row] if change <= tolerance else -count[row]
+            if factor[row] > 1:
+                _to_faster(op, slow[row], factor[row], results[done])
+            iterations[done] = count[row] if change[row] <= tolerance else -count[row]
             if traction.shape[0] > 0:
                 traction[done] = force[row]
                 for j in range(2 * size):
-                    slip_out[done, j] = op.step[j % size] * (force[row, j] - z[row, j])
+                    slip_out[done, j] = op.step[j % size] * (force[row, j] - z[row, j]) * np.float32(factor[row])
             if waiting < cases:
                 case[row], count[row] = waiting, 0
-                z[row], delta[row] = np.float32(0), np.float32(0)
-                _rigid_slip(op, creepages[waiting], op.x_slip, slip[row])
+                delta[row] = _ZERO
+                factor[row] = _slowed(creepages[waiting], slow[row])
+                _start(op, slow[row], slip[row], z[row])
                 waiting += 1
                 row += 1
             else:
                 active -= 1
                 z[row], delta[row], slip[row], y[row] = z[active], delta[active], slip[active], y[active]
-                force[row] = force[active]
-                case[row], count[row] = case[active], count[active]
+                force[row], change[row] = force[active], change[active]
+                case[row], count[row], factor[row], slow[row] = case[active], count[active], factor[active], slow[active]
 
 
 @dataclass(frozen=True)
@@ -296,6 +346,16 @@ class RollingContact:
         results, iterations, empty = np.empty((len(creepages), 3)), np.empty(len(creepages), np.int64), _no_rows()
         solve_rows(self.operator, creepages, tolerance, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
         return results, iterations
+
+    def linear_response(self):
+        """Derivatives of (fx, fy, mz) by (ux', uy', phi') at zero creepage, adhesion everywhere: (3, 3) ndarray.
+
+        Row i belongs to output i. For the ellipse this is Kalker's matrix at this refinement.
+        """
+        unbound = self.operator._replace(bound=self.operator.bound * np.float32(1e6))
+        results, iterations, empty = np.empty((3, 3)), np.empty(3, np.int64), _no_rows()
+        solve_rows(unbound, np.eye(3), 1e-5, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
+        return results.T
 
     def field(self, ux, uy, phi, tolerance=TOLERANCE / 10):
         """Traction and slip over the patch for one case.

@@ -71,12 +71,14 @@ class Operator(NamedTuple):
     resolvent: np.ndarray
     resolvent_odd: np.ndarray
     step: np.ndarray
+    inverse_step: np.ndarray
     bound: np.ndarray
     x_slip: np.ndarray
     x_force: np.ndarray
     y: np.ndarray
     ahead: np.ndarray
     behind: np.ndarray
+    rigid: np.ndarray
 
 
 def panel_counts(g, level):
@@ -272,5 +274,8 @@ def make_operator(g, psi, nu, n, ny):
         step = np.concatenate([step, step.reshape(-1, n)[::-1].ravel()])
     else:
         even, odd = _resolvent(axx, axy, axy, ayy, step), np.empty((0, 0), np.float32)
-    single = [np.float32(v) for v in (step, *panels[6:])]
+    rigid = panels.x_force - panels.x_slip
+    weights = np.tile(panels.ahead, ny), np.tile(panels.behind, ny)
+    vectors = (step, 1 / step, panels.bound, panels.x_slip, panels.x_force, panels.y, *weights, rigid)
+    single = [np.float32(v) for v in vectors]
     return Operator(n, ny, symmetric, even, odd, *single)

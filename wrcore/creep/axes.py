@@ -1,0 +1,248 @@
+"""Axes of the creep table, and the look-up: quadratic B-splines in up to five inputs.
+
+Creepages w = (ux', uy', phi') become a direction and a distance from zero creepage,
+
+    X = ux' C11/3,   Y = uy' C22/3,   P = phi' l C11/3,   l = LEVER (sqrt(g) + 1/sqrt(g))
+    alpha = atan2(Y, X),   beta = atan2(P, hypot(X, Y)),
+    r^2 = X^2 + Y^2 + phi'^2 ((C23/1.5)^2 + SPIN_FLOOR^2),   t = k r/(1 + k r),
+
+all axes of equal spacing, with ln(a/b) and abs(psi) as the others. Along a ray t runs from zero creepage (0) to full
+slip (1), where the force is smooth; polar axes are needed because across zero creepage it is not (it has a term
+r abs(r)). Stored is what remains of the force beside its linear part,
+
+    F = (1 - t)^2 F_lin(w) + t R(g, psi, t, alpha, beta),      F_lin from `kalker`,
+
+so that the slope at zero creepage is Kalker's exactly: R = 0 at t = 0 for the ellipse. Symmetries are used, not
+approximated: F(-w) = -F(w) leaves beta >= 0, and mirroring y leaves psi >= 0 and, for the ellipse, ux >= 0.
+R is the tensor product of quadratic B-splines that interpolates the nodes: once continuously differentiable,
+three taps per axis.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.creep.kalker import KalkerData, coefficients_at
+
+LEVER = 0.25
+SPIN_FLOOR = 0.8
+RATE = 1.1
+_LARGE = 1e12
+_HALF_PI = 0.5 * np.pi
+
+
+class TableAxes(NamedTuple):
+    """Extent and node counts of the axes; a kernel argument.
+
+    Fields
+    ------
+    log_g_min, log_g_max, psi_max : float
+        Range of ln(a/b) and of abs(psi); psi_max = 0 for the plane of ellipses.
+    n_g, n_psi, n_t, n_alpha, n_beta : int
+        Nodes; alpha: on the full circle (even), beta: from 0 to pi/2 with both ends.
+    """
+
+    log_g_min: float
+    log_g_max: float
+    psi_max: float
+    n_g: int
+    n_psi: int
+    n_t: int
+    n_alpha: int
+    n_beta: int
+
+
+class CreepTableData(NamedTuple):
+    """A creep table as kernels want it.
+
+    Fields
+    ------
+    axes : TableAxes
+    kalker : KalkerData
+        Coefficients for the table's Poisson's ratio.
+    coefficients : (n,) ndarray of float32
+        B-spline coefficients in the order g, psi, t, alpha, beta, output; one ghost on either side of each axis (none
+        for psi in the plane of ellipses, whose alpha covers only -pi/2..pi/2); outputs fx, fy, mz and one zero.
+    """
+
+    axes: TableAxes
+    kalker: KalkerData
+    coefficients: np.ndarray
+
+
+@jit
+def _atan(z):
+    """atan for 0 <= z <= 1 within 1e-8; exact at 1, so that `_atan2` has no step (nor a kink: slope 1/2 there)."""
+    s = z * z
+    p = 0.00257596204804535 * s - 0.014952970057209986
+    p = p * s + 0.040838569517279953
+    p = p * s - 0.073433958870568999
+    p = p * s + 0.10563281351540649
+    p = p * s - 0.14183326803556859
+    p = p * s + 0.19990074492491161
+    p = p * s - 0.33332972964484753
+    return z + z * s * p
+
+
+@jit
+def _atan2(y, x):
+    """Angle of (x, y) in -pi..pi within 1e-7; 0 at the origin."""
+    ax, ay = abs(x), abs(y)
+    large, small = max(ax, ay), min(ax, ay)
+    angle = _atan(small / (large + 1e-300))
+    angle = _HALF_PI - angle if ay > ax else angle
+    angle = np.pi - angle if x < 0 else angle
+    return -angle if y < 0 else angle
+
+
+@jit
+def scales(g, c11, c22, c23):
+    """Factors of ux', uy', phi' in the direction, and of phi' in the distance (see the module's formulas)."""
+    root = np.sqrt(g)
+    lever = LEVER * (root + 1 / root)
+    return c11 / 3, c22 / 3, lever * c11 / 3, np.sqrt((c23 / 1.5) ** 2 + SPIN_FLOOR**2)
+
+
+def creepages_at(g, t, alpha, beta, kalker):
+    """Inverse of the axes: creepages of the nodes.
+
+    Parameters
+    ----------
+    g : float
+        a/b.
+    t, alpha, beta : ndarray
+        Coordinates of equal shape, t < 1.
+    kalker : KalkerData
+
+    Returns
+    -------
+    ndarray (..., 3)
+        ux', uy', phi'.
+    """
+    c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
+    sx, sy, sp, spin = scales(g, c11, c22, c23)
+    direction = np.stack([np.cos(beta) * np.cos(alpha) / sx, np.cos(beta) * np.sin(alpha) / sy, np.sin(beta) / sp], -1)
+    length = np.sqrt(np.cos(beta) ** 2 + (direction[..., 2] * spin) ** 2)
+    return direction * (t / ((1 - t) * RATE * length))[..., None]
+
+
+@jit
+def _taps(position, last):
+    """Nearest node and the three quadratic B-spline weights at a position in node spacings, clamped to 0..last."""
+    position = min(max(position, 0.0), float(last))
+    node = int(position + 0.5)
+    f = position - node
+    return node, 0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)
+
+
+@jit
+def _line(c, i, w0, w1, w2):
+    """Sum over three neighbours in beta of the three outputs."""
+    return (
+        w0 * c[i] + w1 * c[i + 4] + w2 * c[i + 8],
+        w0 * c[i + 1] + w1 * c[i + 5] + w2 * c[i + 9],
+        w0 * c[i + 2] + w1 * c[i + 6] + w2 * c[i + 10],
+    )
+
+
+@jit
+def _block(c, start, row, layer, wt, wa, wb):
+    """Sum over three neighbours each in t (stride ``layer``), alpha (stride ``row``) and beta."""
+    fx = fy = mz = 0.0
+    for i in range(3):
+        for j in range(3):
+            x, y, z = _line(c, start + i * layer + j * row, wb[0], wb[1], wb[2])
+            weight = wt[i] * wa[j]
+            fx += weight * x
+            fy += weight * y
+            mz += weight * z
+    return fx, fy, mz
+
+
+@jit
+def table_lookup(table, g, psi, ux, uy, phi):
+    """Creep force from the table.
+
+    Parameters
+    ----------
+    table : CreepTableData
+    g, psi : float
+        a/b and shape number. Outside the table's range the nearest patch inside is taken and the flag is set.
+    ux, uy, phi : float
+        Nondimensional creepages ux', uy', phi'; any finite value.
+
+    Returns
+    -------
+    fx, fy, mz : float
+        Fx/(mu N), Fy/(mu N), Mz/(mu N c).
+    out_of_range : int
+        1 where a/b or psi lay outside.
+    """
+    axes, c = table.axes, table.coefficients
+    log_g = np.log(g)
+    outside = 0
+    if not axes.log_g_min - 1e-12 <= log_g <= axes.log_g_max + 1e-12:
+        outside = 1
+        log_g = min(max(log_g, axes.log_g_min), axes.log_g_max)
+        g = np.exp(log_g)
+    if abs(psi) > axes.psi_max:
+        outside = 1
+    # mirror y (psi >= 0), then turn all creepages round (phi >= 0), then, for the ellipse, mirror again (ux >= 0)
+    flip_y = -1.0 if psi < 0 else 1.0
+    flip = -1.0 if flip_y * phi < 0 else 1.0
+    ux, uy, phi = flip * ux, flip * flip_y * uy, flip * flip_y * phi
+    flip_x = 1.0
+    if axes.n_psi == 1 and ux < 0:
+        flip_x, ux = -1.0, -ux
+    c11, c22, c23, c33 = coefficients_at(log_g, table.kalker)
+    sx, sy, sp, spin = scales(g, c11, c22, c23)
+    size = max(abs(ux), abs(uy), abs(phi))
+    if size > _LARGE:
+        ux, uy, phi = ux / size * _LARGE, uy / size * _LARGE, phi / size * _LARGE
+    x, y, p, q = ux * sx, uy * sy, phi * sp, phi * spin
+    flat = x * x + y * y
+    stick = 1 / (1 + RATE * np.sqrt(flat + q * q))
+    t = 1 - stick
+    angle = _atan2(y, x)
+    rise = _atan2(p, np.sqrt(flat))
+    k, w0, w1, w2 = _taps(t * (axes.n_t - 1), axes.n_t - 1)
+    wt = (w0, w1, w2)
+    turn = axes.n_alpha / (2 * np.pi)
+    if axes.n_psi == 1:
+        last = axes.n_alpha // 2
+        m, w0, w1, w2 = _taps((angle + _HALF_PI) * turn, last)
+    else:
+        last = axes.n_alpha
+        m, w0, w1, w2 = _taps((angle + np.pi) * turn, last)
+    wa = (w0, w1, w2)
+    n, w0, w1, w2 = _taps(rise * ((axes.n_beta - 1) / _HALF_PI), axes.n_beta - 1)
+    wb = (w0, w1, w2)
+    row = 4 * (axes.n_beta + 2)
+    layer = row * (last + 3)
+    patch = layer * (axes.n_t + 2)
+    start = k * layer + m * row + 4 * n
+    i, w0, w1, w2 = _taps((log_g - axes.log_g_min) / (axes.log_g_max - axes.log_g_min) * (axes.n_g - 1), axes.n_g - 1)
+    wg = (w0, w1, w2)
+    fx = fy = mz = 0.0
+    if axes.n_psi == 1:
+        for u in range(3):
+            bx, by, bz = _block(c, start + (i + u) * patch, row, layer, wt, wa, wb)
+            fx += wg[u] * bx
+            fy += wg[u] * by
+            mz += wg[u] * bz
+    else:
+        j, w0, w1, w2 = _taps(abs(psi) / axes.psi_max * (axes.n_psi - 1), axes.n_psi - 1)
+        wp = (w0, w1, w2)
+        for u in range(3):
+            for v in range(3):
+                bx, by, bz = _block(c, start + ((i + u) * (axes.n_psi + 2) + j + v) * patch, row, layer, wt, wa, wb)
+                weight = wg[u] * wp[v]
+                fx += weight * bx
+                fy += weight * by
+                mz += weight * bz
+    linear = stick * stick
+    fx = t * fx - linear * c11 * ux
+    fy = t * fy - linear * (c22 * uy + c23 * phi)
+    mz = t * mz + linear * (c23 * uy - c33 * phi)
+    return flip * flip_x * fx, flip * flip_y * fy, flip * flip_y * mz, outside

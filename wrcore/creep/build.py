@@ -1,0 +1,241 @@
+"""Fill the nodes of a creep table with exact solutions and turn them into B-spline coefficients."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.creep.axes import CreepTableData, TableAxes, creepages_at, table_lookup
+from wrcore.creep.halfspace import RollingContact
+from wrcore.creep.kalker import coefficients_at, kalker_data
+
+A_OVER_B = (0.05, 20.0)
+PSI_MAX = 0.95
+NEARLY_FULL_SLIP = 1 - 1e-9
+
+
+class Resolution(NamedTuple):
+    """Node counts of the axes and level of the exact solver (``n_psi`` is ignored in the plane of ellipses)."""
+
+    n_g: int
+    n_psi: int
+    n_t: int
+    n_alpha: int
+    n_beta: int
+    level: int
+
+
+RESOLUTIONS = {
+    "ellipse": (
+        Resolution(9, 1, 12, 20, 9, 12),
+        Resolution(15, 1, 18, 24, 13, 18),
+        Resolution(21, 1, 28, 36, 18, 22),
+    ),
+    "sdec": (
+        Resolution(8, 4, 10, 16, 8, 12),
+        Resolution(11, 5, 14, 24, 11, 16),
+        Resolution(13, 6, 18, 24, 13, 19),
+    ),
+}
+
+
+def table_axes(planes, resolution):
+    """Axes of a table of ``planes`` "ellipse" or "sdec" with the node counts of ``resolution``."""
+    n_psi, psi_max = (1, 0.0) if planes == "ellipse" else (resolution.n_psi, PSI_MAX)
+    low, high = np.log(A_OVER_B)
+    return TableAxes(
+        float(low), float(high), psi_max,
+        resolution.n_g, n_psi, resolution.n_t, resolution.n_alpha, resolution.n_beta,
+    )  # fmt: skip
+
+
+def count_cases(axes):
+    """Creep force problems solved for a table (t = 0 and directions that symmetry gives are not solved)."""
+    half = axes.n_alpha // 2 + 1
+    ellipse = (axes.n_t - 1) * (half * (axes.n_beta - 1) + 1)
+    skewed = (axes.n_t - 1) * (axes.n_alpha * (axes.n_beta - 1) + 1)
+    return axes.n_g * (ellipse + (axes.n_psi - 1) * skewed)
+
+
+def axis_values(axes):
+    """Node values (ln(a/b), psi, t, alpha, beta) of the axes; alpha on the full circle from -pi."""
+    return (
+        np.linspace(axes.log_g_min, axes.log_g_max, axes.n_g), np.linspace(0, axes.psi_max, axes.n_psi),
+        np.linspace(0, 1, axes.n_t), 2 * np.pi * np.arange(axes.n_alpha) / axes.n_alpha - np.pi,
+        np.linspace(0, np.pi / 2, axes.n_beta),
+    )  # fmt: skip
+
+
+def _directions(axes, ellipse):
+    """Node indices (alpha, beta) that must be solved: ux >= 0 for the ellipse, the pole once."""
+    a, b = np.meshgrid(np.arange(axes.n_alpha), np.arange(axes.n_beta), indexing="ij")
+    quarter = axes.n_alpha // 4
+    wanted = (b < axes.n_beta - 1) | (a == axes.n_alpha // 2)
+    if ellipse:
+        wanted &= abs(a - axes.n_alpha // 2) <= quarter
+    return a[wanted], b[wanted]
+
+
+def _kalker_matrix(c11, c22, c23, c33):
+    return np.array([[-c11, 0, 0], [0, -c22, -c23], [0, c23, -c33]])
+
+
+def _fill(axes, ellipse, alpha_index, beta_index, values):
+    """Spread solved directions (n_t, m, 3) over all of (n_t, n_alpha, n_beta, 3) by symmetry."""
+    full = np.empty((values.shape[0], axes.n_alpha, axes.n_beta, 3))
+    full[:, alpha_index, beta_index] = values
+    if ellipse:
+        mirrored = (axes.n_alpha // 2 - alpha_index) % axes.n_alpha
+        inside = beta_index < axes.n_beta - 1
+        full[:, mirrored[inside], beta_index[inside]] = values[:, inside] * [-1, 1, 1]
+    full[:, :, -1] = full[:, axes.n_alpha // 2, -1][:, None]
+    return full
+
+
+def patch_remainder(axes, log_g, psi, kalker, level):
+    """R at all nodes of one patch (see `axes`): solve, subtract the linear part, divide by t.
+
+    Returns
+    -------
+    ndarray (n_t, n_alpha, n_beta, 3)
+    """
+    g, ellipse = np.exp(log_g), psi == 0
+    contact = RollingContact(g, psi, kalker.nu, level)
+    alpha_index, beta_index = _directions(axes, ellipse)
+    _, _, t_nodes, alphas, betas = axis_values(axes)
+    alpha, beta = alphas[alpha_index], betas[beta_index]
+    kalker_law = _kalker_matrix(*coefficients_at(log_g, kalker))
+    t = np.minimum(t_nodes[1:], NEARLY_FULL_SLIP)[:, None] + 0 * alpha
+    creepages = creepages_at(g, t, alpha + 0 * t, beta + 0 * t, kalker)
+    force = contact.solve_many(creepages.reshape(-1, 3))[0].reshape(creepages.shape)
+    values = np.zeros((axes.n_t, len(alpha), 3))
+    values[1:] = (force - (1 - t[..., None]) ** 2 * (creepages @ kalker_law.T)) / t[..., None]
+    if not ellipse:
+        small = 1e-6
+        slope = creepages_at(g, small + 0 * alpha, alpha, beta, kalker) / small
+        ellipse_law = RollingContact(g, 0.0, kalker.nu, level).linear_response()
+        values[0] = slope @ (contact.linear_response() - ellipse_law).T
+    return _fill(axes, ellipse, alpha_index, beta_index, values)
+
+
+def _interpolation(n, periodic):
+    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node.
+
+    Periodic: (n, n). Else (n + 2, n) with a vanishing third difference of the coefficients at either end.
+    """
+    if periodic:
+        rows = 0.75 * np.eye(n) + 0.125 * (np.roll(np.eye(n), 1, 0) + np.roll(np.eye(n), -1, 0))
+        return np.linalg.inv(rows)
+    matrix = np.zeros((n + 2, n + 2))
+    for node in range(n):
+        matrix[node, node : node + 3] = 0.125, 0.75, 0.125
+    matrix[n, :4] = matrix[n + 1, -4:] = 1, -3, 3, -1
+    return np.linalg.inv(matrix)[:, :n]
+
+
+def _along(matrix, values, axis):
+    return np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
+
+
+def _mirror_psi(values):
+    """R at -psi: mirrored in y and turned round, (fx, fy, mz)(alpha) -> (-fx, fy, mz)(pi - alpha)."""
+    n_alpha = values.shape[3]
+    index = (n_alpha // 2 - np.arange(n_alpha)) % n_alpha
+    return values[:, :, :, index] * [-1, 1, 1]
+
+
+def spline_coefficients(values):
+    """B-spline coefficients with ghosts, flattened as `CreepTableData` wants them.
+
+    Parameters
+    ----------
+    values : ndarray (n_g, n_psi, n_t, n_alpha, n_beta, 3)
+        R at the nodes.
+
+    Returns
+    -------
+    ndarray of float32
+    """
+    n_g, n_psi, n_t, n_alpha, n_beta, _ = values.shape
+    c = _along(_interpolation(n_g, False), values, 0)
+    c = _along(_interpolation(n_t, False), c, 2)
+    c = _along(_interpolation(n_alpha, True), c, 3)
+    opposite = np.roll(c, -n_alpha // 2, axis=3)[..., -2:0:-1, :]
+    circle = np.concatenate([c, opposite, -c, -opposite], axis=4)
+    c = _along(_interpolation(4 * (n_beta - 1), True), circle, 4)
+    c = np.concatenate([c[..., -1:, :], c[..., : n_beta + 1, :]], axis=4)
+    if n_psi == 1:
+        quarter = n_alpha // 4
+        c = c[:, :, :, quarter - 1 : 3 * quarter + 2]
+    else:
+        both = np.concatenate([_mirror_psi(c[:, :0:-1]), c], axis=1)
+        c = _along(_interpolation(2 * n_psi - 1, False), both, 1)[:, n_psi - 1 :]
+        c = np.concatenate([c[:, :, :, -1:], c, c[:, :, :, :2]], axis=3)
+    padded = np.zeros((*c.shape[:-1], 4), np.float32)
+    padded[..., :3] = c
+    return padded.ravel()
+
+
+def build_data(nu, planes, resolution, progress=None):
+    """Solve all nodes of a table and interpolate.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio.
+    planes : {"ellipse", "sdec"}
+    resolution : Resolution
+    progress : callable, optional
+        Wraps the list of patches, e.g. ``tqdm.tqdm``.
+
+    Returns
+    -------
+    CreepTableData
+    """
+    axes, kalker = table_axes(planes, resolution), kalker_data(nu)
+    log_g, psi, *_ = axis_values(axes)
+    values = np.empty((axes.n_g, axes.n_psi, axes.n_t, axes.n_alpha, axes.n_beta, 3))
+    patches = [(i, j) for i in range(axes.n_g) for j in range(axes.n_psi)]
+    for i, j in progress(patches) if progress else patches:
+        values[i, j] = patch_remainder(axes, log_g[i], psi[j], kalker, resolution.level)
+    return CreepTableData(axes, kalker, spline_coefficients(values))
+
+
+def random_creepages(g, count, kalker, rng):
+    """Creepages from small to beyond saturation: a third each without spin, pure spin, mixed.
+
+    With xi, eta = u C/3 (C11, C22) and spin phi' C23: abs(xi, eta) log-uniform 0.03..3, spin log-uniform 0.03..5.
+    """
+    c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
+    kind, turn = rng.integers(0, 3, count), rng.uniform(0, 2 * np.pi, count)
+    radius = np.exp(rng.uniform(np.log(0.03), np.log(3), count)) * (kind != 1)
+    spin = np.exp(rng.uniform(np.log(0.03), np.log(5), count)) * rng.choice([-1.0, 1.0], count) * (kind != 0)
+    return np.stack([radius * np.cos(turn) * 3 / c11, radius * np.sin(turn) * 3 / c22, spin / c23], axis=1)
+
+
+def random_errors(data, level, patches=48, per_patch=40, seed=0):
+    """Table against the exact solver at random patches and creepages.
+
+    Parameters
+    ----------
+    data : CreepTableData
+    level : int
+        Level of the exact solver.
+    patches, per_patch, seed : int
+        Patches drawn (ln(a/b) and psi uniform over the table's range), creepages on each, seed.
+
+    Returns
+    -------
+    force, moment : ndarray (patches per_patch,)
+        Error of (fx, fy) as a vector's length, and of mz.
+    """
+    rng, axes = np.random.default_rng(seed), data.axes
+    force, moment = [], []
+    for _ in range(patches):
+        g = np.exp(rng.uniform(axes.log_g_min, axes.log_g_max))
+        psi = rng.uniform(-axes.psi_max, axes.psi_max)
+        creepages = random_creepages(g, per_patch, data.kalker, rng)
+        exact, _ = RollingContact(g, psi, data.kalker.nu, level).solve_many(creepages)
+        error = np.array([table_lookup(data, g, psi, *row)[:3] for row in creepages]) - exact
+        force.append(np.hypot(error[:, 0], error[:, 1]))
+        moment.append(abs(error[:, 2]))
+    return np.concatenate(force), np.concatenate(moment)

@@ -1,0 +1,163 @@
+"""Kalker's linear theory of rolling contact: the coefficients C11, C22, C23, C33 and the law.
+
+    fx = -C11 ux',   fy = -C22 uy' - C23 phi',   mz = +C23 uy' - C33 phi'
+
+in the nondimensional form of the package (`halfspace.RollingContact`), i.e. Fx = -G a b C11 xi and so on. The
+coefficients come from this package's own half-space operator with adhesion everywhere, extrapolated in the panel
+size; ``kalker_coefficients.csv`` beside this file holds them on a grid of a/b and nu, `write_coefficients` made it.
+
+References
+----------
+Kalker, On the rolling contact of two elastic bodies in the presence of dry friction (thesis, Delft 1967).
+Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), table E.3.
+"""
+
+from importlib.resources import files
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator, CubicSpline
+
+from wrcore._jit import jit
+from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
+
+COEFFICIENTS_FILE = "kalker_coefficients.csv"
+GRID_A_OVER_B = 2.0 ** np.arange(-5, 5.25, 0.5)
+GRID_NU = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+LEVELS = (32, 48)
+
+
+class KalkerData(NamedTuple):
+    """Coefficients for one nu as cubic polynomials on equal cells of ln(a/b); a kernel argument.
+
+    Fields
+    ------
+    nu, start, spacing : float
+        Poisson's ratio; first node and spacing of ln(a/b).
+    cubic : (cells, 4, 4) ndarray
+        Per cell and power 0..3 of the distance from its lower node: C11, C22, C23, C33.
+    """
+
+    nu: float
+    start: float
+    spacing: float
+    cubic: np.ndarray
+
+
+def adhesion_coefficients(g, nu, level):
+    """C11, C22, C23, C33 of an ellipse at one refinement, by solving A F = -w with no slip anywhere.
+
+    Parameters
+    ----------
+    g, nu : float
+        a/b and Poisson's ratio.
+    level : int
+        About ``level**2`` panels.
+
+    Returns
+    -------
+    ndarray (4,)
+        C23 is the mean of the two numbers (-dfy/dphi', dmz/duy') that agree in the limit.
+    """
+    n, ny = panel_counts(g, level)
+    panels = make_panels(g, 0.0, n, ny)
+    (xx, xx_m), (yy, yy_m), (xy, xy_m) = (_mirrored(block, n) for block in slip_matrix(panels, nu, ny // 2))
+    half = n * ny // 2
+    zero, one = np.zeros(half), np.ones(half)
+    y, x_slip, x_force = panels.y[:half], panels.x_slip[:half], panels.x_force[:half]
+    even = np.block([[xx + xx_m, xy - xy_m], [xy + xy_m, yy - yy_m]])
+    odd = np.block([[xx - xx_m, xy + xy_m], [xy - xy_m, yy + yy_m]])
+    pull = np.linalg.solve(even, -np.concatenate([one, zero]))
+    side, spin = np.linalg.solve(odd, -np.stack([np.concatenate([zero, one]), np.concatenate([-y, x_slip])], axis=1)).T
+    c22, c23 = -2 * side[half:].sum(), -2 * spin[half:].sum()
+    c32 = 2 * (x_force @ side[half:] - y @ side[:half])
+    c33 = -2 * (x_force @ spin[half:] - y @ spin[:half])
+    return np.array([-2 * pull[:half].sum(), c22, (c23 + c32) / 2, c33])
+
+
+def extrapolated_coefficients(g, nu, levels=LEVELS):
+    """C11, C22, C23, C33 extrapolated linearly in 1/level from two refinements."""
+    coarse, fine = (adhesion_coefficients(g, nu, level) for level in levels)
+    return fine + (fine - coarse) * levels[0] / (levels[1] - levels[0])
+
+
+def write_coefficients(path, progress=None):
+    """Compute the packaged coefficient grid afresh (about two minutes) and write it as CSV.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write.
+    progress : callable, optional
+        Wraps the iterable of (nu, g), e.g. ``tqdm.tqdm``.
+    """
+    pairs = [(nu, g) for nu in GRID_NU for g in GRID_A_OVER_B]
+    lines = [
+        "# Linear creep coefficients of two equal bodies, ellipse; wrcore.creep.kalker.write_coefficients: half-space, "
+        f"adhesion everywhere, levels {LEVELS[0]} and {LEVELS[1]} extrapolated",
+        "nu,a_over_b,C11,C22,C23,C33",
+    ]
+    for nu, g in progress(pairs) if progress else pairs:
+        lines.append(",".join(f"{value:.8g}" for value in (nu, g, *extrapolated_coefficients(g, nu))))
+    with open(path, "w", encoding="utf-8") as out:
+        out.write("\n".join(lines) + "\n")
+
+
+def kalker_data(nu):
+    """Coefficients for one Poisson's ratio, ready for kernels.
+
+    Parameters
+    ----------
+    nu : float
+        0 to 0.5; interpolated by the polynomial through all stored values.
+
+    Returns
+    -------
+    KalkerData
+
+    Raises
+    ------
+    ValueError
+        If nu lies outside 0 to 0.5.
+    """
+    if not 0 <= nu <= 0.5:
+        raise ValueError(f"Poisson's ratio: expected 0 to 0.5, got {nu}")
+    text = files("wrcore.creep").joinpath(COEFFICIENTS_FILE).read_text(encoding="utf-8")
+    rows = np.loadtxt(text.splitlines(), delimiter=",", skiprows=2)
+    values = rows[:, 2:].reshape(len(GRID_NU), len(GRID_A_OVER_B), 4)
+    log_g = np.log(GRID_A_OVER_B)
+    spline = CubicSpline(log_g, BarycentricInterpolator(GRID_NU, values)(nu))
+    cubic = np.ascontiguousarray(np.moveaxis(spline.c[::-1], 0, 1))
+    return KalkerData(float(nu), float(log_g[0]), float(log_g[1] - log_g[0]), cubic)
+
+
+@jit
+def coefficients_at(log_g, data):
+    """C11, C22, C23, C33 at ln(a/b); outside the stored range the value at its end."""
+    cells = data.cubic.shape[0]
+    position = min(max((log_g - data.start) / data.spacing, 0.0), float(cells))
+    cell = min(int(position), cells - 1)
+    d = (position - cell) * data.spacing
+    p = data.cubic[cell]
+    c11 = p[0, 0] + d * (p[1, 0] + d * (p[2, 0] + d * p[3, 0]))
+    c22 = p[0, 1] + d * (p[1, 1] + d * (p[2, 1] + d * p[3, 1]))
+    c23 = p[0, 2] + d * (p[1, 2] + d * (p[2, 2] + d * p[3, 2]))
+    c33 = p[0, 3] + d * (p[1, 3] + d * (p[2, 3] + d * p[3, 3]))
+    return c11, c22, c23, c33
+
+
+@jit
+def kalker_coefficients(g, data):
+    """C11, C22, C23, C33 at a/b = g; outside 1/32..32 the values at the end of the range.
+
+    Parameters
+    ----------
+    g : float
+        a/b > 0.
+    data : KalkerData
+
+    Returns
+    -------
+    c11, c22, c23, c33 : float
+    """
+    return coefficients_at(np.log(g), data)

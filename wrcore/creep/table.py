@@ -1,0 +1,245 @@
+"""Creep tables on disk: built to a wanted error when first needed, cached, loaded in milliseconds.
+
+A table holds Fx, Fy, Mz of steady rolling for one Poisson's ratio, either for ellipses (four inputs) or for SDEC
+patches (five). Its error is measured, not assumed: random patches and creepages are solved exactly and compared, and a
+finer table is built until the 99 % quantile of the force error is below the tolerance. The numbers stay in the file.
+"""
+
+import hashlib
+import os
+import tempfile
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from wrcore import __version__
+from wrcore._jit import cache_root
+from wrcore.creep.axes import CreepTableData, TableAxes
+from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
+from wrcore.creep.kalker import kalker_data
+from wrcore.errors import InputError
+
+DEFAULT_TOLERANCE = 0.01
+CHECK_LEVEL = 20
+QUANTILES = ("median", "95 %", "99 %", "max")
+_SCHEMA = "wrcore creep table 1"
+
+
+@dataclass(frozen=True)
+class CreepTable:
+    """A creep table with what is known about it.
+
+    Attributes
+    ----------
+    data : CreepTableData
+        For kernels (`axes.table_lookup`).
+    planes : str
+        "ellipse" or "sdec".
+    tolerance : float
+        What the table was asked for: 99 % quantile of abs(dF)/(mu N).
+    resolution : Resolution
+    cases : int
+        Exact solutions in it.
+    force_error, moment_error : tuple of float
+        Median, 95 %, 99 %, largest error found in the random check, over mu N and mu N c.
+    """
+
+    data: CreepTableData
+    planes: str
+    tolerance: float
+    resolution: Resolution
+    cases: int
+    force_error: tuple
+    moment_error: tuple
+
+    @property
+    def nu(self):
+        """Poisson's ratio."""
+        return self.data.kalker.nu
+
+    def kernel_data(self):
+        """The `CreepTableData` to hand to kernels."""
+        return self.data
+
+
+def _quantiles(errors):
+    return tuple(float(value) for value in (*np.percentile(errors, [50, 95, 99]), errors.max()))
+
+
+def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
+    """Build a table whose force error stays below a tolerance in 99 % of random cases.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio, 0 to 0.5.
+    planes : {"ellipse", "sdec"}
+        Four inputs (psi = 0) or five.
+    tolerance : float
+        Bound of the 99 % quantile of abs(dF)/(mu N). The finest of the known resolutions is the last resort.
+    progress : callable, optional
+        Wraps the list of patches to solve, e.g. ``tqdm.tqdm``.
+
+    Returns
+    -------
+    CreepTable
+
+    Raises
+    ------
+    InputError
+        If nu, planes or tolerance make no sense.
+    """
+    _check_arguments(nu, planes, tolerance)
+    for resolution in RESOLUTIONS[planes]:
+        data = build_data(nu, planes, resolution, progress)
+        force, moment = (_quantiles(errors) for errors in random_errors(data, max(CHECK_LEVEL, resolution.level)))
+        if force[2] <= tolerance:
+            break
+    return CreepTable(data, planes, float(tolerance), resolution, count_cases(data.axes), force, moment)
+
+
+def _check_arguments(nu, planes, tolerance):
+    if planes not in RESOLUTIONS:
+        raise InputError("creep table", "planes", f"expected one of {', '.join(RESOLUTIONS)}, got {planes!r}")
+    if not 0 <= nu <= 0.5:
+        raise InputError("creep table", "nu", f"expected 0 to 0.5, got {nu}")
+    if not 0 < tolerance < 1:
+        raise InputError("creep table", "tolerance", f"expected a fraction of mu N between 0 and 1, got {tolerance}")
+
+
+def write_table(path, table):
+    """Write a table as HDF5: to a temporary name first, renamed when complete.
+
+    Parameters
+    ----------
+    path : path-like
+    table : CreepTable
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    os.close(handle)
+    try:
+        with h5py.File(temporary, "w") as file:
+            _write_datasets(file, table)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+
+
+def _write_datasets(file, table):
+    axes = table.data.axes
+    inputs = (axes.n_g + 2, axes.n_psi + 2 * (axes.n_psi > 1), axes.n_t + 2, -1, axes.n_beta + 2, 4)
+    coefficients = file.create_dataset("coefficients", data=table.data.coefficients.reshape(inputs))
+    coefficients.attrs["units"] = "1"
+    coefficients.attrs["description"] = (
+        "quadratic B-spline coefficients over ln(a/b), abs(psi), t, alpha, beta; outputs fx, fy, mz and one zero"
+    )
+    for name, errors in (("force_error", table.force_error), ("moment_error", table.moment_error)):
+        dataset = file.create_dataset(name, data=errors)
+        dataset.attrs["units"] = "1"
+        dataset.attrs["description"] = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
+    file.attrs.update(schema=_SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
+    file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
+    for name, value in axes._asdict().items():
+        file.attrs[f"axes.{name}"] = value
+
+
+def load_table(path):
+    """Read a creep table.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    CreepTable
+
+    Raises
+    ------
+    InputError
+        If the file is missing or is not a creep table.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("schema") != _SCHEMA:
+                raise InputError(path, "schema", f"expected {_SCHEMA!r}, got {file.attrs.get('schema')!r}")
+            return _read_datasets(file)
+    except OSError as error:
+        raise InputError(path, "", f"expected a creep table in HDF5 ({error})") from error
+
+
+def _read_datasets(file):
+    attributes = file.attrs
+    kinds = TableAxes.__annotations__
+    axes = TableAxes(*(kinds[name](attributes[f"axes.{name}"]) for name in TableAxes._fields))
+    coefficients = np.ascontiguousarray(file["coefficients"][...], dtype=np.float32).ravel()
+    data = CreepTableData(axes, kalker_data(float(attributes["nu"])), coefficients)
+    resolution = Resolution(*(int(value) for value in attributes["resolution"]))
+    errors = tuple(tuple(float(value) for value in file[name][...]) for name in ("force_error", "moment_error"))
+    return CreepTable(
+        data, str(attributes["planes"]), float(attributes["tolerance"]), resolution, int(attributes["cases"]), *errors
+    )
+
+
+def creep_digest():
+    """Digest (16 hex digits) of everything in this room that the numbers in a table depend on."""
+    digest = hashlib.sha256()
+    room = files("wrcore.creep")
+    for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
+        digest.update(room.joinpath(name).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def table_path(nu, planes, tolerance):
+    """Where the cache keeps the table with these properties."""
+    return cache_root() / "tables" / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
+
+
+def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
+    """The table from the cache; built and cached first where it is not there yet.
+
+    Two processes that need the same table at once both build it and the later rename wins, with equal content.
+
+    Parameters
+    ----------
+    nu, planes, tolerance, progress
+        As for `build_table`.
+
+    Returns
+    -------
+    CreepTable
+    """
+    _check_arguments(nu, planes, tolerance)
+    path = table_path(nu, planes, tolerance)
+    if path.exists():
+        return load_table(path)
+    table = build_table(nu, planes, tolerance, progress)
+    write_table(path, table)
+    return table
+
+
+def table_info(table):
+    """Properties of a table as a flat dict (for ``wrcore table info`` and for settings of results).
+
+    Parameters
+    ----------
+    table : CreepTable
+
+    Returns
+    -------
+    dict
+    """
+    info = {"planes": table.planes, "nu": table.nu, "tolerance": table.tolerance, "cases": table.cases}
+    info |= {f"nodes_{name[2:]}": value for name, value in table.data.axes._asdict().items() if name.startswith("n_")}
+    info |= {"level": table.resolution.level, "a_over_b_min": float(np.exp(table.data.axes.log_g_min))}
+    info |= {"a_over_b_max": float(np.exp(table.data.axes.log_g_max)), "psi_max": table.data.axes.psi_max}
+    info["memory_MB"] = table.data.coefficients.nbytes / 1e6
+    for name, errors in (("force_error", table.force_error), ("moment_error", table.moment_error)):
+        info |= {f"{name}_{quantile}": value for quantile, value in zip(QUANTILES, errors, strict=True)}
+    return info
