@@ -268,6 +268,7 @@ def test_a_turning_profile_is_trimmed_on_request():
     assert curve.u[0] == pytest.approx(-limit, abs=1e-4)
     assert curve.u[-1] == pytest.approx(limit, abs=1e-4)
     assert curve.gauge_offset() == pytest.approx(np.sqrt(0.02**2 - 0.006**2), abs=1e-8)
+    assert curve.gauge_offset(0.024) == pytest.approx(0.02, abs=1e-9)  # the circle's widest place lies above
 
 
 def test_gauge_of_points_is_nan_where_they_end_too_high():
@@ -309,6 +310,12 @@ def _put(array, index, value):
         (_bad(lambda u, f: (u, -f)), "rail", "highest point at an end"),
         (_bad(lambda u, f: (u, -10.0 * u**2)), "wheel", "falls on both sides like a rail"),
         (_bad(lambda u, f: (u + 0.05, 0.05 * u)), "wheel", "u = 0"),
+        (
+            _bad(lambda u, f: (u, 0.05 * u + 0.02 * (u > 0.02))),
+            "wheel",
+            "slopes below 10, got a steeper place at u = 0.0",
+        ),
+        (_bad(lambda u, f: (0.1 * u, -10.0 * u**2)), "rail", "smooth profile around u = 0, got 0.00"),
         (_bad(lambda u, f: (u, -0.05 * u)), "wheel", "flange at negative u"),
     ],
 )
@@ -317,6 +324,14 @@ def test_bad_points_are_one_clear_line(points, kind, says):
         ProfileCurve.from_points(*points, kind, name="bad.csv")
     assert says in str(caught.value)
     assert str(caught.value).startswith("bad.csv: ")
+
+
+def test_a_smoothing_that_no_spline_meets_is_refused():
+    """Nine points with 40 um of noise: the spline fit does not settle at a distance of 0.1 um and says so."""
+    u, f = circle_points(0.3, 0.03, 9)
+    noise = np.random.default_rng(2).normal(scale=4e-5, size=u.size)
+    with pytest.raises(InputError, match="smoothing: expected points that a spline can follow"):
+        ProfileCurve.from_points(u, f + noise, "rail", smoothing=1e-7)
 
 
 @pytest.mark.parametrize("smoothing", [-1e-6, 1.0, float("nan")])

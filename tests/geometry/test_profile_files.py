@@ -131,6 +131,13 @@ def test_a_file_that_cannot_be_read_is_one_clear_line(spec):
         read_profile(spec, "wheel")
 
 
+def test_bytes_that_are_no_text_are_one_clear_line(tmp_path):
+    path = tmp_path / "wheel.csv"
+    path.write_bytes(b"u_mm,f_mm\n\xff\xfe\x00\x01\n")
+    with pytest.raises(InputError, match="line 2: expected two numbers"):
+        read_profile(str(path), "wheel")
+
+
 # --- SIMPACK ---------------------------------------------------------------------------------------------------------
 
 
@@ -157,6 +164,12 @@ def down(u, f):
 def test_simpack_keys_are_applied(tmp_path, points, keys):
     path = write(tmp_path, "wheel.prw", simpack(points(U, wheel()(U)), **keys))
     assert deviation(read_profile(str(path), "wheel")) < 0.2e-6
+
+
+def test_simpack_bounds_cut_the_points(tmp_path):
+    path = write(tmp_path, "wheel.prw", simpack(down(U, wheel()(U)), bound_y_min="-50", bound_y_max="40"))
+    curve = read_profile(str(path), "wheel")
+    assert np.allclose([curve.u[0], curve.u[-1]], [-0.05, 0.04], rtol=0.0, atol=1e-4)
 
 
 def test_simpack_steep_sides_are_trimmed_to_the_head(tmp_path):

@@ -124,10 +124,8 @@ class ProfileCurve:
             Points that are too few, not finite, not monotone, in another unit than stated, or no such profile.
         """
         outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing)
-        low, high = outline.span(STEEPEST)
+        low, high = outline.working_span(STEEPEST, trim)
         nodes = _nodes(low, high, spacing)
-        if nodes.size < profile_points.FEWEST:
-            raise InputError(name, "points", f"expected a profile around u = 0, got {high - low:.3g} m of it")
         value, slope = outline.evaluate(nodes)
         d2f = averaged_second_derivative(nodes, value, slope, window)
         return cls(name, kind, nodes, value, slope, d2f, f"measured points, {name}", outline)

@@ -1,5 +1,6 @@
 """Measured points to a smooth outline: checks, parametric spline, origin."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ _CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
 _DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
 _LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
 _ANY_SLOPE = 1e6
+_NARROWEST = 0.02  # m; less of a profile is left only where its points are faulty
+_LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than this
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 
 
@@ -52,6 +55,19 @@ class Outline:
         bad = np.flatnonzero(~good)
         first, last = bad[bad < home].max(initial=-1) + 1, bad[bad > home].min(initial=u.size) - 1
         return float(u[first]), float(u[last])
+
+    def working_span(self, steepest, trim):
+        """`span`, refused where it is too narrow or, unless ``trim``, ends long before the points do."""
+        low, high = self.span(steepest)
+        if high - low < _NARROWEST:
+            got = f"got {high - low:.3g} m of it"
+            raise InputError(self.name, "points", f"expected a smooth profile around u = 0, {got}")
+        u = self.curve(self._dense())[:, 0]
+        for end, rest in ((low, low - u.min()), (high, u.max() - high)):
+            if not trim and rest > _LEFT_OUT:
+                got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond"
+                raise InputError(self.name, "points", f"expected slopes below {steepest:g}, {got}")
+        return low, high
 
     def evaluate(self, u):
         """Ordinate (m) and slope at the abscissae ``u`` (m, inside `span`)."""
@@ -173,9 +189,12 @@ def _spline(u, f, name, smoothing):
     if len(kept) < FEWEST:
         raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(kept)}")
     try:
-        (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
-    except ValueError as error:
-        raise InputError(name, "points", f"expected a profile that a cubic spline can follow: {error}") from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # FITPACK warns where it misses the asked distance
+            (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
+    except (ValueError, RuntimeWarning) as error:
+        expected = f"expected points that a spline can follow to {smoothing:g} m (more smoothing, or 0)"
+        raise InputError(name, "smoothing", f"{expected}: {error}") from None
     return Outline(BSpline(knots, np.column_stack(coefficients), degree), name)
 
 
