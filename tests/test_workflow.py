@@ -96,7 +96,11 @@ def test_report_holds_the_figures(smoke):
         ({"timing": {"repetition": 5}}, "'repetition' was unexpected"),
         ({"timing": {"cases": ["absent"]}}, "timing.cases: expected a name under cases, got 'absent'"),
         ({"twins": {"rtol": "1e-9"}}, "twins.rtol: '1e-9' is not of type 'number'"),
-        ({"cases": {"wheelset_v20": {"scene": "absent.yaml"}}}, "cases.wheelset_v20.scene: no such file: absent.yaml"),
+        (
+            {"cases": {"wheelset_v20": {"scene": "absent.yaml"}}},
+            "cases.wheelset_v20: absent.yaml: expected a readable file",
+        ),
+        ({"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}, "wheelset.yaml: sped: unknown key"),
     ],
 )
 def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):

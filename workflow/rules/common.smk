@@ -6,6 +6,9 @@ import jsonschema
 import yaml
 from snakemake.exceptions import WorkflowError
 
+from wrcore.errors import InputError
+from wrcore.scene import load_scene
+
 HERE = Path(workflow.basedir)
 
 
@@ -27,10 +30,13 @@ def check_config():
             raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
     if config["comparison"]["case"] not in config["timing"]["cases"]:
         raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
-    scenes = {f"cases.{case}": entry for case, entry in config["cases"].items()}
-    for key, entry in (scenes | {"contact_geometry": config["contact_geometry"]}).items():
-        if not Path(entry["scene"]).is_file():
-            raise WorkflowError(f"configuration: {key}.scene: no such file: {entry['scene']}")
+    scenes = {f"cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["cases"].items()}
+    scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
+    for key, (scene, changes) in scenes.items():
+        try:
+            load_scene(scene, [f"{name}={value}" for name, value in changes.items()])
+        except InputError as error:
+            raise WorkflowError(f"configuration: {key}: {error}")
 
 
 check_config()
