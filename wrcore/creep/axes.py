@@ -130,33 +130,32 @@ def creepages_at(g, t, alpha, beta, kalker):
 @jit
 def _taps(position, last):
     """Nearest node and the three quadratic B-spline weights at a position in node spacings, clamped to 0..last."""
-    position = min(max(position, 0.0), float(last))
+    position = min(position, float(last)) if position > 0 else 0.0
     node = int(position + 0.5)
     f = position - node
     return node, 0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)
 
 
 @jit
-def _line(c, i, w0, w1, w2):
-    """Sum over three neighbours in beta of the three outputs."""
-    return (
-        w0 * c[i] + w1 * c[i + 4] + w2 * c[i + 8],
-        w0 * c[i + 1] + w1 * c[i + 5] + w2 * c[i + 9],
-        w0 * c[i + 2] + w1 * c[i + 6] + w2 * c[i + 10],
-    )
-
-
-@jit
 def _block(c, start, row, layer, wt, wa, wb):
-    """Sum over three neighbours each in t (stride ``layer``), alpha (stride ``row``) and beta."""
+    """Sum over three neighbours each in t (stride ``layer``), alpha (stride ``row``) and beta (stride 4).
+
+    Indices are unsigned: numba then leaves out the treatment of negative ones, which costs a third of the look-up.
+    """
+    one, two = np.uint64(1), np.uint64(2)
     fx = fy = mz = 0.0
     for i in range(3):
+        x = y = z = 0.0
         for j in range(3):
-            x, y, z = _line(c, start + i * layer + j * row, wb[0], wb[1], wb[2])
-            weight = wt[i] * wa[j]
-            fx += weight * x
-            fy += weight * y
-            mz += weight * z
+            p = start + np.uint64(j) * row
+            q, r = p + np.uint64(4), p + np.uint64(8)
+            x += wa[j] * (wb[0] * c[p] + wb[1] * c[q] + wb[2] * c[r])
+            y += wa[j] * (wb[0] * c[p + one] + wb[1] * c[q + one] + wb[2] * c[r + one])
+            z += wa[j] * (wb[0] * c[p + two] + wb[1] * c[q + two] + wb[2] * c[r + two])
+        fx += wt[i] * x
+        fy += wt[i] * y
+        mz += wt[i] * z
+        start += layer
     return fx, fy, mz
 
 
@@ -170,7 +169,7 @@ def table_lookup(table, g, psi, ux, uy, phi):
     g, psi : float
         a/b and shape number. Outside the table's range the nearest patch inside is taken and the flag is set.
     ux, uy, phi : float
-        Nondimensional creepages ux', uy', phi'; any finite value.
+        Nondimensional creepages ux', uy', phi'; any finite value (NaN or infinity give NaN and the flag).
 
     Returns
     -------
@@ -180,6 +179,8 @@ def table_lookup(table, g, psi, ux, uy, phi):
         1 where a/b or psi lay outside.
     """
     axes, c = table.axes, table.coefficients
+    if not abs(g + psi + ux + uy + phi) < np.inf:
+        return np.nan, np.nan, np.nan, 1
     log_g = np.log(g)
     outside = 0
     if not axes.log_g_min - 1e-12 <= log_g <= axes.log_g_max + 1e-12:
@@ -218,29 +219,34 @@ def table_lookup(table, g, psi, ux, uy, phi):
     wa = (w0, w1, w2)
     n, w0, w1, w2 = _taps(rise * ((axes.n_beta - 1) / _HALF_PI), axes.n_beta - 1)
     wb = (w0, w1, w2)
-    row = 4 * (axes.n_beta + 2)
-    layer = row * (last + 3)
-    patch = layer * (axes.n_t + 2)
-    start = k * layer + m * row + 4 * n
-    i, w0, w1, w2 = _taps((log_g - axes.log_g_min) / (axes.log_g_max - axes.log_g_min) * (axes.n_g - 1), axes.n_g - 1)
+    i, w0, w1, w2 = _taps((log_g - axes.log_g_min) * ((axes.n_g - 1) / (axes.log_g_max - axes.log_g_min)), axes.n_g - 1)
     wg = (w0, w1, w2)
+    row = np.uint64(4 * (axes.n_beta + 2))
+    layer = row * np.uint64(last + 3)
+    patch = layer * np.uint64(axes.n_t + 2)
+    start = np.uint64(k) * layer + np.uint64(m) * row + np.uint64(4 * n)
     fx = fy = mz = 0.0
     if axes.n_psi == 1:
+        start += np.uint64(i) * patch
         for u in range(3):
-            bx, by, bz = _block(c, start + (i + u) * patch, row, layer, wt, wa, wb)
+            bx, by, bz = _block(c, start, row, layer, wt, wa, wb)
             fx += wg[u] * bx
             fy += wg[u] * by
             mz += wg[u] * bz
+            start += patch
     else:
-        j, w0, w1, w2 = _taps(abs(psi) / axes.psi_max * (axes.n_psi - 1), axes.n_psi - 1)
+        j, w0, w1, w2 = _taps(abs(psi) * ((axes.n_psi - 1) / axes.psi_max), axes.n_psi - 1)
         wp = (w0, w1, w2)
+        plane = np.uint64(axes.n_psi + 2) * patch
+        start += np.uint64(i) * plane + np.uint64(j) * patch
         for u in range(3):
             for v in range(3):
-                bx, by, bz = _block(c, start + ((i + u) * (axes.n_psi + 2) + j + v) * patch, row, layer, wt, wa, wb)
+                bx, by, bz = _block(c, start + np.uint64(v) * patch, row, layer, wt, wa, wb)
                 weight = wg[u] * wp[v]
                 fx += weight * bx
                 fy += weight * by
                 mz += weight * bz
+            start += plane
     linear = stick * stick
     fx = t * fx - linear * c11 * ux
     fy = t * fy - linear * (c22 * uy + c23 * phi)

@@ -27,13 +27,15 @@ class Resolution(NamedTuple):
 RESOLUTIONS = {
     "ellipse": (
         Resolution(9, 1, 12, 20, 9, 12),
-        Resolution(15, 1, 18, 24, 13, 18),
+        Resolution(13, 1, 16, 24, 12, 16),
+        Resolution(17, 1, 20, 28, 14, 20),
         Resolution(21, 1, 28, 36, 18, 22),
     ),
     "sdec": (
         Resolution(8, 4, 10, 16, 8, 12),
+        Resolution(9, 5, 13, 20, 10, 14),
         Resolution(11, 5, 14, 24, 11, 16),
-        Resolution(13, 6, 18, 24, 13, 19),
+        Resolution(11, 5, 16, 24, 12, 20),
     ),
 }
 

@@ -6,13 +6,13 @@ that CONTACT solves). With panel forces F and bounds G this is the variational i
 
     find |F| <= G :   (A F + w) . (F' - F) >= 0   for all |F'| <= G,
 
-A from `operator`, w the rigid slip. It is solved by Douglas-Rachford splitting between the projection P on the disks and
-the resolvent of A, factorised once per patch:
+A from `operator`, w the rigid slip. It is solved by Douglas-Rachford splitting between the projection P on the
+disks and the resolvent of A, factorised once per patch:
 
     F = P(z),   y = M (2 F - z - (w + delta)/h),   z <- z + rho (y - F),   M = (H + A)^-1 H,
 
-which converges for every rho in (0, 2) because the symmetric part of A is positive definite. A panel's slip holds half a
-panel ahead of its load. That is second-order accurate where the panel sticks, but in sliding panels the direction of
+which converges for every rho in (0, 2) because the symmetric part of A is positive definite. A panel's slip holds half
+a panel ahead of its load. That is second-order accurate where the panel sticks, but in sliding panels the direction of
 the traction must follow the slip at the load: delta carries the slip there (rigid part exactly, elastic part by
 differences along the strip) and lags one iteration behind.
 
@@ -30,10 +30,10 @@ import numpy as np
 from wrcore._jit import jit
 from wrcore.creep.operator import make_operator, panel_counts
 
-DEFAULT_LEVEL = 20
+DEFAULT_LEVEL = 22
 TOLERANCE = 1e-3
 MAX_ITERATIONS = 200
-BATCH = 64
+BATCH = 256
 FAST = 100.0
 
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
@@ -223,9 +223,7 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
     while active > 0:
         for row in range(active):
             phi = np.float32(slow[row, 2])
-            _before_resolvent(
-                op, phi, count[row], z[row], slip[row], delta[row], force[row], rhs[row], ramp, elastic
-            )
+            _before_resolvent(op, phi, count[row], z[row], slip[row], delta[row], force[row], rhs[row], ramp, elastic)
             count[row] += 1
         _apply_resolvent(op, rhs[:active], half_rows[:active], out_rows[:active], y[:active])
         for row in range(active):
@@ -255,7 +253,8 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
                 active -= 1
                 z[row], delta[row], slip[row], y[row] = z[active], delta[active], slip[active], y[active]
                 force[row], change[row] = force[active], change[active]
-                case[row], count[row], factor[row], slow[row] = case[active], count[active], factor[active], slow[active]
+                case[row], count[row] = case[active], count[active]
+                factor[row], slow[row] = factor[active], slow[active]
 
 
 @dataclass(frozen=True)

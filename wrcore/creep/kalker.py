@@ -135,7 +135,8 @@ def kalker_data(nu):
 def coefficients_at(log_g, data):
     """C11, C22, C23, C33 at ln(a/b); outside the stored range the value at its end."""
     cells = data.cubic.shape[0]
-    position = min(max((log_g - data.start) / data.spacing, 0.0), float(cells))
+    position = (log_g - data.start) / data.spacing
+    position = min(position, float(cells)) if position > 0 else 0.0
     cell = min(int(position), cells - 1)
     d = (position - cell) * data.spacing
     p = data.cubic[cell]

@@ -1,0 +1,169 @@
+"""Creep forces of a list of cases in SI units: the work behind ``wrcore creep``."""
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
+from wrcore.creep.laws import LAWS, creep_data, creep_force
+from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
+from wrcore.errors import InputError
+
+MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
+POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
+NUMBERS = (*POSITIVE, "nu", "ux", "uy", "phi_per_m")
+_SAME_NU = 1e-9
+
+
+def check_cases(frame, source="cases"):
+    """Columns of the case list as floats, checked.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, ux, uy, phi_per_m; others are ignored.
+    source : str
+        Name of the file, for messages.
+
+    Returns
+    -------
+    dict of str to ndarray
+
+    Raises
+    ------
+    InputError
+        On a missing column, on a value that is not a finite number, not positive where it must be, or nu outside
+        0 to 0.5. Rows are counted from 1, without the header.
+    """
+    missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
+    if missing:
+        raise InputError(source, ", ".join(missing), f"expected columns case_id, {', '.join(NUMBERS)}; not found")
+    columns = {name: _numbers(frame[name], name, source) for name in NUMBERS}
+    for name in POSITIVE:
+        _refuse(columns[name] <= 0, columns[name], name, source, "a number above 0")
+    _refuse((columns["nu"] < 0) | (columns["nu"] > 0.5), columns["nu"], "nu", source, "0 to 0.5")
+    return columns
+
+
+def _numbers(series, name, source):
+    import pandas as pd
+
+    values = pd.to_numeric(series, errors="coerce").to_numpy(dtype=float)
+    _refuse(~np.isfinite(values), series.to_numpy(), name, source, "a finite number")
+    return values
+
+
+def _refuse(bad, values, name, source, expected):
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise InputError(source, f"{name}, row {row + 1}", f"expected {expected}, got {values[row]}")
+
+
+def nondimensional(columns):
+    """Patch and creepages of SI cases as the laws take them.
+
+    Parameters
+    ----------
+    columns : mapping
+        As `check_cases` returns.
+
+    Returns
+    -------
+    g, psi : (n,) ndarray
+    creepages : (n, 3) ndarray
+        ux', uy', phi'.
+    c : (n,) ndarray
+        sqrt(a b), b the mean of b_neg and b_pos, m.
+    """
+    b = (columns["b_neg_m"] + columns["b_pos_m"]) / 2
+    psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
+    c = np.sqrt(columns["a_m"] * b)
+    factor = columns["G_Pa"] * c**2 / (columns["mu"] * columns["N_N"])
+    creepages = np.stack([columns["ux"], columns["uy"], columns["phi_per_m"] * c], axis=1) * factor[:, None]
+    return columns["a_m"] / b, psi, creepages, c
+
+
+def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, source="cases"):
+    """Creep forces of all cases of a list.
+
+    For an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of the patch's bounding box.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        See `check_cases`.
+    model : {"table", "exact", "fastsim", "polach", "she", "linear"}
+    table : CreepTable or path, optional
+        Table for the model "table"; without it the cached table for each nu is used, built first if need be.
+    level : int
+        Refinement of the model "exact".
+    progress : callable, optional
+        Wraps the iterable of patches (tables, exact).
+    source : str
+        Name of the input, for messages.
+
+    Returns
+    -------
+    pandas.DataFrame
+        case_id, Fx_N, Fy_N, Mz_Nm in the order of the input; ``attrs["out_of_range"]`` counts cases whose patch lies
+        outside the law's data, ``attrs["not_converged"]`` exact solutions that missed their tolerance.
+
+    Raises
+    ------
+    InputError
+        On bad input, an unknown model, or a table made for another Poisson's ratio.
+    """
+    import pandas as pd
+
+    if model not in MODELS:
+        raise InputError(source, "model", f"expected one of {', '.join(MODELS)}, got {model!r}")
+    columns = check_cases(frame, source)
+    g, psi, creepages, c = nondimensional(columns)
+    if model == "exact":
+        forces, counts = _exact(g, psi, columns["nu"], creepages, level, progress)
+    else:
+        forces, counts = _by_law(model, g, psi, columns["nu"], creepages, table, progress, source)
+    size = columns["mu"] * columns["N_N"]
+    out = pd.DataFrame({"case_id": frame["case_id"].to_numpy()})
+    out["Fx_N"], out["Fy_N"], out["Mz_Nm"] = size * forces[:, 0], size * forces[:, 1], size * c * forces[:, 2]
+    out.attrs.update(counts)
+    return out
+
+
+def _exact(g, psi, nu, creepages, level, progress):
+    """Exact forces; cases on the same patch share its operator."""
+    forces, failed = np.empty_like(creepages), 0
+    patches, member = np.unique(np.round(np.stack([g, psi, nu], axis=1), 12), axis=0, return_inverse=True)
+    for index in progress(range(len(patches))) if progress else range(len(patches)):
+        rows = np.flatnonzero(member.ravel() == index)
+        forces[rows], iterations = RollingContact(*patches[index], level=level).solve_many(creepages[rows])
+        failed += int((iterations < 0).sum())
+    return forces, {"not_converged": failed, "out_of_range": 0}
+
+
+def _by_law(model, g, psi, nu, creepages, table, progress, source):
+    """Forces by a law of `laws`, group by group of equal nu."""
+    forces, outside = np.empty_like(creepages), 0
+    given = table if table is None or isinstance(table, CreepTable) else load_table(table)
+    planes = "sdec" if np.any(psi != 0) else "ellipse"
+    for value in np.unique(nu):
+        rows = np.flatnonzero(nu == value)
+        kernel_table = None
+        if model == "table":
+            if given is not None and abs(given.nu - value) > _SAME_NU:
+                raise InputError(source, f"nu, row {rows[0] + 1}", f"expected the table's {given.nu}, got {value}")
+            kernel_table = (given or ensure_table(float(value), planes, DEFAULT_TOLERANCE, progress)).kernel_data()
+        data, part = creep_data(value, kernel_table), np.empty((len(rows), 3))
+        outside += _apply(LAWS[model], data, g[rows], psi[rows], creepages[rows], part)
+        forces[rows] = part
+    return forces, {"not_converged": 0, "out_of_range": int(outside)}
+
+
+@jit
+def _apply(law, data, g, psi, creepages, forces):
+    """One law over all rows; returns how many patches were out of range."""
+    outside = 0
+    for i in range(g.size):
+        ux, uy, phi = creepages[i]
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
+        outside += flag
+    return outside

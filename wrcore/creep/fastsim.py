@@ -1,0 +1,78 @@
+"""FASTSIM: Kalker's simplified theory, in which a point's elastic displacement follows its own traction only.
+
+References
+----------
+Kalker, A fast algorithm for the simplified theory of rolling contact, Vehicle System Dynamics 11 (1982) 1-13.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.creep.kalker import KalkerData, kalker_coefficients
+
+
+class FastsimData(NamedTuple):
+    """Settings of FASTSIM; a kernel argument.
+
+    Fields
+    ------
+    kalker : KalkerData
+    n_x, n_y : int
+        Steps along a strip, strips.
+    elliptic : int
+        0: bound of the traction parabolic in x and y (Kalker's choice); 1: Hertzian.
+    """
+
+    kalker: KalkerData
+    n_x: int
+    n_y: int
+    elliptic: int
+
+
+@jit
+def fastsim(data, g, psi, ux, uy, phi):
+    """Creep force by FASTSIM with three flexibilities.
+
+    Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
+    lateral and spin creepage; the traction starts at zero at the leading edge, follows s = 0 and is cut back to its
+    bound where it exceeds it. An SDEC patch takes the flexibilities of its mean ellipse.
+
+    Parameters
+    ----------
+    data : FastsimData
+    g, psi, ux, uy, phi : float
+        a/b, shape number, nondimensional creepages (see `laws`).
+
+    Returns
+    -------
+    fx, fy, mz : float
+        Over mu N, mu N, mu N c.
+    """
+    c11, c22, c23, _ = kalker_coefficients(g, data.kalker)
+    a, b = np.sqrt(g), 1 / np.sqrt(g)
+    rate_x, rate_y = ux * 3 * c11 / (8 * a), uy * 3 * c22 / (8 * a)
+    rate_spin = phi * 4 * c23 / (np.pi * a * a)
+    fx = fy = mz = 0.0
+    width = 2 * b / data.n_y
+    for strip in range(data.n_y):
+        y = -b + (strip + 0.5) * width
+        offset = (y + psi * b) / (b * (1 + psi) if y + psi * b > 0 else b * (1 - psi))
+        length = a * np.sqrt(1 - offset * offset)
+        step = 2 * length / data.n_x
+        px = py = 0.0
+        for k in range(data.n_x):
+            x = length - (k + 0.5) * step
+            dx = step if k > 0 else 0.5 * step
+            px -= (rate_x - rate_spin * y) * dx
+            py -= (rate_y + rate_spin * (x + 0.5 * dx)) * dx
+            height = max(length * length - x * x, 0.0) / (a * a)
+            bound = 1.5 / np.pi * np.sqrt(height) if data.elliptic else 2 / np.pi * height
+            size = np.sqrt(px * px + py * py)
+            if size > bound:
+                px, py = px * bound / size, py * bound / size
+            fx += px * step * width
+            fy += py * step * width
+            mz += (x * py - y * px) * step * width
+    return fx, fy, mz

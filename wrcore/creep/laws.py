@@ -1,0 +1,161 @@
+"""Creep-force laws behind one signature.
+
+Every law maps the patch (g = a/b, shape number psi) and the nondimensional creepages
+
+    ux' = ux G c^2/(mu N),   uy' = uy G c^2/(mu N),   phi' = phi G c^3/(mu N),   c = sqrt(a b)
+
+to (fx, fy, mz) = (Fx/(mu N), Fy/(mu N), Mz/(mu N c)), forces on the body whose creepage it is (the wheel). Only the
+table and FASTSIM know the shape number; the others take the mean ellipse.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup
+from wrcore.creep.fastsim import FastsimData, fastsim
+from wrcore.creep.kalker import KalkerData, kalker_coefficients, kalker_data
+
+LAWS = {"table": 0, "linear": 1, "she": 2, "polach": 3, "fastsim": 4}
+_TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3
+FASTSIM_GRID = 40
+
+
+class CreepData(NamedTuple):
+    """What the laws need beside their arguments; a kernel argument.
+
+    Fields
+    ------
+    kalker : KalkerData
+    table : CreepTableData
+        Empty where the law is not the table.
+    fastsim : FastsimData
+    """
+
+    kalker: KalkerData
+    table: CreepTableData
+    fastsim: FastsimData
+
+
+def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
+    """Data for `creep_force`.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio, 0 to 0.5.
+    table : CreepTableData, optional
+        ``CreepTable.kernel_data()``; needed for the law "table" only.
+    grid : int
+        FASTSIM's steps along x and strips across.
+    elliptic : bool
+        FASTSIM's bound: Hertzian instead of parabolic.
+
+    Returns
+    -------
+    CreepData
+    """
+    kalker = kalker_data(nu)
+    if table is None:
+        table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker, np.zeros(0, np.float32))
+    return CreepData(kalker, table, FastsimData(kalker, int(grid), int(grid), int(elliptic)))
+
+
+@jit
+def linear(kalker, g, ux, uy, phi):
+    """Kalker's linear theory: fx = -C11 ux', fy = -C22 uy' - C23 phi', mz = C23 uy' - C33 phi'; no bound.
+
+    Parameters
+    ----------
+    kalker : KalkerData
+    g, ux, uy, phi : float
+
+    Returns
+    -------
+    fx, fy, mz : float
+    """
+    c11, c22, c23, c33 = kalker_coefficients(g, kalker)
+    return -c11 * ux, -c22 * uy - c23 * phi, c23 * uy - c33 * phi
+
+
+@jit
+def she(kalker, g, ux, uy, phi):
+    """Shen, Hedrick and Elkins: the linear force, reduced to u - u^2/3 + u^3/27 (1 for u >= 3), direction kept.
+
+    u is the linear force over mu N. The spin moment is reduced by the same factor (the paper leaves it open).
+
+    References
+    ----------
+    Shen, Hedrick, Elkins, Proc. 8th IAVSD Symposium (1983) 591-605.
+    """
+    fx, fy, mz = linear(kalker, g, ux, uy, phi)
+    u = np.sqrt(fx * fx + fy * fy)
+    factor = 1 - u / 3 + u * u / 27 if u < 3 else 1 / u
+    return factor * fx, factor * fy, factor * mz
+
+
+@jit
+def polach(kalker, g, ux, uy, phi):
+    """Polach: one saturation curve for the force, a separate one for the part that spin makes; no moment (mz = 0).
+
+    With the creepages s, s_yc = s_y + phi a where that is larger in size than s_y, s_c = sqrt(s_x^2 + s_yc^2):
+    eps = (pi/4) c_jj s_c, F = (2/pi) (eps/(1 + eps^2) + atan eps), F_x = -F s_x/s_c,
+    F_y = -F s_y/s_c + (9/16) a k K phi/s_c, k = 1 + 6.3 (1 - exp(-a/b)), K(eps_s) from
+    eps_s = (8/3) b C23 abs(s_yc)/k (lengths over c).
+
+    References
+    ----------
+    Polach, A fast wheel-rail forces calculation computer code, Vehicle System Dynamics Suppl. 33 (1999) 728-739.
+    """
+    c11, c22, c23, _ = kalker_coefficients(g, kalker)
+    a, b = np.sqrt(g), 1 / np.sqrt(g)
+    turned = uy + phi * a
+    lateral = turned if abs(turned) > abs(uy) else uy
+    total = np.sqrt(ux * ux + lateral * lateral)
+    if total < 1e-300:
+        return 0.0, 0.0, 0.0
+    plain = np.sqrt(ux * ux + uy * uy) + 1e-300
+    stiffness = np.sqrt((c11 * ux / plain) ** 2 + (c22 * uy / plain) ** 2)
+    eps = 0.25 * np.pi * stiffness * total
+    force = 2 / np.pi * (eps / (1 + eps * eps) + np.arctan(eps))
+    k = 1 + 6.3 * (1 - np.exp(-g))
+    eps_spin = 8 / 3 * b * c23 * abs(lateral) / k
+    delta = (eps_spin * eps_spin - 1) / (eps_spin * eps_spin + 1)
+    spin = eps_spin * (delta**3 / 3 - delta**2 / 2 + 1 / 6) - (1 - delta**2) ** 1.5 / 3
+    return -force * ux / total, (-force * uy + 0.5625 * a * k * spin * phi) / total, 0.0
+
+
+@jit
+def creep_force(law, data, g, psi, ux, uy, phi):
+    """Creep force by the law with number ``law`` (see `LAWS`).
+
+    Parameters
+    ----------
+    law : int
+    data : CreepData
+    g, psi : float
+        a/b and shape number.
+    ux, uy, phi : float
+        Nondimensional creepages.
+
+    Returns
+    -------
+    fx, fy, mz : float
+        Over mu N, mu N, mu N c.
+    out_of_range : int
+        1 where the patch lies outside what the law's data cover; the nearest patch inside was taken.
+    """
+    if law == _TABLE:
+        return table_lookup(data.table, g, psi, ux, uy, phi)
+    cubic, start = data.kalker.cubic, data.kalker.start
+    outside = int(not start <= np.log(g) <= start + cubic.shape[0] * data.kalker.spacing)
+    if law == _LINEAR:
+        fx, fy, mz = linear(data.kalker, g, ux, uy, phi)
+    elif law == _SHE:
+        fx, fy, mz = she(data.kalker, g, ux, uy, phi)
+    elif law == _POLACH:
+        fx, fy, mz = polach(data.kalker, g, ux, uy, phi)
+    else:
+        fx, fy, mz = fastsim(data.fastsim, g, psi, ux, uy, phi)
+    return fx, fy, mz, outside
