@@ -65,7 +65,8 @@ def test_fig4_marks_the_horizon_only_where_given():
 
 
 def test_fig5_puts_every_patch_on_its_profile(scene):
-    figure = figures.fig5_contact_points(runs(flange_at=2.5), scene.wheel, scene.rail)
+    twin = {"spatial_tight": hunting_run()}  # a case's other runs are left out
+    figure = figures.fig5_contact_points(runs(flange_at=2.5) | twin, scene.wheel, scene.rail)
     over_time, on_profile = figure.axes[4], figure.axes[5]
     run = runs(flange_at=2.5)["planar"]
     shown = over_time.collections[0].get_offsets()

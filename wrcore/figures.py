@@ -21,7 +21,6 @@ MM = 1e3
 
 STYLE = {
     "figure.dpi": 100,
-    "figure.constrained_layout.use": True,
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -107,7 +106,7 @@ def fig1_parametrisation(scene, point=(0.015, 0.22, -0.012, 0.07)):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(6.8, 3.2), layout="none")
+    figure = Figure(figsize=(6.8, 3.2))
     overview = figure.add_axes((-0.16, -0.45, 0.8, 1.8), projection="3d", computed_zorder=False)
     for side in ("right", "left"):
         _wheel_on_rail(overview, scene, side, reach=0.55, angle=np.pi, lift=0.0)
@@ -148,6 +147,7 @@ def _surface(axes, points, color, zorder):
         color=color,
         linewidth=0,
         antialiased=False,
+        rasterized=True,
         rcount=80,
         ccount=80,
         zorder=zorder,
@@ -197,7 +197,7 @@ def fig2_profiles(wheel, rail, u_wheel=-0.034, u_rail=-0.030):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(6.8, 2.5))
+    figure = Figure(figsize=(6.8, 2.5), layout="constrained")
     rail_axes, wheel_axes = figure.subplots(1, 2)
     _profile_with_point(rail_axes, rail, u_rail, ("P", "u_r", "f_r"), up=1.0)
     rail_axes.set_ylim(-30, 17)
@@ -229,7 +229,7 @@ def _profile_with_point(axes, curve, u, names, up):
 
 
 @styled
-def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.012):
+def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.007):
     """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose.
 
     Parameters
@@ -262,7 +262,7 @@ def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.012):
         found[detection] = [patch for patch in detect(geometry, **pose, detection=detection) if patch.side == side]
         if not found[detection]:
             raise ValueError(f"no contact on the {side} side at this pose")
-    figure = Figure(figsize=(6.8, 3.3))
+    figure = Figure(figsize=(6.8, 3.3), layout="constrained")
     section, plan = figure.subplots(1, 2)
     _cross_section(section, scene, pose, side, found["planar"], window)
     _plan_view(plan, scene, pose, side, found, window)
@@ -345,14 +345,12 @@ def fig4_lateral_position(cases, horizons=None):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(6.6, 0.9 + 1.6 * len(cases)))
+    figure = Figure(figsize=(6.6, 0.9 + 1.6 * len(cases)), layout="constrained")
     panels = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
     for axes, (title, runs) in zip(panels, cases.items(), strict=True):
         for detection, line in LINES.items():
-            if detection in runs:
-                run = runs[detection]
-                axes.plot(run.t, MM * run["wheelset"].y_m, label=detection, **line)
-        _mark_horizon(axes, (horizons or {}).get(title, np.nan), max(run.t[-1] for run in runs.values()))
+            axes.plot(runs[detection].t, MM * runs[detection]["wheelset"].y_m, label=detection, **line)
+        _mark_horizon(axes, (horizons or {}).get(title), max(run.t[-1] for run in runs.values()))
         axes.set_title(title, loc="left")
         axes.set(ylabel="y / mm", xmargin=0)
     panels[-1].set_xlabel("time / s")
@@ -371,13 +369,13 @@ def _shared_legend(figure, panels, **kwargs):
 
 def _mark_horizon(axes, horizon, end):
     """Shade the part in which neighbouring trajectories have separated."""
-    if np.isfinite(horizon) and horizon < end:
+    if horizon is not None and horizon < end:
         axes.axvline(horizon, color="0.3", linewidth=0.9, linestyle="-.", label="prediction horizon")
         axes.axvspan(horizon, end, color="0.93", linewidth=0, zorder=0)
 
 
 @styled
-def fig5_contact_points(runs, wheel, rail, horizon=np.nan, body="wheelset"):
+def fig5_contact_points(runs, wheel, rail, horizon=None, body="wheelset"):
     """Fig. 5: where the contact points lie on rail and wheel profile, per side, over time and on the profile.
 
     Parameters
@@ -386,8 +384,8 @@ def fig5_contact_points(runs, wheel, rail, horizon=np.nan, body="wheelset"):
         Runs by detection.
     wheel, rail : ProfileCurve
         Profiles that the points lie on.
-    horizon : float
-        Prediction horizon, s; marked if finite.
+    horizon : float, optional
+        Prediction horizon, s; marked where given.
     body : str
         Wheelset.
 
@@ -395,14 +393,14 @@ def fig5_contact_points(runs, wheel, rail, horizon=np.nan, body="wheelset"):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(7.4, 5.4))
+    figure = Figure(figsize=(7.4, 5.4), layout="constrained")
     panels = figure.subplots(2, 4, width_ratios=(3, 1, 3, 1), sharey="row")
     rows = (("(a) rail", "u_rail_m", rail, RAIL), ("(b) wheel", "u_wheel_m", wheel, WHEEL))
     for row, (name, channel, curve, color) in enumerate(rows):
         for column, side in enumerate(("left", "right")):
             over_time, on_profile = panels[row, 2 * column : 2 * column + 2]
-            for detection, run in runs.items():
-                _contact_history(over_time, on_profile, run, f"{body}/{side}", channel, curve, detection)
+            for detection in MARKERS:
+                _contact_history(over_time, on_profile, runs[detection], f"{body}/{side}", channel, curve, detection)
             nodes = _inside(curve, 600)
             on_profile.plot(MM * curve(nodes), MM * nodes, color=color, linewidth=1.0, zorder=1)
             _mark_horizon(over_time, horizon, max(run.t[-1] for run in runs.values()))

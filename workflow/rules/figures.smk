@@ -2,6 +2,8 @@
 
 
 rule fig1_parametrisation:
+    message:
+        "Fig. 1: surfaces and coordinates"
     input:
         core=CORE["figures"],
         scenes=SCENES,
@@ -21,6 +23,8 @@ rule fig1_parametrisation:
 
 
 rule fig2_profiles:
+    message:
+        "Fig. 2: points on the profiles"
     input:
         core=CORE["figures"],
         scenes=SCENES,
@@ -40,6 +44,8 @@ rule fig2_profiles:
 
 
 rule fig3_detection:
+    message:
+        "Fig. 3: planar and spatial detection"
     input:
         core=CORE["figures"],
         scenes=SCENES,
@@ -61,6 +67,8 @@ rule fig3_detection:
 
 
 rule fig4_lateral_position:
+    message:
+        "Fig. 4: lateral position"
     input:
         core=CORE["figures"],
         planar=expand(rules.simulate.output.planar, case=CASES),
@@ -84,9 +92,12 @@ rule fig4_lateral_position:
 
 
 rule fig5_contact_points:
+    message:
+        "Fig. 5: contact points"
     input:
         core=CORE["figures"],
         scenes=SCENES,
+        scene=config["cases"][config["figures"]["contact_points"]]["scene"],
         planar=expand(rules.simulate.output.planar, case=config["figures"]["contact_points"]),
         spatial=expand(rules.simulate.output.spatial, case=config["figures"]["contact_points"]),
         tight=expand(rules.simulate_twins.output.tight, case=set(WITH_TWINS) & {config["figures"]["contact_points"]}),

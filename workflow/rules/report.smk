@@ -2,6 +2,8 @@
 
 
 rule motion_table:
+    message:
+        "Table: motion"
     input:
         core=CORE["analysis"],
         planar=expand(rules.simulate.output.planar, case=CASES),
@@ -24,6 +26,8 @@ rule motion_table:
 
 
 rule timing_table:
+    message:
+        "Table: timing"
     input:
         core=CORE["analysis"],
         samples=rules.time_runs.output,
@@ -41,6 +45,8 @@ rule timing_table:
 
 
 rule comparison_table:
+    message:
+        "Table: published values beside ours"
     input:
         core=CORE["analysis"],
         reference="reports/reference_values.csv",
@@ -64,6 +70,8 @@ rule comparison_table:
 
 
 rule first_light_notebook:
+    message:
+        "Notebook: loads runs, redraws Fig. 4"
     input:
         core=CORE["figures"],
         notebook="notebooks/first_light.ipynb",
@@ -72,13 +80,9 @@ rule first_light_notebook:
     output:
         "<results>/notebooks/first_light.ipynb",
     log:
-        "<logs>/notebook.log",
-    params:
-        runs=lambda wildcards, input: Path(input.runs[0]).parent.parent,
-        folder=subpath(output[0], parent=True),
-    shell:
-        "WRCORE_RUNS=$(realpath {params.runs}) jupyter nbconvert --to notebook --execute"
-        " --ExecutePreprocessor.record_timing=False --output-dir {params.folder} {input.notebook} &> {log}"
+        "<logs>/first_light_notebook.log",
+    script:
+        "../scripts/first_light_notebook.py"
 
 
 rule study:
@@ -96,6 +100,8 @@ rule study:
 
 
 rule report_archive:
+    message:
+        "Report: {output}"
     input:
         rules.study.input,
         captions=expand("workflow/report/{name}", name=sorted(p.name for p in (HERE / "workflow/report").glob("*.rst"))),

@@ -2,6 +2,8 @@
 
 
 rule simulate:
+    message:
+        "{wildcards.case}: planar and spatial run"
     input:
         core=CORE["simulation"],
         scenes=SCENES,
@@ -21,6 +23,8 @@ rule simulate:
 
 
 rule simulate_twins:
+    message:
+        "{wildcards.case}: tighter and mirrored twin of the spatial run"
     input:
         core=CORE["simulation"],
         scenes=SCENES,
@@ -41,6 +45,8 @@ rule simulate_twins:
 
 
 rule time_runs:
+    message:
+        "Timing: planar and spatial runs in turn, nothing beside them"
     input:
         core=CORE["simulation"] + CORE["analysis"],
         scenes=SCENES,

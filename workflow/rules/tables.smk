@@ -2,6 +2,8 @@
 
 
 rule creep_table:
+    message:
+        "Creep table by exact rolling contact"
     input:
         core=CORE["creep"],
     output:
@@ -17,6 +19,8 @@ rule creep_table:
 
 
 rule contact_geometry:
+    message:
+        "Contact geometry without load"
     input:
         core=CORE["geometry"],
         scenes=SCENES,

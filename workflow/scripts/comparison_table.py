@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 import pandas as pd
-from snakemake.script import snakemake
 
 from wrcore.analysis import comparison_table, our_values
 

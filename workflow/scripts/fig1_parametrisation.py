@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.figures import fig1_parametrisation, save_figure
 from wrcore.scene import load_scene
 

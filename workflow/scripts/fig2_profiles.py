@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.figures import fig2_profiles, save_figure
 from wrcore.scene import load_scene
 

@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.figures import fig3_detection, save_figure
 from wrcore.scene import load_scene
 

@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.analysis import horizons
 from wrcore.figures import fig4_lateral_position, save_figure
 from wrcore.results import load_runs

@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.analysis import motion_table
 from wrcore.results import load_runs
 

@@ -5,8 +5,6 @@ import subprocess
 import sys
 import tempfile
 
-from snakemake.script import snakemake
-
 with tempfile.NamedTemporaryFile("w", suffix=".json") as file, open(snakemake.log[0], "w") as log:
     json.dump(snakemake.params.config, file)
     file.flush()

@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.results import write_run
 from wrcore.scene import load_scene
 from wrcore.simulate import simulate

@@ -2,8 +2,6 @@
 
 import sys
 
-from snakemake.script import snakemake
-
 from wrcore.analysis import time_runs
 from wrcore.scene import load_scene
 

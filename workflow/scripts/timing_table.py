@@ -3,7 +3,6 @@
 import sys
 
 import pandas as pd
-from snakemake.script import snakemake
 
 from wrcore.analysis import timing_table
 
