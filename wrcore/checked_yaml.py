@@ -98,7 +98,7 @@ def validate(data, schema_name, source):
     _refuse_non_finite(data, source, "")
     errors = sorted(jsonschema.Draft202012Validator(schema).iter_errors(data), key=lambda e: (len(e.path), str(e.path)))
     if errors:
-        field, expected = _explain(errors[0])
+        field, expected = _explain(errors[0], schema)
         raise InputError(source, field, expected)
     _fill_defaults(data, schema, schema)
     return data
@@ -112,7 +112,7 @@ def _refuse_non_finite(value, source, field):
         _refuse_non_finite(item, source, f"{field}.{key}".lstrip("."))
 
 
-def _explain(error):
+def _explain(error, schema):
     """Field and expectation of a validation error, from the schema's own descriptions."""
     field = ".".join(str(part) for part in error.absolute_path)
     if error.validator == "additionalProperties":
@@ -125,9 +125,11 @@ def _explain(error):
         field = ".".join(filter(None, [field, missing[0]]))
         text = error.schema["properties"].get(missing[0], {}).get("description", "a value")
         return field, f"expected {text}, but the key is missing"
-    description = error.schema.get("description")
-    if description is None:
-        return field, error.message
+    description = "a valid value"
+    for part in error.absolute_schema_path:  # the innermost description on the way to what failed
+        schema = schema[part]
+        if isinstance(schema, dict) and isinstance(schema.get("description"), str):
+            description = schema["description"]
     return field, f"expected {description}, got {_short(error.instance)}"
 
 

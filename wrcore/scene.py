@@ -12,7 +12,8 @@ from wrcore.checked_yaml import parse_value, read_yaml, validate
 from wrcore.contact.detection import axle_direction, contact_geometry, detect
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import settle
-from wrcore.creep.laws import creep_data
+from wrcore.creep.laws import LAWS, creep_data
+from wrcore.creep.table import ensure_table, load_table
 from wrcore.dynamics.body import STATE_SIZE, euler_parameters
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.wheel import ContactModel
@@ -145,14 +146,31 @@ def _profile(data, kind, folder, source, inclination):
         raise
 
 
+def _creep(scene, progress):
+    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
+    creep, nu = scene.data["contact"]["creep"], scene.data["contact"]["material"]["poisson_ratio"]
+    if creep["model"] != "table":
+        return creep_data(nu)
+    table = (
+        load_table(creep["table"]) if "table" in creep else ensure_table(nu, "ellipse", creep["tolerance"], progress)
+    )
+    if abs(table.nu - nu) > 1e-9:
+        raise InputError(
+            scene.source,
+            "contact.creep.table",
+            f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}",
+        )
+    return creep_data(nu, table.kernel_data())
+
+
 def compile_scene(scene, progress=None):
     """Turn a scene into what kernels need.
 
     Parameters
     ----------
     scene : Scene
-    progress : bool, optional
-        Show progress if a creep table has to be built.
+    progress : callable, optional
+        Wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``.
 
     Returns
     -------
@@ -167,7 +185,7 @@ def compile_scene(scene, progress=None):
         vehicle.bodies,
         ContactModel(
             contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance),
-            hertz_table(), creep_data(contact["creep"], material["poisson_ratio"], progress), scene.detection == "spatial",
+            hertz_table(), LAWS[contact["creep"]["model"]], _creep(scene, progress), scene.detection == "spatial",
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
         ),

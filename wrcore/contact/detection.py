@@ -290,10 +290,11 @@ def _describe(geometry, u, side, y, z, ex, ey, ez, q, spatial, patch):
     around = wheel_cos / radius
     across = -second * wheel_cos * wheel_cos * wheel_cos
     rail_across = -rail_second * rail_cos * rail_cos * rail_cos
+    down = math.sqrt(max(1.0 - along * along, 0.0))
+    dy = (down * side * ez - along * ex * ey) / q  # lateral component of the strip's radius
     hxx, hxy, hyy = around, 0.0, across + rail_across
     if spatial:
         # The circle's tangent leaves the rolling direction by the angle turn in the tangent plane.
-        down = math.sqrt(max(1.0 - along * along, 0.0))
         cy = (-down * ex * ey - along * side * ez) / q
         cz = (-down * ex * ez + along * side * ey) / q
         sine = (cy + cz * side * df) * rail_cos
@@ -306,7 +307,7 @@ def _describe(geometry, u, side, y, z, ex, ey, ez, q, spatial, patch):
     if half < 0.0:
         spread = -spread
     patch[U_WHEEL] = u
-    patch[S_WHEEL] = -side * math.asin(min(max(along, -1.0), 1.0))
+    patch[S_WHEEL] = -math.asin((along * q * ey - ex * dy) / math.sqrt(ex * ex + ey * ey))
     patch[U_RAIL] = ur
     patch[X] = reach * ex + radius * along * q
     # The contact surface of two equal bodies lies midway between the two undeformed surfaces.

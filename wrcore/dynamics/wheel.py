@@ -34,6 +34,8 @@ class ContactModel(NamedTuple):
 
     geometry: ContactGeometry
     hertz: HertzTable
+    law: int
+    """Creep law, see wrcore.creep.laws.LAWS."""
     creep: CreepData
     spatial: bool
     shear_modulus: float
@@ -104,7 +106,9 @@ def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, co
             square = a * b
             c = math.sqrt(square)
             scale = modulus * square / limit
-            f1, f2, m3, missed = creep_force(model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c)
+            f1, f2, m3, missed = creep_force(
+                model.law, model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c
+            )
             outside += missed
             f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
             cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])

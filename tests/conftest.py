@@ -1,0 +1,43 @@
+"""Fixtures that several test modules share: the benchmark pair and where data that is never committed may lie."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from wrcore.contact.detection import contact_geometry
+from wrcore.geometry.standards import named_profile
+from wrcore.geometry.track import Track
+
+ROOT = Path(__file__).parent.parent
+DATA = Path(__file__).parent / "data"
+SCENES = ROOT / "config" / "scenes"
+
+
+@pytest.fixture(scope="session")
+def s1002():
+    return named_profile("S1002", "wheel")
+
+
+@pytest.fixture(scope="session")
+def uic60():
+    return named_profile("UIC60-MBench", "rail", 1 / 40)
+
+
+@pytest.fixture(scope="session")
+def benchmark_pair(s1002, uic60):
+    """S1002 on UIC60 1:40, gauge 1435 mm, rolling radius 460 mm: the Manchester contact benchmark."""
+    return contact_geometry(s1002, uic60, Track(1.435), 0.46, 0.75)
+
+
+@pytest.fixture
+def shared_file():
+    """Path of a file that belongs to others; skips where it is absent."""
+
+    def find(*parts):
+        path = Path(os.environ.get("WRCORE_SHARED", ROOT.parent / "shared")).joinpath(*parts)
+        if not path.is_file():
+            pytest.skip(f"{'/'.join(parts)} is not distributed with the project and not present here")
+        return path
+
+    return find

@@ -1,0 +1,161 @@
+"""Scenes: defaults, overrides, and one clear line for every kind of bad input."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.conftest import ROOT, SCENES
+from wrcore.checked_yaml import read_yaml
+from wrcore.cli import main
+from wrcore.contact.detection import ANGLE, NORMAL
+from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.errors import InputError
+from wrcore.scene import GRAVITY, compile_scene, load_scene
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    """Write a scene in its own folder, changed by a function, and return its path."""
+    (tmp_path / "vehicles").mkdir()
+    for name in ("wheelset", "suspended_wheelset"):
+        shutil.copy(ROOT / "config" / "vehicles" / f"{name}.yaml", tmp_path / "vehicles")
+
+    def write(change=lambda data: None, vehicle=None):
+        data = read_yaml(SCENES / "suspended_wheelset.yaml")
+        change(data)
+        path = tmp_path / "scene.yaml"
+        path.write_text(yaml.safe_dump(data))
+        if vehicle is not None:
+            content = read_yaml(tmp_path / "vehicles" / "suspended_wheelset.yaml")
+            vehicle(content)
+            (tmp_path / "vehicles" / "suspended_wheelset.yaml").write_text(yaml.safe_dump(content))
+        return path
+
+    return write
+
+
+def put(path, value):
+    """A change that sets one key."""
+
+    def change(data):
+        *parents, last = path.split(".")
+        for part in parents:
+            data = data.setdefault(part, {}) if not isinstance(data, list) else data[int(part)]
+        data[last] = value
+
+    return change
+
+
+BAD_SCENES = [
+    ("contact.frction", 0.3, "contact.frction", "unknown key"),
+    ("speed", -3.0, "speed", "m/s, above 0"),
+    ("speed", "fast", "speed", "expected a speed"),
+    ("speed", True, "speed", "expected a speed"),
+    ("speed", float("nan"), "speed", "finite"),
+    ("contact.friction", 0.0, "contact.friction", "above 0"),
+    ("contact.detection", "3d", "contact.detection", "'planar' or 'spatial'"),
+    ("wheel.profile", "S1003", "wheel.profile", "S1002"),
+    ("wheel.profile", "UIC60-MBench", "wheel.profile", "expected a wheel profile"),
+    ("wheel.profile", {"points": "missing.csv"}, "wheel.profile.points", "existing file"),
+    ("wheel.profile", "missing.csv", "wheel.profile", "existing file"),
+    ("rail.inclination", "1:40", "rail.inclination", "ratio"),
+    ("rail.inclination", 40, "rail.inclination", "within 1/5"),
+    ("vehicle.parameters", "nowhere.yaml", "vehicle.parameters", "existing file"),
+    ("track.gauge", 1435, "track.gauge", "in m"),
+    ("integration.duration", 0, "integration.duration", "above 0"),
+    ("contact.creep.table", "nowhere.h5", "contact.creep.table", "existing file"),
+    ("initial", [1], "initial", "mapping"),
+    ("output.channels", ["pose", "colour"], "output.channels.1", "pose, velocity, contact"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "field", "expected"), BAD_SCENES)
+def test_bad_scenes_get_one_line_with_file_and_field(scene_file, capsys, key, value, field, expected):
+    path = scene_file(put(key, value))
+    assert main(["simulate", str(path), "--out", str(path.parent / "run.h5")]) == 2
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "scene.yaml" in printed and f" {field}:" in printed and expected in printed
+    assert not (path.parent / "run.h5").exists()
+
+
+BAD_VEHICLES = [
+    ("bodies.wheelset.mass", -1.0, "bodies.wheelset.mass", "kg, above 0"),
+    ("bodies.wheelset.inertia", {"roll": 1.0, "pitch": 1.0, "yaw": 2.0}, "bodies.wheelset.inertia", "equal"),
+    ("bodies.wheelset.rolling_radius", 460, "bodies.wheelset.rolling_radius", "in m"),
+    ("elements.0.bodies", ["wheelset", "bogie"], "elements.axle_box_left.bodies", "frame or one of wheelset"),
+    ("elements.0.at", [0.1, 1.0, 0.46], "elements.axle_box_left.at", "axle"),
+    ("elements.0.stiffness", [1.0, 2.0], "elements.0.stiffness", "N/m"),
+    ("elements.0.preload", [0, 0, 2e5], "vehicle", "pressed onto the rails"),
+    ("joints", [{"name": "j", "kind": "coordinate", "bodies": ["wheelset", "frame"]}], "joints.j", "axis"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "field", "expected"), BAD_VEHICLES)
+def test_bad_vehicles_name_the_element(scene_file, capsys, key, value, field, expected):
+    path = scene_file(vehicle=put(key, value))
+    assert main(["simulate", str(path)]) == 2
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1 and f" {field}:" in printed and expected in printed
+
+
+@pytest.mark.parametrize("text", ["", "- 1\n", "a: [", "speed: 1\nspeed: 2\n", "\x00", "? {a: 1}: 2"])
+def test_files_that_are_no_scene(tmp_path, capsys, text):
+    path = tmp_path / "scene.yaml"
+    path.write_text(text)
+    assert main(["simulate", str(path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_profile_in_millimetres_and_unordered_points(scene_file, capsys):
+    path = scene_file(put("wheel.profile", {"points": "wheel.csv"}))
+    u = np.linspace(-60, 60, 121)
+    for content, expected in (
+        ("u_m,f_m\n" + "\n".join(f"{x},{-0.05 * x}" for x in u), "mm"),
+        ("u_m,f_m\n" + "\n".join(f"{1e-3 * x},0.0" for x in [0, 1, 3, 2, 4, 5, 6, 7, 8, 9]), "monotone"),
+    ):
+        (path.parent / "wheel.csv").write_text(content)
+        assert main(["simulate", str(path)]) == 2
+        printed = capsys.readouterr().err
+        assert printed.count("\n") == 1 and "wheel.csv" in printed and expected in printed
+
+
+def test_table_for_another_material_is_refused(scene_file, tmp_path, capsys):
+    from wrcore.creep.table import ensure_table, write_table
+
+    write_table(tmp_path / "table.h5", ensure_table(0.28, "ellipse"))
+
+    def change(data):
+        data["contact"] |= {"creep": {"table": "table.h5"}, "material": {"poisson_ratio": 0.3}}
+
+    path = scene_file(change)
+    assert main(["simulate", str(path)]) == 2
+    printed = capsys.readouterr().err
+    assert "contact.creep.table" in printed and "0.3" in printed and "0.28" in printed
+
+
+def test_overrides_and_defaults():
+    scene = load_scene(SCENES / "wheelset.yaml", ["speed=30", "contact.detection=planar", "integration.rtol=1e-7"])
+    assert scene.data["speed"] == 30 and scene.detection == "planar"
+    assert scene.data["integration"]["rtol"] == 1e-7  # YAML 1.1 would read 1e-7 as text
+    assert scene.data["contact"]["material"] == {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}
+    json.dumps(scene.data)
+    for bad in ("speed", "=3", "speed.x=3"):
+        with pytest.raises(InputError, match="--set"):
+            load_scene(SCENES / "wheelset.yaml", [bad])
+
+
+@pytest.mark.parametrize("name", ["wheelset", "suspended_wheelset"])
+def test_a_scene_starts_in_vertical_equilibrium(name):
+    scene = load_scene(SCENES / f"{name}.yaml", ["contact.creep.model=linear"])
+    model, state = compile_scene(scene)
+    work = workspace(model)
+    right_hand_side(model, work)(0.0, state)
+    # static wheel load of Manchester vehicle 1: 54 546 N (derived there); the free wheelset's own: 1813 kg g/2
+    load = {"wheelset": 1813 * GRAVITY / 2, "suspended_wheelset": 45653 + 1813 * GRAVITY / 2}[name]
+    rows = work.patches[0, :, 0]
+    np.testing.assert_allclose(rows[:, NORMAL] * np.cos(rows[:, ANGLE]), load, rtol=1e-6)
+    assert load == pytest.approx({"wheelset": 8893, "suspended_wheelset": 54546}[name], rel=1e-4)
