@@ -229,7 +229,7 @@ def _profile_with_point(axes, curve, u, names, up):
 
 
 @styled
-def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.007):
+def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
     """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose.
 
     Parameters
@@ -294,7 +294,7 @@ def _cross_section(axes, scene, pose, side, patches, window):
     axes.fill_between(MM * y_wheel, MM * z_wheel, MM * z_rail, where=z_wheel < z_rail, color=ACCENT, alpha=0.5, lw=0)
     _mark(axes, [(patch.y_m, patch.z_m) for patch in patches], "planar")
     axes.set(xlabel="y / mm", ylabel="z / mm", aspect="equal")
-    axes.legend(fontsize=7, loc="lower right")
+    axes.legend(fontsize=7, loc="upper left")
 
 
 def _rail_below(scene, side, y):

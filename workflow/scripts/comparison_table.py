@@ -13,4 +13,5 @@ table = comparison_table(
     pd.read_csv(snakemake.input.reference, comment="#"), our_values(*tables, snakemake.params.case)
 )
 table.to_csv(snakemake.output[0], index=False)
-Path(snakemake.output[1]).write_text(table.to_markdown(index=False) + "\n")
+rounded = table.astype(object).where(table.notna(), "")
+Path(snakemake.output[1]).write_text(rounded.to_markdown(index=False, floatfmt=".6g") + "\n")
