@@ -4,11 +4,11 @@ Creepages w = (ux', uy', phi') become a direction and a distance from zero creep
 
     X = ux' C11/3,   Y = uy' C22/3,   P = phi' l C11/3,   l = LEVER (sqrt(g) + 1/sqrt(g))
     alpha = atan2(Y, X),   beta = atan2(P, hypot(X, Y)),
-    r^2 = X^2 + Y^2 + phi'^2 ((C23/1.5)^2 + SPIN_FLOOR^2),   t = k r/(1 + k r),
+    r^2 = X^2 + Y^2 + phi'^2 ((C23/1.5)^2 + SPIN_FLOOR^2),   t = k r/(1 + k r),   k = RATE sqrt(1 + WIDE b/a),
 
-all axes of equal spacing, with ln(a/b) and abs(psi) as the others. Along a ray t runs from zero creepage (0) to full
-slip (1), where the force is smooth; polar axes are needed because across zero creepage it is not (it has a term
-r abs(r)). Stored is what remains of the force beside its linear part,
+beside ln(a/b) and abs(psi); nodes are equally spaced in all of them but t (see `_stretch`). Along a ray t runs from
+zero creepage (0) to full slip (1), where the force is smooth; polar axes are needed because across zero creepage it is
+not (it has a term r abs(r)). Stored is what remains of the force beside its linear part,
 
     F = (1 - t)^2 F_lin(w) + t R(g, psi, t, alpha, beta),      F_lin from `kalker`,
 
@@ -28,6 +28,10 @@ from wrcore.creep.kalker import KalkerData, coefficients_at
 LEVER = 0.25
 SPIN_FLOOR = 0.8
 RATE = 1.1
+WIDE = 0.1
+PEAK, PEAK_WIDTH = 0.43, 0.1
+_PEAK_LOW = -PEAK / np.hypot(PEAK, PEAK_WIDTH)
+_PEAK_HIGH = (1 - PEAK) / np.hypot(1 - PEAK, PEAK_WIDTH)
 _LARGE = 1e12
 _HALF_PI = 0.5 * np.pi
 
@@ -98,10 +102,25 @@ def _atan2(y, x):
 
 @jit
 def scales(g, c11, c22, c23):
-    """Factors of ux', uy', phi' in the direction, and of phi' in the distance (see the module's formulas)."""
+    """Factors of ux', uy', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
     root = np.sqrt(g)
     lever = LEVER * (root + 1 / root)
-    return c11 / 3, c22 / 3, lever * c11 / 3, np.sqrt((c23 / 1.5) ** 2 + SPIN_FLOOR**2)
+    rate = RATE * np.sqrt(1 + WIDE / g)
+    return c11 / 3, c22 / 3, lever * c11 / 3, np.sqrt((c23 / 1.5) ** 2 + SPIN_FLOOR**2), rate
+
+
+@jit
+def _stretch(t):
+    """Position along t, 0 to 1: up to twice as many nodes around PEAK, where spin saturates with a sharp bend."""
+    d = t - PEAK
+    bend = d / np.sqrt(d * d + PEAK_WIDTH * PEAK_WIDTH)
+    return (t + PEAK_WIDTH * (bend - _PEAK_LOW)) / (1 + PEAK_WIDTH * (_PEAK_HIGH - _PEAK_LOW))
+
+
+def node_distances(n_t):
+    """Values of t at equally spaced positions."""
+    t = np.linspace(0, 1, 20001)
+    return np.interp(np.linspace(0, 1, n_t), _stretch(t), t)
 
 
 def creepages_at(g, t, alpha, beta, kalker):
@@ -121,10 +140,10 @@ def creepages_at(g, t, alpha, beta, kalker):
         ux', uy', phi'.
     """
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
-    sx, sy, sp, spin = scales(g, c11, c22, c23)
+    sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
     direction = np.stack([np.cos(beta) * np.cos(alpha) / sx, np.cos(beta) * np.sin(alpha) / sy, np.sin(beta) / sp], -1)
     length = np.sqrt(np.cos(beta) ** 2 + (direction[..., 2] * spin) ** 2)
-    return direction * (t / ((1 - t) * RATE * length))[..., None]
+    return direction * (t / ((1 - t) * rate * length))[..., None]
 
 
 @jit
@@ -197,17 +216,17 @@ def table_lookup(table, g, psi, ux, uy, phi):
     if axes.n_psi == 1 and ux < 0:
         flip_x, ux = -1.0, -ux
     c11, c22, c23, c33 = coefficients_at(log_g, table.kalker)
-    sx, sy, sp, spin = scales(g, c11, c22, c23)
+    sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
     size = max(abs(ux), abs(uy), abs(phi))
     if size > _LARGE:
         ux, uy, phi = ux / size * _LARGE, uy / size * _LARGE, phi / size * _LARGE
     x, y, p, q = ux * sx, uy * sy, phi * sp, phi * spin
     flat = x * x + y * y
-    stick = 1 / (1 + RATE * np.sqrt(flat + q * q))
+    stick = 1 / (1 + rate * np.sqrt(flat + q * q))
     t = 1 - stick
     angle = _atan2(y, x)
     rise = _atan2(p, np.sqrt(flat))
-    k, w0, w1, w2 = _taps(t * (axes.n_t - 1), axes.n_t - 1)
+    k, w0, w1, w2 = _taps(_stretch(t) * (axes.n_t - 1), axes.n_t - 1)
     wt = (w0, w1, w2)
     turn = axes.n_alpha / (2 * np.pi)
     if axes.n_psi == 1:

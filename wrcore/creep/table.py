@@ -22,7 +22,7 @@ from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases,
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
 
-DEFAULT_TOLERANCE = 0.01
+DEFAULT_TOLERANCE = 0.007
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
 _SCHEMA = "wrcore creep table 1"
@@ -93,12 +93,19 @@ def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress
         If nu, planes or tolerance make no sense.
     """
     _check_arguments(nu, planes, tolerance)
-    for resolution in RESOLUTIONS[planes]:
+    for resolution in _promising(planes, tolerance):
         data = build_data(nu, planes, resolution, progress)
         force, moment = (_quantiles(errors) for errors in random_errors(data, max(CHECK_LEVEL, resolution.level)))
         if force[2] <= tolerance:
             break
     return CreepTable(data, planes, float(tolerance), resolution, count_cases(data.axes), force, moment)
+
+
+def _promising(planes, tolerance):
+    """Resolutions worth building: the first that is expected to meet the tolerance, and the finer ones."""
+    known = RESOLUTIONS[planes]
+    first = next((i for i, (expected, _) in enumerate(known) if expected <= tolerance), len(known) - 1)
+    return [resolution for _, resolution in known[first:]]
 
 
 def _check_arguments(nu, planes, tolerance):
