@@ -34,8 +34,8 @@ RESOLUTIONS = {
     "sdec": (
         (0.015, Resolution(8, 4, 12, 16, 9, 12)),
         (0.008, Resolution(9, 4, 14, 20, 10, 14)),
-        (0.006, Resolution(10, 4, 16, 20, 11, 16)),
-        (0.004, Resolution(11, 4, 20, 24, 12, 20)),
+        (0.006, Resolution(10, 4, 16, 20, 13, 16)),
+        (0.004, Resolution(10, 4, 20, 20, 16, 20)),
     ),
 }
 """From coarse to fine, with the 99 % quantile of the force error that each was found to have (nu = 0.28)."""

@@ -383,11 +383,8 @@ def _field(contact, force, slip, result):
     op, n, ny = contact.operator, contact.n, contact.ny
     size = n * ny
     y_edges = np.linspace(-1, 1, ny + 1) / np.sqrt(contact.g)
-    slip_point = 0.75 - np.cos(np.pi / (2 * n)) / 2 + np.cos(np.pi / (2 * n)) / 2
-    half_length = op.x_slip.astype(float).reshape(ny, n)[:, 0]
-    first = (2 - np.cos(np.pi / (2 * n)) + np.cos(np.pi / (2 * n))) / 2
-    del slip_point
-    x_edges = np.outer(half_length / first, np.cos(np.pi * np.arange(n + 1) / n))
+    half_length = op.x_slip.astype(float).reshape(ny, n)[:, :1]  # the first slip point lies on the leading edge
+    x_edges = half_length * np.cos(np.pi * np.arange(n + 1) / n)
     area = (-np.diff(x_edges, axis=1) * np.diff(y_edges)[:, None]).ravel()
     bound = op.bound.astype(float)
     magnitude = np.hypot(force[:size], force[size:])
