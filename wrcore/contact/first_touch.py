@@ -1,0 +1,276 @@
+"""Rigid first touch: where a wheelset without yaw that is lowered onto the rails touches them.
+
+Each wheel touches where the height that the rail asks of the wheelset's centre,
+
+    h(u) = f_rail(u_r) - (c sin(roll) - r cos(roll)),   u_r = y + c cos(roll) + r sin(roll) - d_rail,
+
+is greatest over the wheel's lateral coordinate u (c = half distance + u along the axle, r = r0 - f(u)). All of it is
+written for the left side; the right side is its mirror image (y and roll change sign). Roll is either solved, so that
+both wheels touch, or left at zero, so that each side is searched by itself: the reference values of EN 15302 are of
+the second kind.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import FAST, jit
+from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.track import GAUGE_DEPTH
+
+SCAN_STEP = 1e-4
+"""Distance of the wheel's nodes in the search for the first touch, m."""
+
+_RESERVE = 1e-6
+"""Local maxima this close to the highest node compete, m: above SCAN_STEP^2 / 8 times any curvature up to 800 1/m."""
+
+_ROLL_STEPS = 40
+
+_HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
+
+
+@dataclass(frozen=True)
+class WheelOnRail:
+    """One side of a pair.
+
+    Parameters
+    ----------
+    wheel, rail : ProfileCurve
+    rolling_radius : float
+        Radius at the tape circle, m.
+    """
+
+    wheel: ProfileCurve
+    rail: ProfileCurve
+    rolling_radius: float = 0.46
+
+    def __post_init__(self):
+        if (self.wheel.kind, self.rail.kind) != ("wheel", "rail"):
+            got = f"{self.wheel.kind} and {self.rail.kind}"
+            raise InputError(self.wheel.name, "kind", f"expected a wheel and a rail, got {got}")
+        if not 0.0 < self.rolling_radius < math.inf:
+            raise InputError("wheel", "rolling_radius", f"expected a radius in m, got {self.rolling_radius!r}")
+
+
+@dataclass(frozen=True)
+class WheelsetOnTrack:
+    """A wheelset and the track under it; the sides may differ in profile and in radius.
+
+    Parameters
+    ----------
+    left, right : WheelOnRail
+    half_distance : float
+        Tape circle from the wheelset's centre, m.
+    gauge : float
+        Distance between the rails' innermost points within ``gauge_depth`` of their tops, m.
+    gauge_depth : float
+        m; 14 mm (EN 13848-1). The reference rail of UIC 519 is drawn about a point 0.492 mm lower than its top, from
+        which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies at 750 mm.
+    """
+
+    left: WheelOnRail
+    right: WheelOnRail
+    half_distance: float = 0.75
+    gauge: float = 1.435
+    gauge_depth: float = GAUGE_DEPTH
+
+    def __post_init__(self):
+        for name in ("half_distance", "gauge", "gauge_depth"):
+            if not 0.0 < getattr(self, name) < 10.0:
+                raise InputError("track", name, f"expected a length in m, got {getattr(self, name)!r}")
+        for side in (self.left, self.right):
+            if math.isnan(side.rail.gauge_offset(self.gauge_depth)):
+                raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")
+
+    @classmethod
+    def alike(cls, wheel, rail, gauge=1.435, rolling_radius=0.46, half_distance=0.75):
+        """The usual case: the right side is the mirror image of the left one."""
+        side = WheelOnRail(wheel, rail, rolling_radius)
+        return cls(side, side, half_distance, gauge)
+
+    @property
+    def base(self):
+        """Distance of the tape circles, m: the standard's e = 1500 mm at standard gauge."""
+        return 2.0 * self.half_distance
+
+    @property
+    def mean_radius(self):
+        """Mean of both rolling radii, m."""
+        return 0.5 * (self.left.rolling_radius + self.right.rolling_radius)
+
+    def rail_distance(self, side):
+        """Origin of a side's rail from the centre line, m, positive."""
+        return 0.5 * self.gauge + side.rail.gauge_offset(self.gauge_depth)
+
+    def kernel_data(self):
+        """Both sides for the kernels."""
+        return tuple(
+            _Side(
+                np.column_stack([-s.wheel.f, -s.wheel.df]), float(s.wheel.u[0]), float(s.wheel.spacing),
+                np.column_stack([s.rail.f, s.rail.df]), float(s.rail.u[0]), float(s.rail.spacing),
+                float(s.rolling_radius), float(self.half_distance), float(self.rail_distance(s)),
+            )
+            for s in (self.left, self.right)
+        )  # fmt: skip
+
+
+class _Side(NamedTuple):
+    wheel: np.ndarray
+    """(n, 2): R - r0 and R' at equally spaced nodes."""
+    wheel_start: float
+    wheel_step: float
+    rail: np.ndarray
+    """(m, 2): f and f'."""
+    rail_start: float
+    rail_step: float
+    rolling_radius: float
+    half_distance: float
+    rail_distance: float
+
+
+@jit(fastmath=FAST, inline="always")
+def _hermite(nodes, start, step, u):
+    """Value and slope of the cubic Hermite polynomial; end cells are continued outwards."""
+    position = (u - start) / step
+    i = min(max(int(position), 0), nodes.shape[0] - 2)
+    t = position - i
+    d0, d1, rise = nodes[i, 1] * step, nodes[i + 1, 1] * step, nodes[i + 1, 0] - nodes[i, 0]
+    c2, c3 = 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
+    return nodes[i, 0] + t * (d0 + t * (c2 + t * c3)), (d0 + t * (2.0 * c2 + 3.0 * t * c3)) / step
+
+
+@jit
+def _height(side, u, y, cosine, sine):
+    """Height (m) asked of the wheelset's centre by wheel coordinate ``u``, its slope over u, u_r, f' and r."""
+    extra, slope = _hermite(side.wheel, side.wheel_start, side.wheel_step, u)
+    radius, reach = side.rolling_radius + extra, side.half_distance + u
+    u_rail = y + reach * cosine + radius * sine - side.rail_distance
+    f, df = _hermite(side.rail, side.rail_start, side.rail_step, u_rail)
+    rate = df * (cosine + slope * sine) - (sine - slope * cosine)
+    return f - reach * sine + radius * cosine, rate, u_rail, df, radius
+
+
+@jit
+def _summit(side, low, high, y, cosine, sine):
+    """Wheel coordinate of the greatest height between ``low`` and ``high``; an end if it does not turn inside."""
+    while high - low > 1e-9:  # narrow down until one turn is left: noisy profiles turn several times
+        if _height(side, low, y, cosine, sine)[1] >= 0.0 >= _height(side, high, y, cosine, sine)[1]:
+            break
+        part, best, best_at = (high - low) / 8.0, -np.inf, 0
+        for k in range(9):
+            height = _height(side, low + k * part, y, cosine, sine)[0]
+            if height > best:
+                best, best_at = height, k
+        low, high = low + max(best_at - 1, 0) * part, low + min(best_at + 1, 8) * part
+    while high - low > 1e-13:
+        middle = 0.5 * (low + high)
+        if _height(side, middle, y, cosine, sine)[1] > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@jit
+def _touch(side, y, roll, heights, found):
+    """First touch of one side (mirrored to the left); fills ``found``, NaN if it is at an end of a profile."""
+    cosine, sine = math.cos(roll), math.sin(roll)
+    rail_end = side.rail_start + side.rail_step * (side.rail.shape[0] - 1)
+    n, best = heights.shape[0], -np.inf
+    for k in range(n):
+        height, _, u_rail, _, _ = _height(side, side.wheel_start + k * SCAN_STEP, y, cosine, sine)
+        heights[k] = height if side.rail_start <= u_rail <= rail_end else -np.inf
+        best = max(best, heights[k])
+    found[:] = np.nan
+    if max(heights[0], heights[n - 1]) == best:
+        return
+    for k in range(1, n - 1):
+        before, after = heights[k - 1], heights[k + 1]
+        if heights[k] < best - _RESERVE or heights[k] < before or heights[k] < after:
+            continue
+        if min(before, after) == -np.inf:  # touches the end of the rail's profile
+            continue
+        low = side.wheel_start + (k - 1) * SCAN_STEP
+        u = _summit(side, low, low + 2.0 * SCAN_STEP, y, cosine, sine)
+        height, _, u_rail, df, radius = _height(side, u, y, cosine, sine)
+        if math.isnan(found[_HEIGHT]) or height > found[_HEIGHT]:
+            found[_HEIGHT], found[_U_WHEEL], found[_U_RAIL], found[_SLOPE], found[_RADIUS] = (
+                height,
+                u,
+                u_rail,
+                df,
+                radius,
+            )
+
+
+@jit
+def _turn_rate(side, found, roll):
+    """Rate of a side's height over its own roll at the touching point, m/rad (envelope theorem)."""
+    cosine, sine = math.cos(roll), math.sin(roll)
+    reach = side.half_distance + found[_U_WHEEL]
+    sideways = found[_RADIUS] * cosine - reach * sine
+    return found[_SLOPE] * sideways - reach * cosine - found[_RADIUS] * sine
+
+
+@jit
+def _touch_both(left, right, y, solve_roll, buffers, found):
+    """Roll (rad) of the wheelset at lateral position ``y`` and the touching points of both sides."""
+    roll = 0.0
+    for _ in range(_ROLL_STEPS):
+        _touch(left, y, roll, buffers[0], found[0])
+        _touch(right, -y, -roll, buffers[1], found[1])
+        error = found[0, _HEIGHT] - found[1, _HEIGHT]
+        if not solve_roll or not abs(error) > 1e-12:  # ends on NaN, too
+            break
+        roll -= error / (_turn_rate(left, found[0], roll) + _turn_rate(right, found[1], -roll))
+    return roll
+
+
+@jit
+def _tabulate(left, right, shifts, solve_roll, rolls, found):
+    """Touching points for all lateral positions: ``found`` has shape (n, 2, 5)."""
+    nodes_left = int((left.wheel.shape[0] - 1) * left.wheel_step / SCAN_STEP + 1e-9) + 1
+    nodes_right = int((right.wheel.shape[0] - 1) * right.wheel_step / SCAN_STEP + 1e-9) + 1
+    buffers = (np.empty(nodes_left), np.empty(nodes_right))
+    for i in range(shifts.shape[0]):
+        rolls[i] = _touch_both(left, right, shifts[i], solve_roll, buffers, found[i])
+
+
+def first_touch(pair, shifts, roll=True):
+    """Where a rigid wheelset without yaw touches the rails, and the rolling radius difference.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+    shifts : array_like, shape (n,)
+        Lateral positions y of the wheelset's centre, m, positive to the left.
+    roll : bool
+        True: roll is solved so that both wheels touch. False: roll is zero and each side is searched by itself, as
+        the reference values of EN 15302 are.
+
+    Returns
+    -------
+    pandas.DataFrame
+        y_m, roll_rad, rolling_radius_difference_m (left less right) and, per side, u_wheel, u_rail (m, positive to
+        the field side), contact_angle (rad, rotation about x, as in `wrcore.contact.detection`) and height (m, of the
+        wheelset's centre above the rails' tops; alike on both sides if roll is solved). NaN where a profile ends
+        before it touches.
+    """
+    import pandas as pd
+
+    shifts = np.atleast_1d(np.asarray(shifts, dtype=float))
+    if shifts.ndim != 1 or not np.all(np.abs(shifts) < 0.1):
+        raise InputError("first_touch", "shifts", "expected lateral positions within 0.1 m")
+    rolls, found = np.empty(shifts.size), np.empty((shifts.size, 2, 5))
+    _tabulate(*pair.kernel_data(), shifts, bool(roll), rolls, found)
+    table = {"y_m": shifts, "roll_rad": rolls}
+    table["rolling_radius_difference_m"] = found[:, 0, _RADIUS] - found[:, 1, _RADIUS]
+    for i, (name, sign) in enumerate((("left", 1.0), ("right", -1.0))):
+        table[f"u_wheel_{name}_m"] = found[:, i, _U_WHEEL]
+        table[f"u_rail_{name}_m"] = found[:, i, _U_RAIL]
+        table[f"contact_angle_{name}_rad"] = sign * np.arctan(found[:, i, _SLOPE])
+        table[f"height_{name}_m"] = found[:, i, _HEIGHT]
+    return pd.DataFrame(table)
