@@ -54,6 +54,32 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
     assert rules[0] == rules[1] >= {"creep_table", "simulate", "time_runs", "report_archive", *FIGURES}
 
 
+@pytest.mark.parametrize(
+    ("change", "again", "kept"),
+    [
+        (
+            {"cases": {"suspended_v60": {"set": {"integration.duration": 0.6}}}},
+            "suspended_v60: planar and spatial run",
+            "wheelset_v20: planar and spatial run",
+        ),
+        (
+            {"twins": {"rtol": 2.0e-8}},
+            "wheelset_v20: tighter and mirrored twin",
+            "wheelset_v20: planar and spatial run",
+        ),
+        ({"timing": {"repetitions": 3}}, "Timing: planar and spatial runs", "wheelset_v20: planar and spatial run"),
+        ({"creep_table": {"tolerance": 0.04}}, "Creep table", "Contact geometry without load"),
+        ({"figures": {"detection_pose": {"y": 0.006}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
+    ],
+)
+def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, change, again, kept):
+    (tmp_path / "change.yaml").write_text(yaml.safe_dump(change))
+    plan = snakemake("-n", "--configfile", "config/smoke.yaml", tmp_path / "change.yaml")
+    assert plan.returncode == 0
+    assert again in plan.stdout
+    assert kept not in plan.stdout
+
+
 def test_runs_carry_their_scene_and_no_machine_path(smoke):
     for path in sorted((smoke / "runs").glob("*/*.h5")):
         run = load_run(path)

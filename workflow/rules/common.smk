@@ -1,5 +1,4 @@
 # Checks of the configuration, and which sources each family of rules stands on.
-import os
 from pathlib import Path
 
 import jsonschema
@@ -72,17 +71,11 @@ def case_scene(wildcards):
     return config["cases"][wildcards.case]["scene"]
 
 
-def overrides(case, table):
-    """Changes to a case's scene, as `wrcore simulate --set` takes them. Scenes name files relative to their folder."""
-    entry = config["cases"][case]
-    table = os.path.relpath(table, Path(entry["scene"]).parent)
-    return [f"{key}={value}" for key, value in (entry["set"] | {"contact.creep.table": table}).items()]
+def overrides(case):
+    """Changes to a case's scene, as `wrcore simulate --set` takes them."""
+    return [f"{key}={value}" for key, value in config["cases"][case]["set"].items()]
 
 
-def case_overrides(wildcards, input):
-    return overrides(wildcards.case, input.table[0])
-
-
-def timed_cases(wildcards, input):
-    chosen = config["timing"]["cases"]
-    return {case: [config["cases"][case]["scene"], overrides(case, input.table[0])] for case in chosen}
+# Functions of the wildcards only: Snakemake does not compare params that depend on inputs with those of the last run.
+def case_overrides(wildcards):
+    return overrides(wildcards.case)

@@ -58,7 +58,7 @@ rule time_runs:
     benchmark:
         "<benchmarks>/time_runs.tsv"
     params:
-        cases=timed_cases,
+        cases={case: [config["cases"][case]["scene"], overrides(case)] for case in config["timing"]["cases"]},
         repetitions=config["timing"]["repetitions"],
     # all cores: nothing else may run beside it
     threads: workflow.cores

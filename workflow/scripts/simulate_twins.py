@@ -1,5 +1,6 @@
 """Run one case's spatial twins: with tighter tolerances, and started on the other side of the track."""
 
+import os
 import sys
 
 from wrcore.results import write_run
@@ -7,7 +8,9 @@ from wrcore.scene import load_scene
 from wrcore.simulate import simulate
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-overrides = [*snakemake.params.overrides, "contact.detection=spatial"]
+# a scene names files relative to its own folder
+table = os.path.relpath(snakemake.input.table[0], os.path.dirname(snakemake.input.scene))
+overrides = [*snakemake.params.overrides, f"contact.creep.table={table}", "contact.detection=spatial"]
 start = load_scene(snakemake.input.scene, overrides).data["initial"]["y"]
 twins = {
     "tight": [f"integration.{key}={snakemake.params.twins[key]}" for key in ("rtol", "atol")],
