@@ -11,6 +11,7 @@ from wrcore.creep.kalker import coefficients_at, kalker_data
 A_OVER_B = (0.05, 20.0)
 PSI_MAX = 0.95
 NEARLY_FULL_SLIP = 1 - 1e-9
+ROUNDED = 9
 
 
 class Resolution(NamedTuple):
@@ -91,6 +92,8 @@ def _fill(axes, ellipse, alpha_index, beta_index, values):
         inside = beta_index < axes.n_beta - 1
         full[:, mirrored[inside], beta_index[inside]] = values[:, inside] * [-1, 1, 1]
     full[:, :, -1] = full[:, axes.n_alpha // 2, -1][:, None]
+    # without spin the turned direction is a node too: solved apart, it agrees to the solver's tolerance only
+    full[:, :, 0] = (full[:, :, 0] - np.roll(full[:, :, 0], axes.n_alpha // 2, axis=1)) / 2
     return full
 
 
@@ -157,6 +160,7 @@ def spline_coefficients(values):
     Returns
     -------
     ndarray of float32
+        Rounded to 1e-9, so that rounding in a matrix product neither breaks a symmetry nor tells two builds apart.
     """
     n_g, n_psi, n_t, n_alpha, n_beta, _ = values.shape
     c = _along(_interpolation(n_g, False), values, 0)
@@ -174,7 +178,7 @@ def spline_coefficients(values):
         c = _along(_interpolation(2 * n_psi - 1, False), both, 1)[:, n_psi - 1 :]
         c = np.concatenate([c[:, :, :, -1:], c, c[:, :, :, :2]], axis=3)
     padded = np.zeros((*c.shape[:-1], 4), np.float32)
-    padded[..., :3] = c
+    padded[..., :3] = np.round(c, ROUNDED) + 0.0
     return padded.ravel()
 
 

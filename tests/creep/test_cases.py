@@ -1,0 +1,105 @@
+"""Lists of cases in SI units: every model, the order of rows, mixed materials, and refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from wrcore.creep import cases as cases_module
+from wrcore.creep.cases import MODELS, NUMBERS, solve_cases
+from wrcore.creep.table import CreepTable
+from wrcore.errors import InputError
+
+GOOD = {
+    "case_id": "one", "a_m": 5e-3, "b_neg_m": 4e-3, "b_pos_m": 6e-3, "N_N": 8e4, "mu": 0.3, "G_Pa": 82e9, "nu": 0.28,
+    "ux": 1e-3, "uy": -5e-4, "phi_per_m": 0.2,
+}  # fmt: skip
+
+
+def frame(**changes):
+    return pd.DataFrame([{**GOOD, **changes}])
+
+
+@pytest.fixture
+def table(sdec_table):
+    return CreepTable(sdec_table, "sdec", 0.01, None, 0, (), ())
+
+
+def test_exact_model_gives_contacts_forces(sdec_cases):
+    """In newtons and newton metres about the middle of the bounding box; 1 % of mu N (c)."""
+    some = sdec_cases.frame.iloc[::12]
+    out = solve_cases(some, "exact", level=16)
+    size = some.mu * some.N_N
+    for name, unit in (("Fx_N", size), ("Fy_N", size), ("Mz_Nm", size * sdec_cases.c[::12])):
+        assert abs(out[name].to_numpy() - some[name].to_numpy()).max() < 0.01 * unit.max()
+        assert (abs(out[name].to_numpy() - some[name].to_numpy()) / unit).max() < 0.01
+    assert list(out.columns) == ["case_id", "Fx_N", "Fy_N", "Mz_Nm"]
+    assert list(out.case_id) == list(some.case_id)
+    assert out.attrs == {"not_converged": 0, "out_of_range": 0}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_rows_keep_their_order_with_mixed_materials(model, table, ellipse_cases):
+    """A shuffled list gives the shuffled result; nu differs from row to row where the model allows it."""
+    some = ellipse_cases.frame.head(12).copy()
+    if model != "table":
+        some["nu"] = np.tile([0.0, 0.3, 0.5], 4)
+    order = np.random.default_rng(0).permutation(12)
+    straight = solve_cases(some, model, table, level=8)
+    shuffled = solve_cases(some.iloc[order], model, table, level=8)
+    pd.testing.assert_frame_equal(shuffled, straight.iloc[order].reset_index(drop=True), rtol=1e-3)
+
+
+def test_table_agrees_with_exact(table):
+    """1 % of mu N = 240 N."""
+    exact, looked = (solve_cases(frame(), model, table, level=20).iloc[0] for model in ("exact", "table"))
+    assert [looked.Fx_N, looked.Fy_N] == pytest.approx([exact.Fx_N, exact.Fy_N], abs=240)
+
+
+def test_out_of_range_patches_are_counted(table):
+    assert solve_cases(frame(a_m=0.2), "table", table).attrs["out_of_range"] == 1
+    assert solve_cases(frame(), "table", table).attrs["out_of_range"] == 0
+    assert solve_cases(frame(a_m=0.2), "linear").attrs["out_of_range"] == 1
+
+
+def test_tables_are_made_for_each_material(table, monkeypatch):
+    """Without a table each nu gets its own from the cache, of ellipses where all patches are."""
+    asked = []
+    monkeypatch.setattr(cases_module, "ensure_table", lambda nu, planes, *rest: asked.append((nu, planes)) or table)
+    both = pd.concat([frame(), frame(nu=0.3)], ignore_index=True)
+    solve_cases(both, "table")
+    solve_cases(frame(b_neg_m=6e-3), "table")
+    assert asked == [(0.28, "sdec"), (0.3, "sdec"), (0.28, "ellipse")]
+
+
+@pytest.mark.parametrize("name", [*NUMBERS, "case_id"])
+def test_missing_column(name):
+    with pytest.raises(InputError, match=rf"in\.csv: {name}: expected columns"):
+        solve_cases(frame().drop(columns=name), "linear", source="in.csv")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, "many", None, ""])
+@pytest.mark.parametrize("name", NUMBERS)
+def test_not_a_number(name, value):
+    two = pd.concat([frame(), frame(**{name: value})], ignore_index=True)
+    with pytest.raises(InputError, match=rf"in\.csv: {name}, row 2: expected a finite number"):
+        solve_cases(two, "linear", source="in.csv")
+
+
+@pytest.mark.parametrize("value", [0.0, -1e-3])
+@pytest.mark.parametrize("name", ["a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa"])
+def test_not_positive(name, value):
+    with pytest.raises(InputError, match=rf"{name}, row 1: expected a number above 0"):
+        solve_cases(frame(**{name: value}), "linear")
+
+
+def test_impossible_material_and_model(table):
+    with pytest.raises(InputError, match="nu, row 1: expected 0 to 0.5, got 0.7"):
+        solve_cases(frame(nu=0.7), "linear")
+    with pytest.raises(InputError, match="model: expected one of table, exact"):
+        solve_cases(frame(), "kalker")
+    with pytest.raises(InputError, match="nu, row 1: expected the table's 0.28, got 0.3"):
+        solve_cases(frame(nu=0.3), "table", table)
+
+
+def test_no_rows():
+    assert len(solve_cases(frame().iloc[:0], "exact")) == 0 and len(solve_cases(frame().iloc[:0], "table")) == 0
