@@ -66,9 +66,9 @@ class _Well:
 
         low = max(centre - 2.0 * amplitude, self.y[0])
         high = min(centre, self.y[-1] - 2.0 * amplitude)
-        start = centre - amplitude
-        if not low <= start <= high:
+        if not low <= high:  # the table is too short, or has no centre
             return math.nan, math.nan
+        start = min(max(centre - amplitude, low), high)
         if abs(excess(start)) > _NOISE**2:
             if excess(low) > 0.0 or excess(high) < 0.0:
                 return math.nan, math.nan
@@ -195,3 +195,18 @@ def _around_centre(y, difference):
     if last - first < 2:
         raise InputError("conicity", "profiles", "expected wheels that touch their rails at y = 0, got none")
     return y[first:last], difference[first:last]
+
+
+def en15302_tolerance(conicity):
+    """Permitted deviation from a reference value of EN 15302: min(0.05, half of it), 0.01 where it is zero.
+
+    Parameters
+    ----------
+    conicity : array_like
+        Reference values.
+
+    Returns
+    -------
+    ndarray
+    """
+    return np.clip(0.5 * np.asarray(conicity, dtype=float), 0.01, 0.05)
