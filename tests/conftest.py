@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wrcore.contact.detection import contact_geometry
+from wrcore.contact.geometry import contact_geometry
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
 

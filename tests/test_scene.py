@@ -10,7 +10,7 @@ import yaml
 from tests.conftest import ROOT, SCENES
 from wrcore.checked_yaml import read_yaml
 from wrcore.cli import main
-from wrcore.contact.detection import ANGLE, NORMAL
+from wrcore.contact.reduction import ANGLE, NORMAL
 from wrcore.dynamics.system import right_hand_side, workspace
 from wrcore.errors import InputError
 from wrcore.scene import GRAVITY, compile_scene, load_scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.contact.detection import contact_geometry
+from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.poses import solve_poses
 from wrcore.simulate import simulate
 

@@ -78,6 +78,7 @@ def _add_contact(commands):
     command.add_argument("--shear-modulus", type=float, default=8.2e10, metavar="Pa")
     command.add_argument("--poisson-ratio", type=float, default=0.28)
     command.add_argument("--detection", choices=("planar", "spatial"), default="spatial")
+    command.add_argument("--patch", choices=("maximum", "moment"), default="moment", help="reduction of an overlap")
     command.add_argument("--wheel-load", type=float, required=True, metavar="N")
     command.add_argument("--out", required=True, metavar="OUT.csv")
     command.set_defaults(run=_contact)
@@ -189,7 +190,7 @@ class _progress:
 
 
 def _contact(options):
-    from wrcore.contact.detection import contact_geometry
+    from wrcore.contact.geometry import contact_geometry
     from wrcore.contact.poses import read_poses, solve_poses
     from wrcore.geometry.standards import named_profile
     from wrcore.geometry.track import Track
@@ -212,8 +213,9 @@ def _contact(options):
         wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
     )
     table = solve_poses(
-        poses, geometry, options.wheel_load, options.detection, options.shear_modulus, options.poisson_ratio
-    )
+        poses, geometry, options.wheel_load, options.detection, options.patch, options.shear_modulus,
+        options.poisson_ratio,
+    )  # fmt: skip
     _write_csv(table, out)
     missing = len(set(poses.pose_id) - set(table.pose_id))
     print(f"{len(poses)} poses, {len(table)} patches{f', {missing} poses without contact' if missing else ''}: {out}")

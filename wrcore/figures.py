@@ -12,7 +12,8 @@ import numpy as np
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
-from wrcore.contact.detection import contact_geometry, detect
+from wrcore.contact.detection import detect
+from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import settle
 from wrcore.geometry.surface import SIDES, rail_surface, wheel_surface, wheelset_transform
@@ -140,19 +141,9 @@ def _wheel_on_rail(axes, scene, side, reach, angle, lift):
 
 def _surface(axes, points, color, zorder):
     x, y, z = np.moveaxis(MM * points, -1, 0)
-    axes.plot_surface(
-        x,
-        y,
-        z,
-        color=color,
-        linewidth=0,
-        antialiased=False,
-        rasterized=True,
-        rcount=80,
-        ccount=80,
-        zorder=zorder,
-        lightsource=LightSource(azdeg=200, altdeg=60),
-    )
+    light = LightSource(azdeg=200, altdeg=60)
+    look = {"color": color, "linewidth": 0, "antialiased": False, "rasterized": True, "zorder": zorder}
+    axes.plot_surface(x, y, z, rcount=80, ccount=80, lightsource=light, **look)
 
 
 def _line(axes, points, **kwargs):
@@ -200,11 +191,9 @@ def fig2_profiles(wheel, rail, u_wheel=-0.034, u_rail=-0.030):
     figure = Figure(figsize=(6.8, 2.5), layout="constrained")
     rail_axes, wheel_axes = figure.subplots(1, 2)
     _profile_with_point(rail_axes, rail, u_rail, ("P", "u_r", "f_r"), up=1.0)
-    rail_axes.set_ylim(-30, 17)
     _profile_with_point(wheel_axes, wheel, u_wheel, ("Q", "u_w", "f_w + r_0"), up=-1.0)
-    wheel_axes.set_ylim(-48, 20)
-    rail_axes.set_title(f"(a) rail, {rail.name}")
-    wheel_axes.set_title(f"(b) wheel, {wheel.name}")
+    rail_axes.set(title=f"(a) rail, {rail.name}", ylim=(-30, 17))
+    wheel_axes.set(title=f"(b) wheel, {wheel.name}", ylim=(-48, 20))
     return figure
 
 
@@ -278,15 +267,14 @@ def _resting_pose(scene, geometry, y, yaw, load, lowered):
     return {"y": y, "z": z - lowered, "roll": roll, "yaw": yaw}
 
 
-def _middle(patches):
-    """Lateral wheel coordinate midway between the outermost patches, m."""
+def _wheel_span(scene, patches, window, count):
+    """Lateral wheel coordinates from ``window`` before the first to ``window`` after the last patch, m."""
     u = [patch.u_wheel_m for patch in patches]
-    return 0.5 * (min(u) + max(u)), 0.5 * (max(u) - min(u))
+    return np.linspace(max(min(u) - window, scene.wheel.u[0]), min(max(u) + window, scene.wheel.u[-1]), count)
 
 
 def _cross_section(axes, scene, pose, side, patches, window):
-    centre, spread = _middle(patches)
-    u = np.linspace(max(centre - spread - window, scene.wheel.u[0]), centre + spread + window, 800)
+    u = _wheel_span(scene, patches, window, 800)
     _, y_wheel, z_wheel = np.moveaxis(_wheel_points(scene, side, u, 0.0, **pose), -1, 0)
     z_rail = _rail_below(scene, side, y_wheel)
     axes.plot(MM * y_wheel, MM * z_rail, color=RAIL, linewidth=1.6, label="rail profile")
@@ -304,20 +292,18 @@ def _rail_below(scene, side, y):
 
 def _plan_view(axes, scene, pose, side, found, window):
     """Overlap over the wheel's surface, the deepest point of each strip and the contact points."""
-    centre, spread = _middle(found["spatial"] + found["planar"])
-    u = np.linspace(max(centre - spread - window, scene.wheel.u[0]), centre + spread + window, 300)
+    u = _wheel_span(scene, found["spatial"] + found["planar"], window, 300)
     s = np.linspace(-0.1, 0.1, 1001)
     points = _wheel_points(scene, side, *np.meshgrid(u, s), **pose)
     x, y = MM * points[..., 0], MM * points[..., 1]
     overlap = np.nan_to_num(MM * (_rail_below(scene, side, points[..., 1]) - points[..., 2]), nan=-1.0)
-    mesh = axes.pcolormesh(
-        x, y, np.ma.masked_less(overlap, 0.0), cmap="Greys", vmin=0, shading="gouraud", rasterized=True
-    )
+    positive = np.ma.masked_less(overlap, 0.0)
+    mesh = axes.pcolormesh(x, y, positive, cmap="Greys", vmin=0, shading="gouraud", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label="vertical overlap / mm")
     strip = np.arange(u.size)
     deepest = np.argmax(overlap, axis=0)
     kept = np.where(overlap[deepest, strip] > 0.0, 1.0, np.nan)
-    axes.plot(kept * x[500], y[500], color=ACCENT, linestyle=":", label="lowest generator (planar)")
+    axes.plot(kept * x[s.size // 2], y[s.size // 2], color=ACCENT, linestyle=":", label="lowest generator (planar)")
     axes.plot(kept * x[deepest, strip], y[deepest, strip], color=ACCENT, label="deepest point of each strip")
     for detection, patches in found.items():
         _mark(axes, [(patch.x_m, patch.y_m) for patch in patches], detection)

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.checked_yaml import parse_value, read_yaml, validate
-from wrcore.contact.detection import axle_direction, contact_geometry, detect
+from wrcore.contact.detection import axle_direction, detect
+from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table, load_table
@@ -185,7 +187,8 @@ def compile_scene(scene, progress=None):
         vehicle.bodies,
         ContactModel(
             contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance),
-            hertz_table(), LAWS[contact["creep"]["model"]], _creep(scene, progress), scene.detection == "spatial",
+            hertz_table(), LAWS[contact["creep"]["model"]], _creep(scene, progress),
+            scene.detection == "spatial", REDUCTIONS[contact["patch"]],
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
         ),
@@ -207,11 +210,12 @@ def _initial_state(scene, model):
                 scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
             )
         roll, z = settle(
-            contact.geometry, contact.hertz, modulus, y, yaw, contact.spatial, load, vehicle.rolling_radius
-        )
+            contact.geometry, contact.hertz, modulus, y, yaw, contact.spatial, contact.reduction, load,
+            vehicle.rolling_radius,
+        )  # fmt: skip
         if not math.isfinite(z):
             raise InputError(scene.source, "initial", "expected a position in which both wheels can stand on the rails")
-        patches = detect(contact.geometry, y, z, roll, yaw, scene.detection)
+        patches = detect(contact.geometry, y, z, roll, yaw, scene.detection, data["contact"]["patch"])
         radius = np.mean([vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         part[:3] = vehicle.positions[body, 0], y, z

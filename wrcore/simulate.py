@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 import wrcore
-from wrcore.contact import detection
+from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.system import right_hand_side, workspace
@@ -18,11 +18,11 @@ DERAILED_Y = 0.05
 
 SIDES = ("left", "right")
 CONTACT_CHANNELS = {
-    "u_wheel_m": detection.U_WHEEL, "s_wheel_rad": detection.S_WHEEL, "u_rail_m": detection.U_RAIL,
-    "x_m": detection.X, "y_m": detection.Y, "z_m": detection.Z, "contact_angle_rad": detection.ANGLE,
-    "penetration_m": detection.PENETRATION, "a_m": detection.SEMI_A, "b_m": detection.SEMI_B,
-    "N_N": detection.NORMAL, "Fx_N": detection.FX, "Fy_N": detection.FY, "Mz_Nm": detection.MZ,
-    "xi": detection.XI, "eta": detection.ETA, "phi_per_m": detection.PHI,
+    "u_wheel_m": reduction.U_WHEEL, "s_wheel_rad": reduction.S_WHEEL, "u_rail_m": reduction.U_RAIL,
+    "x_m": reduction.X, "y_m": reduction.Y, "z_m": reduction.Z, "contact_angle_rad": reduction.ANGLE,
+    "penetration_m": reduction.PENETRATION, "a_m": reduction.SEMI_A, "b_m": reduction.SEMI_B,
+    "N_N": reduction.NORMAL, "Fx_N": reduction.FX, "Fy_N": reduction.FY, "Mz_Nm": reduction.MZ,
+    "xi": reduction.XI, "eta": reduction.ETA, "phi_per_m": reduction.PHI,
 }  # fmt: skip
 """Contact channels and their columns in the patch array."""
 
@@ -134,12 +134,12 @@ def _channels(scene, model, work, function, trajectory):
     """Output channels by group; contact forces are evaluated again at the output times."""
     wanted = scene.data["output"]["channels"]
     wheelsets = model.bodies.wheelsets
-    shape = (len(trajectory.t), len(wheelsets), 2, detection.MAX_PATCHES, detection.PATCH_COLUMNS)
+    shape = (len(trajectory.t), len(wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches = np.full(shape, np.nan)
     if "contact" in wanted:
         for i, (t, state) in enumerate(zip(trajectory.t, trajectory.states, strict=True)):
             function(t, state)
-            present = np.arange(detection.MAX_PATCHES) < work.counts[..., None]
+            present = np.arange(reduction.MAX_PATCHES) < work.counts[..., None]
             patches[i][present] = work.patches[present]
     groups = {}
     for body, name in enumerate(scene.vehicle.body_names):

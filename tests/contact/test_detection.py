@@ -7,17 +7,11 @@ import pandas as pd
 import pytest
 
 from tests.conftest import DATA
-from wrcore.contact.detection import (
-    MAX_PATCHES,
-    PATCH_COLUMNS,
-    PENETRATION,
-    axle_direction,
-    contact_geometry,
-    detect,
-    find_patches,
-)
+from wrcore.contact.detection import axle_direction, detect, find_patches
+from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.poses import geometry_table, solve_poses
+from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS, PENETRATION
 from wrcore.contact.statics import height_at_load
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
@@ -42,7 +36,7 @@ def reference(name):
     return table
 
 
-def solved(table, geometry, load, detection):
+def solved(table, geometry, load, detection, reduction="maximum"):
     """Our patches for a reference set: CONTACT's y right, z down become y left, z up."""
     one = table.drop_duplicates("pose_id")
     poses = pd.DataFrame(
@@ -54,7 +48,7 @@ def solved(table, geometry, load, detection):
             "z_m": np.nan,
         }
     )
-    return solve_poses(poses, geometry, load, detection)
+    return solve_poses(poses, geometry, load, detection, reduction)
 
 
 def nearest(ours, row):
@@ -118,7 +112,7 @@ def test_planar_error_follows_the_first_order_law(benchmark_pair, y, roll):
     yaw = 5e-3
     rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     modulus = contact_modulus(8.2e10, 0.28)
-    z = height_at_load(benchmark_pair, hertz_table(), modulus, -1.0, y, roll, yaw, True, 2e4, 0.46, rows)
+    z = height_at_load(benchmark_pair, hertz_table(), modulus, -1.0, y, roll, yaw, True, MAXIMUM, 2e4, 0.46, rows)
     planar, spatial = (
         next(p for p in detect(benchmark_pair, y, z, roll, yaw, d) if p.side == "right") for d in ("planar", "spatial")
     )
@@ -168,8 +162,10 @@ def dense_overlaps(wheel, rail, track, pose, side, spatial):
     return [(u[i], u[j - 1], -gap[i:j].min()) for i, j in zip(edges[::2], edges[1::2], strict=True)]
 
 
-@pytest.mark.parametrize("detection", ["planar", "spatial"])
-def test_every_overlap_of_a_dense_search_is_found(benchmark_pair, s1002, uic60, detection):
+@pytest.mark.parametrize(
+    ("detection", "reduction"), [("planar", "maximum"), ("spatial", "maximum"), ("spatial", "moment")]
+)
+def test_every_overlap_of_a_dense_search_is_found(benchmark_pair, s1002, uic60, detection, reduction):
     rng = np.random.default_rng(1)
     track = Track(1.435)
     checked = 0
@@ -180,7 +176,7 @@ def test_every_overlap_of_a_dense_search_is_found(benchmark_pair, s1002, uic60, 
             rng.uniform(-2e-3, 2e-3),
             rng.uniform(-0.02, 0.02),
         )
-        found = detect(benchmark_pair, *pose, detection)
+        found = detect(benchmark_pair, *pose, detection, reduction)
         for side in ("left", "right"):
             mine = [p for p in found if p.side == side]
             # the dense search sees every strip's minimum over s, so that its overlaps are ours up to its spacing
@@ -226,14 +222,15 @@ def test_no_contact_when_lifted_and_nothing_invented(benchmark_pair):
     assert detect(benchmark_pair, 0.2, 0.46) == []  # the wheels are not over the rails at all
 
 
-def test_random_poses_never_fail(benchmark_pair):
+@pytest.mark.parametrize("reduction", [MAXIMUM, MOMENT])
+def test_random_poses_never_fail(benchmark_pair, reduction):
     rng = np.random.default_rng(2)
     rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     for _ in range(20000):
         y, z = rng.uniform(-0.012, 0.012), 0.46 + rng.uniform(-3e-3, 3e-3)
         axle = axle_direction(rng.uniform(-0.01, 0.01), rng.uniform(-0.03, 0.03))
         for side in (1.0, -1.0):
-            count = find_patches(benchmark_pair, side, y, z, *(side * c for c in axle), True, rows)
+            count = find_patches(benchmark_pair, side, y, z, *(side * c for c in axle), True, reduction, rows)
             assert np.all(np.isfinite(rows[:count, : PENETRATION + 3]))
             assert np.all(rows[:count, PENETRATION] > 0)
 
@@ -241,8 +238,8 @@ def test_random_poses_never_fail(benchmark_pair):
 def test_compiled_search_equals_its_python_source(benchmark_pair):
     compiled, plain = (np.zeros((MAX_PATCHES, PATCH_COLUMNS)) for _ in range(2))
     axle = axle_direction(3e-4, 4e-3)
-    count = find_patches(benchmark_pair, 1.0, 0.002, 0.4595, *axle, True, compiled)
-    assert find_patches.py_func(benchmark_pair, 1.0, 0.002, 0.4595, *axle, True, plain) == count > 0
+    count = find_patches(benchmark_pair, 1.0, 0.002, 0.4595, *axle, True, MAXIMUM, compiled)
+    assert find_patches.py_func(benchmark_pair, 1.0, 0.002, 0.4595, *axle, True, MAXIMUM, plain) == count > 0
     np.testing.assert_allclose(plain[:count], compiled[:count], rtol=1e-7, atol=1e-12)
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from tests.dynamics.test_body import matrix_of
 from wrcore.dynamics.body import STATE_SIZE, euler_parameters
 from wrcore.dynamics.integrate import integrate
@@ -18,19 +19,23 @@ from wrcore.scene import compile_scene, load_scene
 def contact(request):
     """Some contact model: the bodies of these tests have no wheels, so it is never used."""
     scene = {
-        "name": "any", "speed": 1.0, "vehicle": {"model": "wheelset", "parameters": "config/vehicles/wheelset.yaml"},
-        "wheel": {"profile": "cone:1/20"}, "rail": {"profile": "circle:0.05"}, "contact": {"creep": {"model": "linear"}},
-    }  # fmt: skip
+        "name": "any",
+        "speed": 1.0,
+        "vehicle": {"model": "wheelset", "parameters": str(ROOT / "config/vehicles/wheelset.yaml")},
+        "wheel": {"profile": "cone:1/20"},
+        "rail": {"profile": "circle:0.05"},
+        "contact": {"creep": {"model": "linear"}},
+    }
     return compile_scene(load_scene(scene))[0].contact
 
 
 def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, speed=0.0, alpha=5.0, beta=5.0):
     """A model without wheels. springs: (bodies, markers, k, c, preload, rest); joints: (kind, bodies, markers, axis)."""
     n, m = len(springs), len(joints)
-    bodies = Bodies(
-        np.array(masses, float), np.array(inertias, float), np.zeros(len(masses), np.int64), np.zeros(0, np.int64)
-    )
-    columns = [np.array([s[i] for s in springs], float).reshape(n, *shape) for i, shape in ((1, (2, 3)), (2, (3,)), (3, (3,)), (4, (3,)), (5, (3,)))]  # fmt: skip
+    wheelless = np.zeros(len(masses), np.int64), np.zeros(0, np.int64)
+    bodies = Bodies(np.array(masses, float), np.array(inertias, float), *wheelless)
+    shapes = (2, 3), (3,), (3,), (3,), (3,)
+    columns = [np.array([s[i + 1] for s in springs], float).reshape(n, *shape) for i, shape in enumerate(shapes)]
     elements = SpringDampers(np.array([s[0] for s in springs], np.int64).reshape(n, 2), *columns)
     equations = sum(3 if j[0] == SPHERICAL else 1 for j in joints)
     joined = Joints(
@@ -178,7 +183,10 @@ def test_constraints_match_finite_differences(contact):
     for t, y in zip(times, [backwards[2], backwards[1], state, forwards[1], forwards[2]], strict=True):
         work = workspace(model)
         right_hand_side(model, work)(t, y)
-        constraint_equations(model.joints, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma, work.owner, work.scratch)  # fmt: skip
+        constraint_equations(
+            model.joints, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma, work.owner,
+            work.scratch,
+        )  # fmt: skip
         values.append((work.phi.copy(), work.phi_rate.copy(), work.gamma.copy()))
     phi = np.array([v[0] for v in values])
     np.testing.assert_allclose((phi[0] - 8 * phi[1] + 8 * phi[3] - phi[4]) / (12 * h), values[2][1], atol=1e-8)

@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 
-from wrcore.contact import detection as columns
+from wrcore.contact import reduction as columns
+from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
+from wrcore.contact.strip import cubic_at
 from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
 
@@ -66,7 +68,9 @@ def read_poses(path):
     return frame
 
 
-def solve_poses(poses, geometry, wheel_load, detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28):
+def solve_poses(
+    poses, geometry, wheel_load, detection="spatial", reduction="moment", shear_modulus=8.2e10, poisson_ratio=0.28
+):
     """Patches of both wheels for every pose, statically (damping factor 1: plain Hertz).
 
     Parameters
@@ -78,6 +82,7 @@ def solve_poses(poses, geometry, wheel_load, detection="spatial", shear_modulus=
     wheel_load : float
         Vertical load per wheel, N, > 0.
     detection : {"planar", "spatial"}
+    reduction : {"maximum", "moment"}
     shear_modulus, poisson_ratio : float
         Material of both bodies, Pa and -.
 
@@ -89,20 +94,23 @@ def solve_poses(poses, geometry, wheel_load, detection="spatial", shear_modulus=
     import pandas as pd
 
     hertz, modulus, spatial = hertz_table(), contact_modulus(shear_modulus, poisson_ratio), detection == "spatial"
-    if detection not in columns.DETECTIONS:
-        raise InputError("detection", "", f"expected one of {', '.join(columns.DETECTIONS)}, got {detection!r}")
+    if detection not in DETECTIONS:
+        raise InputError("detection", "", f"expected one of {', '.join(DETECTIONS)}, got {detection!r}")
+    if reduction not in columns.REDUCTIONS:
+        raise InputError("patch", "", f"expected one of {', '.join(columns.REDUCTIONS)}, got {reduction!r}")
+    rule = columns.REDUCTIONS[reduction]
     rows = []
     patches = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     nominal = geometry.rolling_radius
     for pose in poses.itertuples():
         y, yaw, roll, heights = pose.y_m, pose.yaw_rad, pose.roll_rad, {side: pose.z_m for side in SIDES}
         if math.isnan(roll) and math.isnan(pose.z_m):
-            roll, z = settle(geometry, hertz, modulus, y, yaw, spatial, wheel_load, nominal)
+            roll, z = settle(geometry, hertz, modulus, y, yaw, spatial, rule, wheel_load, nominal)
             heights = {side: z for side in SIDES}
         elif math.isnan(pose.z_m):
             heights = {
                 side: height_at_load(
-                    geometry, hertz, modulus, sign, y, roll, yaw, spatial, wheel_load, nominal, patches
+                    geometry, hertz, modulus, sign, y, roll, yaw, spatial, rule, wheel_load, nominal, patches
                 )
                 for side, sign in SIDES.items()
             }
@@ -112,7 +120,7 @@ def solve_poses(poses, geometry, wheel_load, detection="spatial", shear_modulus=
             z = heights[side]
             if math.isnan(z):
                 continue
-            count, _ = wheel_at_rest(geometry, hertz, modulus, sign, y, z, roll, yaw, spatial, patches)
+            count, _ = wheel_at_rest(geometry, hertz, modulus, sign, y, z, roll, yaw, spatial, rule, patches)
             for number, row in enumerate(patches[:count], start=1):
                 values = {name: row[column] for name, column in PATCH_FIELDS.items()}
                 p_max = 1.5 * values["N_N"] / (math.pi * values["a_m"] * values["b_m"])
@@ -144,7 +152,7 @@ def geometry_table(geometry, shifts, detection="planar"):
     touch = 1e-3
     poses = pd.DataFrame({"pose_id": [str(i) for i in range(len(shifts))], "y_m": shifts})
     poses = poses.assign(yaw_rad=0.0, roll_rad=np.nan, z_m=np.nan)
-    table = solve_poses(poses, geometry, touch, detection)
+    table = solve_poses(poses, geometry, touch, detection, "maximum")
     rows = []
     for pose in poses.itertuples():
         found = table[table.pose_id == pose.pose_id]
@@ -154,7 +162,7 @@ def geometry_table(geometry, shifts, detection="planar"):
         radius = {}
         for side, patch in deepest.items():
             u, start, step = patch.u_wheel_m, geometry.wheel_start, geometry.wheel_step
-            radius[side] = geometry.rolling_radius + columns._cubic_at(geometry.wheel, start, step, u)[0]
+            radius[side] = geometry.rolling_radius + cubic_at(geometry.wheel, start, step, u)[0]
             row |= {f"u_wheel_{side}_m": u, f"contact_angle_{side}_rad": patch.contact_angle_rad}
         row["rolling_radius_difference_m"] = radius["left"] - radius["right"]
         rows.append(row)

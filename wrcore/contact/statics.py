@@ -5,7 +5,9 @@ import math
 import numpy as np
 
 from wrcore._jit import jit
-from wrcore.contact.detection import (
+from wrcore.contact.detection import find_patches
+from wrcore.contact.normal import hertz_ellipse
+from wrcore.contact.reduction import (
     ANGLE,
     CURVATURE_X,
     CURVATURE_Y,
@@ -15,9 +17,7 @@ from wrcore.contact.detection import (
     PENETRATION,
     SEMI_A,
     SEMI_B,
-    find_patches,
 )
-from wrcore.contact.normal import hertz_ellipse
 
 Z_RANGE = 0.03
 """Half of the range of heights that is searched around the nominal one, m."""
@@ -27,7 +27,7 @@ ROLL_RANGE = 0.05
 
 
 @jit
-def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, patches):
+def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
     """Patches of one wheel in a given pose with their static normal forces (damping factor 1).
 
     Parameters
@@ -41,6 +41,8 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, patc
     y, z, roll, yaw : float
         Pose of the wheelset, m and rad.
     spatial : bool
+    reduction : int
+        MAXIMUM or MOMENT.
     patches : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
         Filled, including semi-axes and normal force.
 
@@ -52,7 +54,7 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, patc
         Vertical force on the wheel, N.
     """
     ex, ey, ez = -math.sin(yaw) * math.cos(roll), math.cos(yaw) * math.cos(roll), math.sin(roll)
-    count = find_patches(geometry, side, y, z, side * ex, side * ey, side * ez, spatial, patches)
+    count = find_patches(geometry, side, y, z, side * ex, side * ey, side * ez, spatial, reduction, patches)
     force = 0.0
     for k in range(count):
         row = patches[k]
@@ -65,21 +67,21 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, patc
 
 
 @jit
-def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, load, nominal, patches):
+def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
     """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding.
 
     NaN if no height within ``Z_RANGE`` of ``nominal`` does.
     """
     low, high = nominal - Z_RANGE, nominal + Z_RANGE
-    if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, patches)[1] < load:
+    if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
         return np.nan
-    if wheel_at_rest(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, patches)[1] > load:
+    if wheel_at_rest(geometry, hertz, modulus, side, y, high, roll, yaw, spatial, reduction, patches)[1] > load:
         return np.nan
     while high - low > 1e-14:
         middle = 0.5 * (low + high)
         if middle == low or middle == high:
             break
-        if wheel_at_rest(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, patches)[1] > load:
+        if wheel_at_rest(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, reduction, patches)[1] > load:
             low = middle
         else:
             high = middle
@@ -87,7 +89,7 @@ def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, load, 
 
 
 @jit
-def settle(geometry, hertz, modulus, y, yaw, spatial, load, nominal):
+def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
     """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none.
 
     The left wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe.
@@ -97,8 +99,8 @@ def settle(geometry, hertz, modulus, y, yaw, spatial, load, nominal):
     left = right = 0.0
     for _ in range(60):
         roll = 0.5 * (low + high)
-        left = height_at_load(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, load, nominal, patches)
-        right = height_at_load(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, load, nominal, patches)
+        left = height_at_load(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
+        right = height_at_load(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
         # roll lifts the left wheel: too much of it and the left wheel must come down further than the right one
         if left < right or (np.isnan(left) and roll > 0.0) or (np.isnan(right) and roll > 0.0):
             high = roll

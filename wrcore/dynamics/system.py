@@ -14,7 +14,7 @@ import numpy as np
 from numba.typed import List
 
 from wrcore._jit import jit
-from wrcore.contact.detection import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.joint import Joints, constraint_equations
 from wrcore.dynamics.suspension import FRAME, SpringDampers, spring_damper_forces

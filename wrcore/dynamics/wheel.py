@@ -5,7 +5,10 @@ from typing import NamedTuple
 
 from wrcore._jit import jit
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import (
+from wrcore.contact.detection import find_patches
+from wrcore.contact.geometry import ContactGeometry
+from wrcore.contact.normal import HertzTable, damping_factor, hertz_ellipse
+from wrcore.contact.reduction import (
     ANGLE,
     CURVATURE_X,
     CURVATURE_Y,
@@ -19,13 +22,10 @@ from wrcore.contact.detection import (
     SEMI_A,
     SEMI_B,
     XI,
-    ContactGeometry,
     X,
     Y,
     Z,
-    find_patches,
 )
-from wrcore.contact.normal import HertzTable, damping_factor, hertz_ellipse
 from wrcore.creep.laws import CreepData, creep_force
 
 
@@ -38,6 +38,8 @@ class ContactModel(NamedTuple):
     """Creep law, see wrcore.creep.laws.LAWS."""
     creep: CreepData
     spatial: bool
+    reduction: int
+    """MAXIMUM or MOMENT of wrcore.contact.reduction."""
     shear_modulus: float
     """G, Pa."""
     poisson_ratio: float
@@ -95,7 +97,9 @@ def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, co
     for wheel in range(2):
         side = 1.0 - 2.0 * wheel
         rows = patches[wheel]
-        count = find_patches(model.geometry, side, y, z, side * ex, side * ey, side * ez, model.spatial, rows)
+        count = find_patches(
+            model.geometry, side, y, z, side * ex, side * ey, side * ez, model.spatial, model.reduction, rows
+        )
         counts[wheel] = count
         for k in range(count):
             row = rows[k]

@@ -1,0 +1,204 @@
+"""From an overlap of wheel and rail to a Hertz patch: two reductions.
+
+* ``maximum`` (the paper's): the point of greatest penetration, where wheel and rail slopes agree, and the curvatures of
+  both profiles there. Its result jumps when another point becomes the deepest one and where curvatures jump.
+* ``moment``: the Hertz patch whose parabolic overlap g = -(d0 - B e^2) has the same first three moments of g^2,
+
+      M_k = int g^2 u^k du:   e_c = M1/M0,   w^2 = 7 (M2/M0 - e_c^2),   d0 = sqrt(15 M0 / (16 w)),   B = d0/w^2.
+
+  It is exact for constant curvatures, needs no curvature, and follows an asymmetric patch smoothly.
+"""
+
+import math
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.contact.geometry import SCAN_STEP
+from wrcore.contact.strip import (
+    cubic_at,
+    curvature_at,
+    gap_at,
+    on_rail,
+    slope_difference,
+    strip_point,
+    wheel_slope,
+)
+
+REDUCTIONS = {"maximum": 0, "moment": 1}
+MAXIMUM, MOMENT = 0, 1
+
+MAX_PATCHES = 3
+"""Patches kept per wheel; tread, flange root and flange can touch at once."""
+
+CURVATURE_FLOOR = 0.5
+"""Smallest relative curvature that ``maximum`` hands to Hertz, 1/m (radius 2 m; where profiles are conformal, or even
+interpenetrate more at the sides, the curvature at one point says nothing about the patch)."""
+
+# Columns of the patch array: geometry first, then what the forces add (wrcore.dynamics.wheel).
+U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y = range(10)
+SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
+PATCH_COLUMNS = 19
+
+SLOPE_TOLERANCE = 1e-12
+"""Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
+
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+@jit
+def deepest_point(geometry, pose, u):
+    """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
+
+    Returns ``u`` itself where the overlap ends (edge of a profile) before the slopes agree.
+    """
+    low, high = u - 3.0 * SCAN_STEP, u + 3.0 * SCAN_STEP
+    new = u
+    for _ in range(60):
+        value, rate = slope_difference(geometry, pose, new)
+        if abs(value) < SLOPE_TOLERANCE:
+            return new
+        if value < 0.0:
+            low = new
+        else:
+            high = new
+        step = -value / rate if rate > 0.0 else math.copysign(SCAN_STEP, -value)
+        new += min(max(step, -SCAN_STEP), SCAN_STEP)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if high - low < 1e-13:
+            break
+    return new if abs(new - u) < 2.9 * SCAN_STEP else u
+
+
+@jit
+def edge_of_overlap(geometry, pose, outside, inside):
+    """Zero of the gap between a point outside and one inside an overlap, to about 1e-7 m (Illinois steps).
+
+    What is left of the integral of g^2 there is of third order in the remaining distance.
+    """
+    high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
+    if high >= 0.5:  # the rail ends here
+        return inside
+    kept = 0
+    for _ in range(30):
+        if abs(outside - inside) < 1e-7 or high - low <= 0.0:
+            break
+        new = (outside * low - inside * high) / (low - high)
+        value = gap_at(geometry, pose, new)[0]
+        if abs(value) < 1e-7 * abs(high - low) / abs(outside - inside):
+            return new
+        if value < 0.0:
+            inside, low = new, value
+            if kept == -1:
+                high *= 0.5
+            kept = -1
+        else:
+            outside, high = new, value
+            if kept == 1:
+                low *= 0.5
+            kept = 1
+    return 0.5 * (outside + inside)
+
+
+@jit
+def overlap_moments(geometry, pose, first, last):
+    """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature, M1 and M2 about the interval's middle."""
+    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    m0 = m1 = m2 = 0.0
+    for i in range(len(GAUSS_POINTS)):
+        e = half * GAUSS_POINTS[i]
+        gap = min(gap_at(geometry, pose, middle + e)[0], 0.0)
+        square = GAUSS_WEIGHTS[i] * gap * gap
+        m0 += square
+        m1 += square * e
+        m2 += square * e * e
+    return half * m0, half * m1, half * m2
+
+
+@jit
+def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
+    """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
+
+    ``rail_z`` is the rail's height at ``ur``, ``slope`` the contact plane's over the rail's lateral coordinate, ``u``,
+    ``along`` and ``radius`` the wheel's strip.
+    """
+    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    down = math.sqrt(max(1.0 - along * along, 0.0))
+    dy = down * pose.y_down + along * pose.y_along
+    patch[U_WHEEL] = u
+    patch[S_WHEEL] = -math.asin((along * pose.q * pose.ey - pose.ex * dy) / math.sqrt(1.0 - pose.ez * pose.ez))
+    patch[U_RAIL] = ur
+    patch[ANGLE] = pose.side * math.atan(slope)
+    patch[PENETRATION] = penetration
+    patch[X] = radius * along * pose.q
+    patch[Z] = rail_z - penetration * (1.0 / cosine - 0.5 * cosine)
+    patch[Y] = -0.5 * penetration * pose.side * slope * cosine
+
+
+@jit
+def patch_at_maximum(geometry, pose, u, patch):
+    """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
+    u = deepest_point(geometry, pose, u)
+    ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
+    if not on_rail(geometry, ur):
+        return False
+    f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    rail_cos = 1.0 / math.sqrt(1.0 + df * df)
+    penetration = (f - z) * rail_cos
+    if penetration <= 0.0:
+        return False
+    second = curvature_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
+    rail_second = curvature_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    wheel_cos = 1.0 / math.sqrt(1.0 + slope * slope)
+    around = wheel_cos / radius
+    across = -second * wheel_cos * wheel_cos * wheel_cos
+    rail_across = -rail_second * rail_cos * rail_cos * rail_cos
+    hxx, hxy, hyy = around, 0.0, across + rail_across
+    if pose.tilt != 0.0:
+        # The circle's tangent leaves the rolling direction by an angle in the tangent plane.
+        down = math.sqrt(max(1.0 - along * along, 0.0))
+        cy = down * pose.y_along - along * pose.y_down
+        cz = down * pose.z_along - along * pose.z_down
+        sine = (cy + cz * pose.side * df) * rail_cos
+        square = sine * sine
+        hxx = around * (1.0 - square) + across * square
+        hxy = (around - across) * sine * math.sqrt(max(1.0 - square, 0.0))
+        hyy = around * square + across * (1.0 - square) + rail_across
+    mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
+    spread = math.copysign(math.sqrt(half * half + hxy * hxy), half)
+    fill_patch(pose, u, along, radius, ur, f, df, penetration, patch)
+    _place(geometry, pose, patch)
+    patch[CURVATURE_X] = 0.5 * max(mean + spread, CURVATURE_FLOOR)
+    patch[CURVATURE_Y] = 0.5 * max(mean - spread, CURVATURE_FLOOR)
+    return True
+
+
+@jit
+def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
+    """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
+    if not m0 > 0.0:
+        return False
+    centre = m1 / m0
+    spread = 7.0 * (m2 / m0 - centre * centre)
+    if not spread > 0.0:
+        return False
+    width = math.sqrt(spread)
+    depth = math.sqrt(0.9375 * m0 / width)
+    u = middle + centre
+    ur, _, radius, slope, _, along = strip_point(geometry, pose, u)
+    f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    slope_both = 0.5 * (wheel_slope(pose, slope, along) + df)
+    cosine = 1.0 / math.sqrt(1.0 + slope_both * slope_both)
+    fill_patch(pose, u, along, radius, ur, f, slope_both, depth * cosine, patch)
+    _place(geometry, pose, patch)
+    patch[CURVATURE_X] = 0.5 / (radius * math.sqrt(1.0 + slope * slope))
+    patch[CURVATURE_Y] = depth / spread * cosine * cosine * cosine
+    return True
+
+
+@jit
+def _place(geometry, pose, patch):
+    """Turn the columns X and Y from local parts into track coordinates (X from the wheelset's cross-section)."""
+    patch[X] += (geometry.half_distance + patch[U_WHEEL]) * pose.ex
+    patch[Y] += pose.side * (patch[U_RAIL] + geometry.rail_distance)

@@ -1,0 +1,139 @@
+"""One strip of the wheel against the rail below it.
+
+The wheel is cut into strips, each a circle of radius R(u) about the axle. With the side's outward axle direction e,
+a strip's point is P = C + R d with d normal to e, and the wheel's outward normal there is N ~ d - R' e.
+
+* spatial: the strip's extreme point against an extruded rail has no longitudinal normal component, N_x = 0, which is
+  solved in closed form by d_x = R' e_x. No iteration along the rail is needed.
+* planar: the strip's lowest point; the wheel's lowest generator is laid into the cross-section at the wheelset's arc
+  length.
+
+A :class:`Pose` holds what all strips of one wheel share, so that a strip costs a few multiplications.
+"""
+
+import math
+from typing import NamedTuple
+
+from wrcore._jit import jit
+from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
+
+
+class Pose(NamedTuple):
+    """A wheel's position and the coefficients of its strips, for kernels.
+
+    With ``along = tilt R'`` and ``down = sqrt(1 - along^2)`` a strip at distance c along the axle has
+    y = y0 + c ey + R (down y_down + along y_along), and z likewise.
+    """
+
+    side: float
+    y: float
+    z: float
+    ex: float
+    ey: float
+    ez: float
+    q: float
+    """sqrt(1 - ex^2)."""
+    tilt: float
+    """ex / q for spatial, 0 for planar detection."""
+    y_down: float
+    y_along: float
+    z_down: float
+    z_along: float
+
+
+@jit
+def make_pose(side, y, z, ex, ey, ez, spatial):
+    """Pose of a wheel from the wheelset's centre and the wheel's outward axle direction."""
+    q = math.sqrt(1.0 - ex * ex)
+    tilt = ex / q if spatial else 0.0
+    return Pose(side, y, z, ex, ey, ez, q, tilt, side * ez / q, -ex * ey / q, -side * ey / q, -ex * ez / q)
+
+
+@jit
+def cubic_at(nodes, start, step, u):
+    """Value, slope and second derivative of the cubic Hermite interpolant; end cells are continued outwards."""
+    position = (u - start) / step
+    i = min(max(int(position), 0), nodes.shape[0] - 2)
+    t = position - i
+    y0, y1 = nodes[i, VALUE], nodes[i + 1, VALUE]
+    d0, d1 = nodes[i, SLOPE] * step, nodes[i + 1, SLOPE] * step
+    c2 = 3.0 * (y1 - y0) - 2.0 * d0 - d1
+    c3 = d0 + d1 - 2.0 * (y1 - y0)
+    value = y0 + t * (d0 + t * (c2 + t * c3))
+    slope = (d0 + t * (2.0 * c2 + 3.0 * t * c3)) / step
+    return value, slope, (2.0 * c2 + 6.0 * t * c3) / (step * step)
+
+
+@jit
+def curvature_at(nodes, start, step, u):
+    """Second derivative for Hertz: its window mean, interpolated linearly."""
+    position = (u - start) / step
+    i = min(max(int(position), 0), nodes.shape[0] - 2)
+    t = position - i
+    return nodes[i, CURVATURE] * (1.0 - t) + nodes[i + 1, CURVATURE] * t
+
+
+@jit
+def strip_point(geometry, pose, u):
+    """Extreme point of the strip at wheel coordinate u.
+
+    Returns
+    -------
+    ur, z : float
+        Rail coordinate below the point and its height, m.
+    radius, slope, second : float
+        R, R' and R'' of the interpolated profile.
+    along : float
+        Longitudinal share of the strip's radius direction, over q.
+    """
+    extra, slope, second = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
+    radius = geometry.rolling_radius + extra
+    along = slope * pose.tilt
+    down = math.sqrt(max(1.0 - along * along, 0.0))
+    reach = geometry.half_distance + u
+    y = pose.y + reach * pose.ey + radius * (down * pose.y_down + along * pose.y_along)
+    z = pose.z + reach * pose.ez + radius * (down * pose.z_down + along * pose.z_along)
+    return pose.side * y - geometry.rail_distance, z, radius, slope, second, along
+
+
+@jit
+def on_rail(geometry, ur):
+    """Whether a rail coordinate lies inside the rail's profile."""
+    return geometry.rail_start <= ur <= geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
+
+
+@jit
+def gap_at(geometry, pose, u):
+    """Vertical gap of the strip at u: negative in overlap, 1 m where there is no rail below; and the rail's slope."""
+    ur, z, _, _, _, _ = strip_point(geometry, pose, u)
+    if not on_rail(geometry, ur):
+        return 1.0, 0.0
+    f, slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    return z - f, slope
+
+
+@jit
+def wheel_slope(pose, slope, along):
+    """Slope of the wheel in the cross-section over the rail's lateral coordinate.
+
+    Spatial: the normal d - R' e has no x component, so its y, z part is normal to the tangent in the cross-section.
+    Planar: the generator's tangent, projected.
+    """
+    if pose.tilt != 0.0:
+        down = math.sqrt(max(1.0 - along * along, 0.0))
+        ny = down * pose.y_down + along * pose.y_along - slope * pose.ey
+        nz = down * pose.z_down + along * pose.z_along - slope * pose.ez
+        return -pose.side * ny / nz
+    return pose.side * (pose.ez + slope * pose.z_down) / (pose.ey + slope * pose.y_down)
+
+
+@jit
+def slope_difference(geometry, pose, u):
+    """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate.
+
+    The difference is negative on the near and positive on the far side of a point of greatest penetration. The rate
+    (1/m) leaves out the small turn of the wheel's slope by roll and yaw: good enough for Newton's steps.
+    """
+    ur, _, _, slope, second, along = strip_point(geometry, pose, u)
+    _, rail_slope, rail_second = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    return wheel_slope(pose, slope, along) - rail_slope, -second - rail_second
