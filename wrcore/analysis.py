@@ -308,7 +308,8 @@ def geometry_table(scene, y, load=RIGID_LOAD):
     vehicle = scene.vehicle
     geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
     poses = pd.DataFrame({"pose_id": range(len(y)), "y_m": y, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan})
-    patches = solve_poses(poses, geometry, load, scene.detection).sort_values("N_N").groupby(["pose_id", "side"]).last()
+    touching = solve_poses(poses, geometry, load, scene.detection, "maximum")
+    patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
     table = pd.DataFrame({"y_m": y})
     for side in SIDES:
         rows = patches.xs(side, level="side").reindex(range(len(y)))

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from wrcore.contact.detection import detect
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.reduction import MAXIMUM
 from wrcore.contact.statics import settle
 from wrcore.geometry.surface import SIDES, rail_surface, wheel_surface, wheelset_transform
 
@@ -263,7 +264,7 @@ def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
 def _resting_pose(scene, geometry, y, yaw, load, lowered):
     material = scene.data["contact"]["material"]
     modulus = contact_modulus(material["shear_modulus"], material["poisson_ratio"])
-    roll, z = settle(geometry, hertz_table(), modulus, y, yaw, True, load, scene.vehicle.rolling_radius)
+    roll, z = settle(geometry, hertz_table(), modulus, y, yaw, True, MAXIMUM, load, scene.vehicle.rolling_radius)
     return {"y": y, "z": z - lowered, "roll": roll, "yaw": yaw}
 
 
