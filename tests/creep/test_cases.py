@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from wrcore.creep import cases as cases_module
-from wrcore.creep.cases import MODELS, NUMBERS, solve_cases
+from wrcore.creep.cases import MODELS, NUMBERS, read_cases, solve_cases
 from wrcore.creep.table import CreepTable
 from wrcore.errors import InputError
 
@@ -103,3 +103,24 @@ def test_impossible_material_and_model(table):
 
 def test_no_rows():
     assert len(solve_cases(frame().iloc[:0], "exact")) == 0 and len(solve_cases(frame().iloc[:0], "table")) == 0
+
+
+def test_file_is_named_in_messages(tmp_path):
+    path = tmp_path / "in.csv"
+    frame(mu=-0.3).to_csv(path, index=False)
+    with pytest.raises(InputError, match=r"in\.csv: mu, row 1: expected a number above 0, got -0.3"):
+        solve_cases(read_cases(path), "linear")
+
+
+def test_names_of_cases_stay_text(tmp_path):
+    frame(case_id="007").to_csv(tmp_path / "in.csv", index=False)
+    assert list(solve_cases(read_cases(tmp_path / "in.csv"), "linear").case_id) == ["007"]
+
+
+@pytest.mark.parametrize("content", [None, "", 'case_id,"a_m\n1,2'])
+def test_unreadable_files(tmp_path, content):
+    path = tmp_path / "in.csv"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match="expected a CSV file with a header line"):
+        read_cases(path)

@@ -51,7 +51,7 @@ def test_pure_lateral_creepage(data):
 def rectangular_fastsim(data, elements, elliptic):
     """FASTSIM on a rectangular grid over the bounding box, as the published numbers were made; Fy/(mu N)."""
     ux, uy, phi = scaled(-6.25e-4, 0.625)
-    c11, c22, c23, _ = kalker_coefficients(A / B, data.kalker)
+    c11, c22, c23, _ = kalker_coefficients(A / B, data.table.kalker)
     a, b = np.sqrt(A / B), np.sqrt(B / A)
     dx, dy = 2 * a / elements, 2 * b / elements
     y = -b + (np.arange(elements) + 0.5) * dy
@@ -79,9 +79,10 @@ def test_fastsim_example(data, elliptic, published):
 def test_fastsim_on_a_skewed_patch():
     """Full slip carries mu N whatever the shape, and mirroring the shape mirrors the force."""
     data = creep_data(0.28, grid=60)
-    assert fastsim(data.fastsim, 0.7, 0.8, 1e6, 0.0, 0.0)[0] == pytest.approx(-1, abs=2e-3)
-    fx, fy, mz = fastsim(data.fastsim, 0.7, 0.8, 0.2, 0.1, 0.5)
-    assert fastsim(data.fastsim, 0.7, -0.8, 0.2, -0.1, -0.5) == pytest.approx((fx, -fy, -mz), abs=1e-12)
+    settings, kalker = data.fastsim, data.table.kalker
+    assert fastsim(settings, kalker, 0.7, 0.8, 1e6, 0.0, 0.0)[0] == pytest.approx(-1, abs=2e-3)
+    fx, fy, mz = fastsim(settings, kalker, 0.7, 0.8, 0.2, 0.1, 0.5)
+    assert fastsim(settings, kalker, 0.7, -0.8, 0.2, -0.1, -0.5) == pytest.approx((fx, -fy, -mz), abs=1e-12)
 
 
 @pytest.mark.parametrize("law", list(LAWS))
@@ -106,7 +107,7 @@ def test_spin_starts_as_linear_theory(data, law):
 def test_every_bounded_law_ends_at_coulomb(data, law, g):
     """abs(F) = mu N; against the slip, but along the linear force for the two laws that keep its direction (SHE by
     design, FASTSIM by its two flexibilities). 1 % for the table's interpolation and FASTSIM's strips."""
-    c11, c22, _, _ = kalker_coefficients(g, data.kalker)
+    c11, c22, _, _ = kalker_coefficients(g, data.table.kalker)
     against = np.array([-6.0, 8.0]) * ([c11, c22] if law in ("she", "fastsim") else [1, 1])
     fx, fy, _, _ = creep_force(LAWS[law], data, g, 0.0, 6e5, -8e5, 0.0)
     assert (fx, fy) == pytest.approx(tuple(against / np.hypot(*against)), abs=0.01)
@@ -133,7 +134,7 @@ def test_ratio_beyond_the_coefficients_is_flagged(data, law):
 
 def test_she_joins_the_bound_smoothly(data):
     """Value and slope at u = 3: 1 - u/3 + u^2/27 meets 1/u with equal slope."""
-    c11 = kalker_coefficients(1.0, data.kalker)[0]
+    c11 = kalker_coefficients(1.0, data.table.kalker)[0]
     u = 3 + np.array([-2e-5, -1e-5, 1e-5, 2e-5])
     force = [-creep_force(LAWS["she"], data, 1.0, 0.0, v / c11, 0.0, 0.0)[0] for v in u]
     assert force == pytest.approx([1.0] * 4, abs=1e-9)

@@ -14,6 +14,32 @@ NUMBERS = (*POSITIVE, "nu", "ux", "uy", "phi_per_m")
 _SAME_NU = 1e-9
 
 
+def read_cases(path):
+    """Read a case list from a CSV file; `solve_cases` then names the file in its messages.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    pandas.DataFrame
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read as a table.
+    """
+    import pandas as pd
+
+    try:
+        frame = pd.read_csv(path, dtype={"case_id": str}, skipinitialspace=True)
+    except (OSError, ValueError) as error:  # pandas' parser errors are ValueErrors
+        raise InputError(path, "", f"expected a CSV file with a header line ({error})") from error
+    frame.attrs["source"] = str(path)
+    return frame
+
+
 def check_cases(frame, source="cases"):
     """Columns of the case list as floats, checked.
 
@@ -82,7 +108,7 @@ def nondimensional(columns):
     return columns["a_m"] / b, psi, creepages, c
 
 
-def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, source="cases"):
+def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, source=None):
     """Creep forces of all cases of a list.
 
     For an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of the patch's bounding box.
@@ -98,8 +124,8 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
         Refinement of the model "exact".
     progress : callable, optional
         Wraps the iterable of patches (tables, exact).
-    source : str
-        Name of the input, for messages.
+    source : str, optional
+        Name of the input, for messages (default: the file that `read_cases` read).
 
     Returns
     -------
@@ -114,6 +140,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
     """
     import pandas as pd
 
+    source = source or frame.attrs.get("source", "cases")
     if model not in MODELS:
         raise InputError(source, "model", f"expected one of {', '.join(MODELS)}, got {model!r}")
     columns = check_cases(frame, source)

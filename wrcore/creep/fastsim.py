@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore._jit import jit
-from wrcore.creep.kalker import KalkerData, kalker_coefficients
+from wrcore.creep.kalker import kalker_coefficients
 
 
 class FastsimData(NamedTuple):
@@ -18,21 +18,19 @@ class FastsimData(NamedTuple):
 
     Fields
     ------
-    kalker : KalkerData
     n_x, n_y : int
         Steps along a strip, strips.
     elliptic : int
         0: bound of the traction parabolic in x and y (Kalker's choice); 1: Hertzian.
     """
 
-    kalker: KalkerData
     n_x: int
     n_y: int
     elliptic: int
 
 
 @jit
-def fastsim(data, g, psi, ux, uy, phi):
+def fastsim(settings, kalker, g, psi, ux, uy, phi):
     """Creep force by FASTSIM with three flexibilities.
 
     Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
@@ -41,7 +39,8 @@ def fastsim(data, g, psi, ux, uy, phi):
 
     Parameters
     ----------
-    data : FastsimData
+    settings : FastsimData
+    kalker : KalkerData
     g, psi, ux, uy, phi : float
         a/b, shape number, nondimensional creepages (see `laws`).
 
@@ -50,25 +49,25 @@ def fastsim(data, g, psi, ux, uy, phi):
     fx, fy, mz : float
         Over mu N, mu N, mu N c.
     """
-    c11, c22, c23, _ = kalker_coefficients(g, data.kalker)
+    c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
     rate_x, rate_y = ux * 3 * c11 / (8 * a), uy * 3 * c22 / (8 * a)
     rate_spin = phi * 4 * c23 / (np.pi * a * a)
     fx = fy = mz = 0.0
-    width = 2 * b / data.n_y
-    for strip in range(data.n_y):
+    width = 2 * b / settings.n_y
+    for strip in range(settings.n_y):
         y = -b + (strip + 0.5) * width
         offset = (y + psi * b) / (b * (1 + psi) if y + psi * b > 0 else b * (1 - psi))
         length = a * np.sqrt(1 - offset * offset)
-        step = 2 * length / data.n_x
+        step = 2 * length / settings.n_x
         px = py = 0.0
-        for k in range(data.n_x):
+        for k in range(settings.n_x):
             x = length - (k + 0.5) * step
             dx = step if k > 0 else 0.5 * step
             px -= (rate_x - rate_spin * y) * dx
             py -= (rate_y + rate_spin * (x + 0.5 * dx)) * dx
             height = max(length * length - x * x, 0.0) / (a * a)
-            bound = 1.5 / np.pi * np.sqrt(height) if data.elliptic else 2 / np.pi * height
+            bound = 1.5 / np.pi * np.sqrt(height) if settings.elliptic else 2 / np.pi * height
             size = np.sqrt(px * px + py * py)
             if size > bound:
                 px, py = px * bound / size, py * bound / size

@@ -15,7 +15,7 @@ import numpy as np
 from wrcore._jit import jit
 from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup
 from wrcore.creep.fastsim import FastsimData, fastsim
-from wrcore.creep.kalker import KalkerData, kalker_coefficients, kalker_data
+from wrcore.creep.kalker import kalker_coefficients, kalker_data
 
 LAWS = {"table": 0, "linear": 1, "she": 2, "polach": 3, "fastsim": 4}
 _TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3
@@ -27,13 +27,11 @@ class CreepData(NamedTuple):
 
     Fields
     ------
-    kalker : KalkerData
     table : CreepTableData
-        Empty where the law is not the table.
+        Without nodes where the law is not the table; its ``kalker`` serves all laws.
     fastsim : FastsimData
     """
 
-    kalker: KalkerData
     table: CreepTableData
     fastsim: FastsimData
 
@@ -56,10 +54,9 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
     -------
     CreepData
     """
-    kalker = kalker_data(nu)
     if table is None:
-        table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker, np.zeros(0, np.float32))
-    return CreepData(kalker, table, FastsimData(kalker, int(grid), int(grid), int(elliptic)))
+        table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker_data(nu), np.zeros(0, np.float32))
+    return CreepData(table, FastsimData(int(grid), int(grid), int(elliptic)))
 
 
 @jit
@@ -148,14 +145,15 @@ def creep_force(law, data, g, psi, ux, uy, phi):
     """
     if law == _TABLE:
         return table_lookup(data.table, g, psi, ux, uy, phi)
-    cubic, start = data.kalker.cubic, data.kalker.start
-    outside = int(not start <= np.log(g) <= start + cubic.shape[0] * data.kalker.spacing)
+    kalker = data.table.kalker
+    end = kalker.start + kalker.cubic.shape[0] * kalker.spacing
+    outside = int(not kalker.start <= np.log(g) <= end)
     if law == _LINEAR:
-        fx, fy, mz = linear(data.kalker, g, ux, uy, phi)
+        fx, fy, mz = linear(kalker, g, ux, uy, phi)
     elif law == _SHE:
-        fx, fy, mz = she(data.kalker, g, ux, uy, phi)
+        fx, fy, mz = she(kalker, g, ux, uy, phi)
     elif law == _POLACH:
-        fx, fy, mz = polach(data.kalker, g, ux, uy, phi)
+        fx, fy, mz = polach(kalker, g, ux, uy, phi)
     else:
-        fx, fy, mz = fastsim(data.fastsim, g, psi, ux, uy, phi)
+        fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, ux, uy, phi)
     return fx, fy, mz, outside

@@ -194,6 +194,13 @@ def _read_datasets(file):
     )
 
 
+def show_progress(patches):
+    """Progress bar with the time left, where someone watches; the ``progress`` of the functions here."""
+    from tqdm import tqdm
+
+    return tqdm(patches, desc="creep table", unit="patch", disable=None, leave=False)
+
+
 def creep_digest():
     """Digest (16 hex digits) of everything in this room that the numbers in a table depend on."""
     digest = hashlib.sha256()
@@ -236,12 +243,13 @@ def table_info(table):
 
     Parameters
     ----------
-    table : CreepTable
+    table : CreepTable or path-like
 
     Returns
     -------
     dict
     """
+    table = table if isinstance(table, CreepTable) else load_table(table)
     info = {"planes": table.planes, "nu": table.nu, "tolerance": table.tolerance, "cases": table.cases}
     info |= {f"nodes_{name[2:]}": value for name, value in table.data.axes._asdict().items() if name.startswith("n_")}
     info |= {"level": table.resolution.level, "a_over_b_min": float(np.exp(table.data.axes.log_g_min))}
