@@ -25,7 +25,8 @@ def test_conical_wheelset_follows_klingel():
     gamma, radius = 0.05, 0.3
     overrides = [
         "wheel.profile=cone:1/20", f"rail.profile=circle:{radius}", "rail.inclination=0", "speed=3.0",
-        "initial.y=0.0005", "integration.duration=14", "integration.rtol=1e-7", "contact.creep.model=linear", "output.channels=[pose]",
+        "initial.y=0.0005", "integration.duration=14", "integration.rtol=1e-7", "contact.creep.model=linear",
+        "output.channels=[pose]",
     ]  # fmt: skip
     scene = load_scene(SCENES / "wheelset.yaml", overrides)
     model, state = compile_scene(scene)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.checked_yaml import parse_value, read_yaml, validate
-from wrcore.contact.detection import axle_direction, detect
+from wrcore.contact.detection import DETECTIONS, axle_direction, detect
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import REDUCTIONS
@@ -56,7 +56,7 @@ class Scene:
 
     @property
     def detection(self):
-        """``planar`` or ``spatial``."""
+        """``planar``, ``spatial`` or ``auto``."""
         return self.data["contact"]["detection"]
 
 
@@ -188,7 +188,7 @@ def compile_scene(scene, progress=None):
         ContactModel(
             contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance),
             hertz_table(), LAWS[contact["creep"]["model"]], _creep(scene, progress),
-            scene.detection == "spatial", REDUCTIONS[contact["patch"]],
+            DETECTIONS[scene.detection], float(contact["detection_tolerance"]), REDUCTIONS[contact["patch"]],
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
         ),
@@ -202,6 +202,7 @@ def _initial_state(scene, model):
     data, vehicle, contact = scene.data, scene.vehicle, model.contact
     state = np.zeros(STATE_SIZE * len(vehicle.body_names))
     y, yaw, speed = float(data["initial"]["y"]), float(data["initial"]["yaw"]), model.speed
+    spatial = scene.detection != "planar"
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     for body in vehicle.bodies.wheelsets:
         load = 0.5 * vehicle.axle_load(body, GRAVITY)
@@ -210,12 +211,14 @@ def _initial_state(scene, model):
                 scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
             )
         roll, z = settle(
-            contact.geometry, contact.hertz, modulus, y, yaw, contact.spatial, contact.reduction, load,
+            contact.geometry, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load,
             vehicle.rolling_radius,
         )  # fmt: skip
         if not math.isfinite(z):
             raise InputError(scene.source, "initial", "expected a position in which both wheels can stand on the rails")
-        patches = detect(contact.geometry, y, z, roll, yaw, scene.detection, data["contact"]["patch"])
+        patches = detect(
+            contact.geometry, y, z, roll, yaw, "spatial" if spatial else "planar", data["contact"]["patch"]
+        )
         radius = np.mean([vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         part[:3] = vehicle.positions[body, 0], y, z

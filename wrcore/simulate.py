@@ -136,11 +136,13 @@ def _channels(scene, model, work, function, trajectory):
     wheelsets = model.bodies.wheelsets
     shape = (len(trajectory.t), len(wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches = np.full(shape, np.nan)
+    bounds = np.full(shape[:3], np.nan)
     if "contact" in wanted:
         for i, (t, state) in enumerate(zip(trajectory.t, trajectory.states, strict=True)):
             function(t, state)
             present = np.arange(reduction.MAX_PATCHES) < work.counts[..., None]
             patches[i][present] = work.patches[present]
+            bounds[i] = work.bounds
     groups = {}
     for body, name in enumerate(scene.vehicle.body_names):
         state = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
@@ -149,6 +151,10 @@ def _channels(scene, model, work, function, trajectory):
             k = int(np.flatnonzero(wheelsets == body)[0])
             for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
                 groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+            if scene.detection == "auto":
+                groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
+                spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
+                groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
     return groups
 
 

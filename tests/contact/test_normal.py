@@ -9,7 +9,7 @@ from scipy.special import ellipe, ellipk
 
 from wrcore.contact.normal import contact_modulus, damping_factor, hertz_ellipse, hertz_shape, hertz_table
 
-# Classical coefficients m, n, r over cos(theta) = (B - A)/(A + B), three decimals (Hertz; e.g. Whittemore and Petrenko 1921).
+# Classical coefficients m, n, r over cos(theta) = (B - A)/(A + B), three decimals (Hertz).
 MNR = [
     (80, 1.128, 0.893, 0.993), (70, 1.285, 0.800, 0.973), (60, 1.486, 0.717, 0.938), (50, 1.754, 0.641, 0.887),
     (40, 2.136, 0.567, 0.818), (30, 2.731, 0.493, 0.726), (20, 3.816, 0.412, 0.604), (10, 6.612, 0.311, 0.428),

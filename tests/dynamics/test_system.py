@@ -30,7 +30,7 @@ def contact(request):
 
 
 def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, speed=0.0, alpha=5.0, beta=5.0):
-    """A model without wheels. springs: (bodies, markers, k, c, preload, rest); joints: (kind, bodies, markers, axis)."""
+    """A model without wheels. springs: bodies, markers, k, c, preload, rest; joints: kind, bodies, markers, axis."""
     n, m = len(springs), len(joints)
     wheelless = np.zeros(len(masses), np.int64), np.zeros(0, np.int64)
     bodies = Bodies(np.array(masses, float), np.array(inertias, float), *wheelless)

@@ -19,6 +19,8 @@ RAIL_RESERVE, RAIL_COSINE = 4, 5
 _MARGIN = 4
 _SAFETY = 1.5
 """Covers what roll and yaw add to a profile's second derivative."""
+RESERVE_TO_SECOND = 8.0 / (_SAFETY * SCAN_STEP**2)
+"""Bound of a second derivative (1/m) from a reserve (m)."""
 
 
 class ContactGeometry(NamedTuple):

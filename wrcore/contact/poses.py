@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from wrcore.contact import reduction as columns
-from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import cubic_at
@@ -94,8 +93,8 @@ def solve_poses(
     import pandas as pd
 
     hertz, modulus, spatial = hertz_table(), contact_modulus(shear_modulus, poisson_ratio), detection == "spatial"
-    if detection not in DETECTIONS:
-        raise InputError("detection", "", f"expected one of {', '.join(DETECTIONS)}, got {detection!r}")
+    if detection not in ("planar", "spatial"):
+        raise InputError("detection", "", f"expected planar or spatial, got {detection!r}")
     if reduction not in columns.REDUCTIONS:
         raise InputError("patch", "", f"expected one of {', '.join(columns.REDUCTIONS)}, got {reduction!r}")
     rule = columns.REDUCTIONS[reduction]

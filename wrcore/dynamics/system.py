@@ -60,6 +60,8 @@ class Workspace(NamedTuple):
     """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
     counts: np.ndarray
     """(k, 2) int: patches in contact."""
+    bounds: np.ndarray
+    """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
     counters: np.ndarray
     """(2,) int: evaluations, creep look-ups out of range."""
     phi: np.ndarray
@@ -83,8 +85,8 @@ def workspace(model):
     n, k, m = len(model.bodies.mass), len(model.bodies.wheelsets), model.joints.equations
     return Workspace(
         np.zeros((n, 3, 3)), np.zeros((n, 6)), np.zeros((7, 3)), np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
-        np.zeros((k, 2), np.int64), np.zeros(2, np.int64), np.zeros(m), np.zeros(m), np.zeros(m),
-        np.zeros((m, 2, 6)), np.zeros((m, 2), np.int64),
+        np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
+        np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((m, 2, 6)), np.zeros((m, 2), np.int64),
     )  # fmt: skip
 
 
@@ -192,7 +194,7 @@ def derivatives(t, state, model, work):
         fx, fy, fz, mx, my, mz, outside = wheelset_wrench(
             model.contact, state[at + 1], state[at + 2], axle[0, 1], axle[1, 1], axle[2, 1], state[at + 7],
             state[at + 8], state[at + 9], state[at + 10], state[at + 11], state[at + 12], work.patches[k],
-            work.counts[k],
+            work.counts[k], work.bounds[k],
         )  # fmt: skip
         work.counters[1] += outside
         wrench = work.wrenches[b]

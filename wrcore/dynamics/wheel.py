@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from wrcore._jit import jit
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import find_patches
+from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, damping_factor, hertz_ellipse
 from wrcore.contact.reduction import (
@@ -37,7 +37,10 @@ class ContactModel(NamedTuple):
     law: int
     """Creep law, see wrcore.creep.laws.LAWS."""
     creep: CreepData
-    spatial: bool
+    detection: int
+    """PLANAR, SPATIAL or AUTO of wrcore.contact.detection."""
+    detection_tolerance: float
+    """AUTO: normal penetration that planar detection may miss, m."""
     reduction: int
     """MAXIMUM or MOMENT of wrcore.contact.reduction."""
     shear_modulus: float
@@ -66,7 +69,7 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit
-def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, counts):
+def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, counts, bounds):
     """Force and moment of the rails on a wheelset, and all patches.
 
     Parameters
@@ -82,6 +85,8 @@ def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, co
         Filled: left wheel, right wheel; rows beyond the count keep old content.
     counts : numpy.ndarray, shape (2,), int
         Filled: number of patches per wheel.
+    bounds : numpy.ndarray, shape (2,)
+        Filled for AUTO only: bound of planar detection's error per wheel, m.
 
     Returns
     -------
@@ -97,8 +102,13 @@ def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, co
     for wheel in range(2):
         side = 1.0 - 2.0 * wheel
         rows = patches[wheel]
+        spatial = model.detection == SPATIAL
+        if model.detection == AUTO:
+            bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
+            spatial = bound > model.detection_tolerance
+            bounds[wheel] = bound
         count = find_patches(
-            model.geometry, side, y, z, side * ex, side * ey, side * ez, model.spatial, model.reduction, rows
+            model.geometry, side, y, z, side * ex, side * ey, side * ez, spatial, model.reduction, rows
         )
         counts[wheel] = count
         for k in range(count):
