@@ -10,6 +10,7 @@ from wrcore.contact.conicity import conicity_curve, en15302_tolerance, equivalen
 from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack, first_touch
 from wrcore.contact.poses import geometry_table
 from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 
 REFERENCE = json.loads((DATA / "contact" / "en15302_reference.json").read_text())
@@ -94,6 +95,12 @@ def test_turning_points_stay_inside_the_table():
     assert conicity[0] == pytest.approx(0.05, rel=1e-9) and np.isnan(conicity[1])
 
 
+def test_turning_points_need_equal_potential_inside_the_table():
+    """6 mm fit into the table, but not with equal potential at both ends."""
+    y = np.linspace(-0.5e-3, 9e-3, 96)
+    assert np.isnan(equivalent_conicity(y, 0.1 * y, 3e-3)[0][0])
+
+
 def test_no_wave_where_the_difference_has_the_wrong_sign():
     """dr = -k y (1 - (y/c)^2) rises only beyond c: the wells lie off the centre, none is there for -k y."""
     y = np.linspace(-5e-3, 5e-3, 201)
@@ -161,6 +168,21 @@ def test_no_point_of_the_wheel_is_below_the_rail(manchester, s1002, uic60, roll)
         assert table.height_left_m.to_numpy() == pytest.approx(table.height_right_m.to_numpy(), abs=1e-11)
 
 
+def test_nearly_equal_heights_at_a_contact_jump(manchester, s1002, uic60):
+    """Around the jump from tread to flange root two summits differ by nanometres: still the higher one is taken."""
+    low, high = 4.7e-3, 5.2e-3
+    while high - low > 1e-12:
+        middle = 0.5 * (low + high)
+        low, high = (
+            (middle, high) if first_touch(manchester, middle, False).u_wheel_left_m[0] > -0.023 else (low, middle)
+        )
+    assert low == pytest.approx(5.0e-3, abs=0.1e-3)  # without roll; 4.85 mm with roll
+    u = np.arange(-0.035, -0.010, 1e-6)
+    for row in first_touch(manchester, low + np.linspace(-1e-7, 1e-7, 9), False).itertuples():
+        asked = uic60(row.y_m + 0.75 + u - manchester.rail_distance(manchester.left)) + 0.46 - s1002(u)
+        assert row.height_left_m >= asked.max() - 1e-12
+
+
 def test_centred_wheelset_as_in_contact(manchester):
     """Lowering 0.1821 mm: CONTACT's value at zero load (Manchester benchmark); y_w = +3.245 mm from a rigid code."""
     row = first_touch(manchester, 0.0).iloc[0]
@@ -207,6 +229,16 @@ def test_touching_the_end_of_a_profile_is_no_contact(cone_on_circle):
     table = first_touch(cone_on_circle, [0.0, 0.075], roll=False)
     assert np.isfinite(table.rolling_radius_difference_m[0])
     assert np.isnan(table.rolling_radius_difference_m[1]) and np.isnan(table.u_wheel_right_m[1])
+
+
+def test_touching_with_the_end_of_the_rail_is_no_contact():
+    """R 0.3 m ends at 20 mm; a cone 1:5 would touch it at 59 mm, so its gauge-side end touches instead."""
+    u = np.linspace(-0.02, 0.02, 81)
+    rail = ProfileCurve.from_points(u, -(u**2) / 0.6, "rail")
+    table = first_touch(
+        WheelsetOnTrack(*2 * [WheelOnRail(named_profile("cone:1/5", "wheel"), rail)], gauge_depth=5e-4), 0
+    )
+    assert np.isnan(table.rolling_radius_difference_m[0])
 
 
 # -------------------------------------------------------------------------------------------------- conicity of pairs

@@ -185,13 +185,11 @@ def _touch(side, y, roll, heights, found):
         heights[k] = height if side.rail_start <= u_rail <= rail_end else -np.inf
         best = max(best, heights[k])
     found[:] = np.nan
-    if max(heights[0], heights[n - 1]) == best:
-        return
     for k in range(1, n - 1):
         before, after = heights[k - 1], heights[k + 1]
         if heights[k] < best - _RESERVE or heights[k] < before or heights[k] < after:
             continue
-        if min(before, after) == -np.inf:  # touches the end of the rail's profile
+        if min(before, after) == -np.inf:  # touches with the end of the rail's profile
             continue
         low = side.wheel_start + (k - 1) * SCAN_STEP
         u = _summit(side, low, low + 2.0 * SCAN_STEP, y, cosine, sine)
