@@ -34,7 +34,10 @@ def test_agrees_with_contact(request, name, force_95, force_max, moment_95):
 
 
 def test_converges_faster_than_first_order():
-    """Force error against a fine solution, mean over spin, pull and mixed cases, falls faster than 1/level."""
+    """Force error against a fine solution, mean over spin, pull and mixed cases: measured order 2.6.
+
+    Without the shift of the slip to the load it is 1.2, so 1.9 tells the two apart.
+    """
     creepages = np.array([[0.3, 0.0, 0.0], [0.2, -0.3, 0.3], [0.0, 0.1, 1.0], [-0.4, 0.2, -2.0], [0.05, 0.05, 0.05]])
     creepages = np.concatenate([creepages, creepages * [0.7, 1.3, 0.8], creepages * [-1.6, 0.6, 1.4]])
     levels = np.array([8, 11, 16, 22])
@@ -45,7 +48,7 @@ def test_converges_faster_than_first_order():
             coarse = RollingContact(g, psi, 0.28, level).solve_many(creepages, 1e-4)[0]
             errors[i] += np.hypot(*(coarse - fine)[:, :2].T).mean()
     order = -np.polyfit(np.log(levels), np.log(errors), 1)[0]
-    assert order > 1.4
+    assert order > 1.9
 
 
 @pytest.mark.parametrize("g", [0.1, 1.0, 7.0])

@@ -28,18 +28,18 @@ class Resolution(NamedTuple):
 RESOLUTIONS = {
     "ellipse": (
         (0.015, Resolution(9, 1, 12, 20, 9, 12)),
-        (0.005, Resolution(13, 1, 16, 24, 12, 16)),
-        (0.0025, Resolution(17, 1, 20, 28, 14, 20)),
+        (0.006, Resolution(13, 1, 16, 24, 12, 16)),
+        (0.003, Resolution(17, 1, 20, 28, 14, 20)),
         (0.0015, Resolution(21, 1, 28, 36, 18, 24)),
     ),
     "sdec": (
         (0.015, Resolution(8, 4, 12, 16, 9, 12)),
-        (0.008, Resolution(9, 4, 14, 20, 10, 14)),
+        (0.009, Resolution(9, 4, 14, 20, 10, 14)),
         (0.006, Resolution(10, 4, 16, 20, 13, 16)),
-        (0.004, Resolution(10, 4, 20, 20, 16, 20)),
+        (0.0035, Resolution(10, 4, 20, 20, 16, 20)),
     ),
 }
-"""From coarse to fine, with the 99 % quantile of the force error that each was found to have (nu = 0.28)."""
+"""From coarse to fine, each with a bound that the 99 % quantile of its force error was found to keep."""
 
 
 def table_axes(planes, resolution):
