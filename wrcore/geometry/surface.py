@@ -1,4 +1,4 @@
-"""Wheel of revolution and rail extruded along the track: Eqs. (1)-(6) of Ferreira, Flores and Marques.
+"""Wheel of revolution and rail swept along the track: Eqs. (1)-(6) of Ferreira, Flores and Marques.
 
 These functions are the readable definition of the surfaces. They serve figures and tests; the contact search
 evaluates the same surfaces in compiled form (:mod:`wrcore.contact.detection`).
@@ -6,6 +6,8 @@ evaluates the same surfaces in compiled form (:mod:`wrcore.contact.detection`).
 
 import numpy as np
 
+from wrcore.geometry.irregularity import irregularity_at
+from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import rotation
 
 SIDES = {"left": 1.0, "right": -1.0}
@@ -43,8 +45,13 @@ def wheelset_transform(points, x=0.0, y=0.0, z=0.0, roll=0.0, yaw=0.0):
     return np.asarray(points) @ rotation(roll, yaw).T + np.array([x, y, z])
 
 
-def rail_surface(rail, track, side, u, x):
-    """Points of a rail's surface in the track frame, Eqs. (1)-(3) on a tangent track.
+def rail_surface(rail, track, side, u, s):
+    """Points of a rail's surface in the track's absolute frame, Eqs. (1)-(3).
+
+    r_P = r_r(s) + A_r(s) {0, u, f(u)}, A_r = [t n b]. The rail's origin r_r lies in the track's cross-section at s,
+    at half the gauge plus half the widening, moved by the irregularity. The profile lies in that cross-section, too,
+    without turning: A_r is the frame of the track. Square to the rail's own line it would differ by the square of the
+    angle between both, 1e-5 of the profile's size in a steep cant ramp.
 
     Parameters
     ----------
@@ -52,13 +59,32 @@ def rail_surface(rail, track, side, u, x):
         Rail profile as it lies in the track.
     track : Track
     side : {"left", "right"}
-    u, x : array_like
-        Lateral coordinate (m, to the field side) and arc length along the track (m); broadcast together.
+    u, s : array_like
+        Lateral coordinate (m, to the field side) and arc length along the track's centre line (m; x on a tangent
+        track); broadcast together.
 
     Returns
     -------
     numpy.ndarray, shape (..., 3)
         Points, m.
     """
-    u, x = np.broadcast_arrays(np.asarray(u, float), np.asarray(x, float))
-    return np.stack([x, SIDES[side] * (track.rail_distance(rail) + u), rail(u)], axis=-1)
+    u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
+    lateral, height = SIDES[side] * (track.rail_distance(rail) + u), rail(u)
+    if track.tangent:
+        return np.stack([s, lateral, height], axis=-1)
+    position, frames, deviation = _along(track, s, side)
+    lateral, height = lateral + deviation[..., 0], height + deviation[..., 1]
+    return position + lateral[..., None] * frames[..., 1] + height[..., None] * frames[..., 2]
+
+
+def _along(track, s, side):
+    """Centre line (..., 3), frames (..., 3, 3), and a rail's lateral and vertical deviation (..., 2) at s."""
+    position, frames, deviation = np.empty((s.size, 3)), np.empty((s.size, 3, 3)), np.zeros((s.size, 2))
+    first, values = (0 if side == "left" else 2), np.zeros((3, 4))
+    for i, at in enumerate(s.flat):
+        station = track_frame(track.path, at, frames[i])
+        irregularity_at(track.irregularity, at, values)
+        position[i] = station.x, station.y, station.z
+        deviation[i] = values[0, first : first + 2]
+        deviation[i, 0] += 0.5 * SIDES[side] * station.widening
+    return position.reshape(*s.shape, 3), frames.reshape(*s.shape, 3, 3), deviation.reshape(*s.shape, 2)

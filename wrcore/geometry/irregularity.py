@@ -1,0 +1,311 @@
+"""Track irregularity: where the rails' lines deviate from the ideal track, as C2 functions of arc length.
+
+Four channels: lateral (towards n, to the left positive) and vertical (towards b, up) deviation of the left and of the
+right rail. Between the nodes of a uniform grid runs a cubic spline, so that the curvature of the rails' lines is
+continuous. The deviation is faded in and out and is zero elsewhere.
+
+Measured or generated quantities are combined into the channels as follows: alignment and level are the means of both
+rails' lateral and vertical deviation, cross level is left minus right height, gauge is the change of the gauge.
+"""
+
+import csv
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import next_fast_len
+from scipy.interpolate import CubicSpline
+
+from wrcore._jit import jit
+from wrcore.errors import InputError
+
+CHANNELS = ("left_lateral", "left_vertical", "right_lateral", "right_vertical")
+"""Order of the channels."""
+
+MEANS = ("alignment", "level", "cross_level", "gauge")
+"""Quantities that `combine` turns into the channels."""
+
+LARGEST = 0.05
+"""Deviations beyond this are taken for another unit, m."""
+
+_PADDING = 40  # a cubic spline forgets a node by 0.268 per cell: 0.268^40 = 1e-23
+_MOST_CELLS = 2_000_000
+
+CUTOFF_C, CUTOFF_R, CUTOFF_S = 0.8246, 0.0206, 0.4380
+"""Cut-off wave numbers of the German (ERRI B 176) spectra, rad/m."""
+
+HALF_BASE = 0.75
+"""Half the distance b of the running circles in the cross level's spectrum, m."""
+
+VERTICAL = {"low": 4.032e-7, "high": 1.080e-6}
+"""Roughness factor A_v, m rad."""
+
+LATERAL = {"low": 2.119e-7, "high": 6.125e-7}
+"""Roughness factor A_a, m rad."""
+
+
+class IrregularityData(NamedTuple):
+    """Irregularity for kernels; without one ``coefficients.shape[0] == 0``."""
+
+    coefficients: np.ndarray
+    """(cells, 4, 4): powers 0 to 3 of the distance from the cell's beginning (m), four channels each."""
+    start: float
+    """Beginning of the first cell, m."""
+    step: float
+    """Length of a cell, m."""
+
+
+def no_irregularity():
+    """IrregularityData of perfect rails."""
+    return IrregularityData(np.zeros((0, 4, 4)), 0.0, 1.0)
+
+
+@jit
+def irregularity_at(data, s, out):
+    """Deviations and their derivatives at an arc length.
+
+    Parameters
+    ----------
+    data : IrregularityData
+    s : float
+        Arc length, m.
+    out : numpy.ndarray, shape (3, 4)
+        Filled: deviations (m), first and second derivatives (1, 1/m) of the four channels; zero outside the range.
+
+    Returns
+    -------
+    bool
+        False for perfect rails: then ``out`` is left as it is.
+    """
+    cells = data.coefficients.shape[0]
+    if cells == 0:
+        return False
+    position = (s - data.start) / data.step
+    if not 0.0 <= position < cells:
+        out[:, :] = 0.0
+        return True
+    i = int(position)
+    d = (position - i) * data.step
+    for k in range(4):
+        c0, c1 = data.coefficients[i, 0, k], data.coefficients[i, 1, k]
+        c2, c3 = data.coefficients[i, 2, k], data.coefficients[i, 3, k]
+        out[0, k] = c0 + d * (c1 + d * (c2 + d * c3))
+        out[1, k] = c1 + d * (2.0 * c2 + 3.0 * d * c3)
+        out[2, k] = 2.0 * c2 + 6.0 * d * c3
+    return True
+
+
+def irregularity_data(start, step, values):
+    """Spline through uniform samples that begin and end at zero.
+
+    Parameters
+    ----------
+    start, step : float
+        Arc length of the first sample and distance of the samples, m.
+    values : (n, 4) array_like
+        Deviations, m, in the order of `CHANNELS`.
+
+    Returns
+    -------
+    IrregularityData
+        With cells of zeros added at both ends, in which the spline dies out: it is C2 there, too.
+    """
+    values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
+    spline = CubicSpline(step * np.arange(len(values)), values, bc_type="clamped")
+    coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
+    return IrregularityData(coefficients, float(start - _PADDING * step), float(step))
+
+
+def combine(alignment, level, cross_level, gauge):
+    """Channels (n, 4) from the means of both rails, cross level (left minus right) and change of gauge, all (n,), m."""
+    return np.stack(
+        [alignment + 0.5 * gauge, level + 0.5 * cross_level, alignment - 0.5 * gauge, level - 0.5 * cross_level], -1
+    )
+
+
+def fade(s, fade_in, fade_out):
+    """Factor 0 to 1 that fades samples at s (n,) in and out over the given lengths (m), with two derivatives zero."""
+
+    def smooth(distance, length):
+        t = np.clip(distance / length, 0.0, 1.0) if length > 0.0 else np.ones_like(distance)
+        return t**3 * (10.0 + t * (6.0 * t - 15.0))
+
+    return smooth(s - s[0], fade_in) * smooth(s[-1] - s, fade_out)
+
+
+def faded_irregularity(s, values, fade_in, fade_out, source, field):
+    """IrregularityData from samples at uniform arc lengths s (n,), values (n, 4), both in m.
+
+    Raises
+    ------
+    InputError
+        Fades longer than the samples, or samples that do not begin and end at zero and are not faded.
+    """
+    if fade_in + fade_out > s[-1] - s[0]:
+        raise InputError(source, field, f"expected fades shorter than the {s[-1] - s[0]:g} m of irregularity")
+    values = values * fade(s, fade_in, fade_out)[:, None]
+    if max(np.abs(values[0]).max(), np.abs(values[-1]).max()) > 1e-9:
+        raise InputError(
+            source, field, "expected fade_in and fade_out above 0, as the values do not begin and end at 0"
+        )
+    return irregularity_data(s[0], (s[-1] - s[0]) / (len(s) - 1), values)
+
+
+def read_irregularity(path):
+    """Read a CSV file of measured irregularity.
+
+    The header names ``s_m`` and either any of `CHANNELS` or any of `MEANS`, each with ``_m``; columns that are missing
+    are zero. Lines that begin with ``#`` are comments.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    s : (n,) ndarray
+        Uniform arc lengths, m. Samples at varying distances are carried over, by a cubic spline, to a grid of the
+        smallest distance.
+    values : (n, 4) ndarray
+        Deviations, m.
+
+    Raises
+    ------
+    InputError
+        Names the file and the line or column at fault.
+    """
+    names, lines, table = _read_table(path)
+    s, columns = table[:, 0], dict(zip(names[1:], table[:, 1:].T, strict=True))
+    wrong = np.flatnonzero(np.diff(s) <= 0.0)
+    if wrong.size:
+        raise InputError(path, f"line {lines[wrong[0] + 1]}", "expected s_m to increase")
+    for name, column in columns.items():
+        if np.abs(column).max() > LARGEST:
+            line = lines[int(np.abs(column).argmax())]
+            got = f"got {column[np.abs(column).argmax()]:g}"
+            raise InputError(path, f"line {line}", f"expected {name} in m, within {LARGEST:g}, {got}")
+    zero = np.zeros_like(s)
+    if set(columns) <= {f"{name}_m" for name in MEANS}:
+        values = combine(*(columns.get(f"{name}_m", zero) for name in MEANS))
+    else:
+        values = np.stack([columns.get(f"{name}_m", zero) for name in CHANNELS], -1)
+    return _uniform(s, values, path)
+
+
+def _read_table(path):
+    """Column names, line numbers and numbers of a CSV file."""
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, "", f"expected a readable CSV file: {error}") from None
+    names = [name.strip() for name in rows[0][1]] if rows else []
+    known = [{f"{name}_m" for name in group} for group in (CHANNELS, MEANS)]
+    found = set(names[1:])
+    if names[:1] != ["s_m"] or not found or len(found) < len(names) - 1 or not any(found <= group for group in known):
+        expected = " or ".join(", ".join(f"{name}_m" for name in group) for group in (CHANNELS, MEANS))
+        raise InputError(path, "header", f"expected s_m and columns out of {expected}; got {','.join(names)!r}")
+    if len(rows) < 5:
+        raise InputError(path, "", f"expected four rows or more, got {len(rows) - 1}")
+    numbers = [_numbers(path, line, row, len(names)) for line, row in rows[1:]]
+    return names, [line for line, _ in rows[1:]], np.array(numbers)
+
+
+def _numbers(path, line, row, count):
+    try:
+        numbers = [float(cell) for cell in row]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise InputError(path, f"line {line}", f"expected {count} finite numbers, got {','.join(row)!r}")
+    return numbers
+
+
+def _uniform(s, values, path):
+    steps = np.diff(s)
+    if np.ptp(steps) <= 1e-6 * steps.mean():
+        return np.linspace(s[0], s[-1], len(s)), values
+    count = (s[-1] - s[0]) / steps.min()
+    if count > _MOST_CELLS:
+        raise InputError(path, "s_m", f"expected distances that do not vary so much, got {steps.min():g} m at least")
+    grid = np.linspace(s[0], s[-1], math.ceil(count) + 1)
+    return grid, CubicSpline(s, values, bc_type="natural")(grid)
+
+
+def spectrum(quantity, level, omega):
+    """German (ERRI B 176) power spectral density of a track irregularity.
+
+    One-sided and per rad/m: the variance of a band is the integral of S over the positive wave numbers of the band,
+    without a further factor 2 or 2 pi.
+
+    Parameters
+    ----------
+    quantity : {"level", "alignment", "cross_angle"}
+        Mean vertical and lateral deviation (m), and the angle between the rails' heights (rad).
+    level : {"low", "high"}
+        Disturbance level.
+    omega : array_like
+        Wave number, rad/m.
+
+    Returns
+    -------
+    numpy.ndarray
+        m^2/(rad/m), or rad^2/(rad/m) for the angle.
+
+    References
+    ----------
+    ERRI B 176 RP 1, Preliminary studies and specifications (1993); constants as in public codes that read it alike.
+    """
+    square = np.asarray(omega, float) ** 2
+    factor = (LATERAL if quantity == "alignment" else VERTICAL)[level]
+    density = factor * CUTOFF_C**2 / ((square + CUTOFF_R**2) * (square + CUTOFF_C**2))
+    if quantity == "cross_angle":
+        return density / HALF_BASE**2 * square / (square + CUTOFF_S**2)
+    return density
+
+
+def generate(level, seed, length, spacing, shortest, longest):
+    """Random irregularity with the German spectra: a sum of cosines with random phases.
+
+    The cosines' wave numbers are the multiples of 2 pi / period, the period being at least twice the length, and each
+    carries the variance of its own share of the band. Alignment, level and cross level are independent; the gauge
+    stays as it is (the spectra know none).
+
+    Parameters
+    ----------
+    level : {"low", "high"}
+    seed : int
+        The same seed, length and spacing give the same track.
+    length, spacing : float
+        Extent and distance of samples, m.
+    shortest, longest : float
+        Band of wavelengths, m.
+
+    Returns
+    -------
+    s : (n,) ndarray
+        From 0 to about ``length``, m.
+    values : (n, 4) ndarray
+        Deviations of the channels, m, not faded.
+    """
+    s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
+    period = next_fast_len(2 * len(s), real=True)
+    random = np.random.default_rng(seed)
+    alignment, level_, angle = (
+        _realise(quantity, level, random, period, spacing, shortest, longest)[: len(s)]
+        for quantity in ("alignment", "level", "cross_angle")
+    )
+    return s, combine(alignment, level_, 2.0 * HALF_BASE * angle, np.zeros_like(s))
+
+
+def _realise(quantity, level, random, period, spacing, shortest, longest):
+    """One periodic realisation (period,) of a spectrum."""
+    step = 2.0 * np.pi / (period * spacing)
+    omega = step * np.arange(period // 2 + 1)
+    low, high = (
+        np.clip(omega + shift, 2.0 * np.pi / longest, 2.0 * np.pi / shortest) for shift in (-step / 2, step / 2)
+    )
+    ends = spectrum(quantity, level, low) + spectrum(quantity, level, high)
+    variance = (high - low) / 6.0 * (ends + 4.0 * spectrum(quantity, level, 0.5 * (low + high)))
+    phase = random.uniform(0.0, 2.0 * np.pi, len(omega))
+    return np.fft.irfft(0.5 * period * np.sqrt(2.0 * variance) * np.exp(1j * phase), period)

@@ -1,0 +1,324 @@
+"""The track's path: its centre line and the frame [t n b] that travels along it, as functions of arc length.
+
+The path is cut into pieces on which the curvature is linear in the arc length s (straight line, clothoid, circle).
+A piece stores its centre line as polynomials in the distance from the piece's middle; pieces are so short that the
+heading hardly turns in one of them, which puts the truncation below the rounding error. A point
+and its tangent then cost two Horner schemes: no quadrature, no trigonometric function.
+
+Conventions
+-----------
+* s is the arc length of the centre line in space, so dr/ds = t exactly, also where a cant ramp lifts the line.
+* heading is the angle of t's projection onto the ground from the x axis, to the left positive; d heading/ds is the
+  curvature.
+* cant h is the height of the right rail above the left one over `CANT_BASE`: positive in a canted left curve. The
+  frame's roll about t is -asin(h / CANT_BASE). The lower rail keeps its height: the centre line is raised by |h|/2.
+* The corners of cant, raise and widening, which are piecewise linear, are rounded: each corner is replaced over the
+  path's rounding length by a cubic spline. They are C2, t is C1, curvature is continuous.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.geometry.path_pieces import (
+    CENTRE,
+    COLUMNS,
+    CURVATURE,
+    CURVATURE_RATE,
+    HEADING,
+    RAISE,
+    ROLL,
+    WIDENING,
+    X,
+    Y,
+    cut,
+)
+
+
+class PathData(NamedTuple):
+    """A path for kernels. A tangent track has no pieces (``pieces.shape[0] == 0``) and x = s."""
+
+    pieces: np.ndarray
+    """(n, 32): middle; polynomials of x, y; heading, curvature and its rate; cubics of sin(roll), raise, widening."""
+    starts: np.ndarray
+    """(n,): arc length at which each piece begins, m. The first reaches back, the last on without end."""
+    lookup: np.ndarray
+    """(m,) int: piece at the beginning of each cell of a uniform grid."""
+    lookup_start: float
+    lookup_step: float
+    """The grid, m."""
+
+
+class Station(NamedTuple):
+    """The centre line at one arc length; derivatives are by s."""
+
+    x: float
+    y: float
+    z: float
+    """Position, m."""
+    tx: float
+    ty: float
+    slope: float
+    """Unit tangent t = (tx, ty, slope); slope is dz/ds."""
+    level: float
+    """Length of (tx, ty): the incline's cosine."""
+    slope_rate: float
+    """1/m."""
+    heading: float
+    """rad."""
+    curvature: float
+    """d heading/ds, 1/m, positive to the left."""
+    curvature_rate: float
+    """1/m^2."""
+    sin_roll: float
+    cos_roll: float
+    roll_rate: float
+    """1/m; roll is right-handed about t, so negative in a canted left curve."""
+    roll_rate_rate: float
+    """1/m^2."""
+    widening: float
+    """Gauge widening, m; half of it belongs to each rail."""
+    widening_rate: float
+
+
+def tangent_path():
+    """PathData of a straight, level path without an end.
+
+    Returns
+    -------
+    PathData
+    """
+    return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0)
+
+
+def path_data(knots, curvature, cant, widening, rounding):
+    """Cut a path into pieces.
+
+    Parameters
+    ----------
+    knots : (k,) array_like
+        Arc lengths of the joints, m, increasing. Before the first the path is straight, after the last all quantities
+        keep their values.
+    curvature, cant, widening : (k,) array_like
+        Values at the knots (1/m, m, m), linear in between; the first curvature must be 0. Cant positive: right rail
+        higher.
+    rounding : float
+        Length over which corners of cant and widening are rounded, m.
+
+    Returns
+    -------
+    PathData
+    """
+    pieces, borders = cut(np.asarray(knots, float), curvature, cant, widening, rounding)
+    starts = np.concatenate(([-math.inf], borders))
+    cells = min(16 * len(pieces), 100_000)
+    grid, step = np.linspace(borders[0], borders[-1], cells, endpoint=False, retstep=True)
+    lookup = np.searchsorted(starts, grid, side="right") - 1
+    return PathData(pieces, starts, lookup, float(borders[0]), float(step))
+
+
+@jit(inline="always")
+def segment_at(path, s):
+    """Index of the piece that holds arc length s (m); at most a few comparisons, whatever the path's length."""
+    if s < path.lookup_start:
+        return 0
+    cell = min(max(int((s - path.lookup_start) / path.lookup_step), 0), path.lookup.shape[0] - 1)
+    i = path.lookup[cell]
+    while i + 1 < path.starts.shape[0] and s >= path.starts[i + 1]:
+        i += 1
+    return i
+
+
+@jit(inline="always")
+def _horner(pieces, i, at, d):
+    """Value and derivative of the polynomial of degree 7 at column ``at`` of piece i, even and odd part in parallel."""
+    a1, a2, a3, a4 = pieces[i, at + 1], pieces[i, at + 2], pieces[i, at + 3], pieces[i, at + 4]
+    a5, a6, a7 = pieces[i, at + 5], pieces[i, at + 6], pieces[i, at + 7]
+    q = d * d
+    even, odd = pieces[i, at] + q * (a2 + q * (a4 + q * a6)), a1 + q * (a3 + q * (a5 + q * a7))
+    even_rate, odd_rate = 2.0 * a2 + q * (4.0 * a4 + q * 6.0 * a6), a1 + q * (3.0 * a3 + q * (5.0 * a5 + q * 7.0 * a7))
+    return even + d * odd, odd_rate + d * even_rate
+
+
+@jit(inline="always")
+def _cubic(pieces, i, at, d):
+    """Value and two derivatives of the cubic at column ``at`` of piece i."""
+    c1, c2, c3 = pieces[i, at + 1], pieces[i, at + 2], pieces[i, at + 3]
+    return pieces[i, at] + d * (c1 + d * (c2 + d * c3)), c1 + d * (2.0 * c2 + 3.0 * d * c3), 2.0 * c2 + 6.0 * d * c3
+
+
+@jit
+def _on_last_circle(x, y, tx, ty, curvature, d):
+    """x, y, tx, ty at distance d along the circle that begins at (x, y) in the direction (tx, ty)."""
+    half = 0.5 * curvature * d
+    c, s = math.cos(half), math.sin(half)
+    chord = d * (s / half if half != 0.0 else 1.0)
+    ahead, aside = c * tx - s * ty, s * tx + c * ty
+    return x + chord * ahead, y + chord * aside, c * ahead - s * aside, s * ahead + c * aside
+
+
+@jit(forceinline=True)
+def centreline(path, s):
+    """The centre line at an arc length.
+
+    Parameters
+    ----------
+    path : PathData
+    s : float
+        Arc length, m. Before the path it is straight; after it the last curvature, cant and widening stay.
+
+    Returns
+    -------
+    Station
+    """
+    if path.pieces.shape[0] == 0:
+        return Station(s, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    pieces, i = path.pieces, segment_at(path, s)
+    d = s - pieces[i, CENTRE]
+    x, tx = _horner(pieces, i, X, d)
+    y, ty = _horner(pieces, i, Y, d)
+    bend, bend_rate = pieces[i, CURVATURE], pieces[i, CURVATURE_RATE]
+    if i == pieces.shape[0] - 1 and bend != 0.0:
+        x, y, tx, ty = _on_last_circle(pieces[i, X], pieces[i, Y], pieces[i, X + 1], pieces[i, Y + 1], bend, d)
+    heading = pieces[i, HEADING] + d * (bend + 0.5 * bend_rate * d)
+    sin_roll, sin_rate, sin_second = _cubic(pieces, i, ROLL, d)
+    z, slope, slope_rate = _cubic(pieces, i, RAISE, d)
+    widening, widening_rate, _ = _cubic(pieces, i, WIDENING, d)
+    cos_roll = math.sqrt(1.0 - sin_roll * sin_roll)
+    secant = 1.0 / cos_roll
+    roll_rate = sin_rate * secant
+    return Station(
+        x, y, z, tx, ty, slope, math.sqrt(1.0 - slope * slope), slope_rate, heading, bend + bend_rate * d, bend_rate,
+        sin_roll, cos_roll, roll_rate, (sin_second + sin_roll * roll_rate * roll_rate) * secant, widening,
+        widening_rate,
+    )  # fmt: skip
+
+
+@jit(inline="always")
+def fill_frame(station, matrix):
+    """Write the frame's axes into the columns of matrix (3, 3): t forward, n left in the canted plane, b up."""
+    tx, ty, tz, level = station.tx, station.ty, station.slope, station.level
+    inverse = 1.0 / level
+    nx, ny = -ty * inverse, tx * inverse
+    bx, by = -tz * ny, tz * nx
+    c, s = station.cos_roll, station.sin_roll
+    matrix[0, 0], matrix[1, 0], matrix[2, 0] = tx, ty, tz
+    matrix[0, 1], matrix[1, 1], matrix[2, 1] = c * nx + s * bx, c * ny + s * by, s * level
+    matrix[0, 2], matrix[1, 2], matrix[2, 2] = c * bx - s * nx, c * by - s * ny, c * level
+
+
+@jit(forceinline=True)
+def track_frame(path, s, matrix):
+    """Frame of the track at arc length s (m): A = [t n b], Eq. (3), with the cant's roll about t.
+
+    Parameters
+    ----------
+    path : PathData
+    s : float
+    matrix : numpy.ndarray, shape (3, 3)
+        Filled: columns t, n, b.
+
+    Returns
+    -------
+    Station
+        The centre line at s.
+    """
+    station = centreline(path, s)
+    fill_frame(station, matrix)
+    return station
+
+
+@jit(inline="always")
+def frame_turn(station):
+    """Turn of the frame per metre: components (1/m) along t, n, b of the vector D with dt/ds = D x t, and so on."""
+    incline_rate = station.slope_rate / station.level
+    along = station.roll_rate + station.curvature * station.slope
+    upright = station.curvature * station.level
+    c, s = station.cos_roll, station.sin_roll
+    return along, upright * s - incline_rate * c, upright * c + incline_rate * s
+
+
+@jit
+def rail_direction(station, y, z, dy, dz):
+    """Direction of a rail whose origin lies at (y, z) of the track's cross-section.
+
+    Parameters
+    ----------
+    station : Station
+    y, z : float
+        Rail's origin along n and b, m.
+    dy, dz : float
+        Their derivatives by s (widening and irregularity).
+
+    Returns
+    -------
+    lateral, vertical : float
+        Slopes of the rail's line towards n and b in the track frame, both over the advance along t. The twist of a
+        cant ramp is contained in them.
+    stretch : float
+        Advance along t per metre of the centre line: 1 - curvature y on a level curve.
+    """
+    along, left, up = frame_turn(station)
+    stretch = 1.0 - up * y + left * z
+    return (dy - along * z) / stretch, (dz + along * y) / stretch, stretch
+
+
+@jit
+def _newton(path, x, y, z, s):
+    """Newton's iteration for (p - r(s)) . t(s) = 0; NaN if it does not settle."""
+    for _ in range(30):
+        p = centreline(path, s)
+        dx, dy, dz = x - p.x, y - p.y, z - p.z
+        ahead = dx * p.tx + dy * p.ty + dz * p.slope
+        bend = p.curvature * (p.tx * dy - p.ty * dx)
+        lift = p.slope_rate * (dz - p.slope * (p.tx * dx + p.ty * dy) / (p.level * p.level))
+        step = ahead / max(1.0 - bend - lift, 0.1)
+        s += step
+        if not math.isfinite(step):
+            break
+        if abs(step) < 1e-6:  # quadratic: what is left is below curvature * step^2
+            return s
+    return math.nan
+
+
+@jit
+def _nearest(path, x, y, z):
+    """Arc length of a point close to (x, y, z), from the tangents of all pieces."""
+    best, least = 0.0, math.inf
+    n = path.pieces.shape[0]
+    for i in range(n):
+        row = path.pieces[i]
+        low = path.starts[i] if i > 0 else -math.inf
+        high = path.starts[i + 1] if i + 1 < n else (low if row[CURVATURE] != 0.0 else math.inf)
+        ahead = row[X + 1] * (x - row[X]) + row[Y + 1] * (y - row[Y])
+        s = min(max(row[CENTRE] + ahead, low), high)
+        p = centreline(path, s)
+        distance = (x - p.x) ** 2 + (y - p.y) ** 2 + (z - p.z) ** 2
+        if distance < least:
+            best, least = s, distance
+    return best
+
+
+@jit
+def arc_length_of(path, x, y, z, guess):
+    """Arc length whose cross-section contains a point: (p - r(s)) . t(s) = 0.
+
+    Parameters
+    ----------
+    path : PathData
+    x, y, z : float
+        Point, m, closer to the path than its radius.
+    guess : float
+        Start of the iteration, m: the last arc length. NaN: the whole path is searched first.
+
+    Returns
+    -------
+    float
+        m; the solution next to the guess, NaN if there is none.
+    """
+    if path.pieces.shape[0] == 0:
+        return x
+    s = _newton(path, x, y, z, guess)
+    return s if math.isfinite(s) else _newton(path, x, y, z, _nearest(path, x, y, z))
