@@ -199,11 +199,11 @@ def _check_format(path, file):
 def _read(file):
     groups = {}
 
-    def collect(name, item):
+    def _collect(name, item):
         if isinstance(item, h5py.Dataset) and "/" in name:
             group, channel = name.rsplit("/", 1)
             groups.setdefault(group, {})[channel] = item[()]
 
-    file.visititems(collect)
+    file.visititems(_collect)
     records = {name: json.loads(file.attrs[name]) for name in ("scene", "settings", "counters")}
     return Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups=groups, **records)
