@@ -18,7 +18,7 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.joint import Joints, constraint_equations
 from wrcore.dynamics.suspension import FRAME, SpringDampers, spring_damper_forces
-from wrcore.dynamics.wheel import ContactModel, wheelset_wrench
+from wrcore.dynamics.wheel import ContactModel, wheel_wrench
 
 
 class Bodies(NamedTuple):
@@ -191,19 +191,21 @@ def derivatives(t, state, model, work):
         b = bodies.wheelsets[k]
         at = STATE_SIZE * b
         axle = work.rotations[b]
-        fx, fy, fz, mx, my, mz, outside = wheelset_wrench(
-            model.contact, state[at + 1], state[at + 2], axle[0, 1], axle[1, 1], axle[2, 1], state[at + 7],
-            state[at + 8], state[at + 9], state[at + 10], state[at + 11], state[at + 12], work.patches[k],
-            work.counts[k], work.bounds[k],
-        )  # fmt: skip
-        work.counters[1] += outside
         wrench = work.wrenches[b]
-        wrench[0] += fx
-        wrench[1] += fy
-        wrench[2] += fz
-        wrench[3] += mx
-        wrench[4] += my
-        wrench[5] += mz
+        for wheel in range(2):
+            fx, fy, fz, mx, my, mz, count, outside, bound = wheel_wrench(
+                model.contact, 1.0 - 2.0 * wheel, state[at + 1], state[at + 2], axle[0, 1], axle[1, 1], axle[2, 1],
+                state[at + 7], state[at + 8], state[at + 9], state[at + 10], state[at + 11], state[at + 12],
+                work.patches[k, wheel],
+            )  # fmt: skip
+            work.counts[k, wheel], work.bounds[k, wheel] = count, bound
+            work.counters[1] += outside
+            wrench[0] += fx
+            wrench[1] += fy
+            wrench[2] += fz
+            wrench[3] += mx
+            wrench[4] += my
+            wrench[5] += mz
     spring_damper_forces(model.springs, t, model.speed, state, work.rotations, work.wrenches, work.scratch)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])

@@ -69,71 +69,64 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit
-def wheelset_wrench(model, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, patches, counts, bounds):
-    """Force and moment of the rails on a wheelset, and all patches.
+def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, rows):
+    """Force and moment of one rail on a wheelset, and the wheel's patches, in a frame in which the rail runs along x.
 
     Parameters
     ----------
     model : ContactModel
+    side : float
+        +1 left, -1 right.
     y, z : float
-        Wheelset centre in the track frame, m.
+        Wheelset centre, m.
     ex, ey, ez : float
         Axle direction, pointing left.
     vx, vy, vz, wx, wy, wz : float
-        Velocity of the centre (m/s) and angular velocity (rad/s), track axes.
-    patches : numpy.ndarray, shape (2, MAX_PATCHES, PATCH_COLUMNS)
-        Filled: left wheel, right wheel; rows beyond the count keep old content.
-    counts : numpy.ndarray, shape (2,), int
-        Filled: number of patches per wheel.
-    bounds : numpy.ndarray, shape (2,)
-        Filled for AUTO only: bound of planar detection's error per wheel, m.
+        Velocity of the centre (m/s) and angular velocity (rad/s).
+    rows : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
+        Filled: the wheel's patches; rows beyond the count keep old content.
 
     Returns
     -------
     fx, fy, fz, mx, my, mz : float
-        Force (N) and moment about the wheelset's centre (N m), track axes.
+        Force (N) and moment about the wheelset's centre (N m).
+    count : int
+        Number of patches.
     outside : int
         Number of creep look-ups outside the range of the creep law's table.
+    bound : float
+        AUTO only: bound of planar detection's error, m.
     """
     fx = fy = fz = mx = my = mz = 0.0
-    outside = 0
+    outside, bound = 0, 0.0
+    spatial = model.detection == SPATIAL
+    if model.detection == AUTO:
+        bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
+        spatial = bound > model.detection_tolerance
+    count = find_patches(model.geometry, side, y, z, side * ex, side * ey, side * ez, spatial, model.reduction, rows)
     speed = max(abs(vx), model.least_speed)
     modulus = model.shear_modulus
-    for wheel in range(2):
-        side = 1.0 - 2.0 * wheel
-        rows = patches[wheel]
-        spatial = model.detection == SPATIAL
-        if model.detection == AUTO:
-            bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
-            spatial = bound > model.detection_tolerance
-            bounds[wheel] = bound
-        count = find_patches(
-            model.geometry, side, y, z, side * ex, side * ey, side * ez, spatial, model.reduction, rows
-        )
-        counts[wheel] = count
-        for k in range(count):
-            row = rows[k]
-            px, py, pz = row[X], row[Y] - y, row[Z] - z
-            xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, row[ANGLE], speed)
-            normal, a, b = normal_contact(model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach)
-            limit = model.friction * normal
-            square = a * b
-            c = math.sqrt(square)
-            scale = modulus * square / limit
-            f1, f2, m3, missed = creep_force(
-                model.law, model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c
-            )
-            outside += missed
-            f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
-            cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])
-            gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
-            fx += f1
-            fy += gy
-            fz += gz
-            mx += py * gz - pz * gy
-            my += pz * f1 - px * gz - m3 * sine
-            mz += px * gy - py * f1 + m3 * cosine
-            row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
-            row[FX], row[FY], row[MZ] = f1, f2, m3
-            row[XI], row[ETA], row[PHI] = xi, eta, phi
-    return fx, fy, fz, mx, my, mz, outside
+    for k in range(count):
+        row = rows[k]
+        px, py, pz = row[X], row[Y] - y, row[Z] - z
+        xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, row[ANGLE], speed)
+        normal, a, b = normal_contact(model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach)
+        limit = model.friction * normal
+        square = a * b
+        c = math.sqrt(square)
+        scale = modulus * square / limit
+        f1, f2, m3, missed = creep_force(model.law, model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c)
+        outside += missed
+        f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
+        cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])
+        gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
+        fx += f1
+        fy += gy
+        fz += gz
+        mx += py * gz - pz * gy
+        my += pz * f1 - px * gz - m3 * sine
+        mz += px * gy - py * f1 + m3 * cosine
+        row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
+        row[FX], row[FY], row[MZ] = f1, f2, m3
+        row[XI], row[ETA], row[PHI] = xi, eta, phi
+    return fx, fy, fz, mx, my, mz, count, outside, bound
