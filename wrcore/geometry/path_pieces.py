@@ -63,6 +63,13 @@ class _Broken(NamedTuple):
         """Value at s and slope of the straight part around s."""
         return np.interp(s, self.knots, self.values), self.slopes()[np.searchsorted(self.knots, s)]
 
+    def integral(self, s):
+        """Integral from the first knot to s."""
+        i = max(np.searchsorted(self.knots, s) - 1, 0)
+        means = 0.5 * (self.values[1:] + self.values[:-1])
+        rest = 0.5 * (self.values[i] + self.line(s)[0]) * (s - self.knots[i])
+        return np.dot(means[:i], np.diff(self.knots)[:i]) + rest
+
     def rounded(self, s, half):
         """Taylor coefficients (4,) about s of the function whose corners are rounded over +-half."""
         at, jumps = self.corners()
@@ -108,17 +115,17 @@ def _assemble(borders, turn, ramps, half):
     before = np.zeros(COLUMNS)
     before[CENTRE] = before[X] = borders[0]
     before[X + 1] = 1.0
-    rows, position, heading = [before], complex(borders[0]), 0.0
+    rows, position = [before], complex(borders[0])
     for a, b in zip(borders[:-1], borders[1:], strict=True):
         middle, reach = 0.5 * (a + b), 0.5 * (b - a)
         curvature, rate = turn.line(middle)
-        row = _row(middle, heading + (curvature - 0.5 * rate * reach) * reach, curvature, rate, ramps, half)
+        row = _row(middle, turn.integral(middle), curvature, rate, ramps, half)
         line = _plan_series(row)
         line[0] = position - polyval(-reach, line)
         row[X : X + _DEGREE + 1], row[Y : Y + _DEGREE + 1] = line.real, line.imag
         position = polyval(reach, line)
-        heading += 2.0 * curvature * reach
         rows.append(row)
+    heading = turn.integral(borders[-1])
     after = _row(borders[-1], heading, turn.values[-1], 0.0, ramps, half)
     for column in (ROLL, RAISE, WIDENING):
         after[column + 1 : column + 4] = 0.0
