@@ -231,6 +231,19 @@ def test_touching_the_end_of_a_profile_is_no_contact(cone_on_circle):
     assert np.isnan(table.rolling_radius_difference_m[1]) and np.isnan(table.u_wheel_right_m[1])
 
 
+@pytest.mark.parametrize("phase", np.linspace(0.1, 6.1, 16))
+def test_ripples_between_the_nodes_of_the_search(phase):
+    """A cone with ripples (50 nm, 250 um long) touches at the highest one, also beside the nodes."""
+    u, wave = np.arange(-0.05, 0.05, 5e-6), 2 * np.pi / 2.5e-4
+    f, df = 0.05 * u + 5e-8 * np.sin(wave * u + phase), 0.05 + 5e-8 * wave * np.cos(wave * u + phase)
+    wheel, rail = ProfileCurve("ripples", "wheel", u, f, df, np.zeros_like(u)), named_profile("circle:0.3", "rail")
+    pair = WheelsetOnTrack.alike(wheel, rail, gauge=1.4)
+    dense = np.arange(0.01, 0.04, 1e-7)
+    for row in first_touch(pair, 1e-3 * np.arange(3), roll=False).itertuples():
+        asked = rail(row.y_m + 0.75 + dense - pair.rail_distance(pair.left)) + 0.46 - wheel(dense)
+        assert row.height_left_m == pytest.approx(asked.max(), abs=1e-12)
+
+
 def test_touching_with_the_end_of_the_rail_is_no_contact():
     """R 0.3 m ends at 20 mm; a cone 1:5 would touch it at 59 mm, so its gauge-side end touches instead."""
     u = np.linspace(-0.02, 0.02, 81)
