@@ -15,4 +15,28 @@ sides. Penetration is positive in contact. Creepages are velocities of the wheel
 rolling speed; forces act on the wheel. Units are SI throughout.
 """
 
+from importlib import import_module
+
 __version__ = "0.1.0"
+
+_PUBLIC = {
+    "load_scene": "wrcore.scene",
+    "simulate": "wrcore.simulate",
+    "load_run": "wrcore.results",
+    "write_run": "wrcore.results",
+    "named_profile": "wrcore.geometry.standards",
+    "RollingContact": "wrcore.creep.halfspace",
+    "ensure_table": "wrcore.creep.table",
+}
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name):
+    """Public names are loaded on first use, so that ``import wrcore`` costs nothing."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'wrcore' has no attribute {name!r}")
+    return getattr(import_module(_PUBLIC[name]), name)
+
+
+def __dir__():
+    return sorted(__all__)

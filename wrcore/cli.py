@@ -1,4 +1,4 @@
-"""Command line: ``wrcore simulate | contact | creep | table | profiles``.
+"""Command line: ``wrcore simulate | contact | conicity | creep | table | profiles``.
 
 Exit status 0 only when the result was produced; 2 for bad input, with one line that names the file, the field and
 what was expected.
@@ -50,6 +50,7 @@ def _parser():
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
     _add_contact(commands)
+    _add_conicity(commands)
     _add_creep(commands)
     _add_table(commands)
     command = commands.add_parser("profiles", help="list the named wheel and rail profiles")
@@ -82,6 +83,26 @@ def _add_contact(commands):
     command.add_argument("--wheel-load", type=float, required=True, metavar="N")
     command.add_argument("--out", required=True, metavar="OUT.csv")
     command.set_defaults(run=_contact)
+
+
+def _add_conicity(commands):
+    command = commands.add_parser("conicity", help="equivalent conicity of a wheelset on its track (EN 15302)")
+    command.add_argument("--wheel", required=True, metavar="NAME|FILE")
+    command.add_argument("--rail", required=True, metavar="NAME|FILE")
+    command.add_argument("--right-wheel", metavar="NAME|FILE", help="where it differs from --wheel")
+    command.add_argument("--right-rolling-radius", type=float, metavar="m", help="where it differs")
+    command.add_argument("--unit", choices=("m", "mm"), help="of profile files without a header")
+    command.add_argument("--inclination", default="0", metavar="1/40", help="of a named rail")
+    command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="14 mm below the rails' tops")
+    command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m")
+    command.add_argument("--tape-circle-half-distance", type=float, default=0.75, metavar="m")
+    command.add_argument("--roll", action=argparse.BooleanOptionalAction, default=True, help="solve the roll angle")
+    command.add_argument("--amplitudes-from", type=float, default=0.001, metavar="m")
+    command.add_argument("--to", type=float, default=0.008, metavar="m")
+    command.add_argument("--step", type=float, default=0.001, metavar="m", help="of the amplitudes")
+    command.add_argument("--out", required=True, metavar="OUT.csv")
+    command.add_argument("--table", metavar="OUT2.csv", help="rolling radius difference over the lateral position")
+    command.set_defaults(run=_conicity)
 
 
 def _add_creep(commands):
@@ -200,15 +221,9 @@ def _contact(options):
         _positive(getattr(options, option), f"--{option.replace('_', '-')}")
     if not 0.0 <= options.poisson_ratio <= 0.5:
         raise InputError("wrcore contact", "--poisson-ratio", f"expected 0 to 0.5, got {options.poisson_ratio}")
-    try:
-        inclination = float(Fraction(options.inclination))
-    except (ValueError, ZeroDivisionError):
-        raise InputError(
-            "wrcore contact", "--inclination", f"expected a ratio such as 1/40, got {options.inclination!r}"
-        ) from None
     poses = read_poses(options.poses)
     wheel = named_profile(options.wheel, "wheel")
-    rail = named_profile(options.rail, "rail", inclination)
+    rail = named_profile(options.rail, "rail", _ratio(options.inclination))
     geometry = contact_geometry(
         wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
     )
@@ -222,29 +237,88 @@ def _contact(options):
     return 0
 
 
-def _creep(options):
-    from wrcore.creep.cases import read_cases, solve_cases
+def _conicity(options):
+    import numpy as np
+
+    from wrcore.contact.conicity import conicity_curve
+    from wrcore.contact.first_touch import first_touch
 
     out = _output(options.out)
-    frame = solve_cases(read_cases(options.cases), options.model, options.table)
+    table_out = _output(options.table) if options.table else None
+    first, last, step = options.amplitudes_from, options.to, options.step
+    if not (0.0 < first <= last <= 0.05 and (last - first) / 1e4 <= step < float("inf") and step > 0.0):
+        raise InputError("wrcore conicity", "--amplitudes-from", "expected 0 < from <= to <= 0.05 m and a step > 0")
+    amplitudes = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
+    pair = _wheelset_on_track(options)
+    _write_csv(conicity_curve(pair, amplitudes, options.roll), out)
+    if table_out:
+        shifts = 1e-4 * np.arange(-round(last / 1e-4) - 20, round(last / 1e-4) + 21)
+        _write_csv(first_touch(pair, shifts, options.roll), table_out)
+    return 0
+
+
+def _wheelset_on_track(options):
+    from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack
+
+    wheel = _profile(options, options.wheel, "wheel")
+    right_wheel = _profile(options, options.right_wheel, "wheel") if options.right_wheel else wheel
+    rail = _profile(options, options.rail, "rail")
+    radius = options.rolling_radius
+    right = radius if options.right_rolling_radius is None else options.right_rolling_radius
+    sides = WheelOnRail(wheel, rail, radius), WheelOnRail(right_wheel, rail, right)
+    return WheelsetOnTrack(*sides, options.tape_circle_half_distance, options.gauge)
+
+
+def _profile(options, spec, kind):
+    """A profile of `conicity`; ``--unit`` applies to files, not to names."""
+    from wrcore.geometry.standards import named_profile
+
+    if options.unit and Path(spec).is_file() and Path(spec).suffix.lower() not in (".prw", ".prr"):
+        spec = {"points": spec, "unit": options.unit}
+    return named_profile(spec, kind, _ratio(options.inclination))
+
+
+def _ratio(text):
+    """A ratio such as 1/40."""
+    try:
+        return float(Fraction(text))
+    except (ValueError, ZeroDivisionError):
+        raise InputError("wrcore", "--inclination", f"expected a ratio such as 1/40, got {text!r}") from None
+
+
+def _creep(options):
+    from wrcore.creep.cases import read_cases, solve_cases
+    from wrcore.creep.table import show_progress
+
+    out = _output(options.out)
+    frame = solve_cases(read_cases(options.cases), options.model, options.table, progress=show_progress)
     _write_csv(frame, out)
-    print(f"{len(frame)} cases by the {options.model} model: {out}")
+    remarks = {"outside the range of the model's data": "out_of_range", "not converged": "not_converged"}
+    remarks = [f", {frame.attrs[key]} {text}" for text, key in remarks.items() if frame.attrs.get(key)]
+    print(f"{len(frame)} cases by the {options.model} model{''.join(remarks)}: {out}")
     return 0
 
 
 def _table_build(options):
-    from wrcore.creep.table import build_table, table_info
+    from wrcore.creep.table import build_table, show_progress, write_table
 
     out = _output(options.out)
-    build_table(out, options.nu, options.planes, options.tolerance)
-    print(table_info(out))
-    return 0
+    table = build_table(options.nu, options.planes, options.tolerance, show_progress)
+    write_table(out, table)
+    return _print_table(table)
 
 
 def _table_info(options):
+    from wrcore.creep.table import load_table
+
+    return _print_table(load_table(options.file))
+
+
+def _print_table(table):
     from wrcore.creep.table import table_info
 
-    print(table_info(options.file))
+    for name, value in table_info(table).items():
+        print(f"{name:24s} {value:.6g}" if isinstance(value, float) else f"{name:24s} {value}")
     return 0
 
 

@@ -30,6 +30,7 @@ UNIT_SUFFIXES = {
 DESCRIPTIONS = {
     "t": "time",
     "x_m": "position along the track (body: centre of mass; contact: contact point), forward positive",
+    "s_m": "arc length along the track's centre line (tracks that are not tangent)",
     "y_m": "lateral position in the track frame, left positive",
     "z_m": "height above the plane of the rails' highest points",
     "roll_rad": "roll about x, right-handed",

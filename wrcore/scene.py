@@ -9,20 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.checked_yaml import parse_value, read_yaml, validate
-from wrcore.contact.detection import DETECTIONS, axle_direction, detect
+from wrcore.contact.detection import DETECTIONS, detect
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table, load_table
-from wrcore.dynamics.body import STATE_SIZE, euler_parameters
+from wrcore.dynamics.body import STATE_SIZE, euler_of
 from wrcore.dynamics.system import Model
+from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
+from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
+from wrcore.geometry.track import Track, build_track, rotation
 from wrcore.vehicle.description import Vehicle, load_vehicle
 
 GRAVITY = 9.81
@@ -98,7 +100,11 @@ def load_scene(scene, overrides=()):
     if "table" in data["contact"]["creep"]:
         table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
         data["contact"]["creep"]["table"] = str(table)
-    return Scene(data, source, vehicle, wheel, rail, Track(data["track"]["gauge"]))
+    track = build_track(data["track"], source, folder)
+    data["track"] = validate(data["track"], "track", source)
+    if not track.tangent and vehicle.joints.equations > 0:
+        raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
+    return Scene(data, source, vehicle, wheel, rail, track)
 
 
 def _override(data, text):
@@ -114,8 +120,8 @@ def _override(data, text):
 
 
 def _find(path, folder, source, field):
-    """A file named in a scene: relative to the scene's folder, else to the folder above it."""
-    for base in (folder, folder.parent):
+    """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
+    for base in (folder, folder.parent, Path()):
         if (base / path).is_file():
             return base / path
     raise InputError(source, field, f"expected an existing file, got {path!r}")
@@ -192,7 +198,9 @@ def compile_scene(scene, progress=None):
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
         ),
-        vehicle.springs, vehicle.joints, float(data["speed"]), GRAVITY,
+        vehicle.springs, vehicle.joints,
+        TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
+        float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
     return model, _initial_state(scene, model)
@@ -220,9 +228,17 @@ def _initial_state(scene, model):
             contact.geometry, y, z, roll, yaw, "spatial" if spatial else "planar", data["contact"]["patch"]
         )
         radius = np.mean([vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
-        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        part[:3] = vehicle.positions[body, 0], y, z
-        part[3:7] = euler_parameters(roll, 0.0, yaw)
-        part[7] = speed
-        part[10:13] = np.array(axle_direction(roll, yaw)) * speed / radius
+        state[STATE_SIZE * body : STATE_SIZE * (body + 1)] = _rolling(
+            model.track.path, vehicle.positions[body, 0], y, z, roll, yaw, speed, speed / radius
+        )
     return state
+
+
+def _rolling(path, s, y, z, roll, yaw, speed, spin):
+    """State of a wheelset that rolls along the track at arc length s, in a pose relative to the track's frame."""
+    frame = np.empty((3, 3))
+    station = track_frame(path, s, frame)
+    turned = frame @ rotation(roll, yaw)
+    position = np.array([station.x, station.y, station.z]) + frame[:, 1:] @ np.array([y, z])
+    turn = frame @ np.array(frame_turn(station)) * speed  # the frame's own turn along the path
+    return np.concatenate([position, euler_of(turned), speed * frame[:, 0], turned[:, 1] * spin + turn])

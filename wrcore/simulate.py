@@ -11,6 +11,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.track import track_poses
 from wrcore.scene import compile_scene
 
 DERAILED_Y = 0.05
@@ -96,7 +97,14 @@ def simulate(scene, progress=None):
     if times[-1] < settings["duration"]:
         times = np.append(times, settings["duration"])
     trajectory = integrate(
-        function, state, times, settings["method"], settings["rtol"], settings["atol"], _derailment(model), progress
+        function,
+        state,
+        times,
+        settings["method"],
+        settings["rtol"],
+        settings["atol"],
+        _derailment(model, work),
+        progress,
     )
     out_of_range = int(work.counters[1])
     counters = {
@@ -117,13 +125,17 @@ def _flat(settings, prefix=""):
     return flat
 
 
-def _derailment(model):
+def _derailment(model, work):
     """Stop condition: the reason once a wheelset has left the rails."""
+    pose = np.empty((1, 5))
 
     def stop(t, state):
-        for body in model.bodies.wheelsets:
+        for k, body in enumerate(model.bodies.wheelsets):
             y = state[STATE_SIZE * body + 1]
-            if abs(y) > DERAILED_Y:
+            if not model.track.tangent:
+                track_poses(model.track, state[None, :], STATE_SIZE * body, work.arc_lengths[k], pose)
+                y = pose[0, 1]
+            if not abs(y) <= DERAILED_Y:
                 return f"a wheelset is {1e3 * abs(y):.0f} mm off the track's centre at t = {t:.6g} s"
         return ""
 
@@ -147,6 +159,8 @@ def _channels(scene, model, work, function, trajectory):
     for body, name in enumerate(scene.vehicle.body_names):
         state = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
         groups[name] = _body_channels(state, wanted)
+        if "pose" in wanted and not model.track.tangent:
+            groups[name] |= _pose_on_track(model.track, trajectory.states, body, scene.vehicle.positions[body, 0])
         if "contact" in wanted and body in wheelsets:
             k = int(np.flatnonzero(wheelsets == body)[0])
             for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
@@ -156,6 +170,13 @@ def _channels(scene, model, work, function, trajectory):
                 spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
                 groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
     return groups
+
+
+def _pose_on_track(track, states, body, start):
+    """Pose channels relative to the track's frame, and the arc length; x stays absolute."""
+    poses = np.empty((len(states), 5))
+    track_poses(track, states, STATE_SIZE * body, start, poses)
+    return dict(zip(("s_m", "y_m", "z_m", "roll_rad", "yaw_rad"), poses.T, strict=True))
 
 
 def _body_channels(state, wanted):

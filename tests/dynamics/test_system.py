@@ -12,7 +12,12 @@ from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import COORDINATE, SPHERICAL, Joints, constraint_equations
 from wrcore.dynamics.suspension import FRAME, SpringDampers
 from wrcore.dynamics.system import Bodies, Model, right_hand_side, workspace
+from wrcore.dynamics.track import TrackModel
+from wrcore.geometry.irregularity import no_irregularity
+from wrcore.geometry.path import tangent_path
 from wrcore.scene import compile_scene, load_scene
+
+LEVEL = TrackModel(True, tangent_path(), no_irregularity())
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +47,7 @@ def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, s
         np.array([j[0] for j in joints], np.int64), np.array([j[1] for j in joints], np.int64).reshape(m, 2),
         np.array([j[2] for j in joints], float).reshape(m, 2, 3), np.array([j[3] for j in joints], np.int64), equations,
     )  # fmt: skip
-    return Model(bodies, contact, elements, joined, speed, gravity, alpha, beta)
+    return Model(bodies, contact, elements, joined, LEVEL, speed, gravity, alpha, beta)
 
 
 def body_state(position=(0, 0, 0), angles=(0, 0, 0), velocity=(0, 0, 0), omega=(0, 0, 0)):
@@ -184,8 +189,8 @@ def test_constraints_match_finite_differences(contact):
         work = workspace(model)
         right_hand_side(model, work)(t, y)
         constraint_equations(
-            model.joints, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma, work.owner,
-            work.scratch,
+            model.joints, model.track, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma,
+            work.owner, work.scratch,
         )  # fmt: skip
         values.append((work.phi.copy(), work.phi_rate.copy(), work.gamma.copy()))
     phi = np.array([v[0] for v in values])

@@ -35,6 +35,19 @@ def euler_parameters(roll, pitch, yaw):
     return np.array([e0 * cp - e2 * sp, e1 * cp - e3 * sp, e0 * sp + e2 * cp, e1 * sp + e3 * cp])
 
 
+def euler_of(matrix):
+    """Euler parameters of a rotation matrix (3, 3), shape (4,), with e0 >= 0."""
+    (a, b, c), (d, e, f), (g, h, i) = np.asarray(matrix, float)
+    squares = np.array([1.0 + a + e + i, 1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i])  # 4 e_k^2
+    k = int(np.argmax(squares))
+    rows = [
+        [squares[0], h - f, c - g, d - b], [h - f, squares[1], b + d, c + g],
+        [c - g, b + d, squares[2], f + h], [d - b, c + g, f + h, squares[3]],
+    ]  # fmt: skip
+    p = np.array(rows[k]) / (2.0 * math.sqrt(squares[k]))
+    return p if p[0] >= 0.0 else -p
+
+
 def angles(p):
     """Roll, pitch and yaw (rad) of Euler parameters, the inverse of :func:`euler_parameters`.
 

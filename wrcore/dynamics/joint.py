@@ -32,16 +32,17 @@ class Joints(NamedTuple):
 
 
 @jit
-def constraint_equations(joints, t, speed, state, rotations, phi, rate, jacobian, gamma, owner, scratch):
+def constraint_equations(joints, track, t, speed, state, rotations, phi, rate, jacobian, gamma, owner, scratch):
     """Evaluate all constraints.
 
     Parameters
     ----------
     joints : Joints
+    track : TrackModel
     t, speed : float
         Time (s), speed of the moving frame (m/s).
     state, rotations : numpy.ndarray
-        State vector, rotation matrices (n, 3, 3).
+        State vector, rotation matrices (n + 1, 3, 3).
     phi, rate, gamma : numpy.ndarray, shape (m,)
         Filled: Phi, Phi' and gamma.
     jacobian : numpy.ndarray, shape (m, 2, 6)
@@ -62,8 +63,8 @@ def constraint_equations(joints, t, speed, state, rotations, phi, rate, jacobian
     row = 0
     for k in range(joints.kind.shape[0]):
         i, j = joints.bodies[k, 0], joints.bodies[k, 1]
-        marker_motion(i, joints.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
-        marker_motion(j, joints.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
+        marker_motion(track, i, joints.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
+        marker_motion(track, j, joints.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
         if joints.kind[k] == COORDINATE:
             axis = joints.axis[k]
             phi[row] = scratch[0, axis] - scratch[3, axis]

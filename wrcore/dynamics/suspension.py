@@ -5,13 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore._jit import jit
+from wrcore.dynamics.track import frame_marker
 
 FRAME = -1
 """Body number of the frame that runs ahead along the track at the scene's speed."""
 
 
 class SpringDampers(NamedTuple):
-    """Linear spring-dampers between two markers, acting along the track's axes, for kernels.
+    """Linear spring-dampers between two markers, acting along the axes of the second body, for kernels.
 
     The force on the first body is ``preload - k * (d - d0) - c * d'`` per axis, with d the position of the first
     marker minus that of the second one; the second body gets the opposite force at its own marker.
@@ -32,11 +33,12 @@ class SpringDampers(NamedTuple):
 
 
 @jit
-def marker_motion(body, local, t, speed, state, rotations, point, arm, velocity):
+def marker_motion(track, body, local, t, speed, state, rotations, point, arm, velocity):
     """Position and velocity of a marker in the track frame.
 
     Parameters
     ----------
+    track : TrackModel
     body : int
         Body number, or FRAME.
     local : numpy.ndarray, shape (3,)
@@ -44,10 +46,13 @@ def marker_motion(body, local, t, speed, state, rotations, point, arm, velocity)
     t, speed : float
         Time (s) and speed of the moving frame (m/s).
     state, rotations : numpy.ndarray
-        State vector and rotation matrices (n, 3, 3) of the bodies.
+        State vector and rotation matrices of the bodies; the last one, (n + 1, 3, 3), is the moving frame's.
     point, arm, velocity : numpy.ndarray, shape (3,)
         Filled: position (m), its part relative to the body's centre (m), and velocity (m/s).
     """
+    if body == FRAME and not track.tangent:
+        frame_marker(track, speed, t, local, point, velocity, rotations[rotations.shape[0] - 1])
+        return
     if body == FRAME:
         point[0], point[1], point[2] = local[0] + speed * t, local[1], local[2]
         velocity[0], velocity[1], velocity[2] = speed, 0.0, 0.0
@@ -79,18 +84,34 @@ def add_force(body, arm, force, sign, wrenches):
 
 
 @jit
-def spring_damper_forces(elements, t, speed, state, rotations, wrenches, scratch):
+def _along_axis(elements, k, axis, stretch, rate):
+    """Force of element k along one of its axes."""
+    return elements.preload[k, axis] - elements.stiffness[k, axis] * stretch - elements.damping[k, axis] * rate
+
+
+@jit
+def spring_damper_forces(elements, track, t, speed, state, rotations, wrenches, scratch):
     """Add the forces of all spring-dampers to the wrenches (n, 6) of the bodies; ``scratch`` is (7, 3)."""
     for k in range(elements.bodies.shape[0]):
         i, j = elements.bodies[k, 0], elements.bodies[k, 1]
-        marker_motion(i, elements.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
-        marker_motion(j, elements.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
+        marker_motion(track, i, elements.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
+        marker_motion(track, j, elements.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
         force = scratch[6]
-        for axis in range(3):
-            stretch = scratch[0, axis] - scratch[3, axis] - elements.rest[k, axis]
-            rate = scratch[2, axis] - scratch[5, axis]
-            force[axis] = (
-                elements.preload[k, axis] - elements.stiffness[k, axis] * stretch - elements.damping[k, axis] * rate
-            )
+        if j == FRAME and track.tangent:  # the axes are the absolute ones
+            for axis in range(3):
+                stretch = scratch[0, axis] - scratch[3, axis] - elements.rest[k, axis]
+                rate = scratch[2, axis] - scratch[5, axis]
+                force[axis] = _along_axis(elements, k, axis, stretch, rate)
+        else:
+            axes = rotations[j]  # of the second body; the frame's is the last one
+            force[:] = 0.0
+            for axis in range(3):
+                stretch, rate = -elements.rest[k, axis], 0.0
+                for m in range(3):
+                    stretch += axes[m, axis] * (scratch[0, m] - scratch[3, m])
+                    rate += axes[m, axis] * (scratch[2, m] - scratch[5, m])
+                size = _along_axis(elements, k, axis, stretch, rate)
+                for m in range(3):
+                    force[m] += axes[m, axis] * size
         add_force(i, scratch[1], force, 1.0, wrenches)
         add_force(j, scratch[4], force, -1.0, wrenches)

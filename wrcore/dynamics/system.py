@@ -18,6 +18,7 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.joint import Joints, constraint_equations
 from wrcore.dynamics.suspension import FRAME, SpringDampers, spring_damper_forces
+from wrcore.dynamics.track import TrackModel, add_rail_wrenches
 from wrcore.dynamics.wheel import ContactModel, wheel_wrench
 
 
@@ -41,6 +42,7 @@ class Model(NamedTuple):
     contact: ContactModel
     springs: SpringDampers
     joints: Joints
+    track: TrackModel
     speed: float
     """Speed of the moving frame, m/s."""
     gravity: float
@@ -54,6 +56,9 @@ class Workspace(NamedTuple):
     """Scratch arrays of one evaluation, and what it leaves for output."""
 
     rotations: np.ndarray
+    """(n + 1, 3, 3): of the bodies, and of the moving frame on a curved track."""
+    arc_lengths: np.ndarray
+    """(k,): last arc length of each wheelset, m; where the search for the next one starts."""
     wrenches: np.ndarray
     scratch: np.ndarray
     patches: np.ndarray
@@ -84,7 +89,8 @@ def workspace(model):
     """
     n, k, m = len(model.bodies.mass), len(model.bodies.wheelsets), model.joints.equations
     return Workspace(
-        np.zeros((n, 3, 3)), np.zeros((n, 6)), np.zeros((7, 3)), np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
+        np.zeros((n + 1, 3, 3)), np.full(k, np.nan), np.zeros((n, 6)),
+        np.zeros((7, 3)), np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
         np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((m, 2, 6)), np.zeros((m, 2), np.int64),
     )  # fmt: skip
@@ -123,8 +129,8 @@ def _add_reactions(model, t, state, work):
     m = model.joints.equations
     bodies = model.bodies
     constraint_equations(
-        model.joints, t, model.speed, state, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma,
-        work.owner, work.scratch,
+        model.joints, model.track, t, model.speed, state, work.rotations, work.phi, work.phi_rate, work.jacobian,
+        work.gamma, work.owner, work.scratch,
     )  # fmt: skip
     solved = np.zeros((m, 2, 6))  # M^-1 D^T, block by block
     turned = np.empty(3)
@@ -192,11 +198,19 @@ def derivatives(t, state, model, work):
         at = STATE_SIZE * b
         axle = work.rotations[b]
         wrench = work.wrenches[b]
+        if not model.track.tangent:
+            s, outside = add_rail_wrenches(
+                model.contact, model.track, state, at, axle, work.arc_lengths[k], work.patches[k], work.counts[k],
+                work.bounds[k], wrench,
+            )  # fmt: skip
+            work.arc_lengths[k] = s
+            work.counters[1] += outside
+            continue
         for wheel in range(2):
             fx, fy, fz, mx, my, mz, count, outside, bound = wheel_wrench(
                 model.contact, 1.0 - 2.0 * wheel, state[at + 1], state[at + 2], axle[0, 1], axle[1, 1], axle[2, 1],
                 state[at + 7], state[at + 8], state[at + 9], state[at + 10], state[at + 11], state[at + 12],
-                work.patches[k, wheel],
+                0.0, 0.0, work.patches[k, wheel],
             )  # fmt: skip
             work.counts[k, wheel], work.bounds[k, wheel] = count, bound
             work.counters[1] += outside
@@ -206,7 +220,7 @@ def derivatives(t, state, model, work):
             wrench[3] += mx
             wrench[4] += my
             wrench[5] += mz
-    spring_damper_forces(model.springs, t, model.speed, state, work.rotations, work.wrenches, work.scratch)
+    spring_damper_forces(model.springs, model.track, t, model.speed, state, work.rotations, work.wrenches, work.scratch)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:

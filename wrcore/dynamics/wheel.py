@@ -69,7 +69,7 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit
-def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, rows):
+def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, rows):
     """Force and moment of one rail on a wheelset, and the wheel's patches, in a frame in which the rail runs along x.
 
     Parameters
@@ -83,6 +83,8 @@ def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, rows):
         Axle direction, pointing left.
     vx, vy, vz, wx, wy, wz : float
         Velocity of the centre (m/s) and angular velocity (rad/s).
+    curvature_y, curvature_z : float
+        Curvature of the rail's line towards y and z, 1/m (0 on a tangent track).
     rows : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
         Filled: the wheel's patches; rows beyond the count keep old content.
 
@@ -110,6 +112,8 @@ def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, rows):
         row = rows[k]
         px, py, pz = row[X], row[Y] - y, row[Z] - z
         xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, row[ANGLE], speed)
+        cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])
+        row[CURVATURE_X] += 0.5 * (curvature_y * sine - curvature_z * cosine)  # rail bending away from the wheel
         normal, a, b = normal_contact(model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach)
         limit = model.friction * normal
         square = a * b
@@ -118,7 +122,6 @@ def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, rows):
         f1, f2, m3, missed = creep_force(model.law, model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c)
         outside += missed
         f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
-        cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])
         gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
         fx += f1
         fy += gy

@@ -1,0 +1,189 @@
+"""A wheelset on a curved or irregular track: each rail's own frame, in which it runs straight along x.
+
+At the wheelset's arc length s the track has a frame [t n b] (Eq. 3). A rail stands at (Y, Z) of that cross-section,
+with the widening and its irregularity, and runs in a direction that leaves t by the slopes of both (and by the twist of
+a cant ramp). Pose and velocities are turned into the rail's frame, the contact is solved there as on a tangent track,
+and the wrench is turned back. The rail does not move: only the direction of its surface changes along the track.
+
+Within a patch the rail counts as straight. Its curvature kappa enters Hertz's relative curvature; what is left out is
+its sagitta kappa x^2/2 over the longitudinal distance x of the contact from the cross-section (0.5 um at x = 17 mm and
+R = 300 m).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.wheel import wheel_wrench
+from wrcore.geometry.irregularity import IrregularityData, irregularity_at
+from wrcore.geometry.path import PathData, arc_length_of, frame_turn, rail_direction, track_frame
+
+
+class TrackModel(NamedTuple):
+    """Path and irregularity, for kernels."""
+
+    tangent: bool
+    """Straight, level and perfect: none of this module runs."""
+    path: PathData
+    irregularity: IrregularityData
+
+
+@jit
+def _turn_into(frame, x, y, z):
+    """Components of a vector along the columns of a frame."""
+    return (
+        frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
+        frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z,
+        frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z,
+    )
+
+
+@jit
+def _turn_back(frame, x, y, z):
+    """Vector whose components along the columns of a frame are given."""
+    return (
+        frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
+        frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z,
+        frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z,
+    )
+
+
+@jit
+def _rail_frame(frame, lateral, vertical, out):
+    """Frame of a rail whose direction leaves t by slopes towards n and b: its own t, n, b as columns of ``out``."""
+    ahead = 1.0 / math.sqrt(1.0 + lateral * lateral + vertical * vertical)
+    level = 1.0 / math.sqrt(1.0 + lateral * lateral)
+    tx, ty, tz = ahead, lateral * ahead, vertical * ahead
+    nx, ny = -lateral * level, level
+    for i in range(3):
+        out[i, 0] = frame[i, 0] * tx + frame[i, 1] * ty + frame[i, 2] * tz
+        out[i, 1] = frame[i, 0] * nx + frame[i, 1] * ny
+        # b' = t' x n'
+        out[i, 2] = -frame[i, 0] * tz * ny + frame[i, 1] * tz * nx + frame[i, 2] * (tx * ny - ty * nx)
+
+
+@jit
+def add_rail_wrenches(contact, track, state, at, axle, guess, patches, counts, bounds, wrench):
+    """Add the wrench of both rails on one wheelset to ``wrench`` (6,), in absolute axes.
+
+    Parameters
+    ----------
+    contact : ContactModel
+    track : TrackModel
+    state : numpy.ndarray
+    at : int
+        Start of the wheelset's state.
+    axle : numpy.ndarray, shape (3, 3)
+        Its rotation matrix.
+    guess : float
+        Arc length from which its own is sought, m.
+    patches, counts, bounds : numpy.ndarray
+        Filled per side; positions in the track's frame at the wheelset's arc length.
+
+    Returns
+    -------
+    s : float
+        Arc length of the wheelset, m; NaN if there is none.
+    outside : int
+        Creep look-ups out of range.
+    """
+    frame, rail, values = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 4))
+    s = arc_length_of(track.path, state[at], state[at + 1], state[at + 2], guess)
+    station = track_frame(track.path, s, frame)
+    irregularity_at(track.irregularity, s, values)
+    _, bend_vertical, bend = frame_turn(station)
+    dx, dy, dz = state[at] - station.x, state[at + 1] - station.y, state[at + 2] - station.z
+    _, y, z = _turn_into(frame, dx, dy, dz)
+    outside = 0
+    for wheel in range(2):
+        side = 1.0 - 2.0 * wheel
+        shift = side * 0.5 * station.widening + values[0, 2 * wheel]
+        lift = values[0, 2 * wheel + 1]
+        place = side * contact.geometry.rail_distance
+        slope_y = side * 0.5 * station.widening_rate + values[1, 2 * wheel]
+        lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
+        _rail_frame(frame, lateral, vertical, rail)
+        # the wheelset's centre from the rail's origin, turned into the rail's frame
+        gx, gy, gz = _turn_back(frame, 0.0, y - place - shift, z - lift)
+        _, ry, rz = _turn_into(rail, gx, gy, gz)
+        ex, ey, ez = _turn_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
+        vx, vy, vz = _turn_into(rail, state[at + 7], state[at + 8], state[at + 9])
+        wx, wy, wz = _turn_into(rail, state[at + 10], state[at + 11], state[at + 12])
+        curvature_y = bend + values[2, 2 * wheel]
+        curvature_z = -bend_vertical + values[2, 2 * wheel + 1]
+        fx, fy, fz, mx, my, mz, count, missed, bound = wheel_wrench(
+            contact, side, ry + place, rz, ex, ey, ez, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, patches[wheel]
+        )
+        counts[wheel], bounds[wheel] = count, bound
+        outside += missed
+        for k in range(count):
+            patches[wheel, k, 4] += shift
+            patches[wheel, k, 5] += lift
+        gx, gy, gz = _turn_back(rail, fx, fy, fz)
+        wrench[0] += gx
+        wrench[1] += gy
+        wrench[2] += gz
+        gx, gy, gz = _turn_back(rail, mx, my, mz)
+        wrench[3] += gx
+        wrench[4] += gy
+        wrench[5] += gz
+    return s, outside
+
+
+@jit
+def frame_marker(track, speed, t, local, point, velocity, frame):
+    """Position and velocity of a marker on the frame that runs along the track at constant speed.
+
+    Parameters
+    ----------
+    track : TrackModel
+    speed, t : float
+        m/s and s.
+    local : numpy.ndarray, shape (3,)
+        Marker: arc length ahead of the frame's start, and lateral and vertical position in the track's frame, m.
+    point, velocity : numpy.ndarray, shape (3,)
+        Filled, absolute axes.
+    frame : numpy.ndarray, shape (3, 3)
+        Filled: the track's frame there.
+    """
+    station = track_frame(track.path, local[0] + speed * t, frame)
+    along, left, up = frame_turn(station)
+    y, z = local[1], local[2]
+    # d/ds of r + y n + z b, with the frame turning by D = (along, left, up) per metre
+    rt, rn, rb = 1.0 + left * z - up * y, -along * z, along * y
+    origin = (station.x, station.y, station.z)
+    for i in range(3):
+        point[i] = origin[i] + frame[i, 1] * y + frame[i, 2] * z
+        velocity[i] = speed * (frame[i, 0] * rt + frame[i, 1] * rn + frame[i, 2] * rb)
+
+
+@jit
+def track_poses(track, states, at, guess, out):
+    """Arc length and pose of one body in the track's frame for each row of ``states``.
+
+    Parameters
+    ----------
+    track : TrackModel
+    states : numpy.ndarray, shape (n, size)
+    at : int
+        Start of the body's state.
+    guess : float
+        Arc length of the first row, roughly, m.
+    out : numpy.ndarray, shape (n, 5)
+        Filled: s, y, z (m), roll, yaw (rad) relative to the track's frame.
+    """
+    frame = np.empty((3, 3))
+    s = guess
+    for i in range(states.shape[0]):
+        state = states[i, at : at + STATE_SIZE]
+        s = arc_length_of(track.path, state[0], state[1], state[2], s)
+        station = track_frame(track.path, s, frame)
+        _, y, z = _turn_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
+        e0, e1, e2, e3 = state[3], state[4], state[5], state[6]
+        ax, ay, az = 2.0 * (e1 * e2 - e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 + e0 * e1)
+        ax, ay, az = _turn_into(frame, ax, ay, az)
+        out[i, 0], out[i, 1], out[i, 2] = s, y, z
+        out[i, 3], out[i, 4] = math.asin(min(max(az, -1.0), 1.0)), math.atan2(-ax, ay)
