@@ -43,8 +43,8 @@ def test_conical_wheelset_follows_klingel():
 
 
 def test_mirrored_start_gives_the_mirrored_run():
-    # Before the first flange contact (afterwards neighbouring runs separate). Every operation is mirrored sign by sign;
-    # the runs differ by rounding and stay closer to each other than to the exact motion, which a tighter run stands for.
+    # Before the first flange contact (afterwards neighbouring runs separate). Every operation is mirrored; the runs
+    # differ by rounding and stay closer to each other than to the exact motion, which a tighter run stands for.
     def run(y, rtol):
         overrides = [f"initial.y={y}", f"integration.rtol={rtol}", "integration.duration=0.8"]
         overrides.append("contact.patch=moment")
