@@ -181,6 +181,15 @@ def test_cant_raises_the_outer_rail_and_leaves_the_inner_one(winding):
     assert centreline(winding, 300.0).sin_roll < 0.0 < centreline(winding, 650.0).sin_roll
 
 
+@pytest.mark.parametrize("s", [100.0, 480.0, 530.0])
+def test_inner_rail_keeps_its_height_in_transitions_too(winding, s):
+    # also where the cant changes sign (s = 510 m); the climbing line's cosine leaves 0.0375 m * 3e-7
+    station, matrix = frame(winding, s)
+    lowest = station.z - 0.75 * abs(matrix[2, 1])
+    assert abs(matrix[2, 1]) > 0.03
+    assert lowest == pytest.approx(0.0, abs=5e-8)
+
+
 def test_cant_and_widening_ramp_linearly_with_the_curvature(winding):
     # a quarter of the way into the first transition
     station = centreline(winding, 75.0)
@@ -217,9 +226,10 @@ def test_arc_length_of_is_the_inverse(s, y, z, off):
     assert arc_length_of(path, *point, s + off) == pytest.approx(s, abs=1e-11)
 
 
-def test_arc_length_of_finds_its_own_start(winding):
-    # the path does not come near itself within the first 800 m
-    for s in np.linspace(-100.0, 800.0, 91):
+def test_arc_length_of_finds_its_own_start():
+    # 270 degrees of a circle: from a far start, Newton's iteration would end in the opposite cross-section
+    winding = build_track({"path": [{"transition": 50.0}, {"curve": 1400.0, "radius": 300.0}]}, "test").path
+    for s in np.linspace(-50.0, 1440.0, 91):
         station, matrix = frame(winding, s)
         point = vector(station) + matrix @ np.array([0.0, 0.5, 0.46])
         assert arc_length_of(winding, *point, math.nan) == pytest.approx(s, abs=1e-11)
