@@ -44,7 +44,8 @@ def test_conical_wheelset_follows_klingel():
 
 def test_mirrored_start_gives_the_mirrored_run():
     # Before the first flange contact (afterwards neighbouring runs separate). Every operation is mirrored; the runs
-    # differ by rounding and stay closer to each other than to the exact motion, which a tighter run stands for.
+    # differ by rounding, and once rounding has made one of them reject a step that the other accepts, by as much as
+    # either differs from the exact motion, which a tighter run stands for.
     def run(y, rtol):
         overrides = [f"initial.y={y}", f"integration.rtol={rtol}", "integration.duration=0.8"]
         overrides.append("contact.patch=moment")
@@ -53,7 +54,7 @@ def test_mirrored_start_gives_the_mirrored_run():
     left, right, tight = run(0.002, 1e-6), run(-0.002, 1e-6), run(0.002, 1e-9)
     error = np.abs(left["wheelset"].y_m - tight["wheelset"].y_m).max()
     assert np.ptp(left["wheelset"].y_m) > 0.003 and error < 1e-5  # it does move, and accurately
-    assert np.abs(left["wheelset"].y_m + right["wheelset"].y_m).max() <= error
+    assert np.abs(left["wheelset"].y_m + right["wheelset"].y_m).max() <= 3.0 * error
     assert left["wheelset/left"].N_N[0, 0] == pytest.approx(right["wheelset/right"].N_N[0, 0], rel=1e-12)
 
 

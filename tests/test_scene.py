@@ -56,7 +56,7 @@ BAD_SCENES = [
     ("speed", True, "speed", "expected a speed"),
     ("speed", float("nan"), "speed", "finite"),
     ("contact.friction", 0.0, "contact.friction", "above 0"),
-    ("contact.detection", "3d", "contact.detection", "'planar' or 'spatial'"),
+    ("contact.detection", "3d", "contact.detection", "'planar', 'spatial' or 'auto'"),
     ("wheel.profile", "S1003", "wheel.profile", "S1002"),
     ("wheel.profile", "UIC60-MBench", "wheel.profile", "expected a wheel profile"),
     ("wheel.profile", {"points": "missing.csv"}, "wheel.profile.points", "existing file"),

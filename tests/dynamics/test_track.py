@@ -101,7 +101,7 @@ def test_rails_moved_together_move_the_contact_with_them(tmp_path):
 
 
 def test_rails_that_run_askew_are_yaw(tmp_path):
-    # both rails drift to the left by 0.2 mm per metre: a wheelset with that yaw, moving along them, sees a tangent track
+    # both rails drift to the left by 0.2 mm per metre: a wheelset with that yaw, moving along them, sees no curve
     slope = 2e-4
     drift = {f"{side}_lateral": lambda s: slope * (s - 100.0) for side in ("left", "right")}
     _, model, _ = compiled(irregular(tmp_path, **drift))
@@ -116,14 +116,15 @@ def test_rails_that_run_askew_are_yaw(tmp_path):
         # measured across the rails the gauge is narrower by 0.76 m slope^2 = 3e-8 m, on a nearly conformal pair
         np.testing.assert_allclose(ours[:, columns.PHI], theirs[:, columns.PHI], rtol=1e-4)
         np.testing.assert_allclose(ours[:, columns.PENETRATION], theirs[:, columns.PENETRATION], rtol=1e-3)
-    # and without that yaw the lateral creepage is minus the slope
+    # A wheel that rolls without slip does so on any surface: without that yaw there is no lateral creepage either. The
+    # rails do not move sideways, only the wheelset will, over them.
     _, patches, _ = evaluated(model, placed(model, 100.0, 0.0, 0.45981, 0.0, 0.0), 100.0)
-    assert patches[0][0, columns.ETA] - expected[0][0, columns.ETA] == pytest.approx(-slope, rel=2e-2)
+    assert abs(patches[0][0, columns.ETA]) < 0.01 * slope
 
 
 def test_a_curve_is_run_through_and_reported_in_the_tracks_frame():
-    # 600 m left curve at 20 m/s: a free spin along the track, arc length V t, outward shift (to the right, y < 0) that
-    # gives the outer wheel the larger radius: conical wheelset, rolling line e r/(2 R gamma-like slope); sign tested only
+    # 600 m left curve at 20 m/s: arc length V t, and a shift to the outside (to the right, y < 0), which gives the outer
+    # wheel the larger radius
     path = [{"tangent": 20}, {"transition": 40}, {"curve": 400, "radius": 600, "cant": 0.06}]
     overrides = [f"track={json.dumps({'path': path})}", "initial.y=0", "integration.duration=8"]
     run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", overrides))
