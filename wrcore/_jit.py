@@ -63,14 +63,23 @@ def _prepare_cache_folder():
 _FOLDER = _prepare_cache_folder()
 
 
-def jit(function=None, **options):
+def jit(function=None, *, allocates=True, **options):
     """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
 
-    Keyword arguments are passed on to numba; ``fastmath=FAST`` is meant for scan loops only.
+    Parameters
+    ----------
+    function : callable
+    allocates : bool
+        False for kernels that create no arrays (views of their arguments are fine): numba then counts no references,
+        which costs more than the arithmetic where a kernel is handed a tuple of many arrays.
+    **options
+        Passed on to numba; ``fastmath=FAST`` is meant for scan loops only.
     """
     if function is None:
-        return lambda f: jit(f, **options)
+        return lambda f: jit(f, allocates=allocates, **options)
     settings = {"cache": _FOLDER is not None, "error_model": "numpy", **options}
+    if not allocates:
+        settings["_nrt"] = False
     before = numba.config.CACHE_DIR
     try:
         numba.config.CACHE_DIR = _FOLDER or before

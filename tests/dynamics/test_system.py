@@ -190,7 +190,7 @@ def test_constraints_match_finite_differences(contact):
         right_hand_side(model, work)(t, y)
         constraint_equations(
             model.joints, model.track, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma,
-            work.owner, work.scratch,
+            work.owner,
         )  # fmt: skip
         values.append((work.phi.copy(), work.phi_rate.copy(), work.gamma.copy()))
     phi = np.array([v[0] for v in values])

@@ -5,7 +5,7 @@ import math
 from wrcore._jit import jit
 
 
-@jit
+@jit(allocates=False)
 def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, angle, speed):
     """Creepages and approach speed of a patch on a tangent track.
 

@@ -91,7 +91,7 @@ def hertz_table():
     return HertzTable(float(step), np.column_stack(columns))
 
 
-@jit
+@jit(allocates=False)
 def _hermite(table, column, position, i):
     t = position - i
     s = t - 1.0
@@ -99,7 +99,7 @@ def _hermite(table, column, position, i):
     return y0 + t * (d0 + t * ((y1 - y0 - d0) + s * (d0 + d1 - 2.0 * (y1 - y0))))
 
 
-@jit
+@jit(allocates=False)
 def hertz_ellipse(table, A, B):
     """Stiffness and semi-axis factors for relative curvatures A (rolling) and B (lateral), 1/m.
 
@@ -123,7 +123,7 @@ def hertz_ellipse(table, A, B):
     return 4.0 / 3.0 * k * root, a_factor * root, b_factor * root
 
 
-@jit
+@jit(allocates=False)
 def damping_factor(approach_speed, c_e, v0):
     """Damping factor c_d of Eq. (7): c_e when separating, 1 when approaching, a cubic in |speed| < v0.
 

@@ -46,7 +46,7 @@ SLOPE_TOLERANCE = 1e-12
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-@jit
+@jit(allocates=False)
 def deepest_point(geometry, pose, u):
     """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
 
@@ -71,7 +71,7 @@ def deepest_point(geometry, pose, u):
     return new if abs(new - u) < 2.9 * SCAN_STEP else u
 
 
-@jit
+@jit(allocates=False)
 def edge_of_overlap(geometry, pose, outside, inside):
     """Zero of the gap between a point outside and one inside an overlap, to about 1e-7 m (Illinois steps).
 
@@ -101,7 +101,7 @@ def edge_of_overlap(geometry, pose, outside, inside):
     return 0.5 * (outside + inside)
 
 
-@jit
+@jit(allocates=False)
 def overlap_moments(geometry, pose, first, last):
     """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature, M1 and M2 about the interval's middle."""
     middle, half = 0.5 * (first + last), 0.5 * (last - first)
@@ -116,7 +116,7 @@ def overlap_moments(geometry, pose, first, last):
     return half * m0, half * m1, half * m2
 
 
-@jit
+@jit(allocates=False)
 def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
 
@@ -136,7 +136,7 @@ def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     patch[Y] = -0.5 * penetration * pose.side * slope * cosine
 
 
-@jit
+@jit(allocates=False)
 def patch_at_maximum(geometry, pose, u, patch):
     """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
     u = deepest_point(geometry, pose, u)
@@ -174,7 +174,7 @@ def patch_at_maximum(geometry, pose, u, patch):
     return True
 
 
-@jit
+@jit(allocates=False)
 def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
     if not m0 > 0.0:
@@ -197,7 +197,7 @@ def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     return True
 
 
-@jit
+@jit(allocates=False)
 def _place(geometry, pose, patch):
     """Turn the columns X and Y from local parts into track coordinates (X from the wheelset's cross-section)."""
     patch[X] += (geometry.half_distance + patch[U_WHEEL]) * pose.ex

@@ -26,7 +26,7 @@ ROLL_RANGE = 0.05
 """Half of the range of roll angles that is searched, rad."""
 
 
-@jit
+@jit(allocates=False)
 def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
     """Patches of one wheel in a given pose with their static normal forces (damping factor 1).
 
@@ -66,7 +66,7 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, redu
     return count, force
 
 
-@jit
+@jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
     """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding.
 

@@ -67,7 +67,7 @@ def angles(p):
     return roll, pitch, yaw
 
 
-@jit
+@jit(allocates=False)
 def rotation_matrix(state, at, matrix):
     """Write A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3)."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
@@ -82,7 +82,7 @@ def rotation_matrix(state, at, matrix):
     matrix[2, 2] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
 
 
-@jit
+@jit(allocates=False)
 def euler_rates(state, at, wx, wy, wz, alpha, rate):
     """Rates of the Euler parameters for an angular velocity in track axes, p' = 1/2 E(p)^T w.
 

@@ -31,8 +31,8 @@ class Joints(NamedTuple):
     """Number of constraint equations in all."""
 
 
-@jit
-def constraint_equations(joints, track, t, speed, state, rotations, phi, rate, jacobian, gamma, owner, scratch):
+@jit(allocates=False)
+def constraint_equations(joints, track, t, speed, state, rotations, phi, rate, jacobian, gamma, owner):
     """Evaluate all constraints.
 
     Parameters
@@ -49,7 +49,6 @@ def constraint_equations(joints, track, t, speed, state, rotations, phi, rate, j
         Filled: block of D for the first and the second body of each equation.
     owner : numpy.ndarray, shape (m, 2), int
         Filled: the bodies of the two blocks.
-    scratch : numpy.ndarray, shape (7, 3)
 
     Notes
     -----
@@ -60,34 +59,34 @@ def constraint_equations(joints, track, t, speed, state, rotations, phi, rate, j
     D = [I, -s_i~, -I, s_j~]; gamma = -w_i x (w_i x s_i) + w_j x (w_j x s_j).
     """
     jacobian[:] = 0.0
+    mark = joints.markers
     row = 0
     for k in range(joints.kind.shape[0]):
         i, j = joints.bodies[k, 0], joints.bodies[k, 1]
-        marker_motion(track, i, joints.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
-        marker_motion(track, j, joints.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
+        p, arm, v = marker_motion(track, speed, t, state, rotations, i, mark[k, 0, 0], mark[k, 0, 1], mark[k, 0, 2])
+        q, other_arm, u = marker_motion(
+            track, speed, t, state, rotations, j, mark[k, 1, 0], mark[k, 1, 1], mark[k, 1, 2]
+        )
+        distance = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
+        speeds = (v[0] - u[0], v[1] - u[1], v[2] - u[2])
         if joints.kind[k] == COORDINATE:
             axis = joints.axis[k]
-            phi[row] = scratch[0, axis] - scratch[3, axis]
-            rate[row] = scratch[2, axis] - scratch[5, axis]
-            gamma[row] = 0.0
+            phi[row], rate[row], gamma[row] = distance[axis], speeds[axis], 0.0
             jacobian[row, 0, axis] = 1.0
             owner[row, 0], owner[row, 1] = i, FRAME
             row += 1
         else:
             for axis in range(3):
-                phi[row + axis] = scratch[0, axis] - scratch[3, axis]
-                rate[row + axis] = scratch[2, axis] - scratch[5, axis]
-                gamma[row + axis] = 0.0
+                phi[row + axis], rate[row + axis], gamma[row + axis] = distance[axis], speeds[axis], 0.0
                 owner[row + axis, 0], owner[row + axis, 1] = i, j
-            for end in range(2):
-                body = joints.bodies[k, end]
-                if body != FRAME:
-                    sign = 1.0 - 2.0 * end
-                    _spherical_blocks(state, body, scratch[1 + 3 * end], sign, row, end, jacobian, gamma)
+            if i != FRAME:
+                _spherical_blocks(state, i, arm, 1.0, row, 0, jacobian, gamma)
+            if j != FRAME:
+                _spherical_blocks(state, j, other_arm, -1.0, row, 1, jacobian, gamma)
             row += 3
 
 
-@jit
+@jit(allocates=False)
 def _spherical_blocks(state, body, arm, sign, row, end, jacobian, gamma):
     """One body's share in a spherical joint: blocks of D and -w x (w x s) in gamma."""
     sx, sy, sz = arm[0], arm[1], arm[2]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore._jit import jit
+from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.track import frame_marker
 
 FRAME = -1
@@ -32,86 +33,89 @@ class SpringDampers(NamedTuple):
     """(n, 3): d0, m."""
 
 
-@jit
-def marker_motion(track, body, local, t, speed, state, rotations, point, arm, velocity):
-    """Position and velocity of a marker in the track frame.
+@jit(allocates=False, inline="always")
+def marker_motion(track, speed, t, state, rotations, body, local_x, local_y, local_z):
+    """Position and velocity of a marker in absolute axes.
 
     Parameters
     ----------
     track : TrackModel
-    body : int
-        Body number, or FRAME.
-    local : numpy.ndarray, shape (3,)
-        Marker in body axes, m.
-    t, speed : float
-        Time (s) and speed of the moving frame (m/s).
+    speed, t : float
+        Speed of the moving frame (m/s) and time (s).
     state, rotations : numpy.ndarray
         State vector and rotation matrices of the bodies; the last one, (n + 1, 3, 3), is the moving frame's.
-    point, arm, velocity : numpy.ndarray, shape (3,)
-        Filled: position (m), its part relative to the body's centre (m), and velocity (m/s).
+    body : int
+        Body number, or FRAME.
+    local_x, local_y, local_z : float
+        Marker in the body's axes, m.
+
+    Returns
+    -------
+    point, arm, velocity : tuple of float
+        Position (m), its part relative to the body's centre (m; zero for the frame), and velocity (m/s).
     """
-    if body == FRAME and not track.tangent:
-        frame_marker(track, speed, t, local, point, velocity, rotations[rotations.shape[0] - 1])
-        return
     if body == FRAME:
-        point[0], point[1], point[2] = local[0] + speed * t, local[1], local[2]
-        velocity[0], velocity[1], velocity[2] = speed, 0.0, 0.0
-        return
-    at = 13 * body
-    matrix = rotations[body]
-    for i in range(3):
-        arm[i] = matrix[i, 0] * local[0] + matrix[i, 1] * local[1] + matrix[i, 2] * local[2]
-        point[i] = state[at + i] + arm[i]
+        zero = (0.0, 0.0, 0.0)
+        if track.tangent:
+            return (local_x + speed * t, local_y, local_z), zero, (speed, 0.0, 0.0)
+        last = rotations.shape[0] - 1
+        point, velocity = frame_marker(track, speed, t, local_x, local_y, local_z, rotations, last)
+        return point, zero, velocity
+    at = STATE_SIZE * body
+    ax = rotations[body, 0, 0] * local_x + rotations[body, 0, 1] * local_y + rotations[body, 0, 2] * local_z
+    ay = rotations[body, 1, 0] * local_x + rotations[body, 1, 1] * local_y + rotations[body, 1, 2] * local_z
+    az = rotations[body, 2, 0] * local_x + rotations[body, 2, 1] * local_y + rotations[body, 2, 2] * local_z
     wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
-    velocity[0] = state[at + 7] + wy * arm[2] - wz * arm[1]
-    velocity[1] = state[at + 8] + wz * arm[0] - wx * arm[2]
-    velocity[2] = state[at + 9] + wx * arm[1] - wy * arm[0]
+    return (
+        (state[at] + ax, state[at + 1] + ay, state[at + 2] + az),
+        (ax, ay, az),
+        (state[at + 7] + wy * az - wz * ay, state[at + 8] + wz * ax - wx * az, state[at + 9] + wx * ay - wy * ax),
+    )
 
 
-@jit
-def add_force(body, arm, force, sign, wrenches):
-    """Add ``sign * force`` (3,), acting at ``arm`` from the body's centre, to the body's wrench (6,)."""
-    if body == FRAME:
-        return
-    fx, fy, fz = sign * force[0], sign * force[1], sign * force[2]
-    wrench = wrenches[body]
-    wrench[0] += fx
-    wrench[1] += fy
-    wrench[2] += fz
-    wrench[3] += arm[1] * fz - arm[2] * fy
-    wrench[4] += arm[2] * fx - arm[0] * fz
-    wrench[5] += arm[0] * fy - arm[1] * fx
+@jit(allocates=False, inline="always")
+def add_force(body, arm, fx, fy, fz, wrenches):
+    """Add a force (N) that acts at ``arm`` (m) from a body's centre to the body's wrench (6,)."""
+    if body != FRAME:
+        wrenches[body, 0] += fx
+        wrenches[body, 1] += fy
+        wrenches[body, 2] += fz
+        wrenches[body, 3] += arm[1] * fz - arm[2] * fy
+        wrenches[body, 4] += arm[2] * fx - arm[0] * fz
+        wrenches[body, 5] += arm[0] * fy - arm[1] * fx
 
 
-@jit
-def _along_axis(elements, k, axis, stretch, rate):
-    """Force of element k along one of its axes."""
+@jit(allocates=False, inline="always")
+def _along_axis(elements, k, axis, distance, rate):
+    """Force of element k along one of its axes, for a distance of its markers and its rate there."""
+    stretch = distance - elements.rest[k, axis]
     return elements.preload[k, axis] - elements.stiffness[k, axis] * stretch - elements.damping[k, axis] * rate
 
 
-@jit
-def spring_damper_forces(elements, track, t, speed, state, rotations, wrenches, scratch):
-    """Add the forces of all spring-dampers to the wrenches (n, 6) of the bodies; ``scratch`` is (7, 3)."""
+@jit(allocates=False)
+def spring_damper_forces(elements, track, t, speed, state, rotations, wrenches):
+    """Add the forces of all spring-dampers to the wrenches (n, 6) of the bodies."""
     for k in range(elements.bodies.shape[0]):
         i, j = elements.bodies[k, 0], elements.bodies[k, 1]
-        marker_motion(track, i, elements.markers[k, 0], t, speed, state, rotations, scratch[0], scratch[1], scratch[2])
-        marker_motion(track, j, elements.markers[k, 1], t, speed, state, rotations, scratch[3], scratch[4], scratch[5])
-        force = scratch[6]
+        mark = elements.markers
+        p, arm, v = marker_motion(track, speed, t, state, rotations, i, mark[k, 0, 0], mark[k, 0, 1], mark[k, 0, 2])
+        q, other_arm, u = marker_motion(
+            track, speed, t, state, rotations, j, mark[k, 1, 0], mark[k, 1, 1], mark[k, 1, 2]
+        )
+        dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+        rx, ry, rz = v[0] - u[0], v[1] - u[1], v[2] - u[2]
         if j == FRAME and track.tangent:  # the axes are the absolute ones
-            for axis in range(3):
-                stretch = scratch[0, axis] - scratch[3, axis] - elements.rest[k, axis]
-                rate = scratch[2, axis] - scratch[5, axis]
-                force[axis] = _along_axis(elements, k, axis, stretch, rate)
+            fx = _along_axis(elements, k, 0, dx, rx)
+            fy = _along_axis(elements, k, 1, dy, ry)
+            fz = _along_axis(elements, k, 2, dz, rz)
         else:
-            axes = rotations[j]  # of the second body; the frame's is the last one
-            force[:] = 0.0
+            axes = rotations.shape[0] - 1 if j == FRAME else j
+            fx = fy = fz = 0.0
             for axis in range(3):
-                stretch, rate = -elements.rest[k, axis], 0.0
-                for m in range(3):
-                    stretch += axes[m, axis] * (scratch[0, m] - scratch[3, m])
-                    rate += axes[m, axis] * (scratch[2, m] - scratch[5, m])
-                size = _along_axis(elements, k, axis, stretch, rate)
-                for m in range(3):
-                    force[m] += axes[m, axis] * size
-        add_force(i, scratch[1], force, 1.0, wrenches)
-        add_force(j, scratch[4], force, -1.0, wrenches)
+                ax, ay, az = rotations[axes, 0, axis], rotations[axes, 1, axis], rotations[axes, 2, axis]
+                size = _along_axis(elements, k, axis, ax * dx + ay * dy + az * dz, ax * rx + ay * ry + az * rz)
+                fx += ax * size
+                fy += ay * size
+                fz += az * size
+        add_force(i, arm, fx, fy, fz, wrenches)
+        add_force(j, other_arm, -fx, -fy, -fz, wrenches)

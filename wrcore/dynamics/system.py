@@ -8,6 +8,7 @@ from the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, and the full matr
 without joints does not run any of this.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +61,6 @@ class Workspace(NamedTuple):
     arc_lengths: np.ndarray
     """(k,): last arc length of each wheelset, m; where the search for the next one starts."""
     wrenches: np.ndarray
-    scratch: np.ndarray
     patches: np.ndarray
     """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
     counts: np.ndarray
@@ -74,6 +74,12 @@ class Workspace(NamedTuple):
     gamma: np.ndarray
     jacobian: np.ndarray
     owner: np.ndarray
+    solved: np.ndarray
+    multipliers: np.ndarray
+    """(m,): Lagrange multipliers of the last evaluation."""
+    matrix: np.ndarray
+    frames: np.ndarray
+    irregularity: np.ndarray
 
 
 def workspace(model):
@@ -90,13 +96,14 @@ def workspace(model):
     n, k, m = len(model.bodies.mass), len(model.bodies.wheelsets), model.joints.equations
     return Workspace(
         np.zeros((n + 1, 3, 3)), np.full(k, np.nan), np.zeros((n, 6)),
-        np.zeros((7, 3)), np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
+        np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
         np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((m, 2, 6)), np.zeros((m, 2), np.int64),
+        np.zeros((m, 2, 6)), np.zeros(m), np.zeros((m, m)), np.zeros((2, 3, 3)), np.zeros((3, 4)),
     )  # fmt: skip
 
 
-@jit
+@jit(allocates=False)
 def _apply_inverse_inertia(inertia, matrix, wrench, out):
     """out = J^-1 n for the moment part of a wrench (6,), J = A diag(inertia) A^T."""
     for i in range(3):
@@ -108,7 +115,7 @@ def _apply_inverse_inertia(inertia, matrix, wrench, out):
             out[i] += matrix[i, k] * local
 
 
-@jit
+@jit(allocates=False)
 def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     """Subtract w x J w from the moment part of a wrench (6,)."""
     wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
@@ -123,50 +130,69 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[5] -= wx * hy - wy * hx
 
 
-@jit
+@jit(allocates=False)
+def _solve_in_place(matrix, right):
+    """Solve a symmetric positive definite system by Cholesky's factorisation; both arguments are overwritten."""
+    n = right.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = math.sqrt(total) if i == j else total / matrix[j, j]
+    for i in range(n):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@jit(allocates=False)
 def _add_reactions(model, t, state, work):
     """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches."""
     m = model.joints.equations
-    bodies = model.bodies
+    mass, inertia = model.bodies.mass, model.bodies.inertia
+    owner, jacobian, solved, multipliers = work.owner, work.jacobian, work.solved, work.multipliers
     constraint_equations(
-        model.joints, model.track, t, model.speed, state, work.rotations, work.phi, work.phi_rate, work.jacobian,
-        work.gamma, work.owner, work.scratch,
+        model.joints, model.track, t, model.speed, state, work.rotations, work.phi, work.phi_rate, jacobian,
+        work.gamma, owner,
     )  # fmt: skip
-    solved = np.zeros((m, 2, 6))  # M^-1 D^T, block by block
-    turned = np.empty(3)
-    right = np.empty(m)
     for row in range(m):
-        right[row] = -(
-            work.gamma[row] - 2.0 * model.alpha * work.phi_rate[row] - model.beta * model.beta * work.phi[row]
-        )
+        feedback = 2.0 * model.alpha * work.phi_rate[row] + model.beta * model.beta * work.phi[row]
+        multipliers[row] = feedback - work.gamma[row]
         for end in range(2):
-            body = work.owner[row, end]
+            body = owner[row, end]
             if body == FRAME:
                 continue
-            block = work.jacobian[row, end]
-            _apply_inverse_inertia(bodies.inertia[body], work.rotations[body], block, turned)
-            for i in range(3):
-                solved[row, end, i] = block[i] / bodies.mass[body]
-                solved[row, end, 3 + i] = turned[i]
-            right[row] += np.dot(solved[row, end], work.wrenches[body])
-    matrix = np.zeros((m, m))
+            block = solved[row, end]  # M^-1 D^T, block by block
+            _apply_inverse_inertia(inertia[body], work.rotations[body], jacobian[row, end], block[3:])
+            for i in range(6):
+                if i < 3:
+                    block[i] = jacobian[row, end, i] / mass[body]
+                multipliers[row] += block[i] * work.wrenches[body, i]
     for row in range(m):
         for column in range(m):
+            entry = 0.0
             for end in range(2):
                 for other in range(2):
-                    body = work.owner[row, end]
-                    if body != FRAME and body == work.owner[column, other]:
-                        matrix[row, column] += np.dot(work.jacobian[row, end], solved[column, other])
-    multipliers = np.linalg.solve(matrix, right)
+                    if owner[row, end] != FRAME and owner[row, end] == owner[column, other]:
+                        for i in range(6):
+                            entry += jacobian[row, end, i] * solved[column, other, i]
+            work.matrix[row, column] = entry
+    _solve_in_place(work.matrix, multipliers)
     for row in range(m):
         for end in range(2):
-            body = work.owner[row, end]
+            body = owner[row, end]
             if body != FRAME:
-                work.wrenches[body] -= multipliers[row] * work.jacobian[row, end]
+                for i in range(6):
+                    work.wrenches[body, i] -= multipliers[row] * jacobian[row, end, i]
 
 
-@jit
-def derivatives(t, state, model, work):
+@jit(allocates=False)
+def fill_derivatives(t, state, model, work, rate):
     """Right-hand side of the equations of motion.
 
     Parameters
@@ -178,15 +204,11 @@ def derivatives(t, state, model, work):
     model : Model
     work : Workspace
         Overwritten; patches and counts belong to this evaluation afterwards.
-
-    Returns
-    -------
-    numpy.ndarray, shape (13 n,)
-        Time derivative of the state.
+    rate : numpy.ndarray, shape (13 n,)
+        Filled: time derivative of the state.
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
-    rate = np.empty_like(state)
     work.counters[0] += 1
     for b in range(n):
         rotation_matrix(state, STATE_SIZE * b, work.rotations[b])
@@ -200,8 +222,8 @@ def derivatives(t, state, model, work):
         wrench = work.wrenches[b]
         if not model.track.tangent:
             s, outside = add_rail_wrenches(
-                model.contact, model.track, state, at, axle, work.arc_lengths[k], work.patches[k], work.counts[k],
-                work.bounds[k], wrench,
+                model.contact, model.track, state, at, axle, work.arc_lengths[k], work.frames, work.irregularity,
+                work.patches[k], work.counts[k], work.bounds[k], wrench,
             )  # fmt: skip
             work.arc_lengths[k] = s
             work.counters[1] += outside
@@ -220,7 +242,7 @@ def derivatives(t, state, model, work):
             wrench[3] += mx
             wrench[4] += my
             wrench[5] += mz
-    spring_damper_forces(model.springs, model.track, t, model.speed, state, work.rotations, work.wrenches, work.scratch)
+    spring_damper_forces(model.springs, model.track, t, model.speed, state, work.rotations, work.wrenches)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
@@ -237,6 +259,13 @@ def derivatives(t, state, model, work):
             rate[at + i] = state[at + 7 + i]
             rate[at + 7 + i] = work.wrenches[b, i] / bodies.mass[b]
         _apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + 10 : at + 13])
+
+
+@jit
+def derivatives(t, state, model, work):
+    """Right-hand side in a new array (13 n,); arguments as for :func:`fill_derivatives`."""
+    rate = np.empty_like(state)
+    fill_derivatives(t, state, model, work, rate)
     return rate
 
 

@@ -31,7 +31,7 @@ class TrackModel(NamedTuple):
     irregularity: IrregularityData
 
 
-@jit
+@jit(allocates=False)
 def _turn_into(frame, x, y, z):
     """Components of a vector along the columns of a frame."""
     return (
@@ -41,7 +41,7 @@ def _turn_into(frame, x, y, z):
     )
 
 
-@jit
+@jit(allocates=False)
 def _turn_back(frame, x, y, z):
     """Vector whose components along the columns of a frame are given."""
     return (
@@ -51,7 +51,7 @@ def _turn_back(frame, x, y, z):
     )
 
 
-@jit
+@jit(allocates=False)
 def _rail_frame(frame, lateral, vertical, out):
     """Frame of a rail whose direction leaves t by slopes towards n and b: its own t, n, b as columns of ``out``."""
     ahead = 1.0 / math.sqrt(1.0 + lateral * lateral + vertical * vertical)
@@ -65,8 +65,8 @@ def _rail_frame(frame, lateral, vertical, out):
         out[i, 2] = -frame[i, 0] * tz * ny + frame[i, 1] * tz * nx + frame[i, 2] * (tx * ny - ty * nx)
 
 
-@jit
-def add_rail_wrenches(contact, track, state, at, axle, guess, patches, counts, bounds, wrench):
+@jit(allocates=False)
+def add_rail_wrenches(contact, track, state, at, axle, guess, frames, values, patches, counts, bounds, wrench):
     """Add the wrench of both rails on one wheelset to ``wrench`` (6,), in absolute axes.
 
     Parameters
@@ -80,6 +80,8 @@ def add_rail_wrenches(contact, track, state, at, axle, guess, patches, counts, b
         Its rotation matrix.
     guess : float
         Arc length from which its own is sought, m.
+    frames, values : numpy.ndarray, shapes (2, 3, 3) and (3, 4)
+        Scratch.
     patches, counts, bounds : numpy.ndarray
         Filled per side; positions in the track's frame at the wheelset's arc length.
 
@@ -90,7 +92,7 @@ def add_rail_wrenches(contact, track, state, at, axle, guess, patches, counts, b
     outside : int
         Creep look-ups out of range.
     """
-    frame, rail, values = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 4))
+    frame, rail = frames[0], frames[1]
     s = arc_length_of(track.path, state[at], state[at + 1], state[at + 2], guess)
     station = track_frame(track.path, s, frame)
     irregularity_at(track.irregularity, s, values)
@@ -133,8 +135,8 @@ def add_rail_wrenches(contact, track, state, at, axle, guess, patches, counts, b
     return s, outside
 
 
-@jit
-def frame_marker(track, speed, t, local, point, velocity, frame):
+@jit(allocates=False)
+def frame_marker(track, speed, t, ahead, y, z, rotations, last):
     """Position and velocity of a marker on the frame that runs along the track at constant speed.
 
     Parameters
@@ -142,22 +144,25 @@ def frame_marker(track, speed, t, local, point, velocity, frame):
     track : TrackModel
     speed, t : float
         m/s and s.
-    local : numpy.ndarray, shape (3,)
+    ahead, y, z : float
         Marker: arc length ahead of the frame's start, and lateral and vertical position in the track's frame, m.
-    point, velocity : numpy.ndarray, shape (3,)
-        Filled, absolute axes.
-    frame : numpy.ndarray, shape (3, 3)
-        Filled: the track's frame there.
+    rotations : numpy.ndarray, shape (n, 3, 3)
+        Matrix ``last`` is filled with the track's frame there.
+    last : int
+
+    Returns
+    -------
+    point, velocity : tuple of float
+        Absolute axes, m and m/s.
     """
-    station = track_frame(track.path, local[0] + speed * t, frame)
+    frame = rotations[last]
+    station = track_frame(track.path, ahead + speed * t, frame)
     along, left, up = frame_turn(station)
-    y, z = local[1], local[2]
     # d/ds of r + y n + z b, with the frame turning by D = (along, left, up) per metre
     rt, rn, rb = 1.0 + left * z - up * y, -along * z, along * y
-    origin = (station.x, station.y, station.z)
-    for i in range(3):
-        point[i] = origin[i] + frame[i, 1] * y + frame[i, 2] * z
-        velocity[i] = speed * (frame[i, 0] * rt + frame[i, 1] * rn + frame[i, 2] * rb)
+    gx, gy, gz = _turn_back(frame, 0.0, y, z)
+    vx, vy, vz = _turn_back(frame, speed * rt, speed * rn, speed * rb)
+    return (station.x + gx, station.y + gy, station.z + gz), (vx, vy, vz)
 
 
 @jit

@@ -56,7 +56,7 @@ class ContactModel(NamedTuple):
     """Rolling speed is not taken smaller than this in creepages, m/s."""
 
 
-@jit
+@jit(allocates=False)
 def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """Normal force (N) by Eq. (7) and the semi-axes (m) of the Hertz ellipse that carries it."""
     stiffness, a_factor, b_factor = hertz_ellipse(model.hertz, curvature_x, curvature_y)
@@ -68,7 +68,7 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
     return force, a_factor * root, b_factor * root
 
 
-@jit
+@jit(allocates=False)
 def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, rows):
     """Force and moment of one rail on a wheelset, and the wheel's patches, in a frame in which the rail runs along x.
 
