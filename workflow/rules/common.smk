@@ -29,6 +29,9 @@ def check_config():
             raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
     if config["comparison"]["case"] not in config["timing"]["cases"]:
         raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
+    creep = config["creep_study"]
+    if creep["shown"] not in [table["name"] for table in creep["tables"]]:
+        raise WorkflowError(f"configuration: creep_study.shown: expected a name under tables, got {creep['shown']!r}")
     scenes = {f"cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["cases"].items()}
     scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
     for key, (scene, changes) in scenes.items():
@@ -59,6 +62,8 @@ def sources(*rooms):
 SCENE = ("vehicle", "schemas", "checked_yaml", "scene")
 CORE = {
     "creep": sources("creep"),
+    "creep_study": sources("creep", "analysis_creep", "analysis_creep_table"),
+    "creep_figures": sources("creep", "analysis_creep", "analysis_creep_table", "figures", "figures_creep"),
     "geometry": sources("geometry", "contact", *SCENE),
     "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, "simulate", "results"),
     "analysis": sources("simulate", "results", "analysis"),

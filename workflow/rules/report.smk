@@ -97,6 +97,7 @@ rule study:
         rules.timing_table.output,
         rules.comparison_table.output,
         rules.first_light_notebook.output,
+        rules.creep_study.input,
 
 
 rule report_archive:

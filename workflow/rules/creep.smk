@@ -1,0 +1,234 @@
+# Creep laws and creep tables against the exact solver and against CONTACT: errors, costs, figures.
+# CONTACT's cases are read where the tests keep them: one copy, whose provenance stands in its first line.
+
+CREEP = config["creep_study"]
+CREEP_TABLES = {table["name"]: table for table in CREEP["tables"]}
+CREEP_REFERENCE = expand(
+    "{folder}/{file}.csv",
+    folder=CREEP["reference"],
+    file=["contact_timing", "ellipse_cases", "kbt_extremes", "sdec_cases"],
+)
+
+
+wildcard_constraints:
+    table="|".join(CREEP_TABLES),
+
+
+def creep_table_settings(wildcards):
+    return {"nu": CREEP["nu"], **CREEP_TABLES[wildcards.table]}
+
+
+rule creep_study_table:
+    message:
+        "Creep table {wildcards.table}"
+    input:
+        core=CORE["creep_study"],
+    output:
+        table="<results>/tables/creep/{table}.h5",
+        cost="<results>/tables/creep/{table}.csv",
+    log:
+        "<logs>/creep_study_table/{table}.log",
+    benchmark:
+        "<benchmarks>/creep_study_table/{table}.tsv"
+    params:
+        settings=creep_table_settings,
+    script:
+        "../scripts/creep_study_table.py"
+
+
+rule creep_errors:
+    message:
+        "Errors of all creep laws in CONTACT's cases"
+    input:
+        core=CORE["creep_study"],
+        reference=CREEP_REFERENCE,
+        tables=expand(rules.creep_study_table.output.table, table=CREEP_TABLES),
+    output:
+        "<results>/tables/creep/errors.csv",
+    log:
+        "<logs>/creep_errors.log",
+    benchmark:
+        "<benchmarks>/creep_errors.tsv"
+    params:
+        reference=CREEP["reference"],
+        nu=CREEP["nu"],
+        grids=CREEP["fastsim_grids"],
+        levels=CREEP["levels"],
+    script:
+        "../scripts/creep_errors.py"
+
+
+rule creep_costs:
+    message:
+        "Costs of all creep laws in turn, nothing beside them"
+    input:
+        core=CORE["creep_study"],
+        reference=CREEP_REFERENCE,
+        tables=expand(rules.creep_study_table.output.table, table=CREEP_TABLES),
+    output:
+        "<results>/tables/creep/cost_samples.csv",
+    log:
+        "<logs>/creep_costs.log",
+    benchmark:
+        "<benchmarks>/creep_costs.tsv"
+    params:
+        reference=CREEP["reference"],
+        nu=CREEP["nu"],
+        grids=CREEP["fastsim_grids"],
+        levels=CREEP["levels"],
+        passes=CREEP["cost"]["passes"],
+        every=CREEP["cost"]["every"],
+    # all cores: nothing else may run beside it
+    threads: workflow.cores
+    script:
+        "../scripts/creep_costs.py"
+
+
+rule creep_laws:
+    message:
+        "Table: creep laws, error and cost"
+    input:
+        core=CORE["creep_study"],
+        errors=rules.creep_errors.output,
+        costs=rules.creep_costs.output,
+        tables=expand(rules.creep_study_table.output.cost, table=CREEP_TABLES),
+    output:
+        report(
+            "<results>/tables/creep_laws.csv",
+            caption="../report/creep_laws.rst",
+            category="Creep",
+            labels={"table": "laws, error and cost"},
+        ),
+        "<results>/tables/creep_laws.md",
+    log:
+        "<logs>/creep_laws.log",
+    script:
+        "../scripts/creep_laws.py"
+
+
+rule fig_creep_curves:
+    message:
+        "Creep curves of all laws"
+    input:
+        core=CORE["creep_figures"],
+        table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
+    output:
+        report(
+            "<results>/figures/creep_curves.png",
+            caption="../report/creep_curves.rst",
+            category="Creep",
+            labels={"figure": "curves"},
+        ),
+        "<results>/figures/creep_curves.svg",
+        "<results>/tables/creep/curves.csv",
+    log:
+        "<logs>/fig_creep_curves.log",
+    params:
+        nu=CREEP["nu"],
+        **CREEP["curves"],
+    script:
+        "../scripts/fig_creep_curves.py"
+
+
+rule fig_creep_traction:
+    message:
+        "Traction, stick and slip"
+    input:
+        core=CORE["creep_figures"],
+    output:
+        report(
+            "<results>/figures/creep_traction.png",
+            caption="../report/creep_traction.rst",
+            category="Creep",
+            labels={"figure": "traction"},
+        ),
+        "<results>/figures/creep_traction.svg",
+    log:
+        "<logs>/fig_creep_traction.log",
+    params:
+        nu=CREEP["nu"],
+        **CREEP["traction"],
+    script:
+        "../scripts/fig_creep_traction.py"
+
+
+rule fig_creep_cost:
+    message:
+        "Cost against error of all creep laws"
+    input:
+        core=CORE["creep_figures"],
+        reference=CREEP_REFERENCE,
+        laws=rules.creep_laws.output[0],
+    output:
+        report(
+            "<results>/figures/creep_cost.png",
+            caption="../report/creep_cost.rst",
+            category="Creep",
+            labels={"figure": "cost against error"},
+        ),
+        "<results>/figures/creep_cost.svg",
+    log:
+        "<logs>/fig_creep_cost.log",
+    params:
+        reference=CREEP["reference"],
+    script:
+        "../scripts/fig_creep_cost.py"
+
+
+rule fig_creep_error_map:
+    message:
+        "Where the creep table errs"
+    input:
+        core=CORE["creep_figures"],
+        table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
+    output:
+        report(
+            "<results>/figures/creep_error_map.png",
+            caption="../report/creep_error_map.rst",
+            category="Creep",
+            labels={"figure": "error of the table"},
+        ),
+        "<results>/figures/creep_error_map.svg",
+        "<results>/tables/creep/error_map.csv",
+    log:
+        "<logs>/fig_creep_error_map.log",
+    benchmark:
+        "<benchmarks>/fig_creep_error_map.tsv"
+    params:
+        name=CREEP["shown"],
+        **CREEP["error_map"],
+    script:
+        "../scripts/fig_creep_error_map.py"
+
+
+rule fig_creep_smoothness:
+    message:
+        "Smoothness of the creep table"
+    input:
+        core=CORE["creep_figures"],
+        table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
+    output:
+        report(
+            "<results>/figures/creep_smoothness.png",
+            caption="../report/creep_smoothness.rst",
+            category="Creep",
+            labels={"figure": "smoothness of the table"},
+        ),
+        "<results>/figures/creep_smoothness.svg",
+        "<results>/tables/creep/smoothness.csv",
+    log:
+        "<logs>/fig_creep_smoothness.log",
+    params:
+        **CREEP["smoothness"],
+    script:
+        "../scripts/fig_creep_smoothness.py"
+
+
+rule creep_study:
+    input:
+        rules.creep_laws.output,
+        rules.fig_creep_curves.output,
+        rules.fig_creep_traction.output,
+        rules.fig_creep_cost.output,
+        rules.fig_creep_error_map.output,
+        rules.fig_creep_smoothness.output,

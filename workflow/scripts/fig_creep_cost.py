@@ -1,0 +1,13 @@
+"""Cost against error of all creep laws, with CONTACT's own points."""
+
+import sys
+
+import pandas as pd
+
+from wrcore.analysis_creep import contact_points
+from wrcore.figures import save_figure
+from wrcore.figures_creep import fig_creep_cost
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+figure = fig_creep_cost(pd.read_csv(snakemake.input.laws), contact_points(snakemake.params.reference))
+save_figure(figure, *snakemake.output)

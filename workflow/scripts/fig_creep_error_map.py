@@ -1,0 +1,15 @@
+"""Where a creep table errs."""
+
+import sys
+
+from wrcore.analysis_creep import table_model
+from wrcore.analysis_creep_table import error_map
+from wrcore.creep.table import load_table
+from wrcore.figures import save_figure
+from wrcore.figures_creep import fig_creep_error_map
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+params = snakemake.params
+errors = error_map(table_model(params.name, load_table(snakemake.input.table[0])), params.patches, params.level)
+errors.to_csv(snakemake.output[2], index=False)
+save_figure(fig_creep_error_map(errors, params.name), *snakemake.output[:2])

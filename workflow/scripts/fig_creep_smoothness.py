@@ -1,0 +1,15 @@
+"""How smooth a creep table is across its cells, its pole and zero creepage."""
+
+import sys
+
+from wrcore.analysis_creep import table_model
+from wrcore.analysis_creep_table import smoothness, smoothness_table
+from wrcore.creep.table import load_table
+from wrcore.figures import save_figure
+from wrcore.figures_creep import fig_creep_smoothness
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+lines = smoothness(table_model("table", load_table(snakemake.input.table[0])), **dict(snakemake.params.items()))
+table = smoothness_table(lines)
+table.to_csv(snakemake.output[2], index=False)
+save_figure(fig_creep_smoothness(lines, table), *snakemake.output[:2])

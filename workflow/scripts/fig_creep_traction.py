@@ -1,0 +1,15 @@
+"""Traction, stick and slip areas of some cases."""
+
+import sys
+
+from wrcore.creep.halfspace import solve_field
+from wrcore.figures import save_figure
+from wrcore.figures_creep import fig_creep_traction
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+params = snakemake.params
+fields = {}
+for case in params.cases:
+    patch = (case["a_over_b"], case["psi"], params.nu)
+    fields[case["title"]] = solve_field(*patch, *case["creepages"], level=params.level)
+save_figure(fig_creep_traction(fields), *snakemake.output)

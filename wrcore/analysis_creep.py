@@ -1,0 +1,386 @@
+"""What creep laws and creep tables err and cost: tidy tables against CONTACT's cases and against the exact solver.
+
+Everything is nondimensional (see `wrcore.creep.laws`): creepages ux', uy', phi', forces over mu N, moments over mu N c,
+c = sqrt(a b). A force error is the length of the error of (fx, fy), a moment error the size of that of mz.
+"""
+
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.creep.build import A_OVER_B, PSI_MAX, Resolution, build_data, random_errors
+from wrcore.creep.cases import check_cases, nondimensional
+from wrcore.creep.halfspace import RollingContact
+from wrcore.creep.laws import LAWS, CreepData, creep_data, creep_force
+from wrcore.creep.table import build_table, table_info
+from wrcore.errors import InputError
+
+REFERENCE_FILES = {"ellipse": "ellipse_cases.csv", "sdec": "sdec_cases.csv", "extremes": "kbt_extremes.csv"}
+CONTACT_TIMES = "contact_timing.csv"
+QUANTILES = {"median": 0.5, "q95": 0.95, "q99": 0.99, "max": 1.0}
+ERRORS = {"force": "F", "moment": "M"}
+ARGUMENTS, ARGUMENTS_FASTSIM = 50_000, 500
+_WARM_UP = Resolution(4, 4, 4, 8, 4, 6)
+
+
+class ReferenceCases(NamedTuple):
+    """One file of reference cases, nondimensional: names, patches (n,), creepages (n, 3), CONTACT's forces (n, 3)."""
+
+    case_id: np.ndarray
+    g: np.ndarray
+    psi: np.ndarray
+    creepages: np.ndarray
+    forces: np.ndarray
+
+
+class Model(NamedTuple):
+    """One law with its data; ``family`` is the law, with the planes for a table ("table ellipse", "table sdec")."""
+
+    name: str
+    family: str
+    law: int
+    data: CreepData
+
+
+def read_reference(folder):
+    """CONTACT's cases.
+
+    Parameters
+    ----------
+    folder : path-like
+        Holds `REFERENCE_FILES`, in the columns of ``wrcore creep`` with Fx_N, Fy_N, Mz_Nm.
+
+    Returns
+    -------
+    dict of str to ReferenceCases
+
+    Raises
+    ------
+    InputError
+        If a file is missing or a column or value is not as `wrcore.creep.cases.check_cases` expects.
+    """
+    return {name: _read_cases(Path(folder) / file) for name, file in REFERENCE_FILES.items()}
+
+
+def _read_cases(path):
+    import pandas as pd
+
+    try:
+        frame = pd.read_csv(path, comment="#")
+    except (OSError, ValueError) as error:  # pandas' parser errors are ValueErrors
+        raise InputError(path, "", f"expected a CSV file of reference cases ({error})") from error
+    g, psi, creepages, c = nondimensional(check_cases(frame, path))
+    size = (frame["mu"] * frame["N_N"]).to_numpy()
+    forces = np.stack([frame["Fx_N"] / size, frame["Fy_N"] / size, frame["Mz_Nm"] / (size * c)], axis=1)
+    return ReferenceCases(frame["case_id"].to_numpy(), g, psi, creepages, forces)
+
+
+def creep_models(nu, tables, grids):
+    """The laws to compare: linear, SHE, Polach, FASTSIM on each grid, and each table.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio.
+    tables : dict of str to CreepTable
+    grids : sequence of int
+        FASTSIM's steps along x and strips across.
+
+    Returns
+    -------
+    list of Model
+    """
+    plain = {"linear": "linear", "she": "SHE", "polach": "Polach"}
+    models = [Model(name, law, LAWS[law], creep_data(nu)) for law, name in plain.items()]
+    models += [Model(f"FASTSIM {n} x {n}", "fastsim", LAWS["fastsim"], creep_data(nu, grid=n)) for n in grids]
+    return models + [table_model(name, table) for name, table in tables.items()]
+
+
+def table_model(name, table):
+    """A `CreepTable` as a `Model`."""
+    return Model(name, f"table {table.planes}", LAWS["table"], creep_data(table.nu, table.kernel_data()))
+
+
+@jit
+def apply_law(law, data, g, psi, creepages, forces):
+    """One law over n patches and creepages, written to ``forces`` (n, 3); returns how many lay out of range."""
+    outside = 0
+    for i in range(g.size):
+        ux, uy, phi = creepages[i]
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
+        outside += flag
+    return outside
+
+
+def law_forces(model, g, psi, creepages):
+    """Forces (n, 3) of a `Model` for g and psi (scalars or (n,)) and creepages (n, 3), and the count out of range."""
+    forces = np.empty((len(creepages), 3))
+    g, psi = (np.broadcast_to(np.asarray(value, dtype=float), len(creepages)).copy() for value in (g, psi))
+    outside = apply_law(model.law, model.data, g, psi, np.ascontiguousarray(creepages, dtype=float), forces)
+    return forces, outside
+
+
+def exact_forces(cases, nu, level):
+    """Forces (n, 3) of `ReferenceCases` by the exact solver at one level."""
+    solved = [
+        RollingContact(g, psi, nu, level).solve_many(creepages[None])[0][0]
+        for g, psi, creepages in zip(cases.g, cases.psi, cases.creepages, strict=True)
+    ]
+    return np.array(solved)
+
+
+def _sizes(difference):
+    return np.hypot(difference[:, 0], difference[:, 1]), abs(difference[:, 2])
+
+
+def error_table(reference, models, nu, levels):
+    """Error of every law and of the exact solver in every reference case.
+
+    Parameters
+    ----------
+    reference : dict of str to ReferenceCases
+    models : list of Model
+    nu : float
+    levels : sequence of int
+        Levels of the exact solver, rising; the last is what "exact" means as the other reference.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Rows: file x model x reference x case. Columns cases, model, family, against ("CONTACT" or "exact"), case_id,
+        force_error, moment_error, out_of_range (patches of this file that the model's data do not cover).
+    """
+    import pandas as pd
+
+    parts = []
+    for name, cases in reference.items():
+        exact = {level: exact_forces(cases, nu, level) for level in levels}
+        found = [(f"exact, level {level}", "exact", forces, 0) for level, forces in exact.items()]
+        for model in models:
+            found.append((model.name, model.family, *law_forces(model, cases.g, cases.psi, cases.creepages)))
+        for model, family, forces, outside in found:
+            for against, right in (("CONTACT", cases.forces), ("exact", exact[levels[-1]])):
+                force, moment = _sizes(forces - right)
+                columns = {"cases": name, "model": model, "family": family, "against": against}
+                columns |= {"case_id": cases.case_id, "force_error": force, "moment_error": moment}
+                parts.append(pd.DataFrame({**columns, "out_of_range": outside}))
+    table = pd.concat(parts, ignore_index=True)
+    itself = (table["against"] == "exact") & (table["model"] == f"exact, level {levels[-1]}")
+    return table[~itself].reset_index(drop=True)
+
+
+def random_arguments(count, planes, seed=0):
+    """Patches and creepages all over the tables' range: g (n,), psi (n,) (0 for planes "ellipse"), creepages (n, 3)."""
+    rng = np.random.default_rng(seed)
+    g = np.exp(rng.uniform(*np.log(A_OVER_B), count))
+    psi = rng.uniform(-PSI_MAX, PSI_MAX, count) * (planes == "sdec")
+    return g, psi, rng.normal(size=(count, 3)) * np.exp(rng.uniform(-4, 3, count))[:, None]
+
+
+def time_models(models, cases, nu, levels, passes):
+    """CPU seconds per case of every law and level; in each pass all of them take their turn.
+
+    Laws run over random arguments in a compiled loop, the exact solver over the given cases one by one. A pass that
+    is not kept comes first, so that compilation and first loads are outside. A single exact case costs its operator
+    and one solution ("from nothing"); where cases share a patch, one solution ("ready").
+
+    Parameters
+    ----------
+    models : list of Model
+    cases : ReferenceCases
+    nu : float
+    levels : sequence of int
+    passes : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns pass, model, family, work, s_per_case.
+    """
+    import pandas as pd
+
+    rows = []
+    for turn in range(-1, passes):
+        kept = []
+        for model in models:
+            kept.append((model.name, model.family, "ready", _time_law(model)))
+        for level in levels:
+            operator, solution = _time_exact(cases, nu, level, count=1 if turn < 0 else len(cases.g))
+            kept.append((f"exact, level {level}", "exact", "ready", solution))
+            kept.append((f"exact, level {level}", "exact", "from nothing", operator + solution))
+        rows += [(turn, *row) for row in kept if turn >= 0]
+    return pd.DataFrame(rows, columns=["pass", "model", "family", "work", "s_per_case"])
+
+
+def _time_law(model):
+    count = ARGUMENTS_FASTSIM if model.family == "fastsim" else ARGUMENTS
+    g, psi, creepages = random_arguments(count, "ellipse" if model.family == "table ellipse" else "sdec")
+    forces = np.empty((count, 3))
+    start = time.process_time()
+    apply_law(model.law, model.data, g, psi, creepages, forces)
+    return (time.process_time() - start) / count
+
+
+def _time_exact(cases, nu, level, count):
+    """Mean CPU seconds of an operator and of one solution with it, over the first ``count`` cases."""
+    operator = solution = 0.0
+    for i in range(count):
+        start = time.process_time()
+        patch = RollingContact(cases.g[i], cases.psi[i], nu, level)
+        middle = time.process_time()
+        patch.solve_many(cases.creepages[i : i + 1])
+        operator, solution = operator + middle - start, solution + time.process_time() - middle
+    return operator / count, solution / count
+
+
+def laws_table(errors, costs, tables):
+    """One row per file, reference and model: quantiles of the errors, cost, memory and build time.
+
+    Parameters
+    ----------
+    errors : pandas.DataFrame
+        From `error_table`.
+    costs : pandas.DataFrame
+        From `time_models`.
+    tables : pandas.DataFrame
+        One row per creep table: name, memory_MB, build_s.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns cases, against, model, family, force_<quantile>, moment_<quantile> (`QUANTILES`), us_per_case and
+        us_from_nothing (medians over the passes), memory_MB, build_s (NaN where there is nothing to build),
+        out_of_range.
+    """
+    keys = ["cases", "against", "model", "family"]
+    grouped = errors.groupby(keys, sort=False)
+    columns = {}
+    for error in ERRORS:
+        for name, share in QUANTILES.items():
+            columns[f"{error}_{name}"] = grouped[f"{error}_error"].quantile(share)
+    result = errors[keys].drop_duplicates().set_index(keys).assign(**columns)
+    result["out_of_range"] = grouped["out_of_range"].first()
+    result = result.reset_index()
+    medians = 1e6 * costs.groupby(["model", "work"])["s_per_case"].median().unstack()
+    result["us_per_case"] = result["model"].map(medians["ready"])
+    result["us_from_nothing"] = result["model"].map(medians["from nothing"])
+    for column in ("memory_MB", "build_s"):
+        result[column] = result["model"].map(tables.set_index("name")[column])
+    return result
+
+
+def laws_markdown(laws):
+    """The table of `laws_table` for reading: errors in per cent, one section per file and reference.
+
+    Parameters
+    ----------
+    laws : pandas.DataFrame
+
+    Returns
+    -------
+    str
+    """
+    names = {f"{error}_{q}": f"{symbol} {q.replace('q', '')}" for error, symbol in ERRORS.items() for q in QUANTILES}
+    units = {"us_per_case": "µs", "us_from_nothing": "µs with operator", "memory_MB": "MB", "build_s": "build s"}
+    parts = [
+        "Errors in % of the friction limit (F: mu N, M: mu N c): median, 95 %, 99 %, largest. Times are CPU times."
+    ]
+    for (cases, against), rows in laws.groupby(["cases", "against"], sort=False):
+        shown = rows.drop(columns=["cases", "against", "family"])
+        shown[list(names)] = 100 * shown[list(names)]
+        shown = shown.rename(columns={**names, **units, "out_of_range": "out of range"})
+        text = shown.astype(object).where(shown.notna(), "").to_markdown(index=False, floatfmt=".3g")
+        parts += [f"## {cases} cases against {'the exact solver' if against == 'exact' else against}", text]
+    return "\n\n".join(parts) + "\n"
+
+
+def timed_table(name, nu, planes, tolerance, progress=None):
+    """Build a creep table and measure what that costs, compilation apart.
+
+    Parameters
+    ----------
+    name : str
+        Goes into the row.
+    nu, planes, tolerance, progress
+        As for `wrcore.creep.table.build_table`.
+
+    Returns
+    -------
+    table : CreepTable
+    row : dict
+        name, build_s (CPU seconds with the random check), and all of `wrcore.creep.table.table_info`.
+    """
+    random_errors(build_data(nu, planes, _WARM_UP), _WARM_UP.level, patches=1, per_patch=2)
+    start = time.process_time()
+    table = build_table(nu, planes, tolerance, progress)
+    return table, {"name": name, "build_s": time.process_time() - start, **table_info(table)}
+
+
+def contact_points(folder):
+    """CONTACT's own errors and times, measured elsewhere on another machine, over the first ellipse cases.
+
+    Parameters
+    ----------
+    folder : path-like
+        Holds `CONTACT_TIMES`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns program ("CONTACT": given Hertz pressure, the faster of its two solvers; "its FASTSIM": parabolic
+        bound), n_across, force_q95, us_per_case.
+    """
+    import pandas as pd
+
+    frame = pd.read_csv(Path(folder) / CONTACT_TIMES, comment="#")
+    programs = {"hertz_pressure_given": "CONTACT", "FASTSIM_3flex_parabolic": "its FASTSIM"}
+    parts = []
+    for pattern, program in programs.items():
+        rows = frame[frame["method"].str.contains(pattern)].sort_values("cpu_s_mean_per_case")
+        rows = rows.drop_duplicates("n_across").sort_values("n_across")
+        columns = {"n_across": rows["n_across"], "force_q95": rows["err_force_q95"]}
+        parts.append(pd.DataFrame({"program": program, **columns, "us_per_case": 1e6 * rows["cpu_s_mean_per_case"]}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def curve_creepages(points, translation=1.0, spin=4.0, held_spin=0.6):
+    """Lines of creepages (points, 3) by name, each with the index of the creepage that varies."""
+    up, through, zero = np.linspace(0, 1, points), np.linspace(-1, 1, points), np.zeros(points)
+    return {
+        "longitudinal": (np.stack([translation * up, zero, zero], axis=1), 0),
+        "lateral": (np.stack([zero, translation * up, zero], axis=1), 1),
+        "spin": (np.stack([zero, zero, spin * up], axis=1), 2),
+        "combined": (np.stack([zero, translation * through, held_spin + zero], axis=1), 1),
+    }
+
+
+def creep_curves(models, nu, a_over_b, level, points):
+    """Forces of every law and of the exact solver along lines of creepage.
+
+    Parameters
+    ----------
+    models : list of Model
+        The names become those of the curves.
+    nu, a_over_b : float
+    level, points : int
+        Level of the exact solver; points on each line.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns line ("longitudinal", "lateral", "spin", "combined": lateral at a held spin), model, family, ux, uy,
+        phi, fx, fy, mz; the exact solution has the family "exact".
+    """
+    import pandas as pd
+
+    patch, parts = RollingContact(a_over_b, 0.0, nu, level), []
+    for line, (creepages, _) in curve_creepages(points).items():
+        found = [(f"exact, level {level}", "exact", patch.solve_many(creepages)[0])]
+        found += [(model.name, model.family, law_forces(model, a_over_b, 0.0, creepages)[0]) for model in models]
+        for name, family, forces in found:
+            numbers = pd.DataFrame(np.hstack([creepages, forces]), columns=["ux", "uy", "phi", "fx", "fy", "mz"])
+            parts.append(numbers.assign(line=line, model=name, family=family))
+    return pd.concat(parts, ignore_index=True)
