@@ -18,6 +18,7 @@ from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.strip import (
     cubic_at,
     curvature_at,
+    gap_and_slope,
     gap_at,
     on_rail,
     slope_difference,
@@ -43,11 +44,20 @@ PATCH_COLUMNS = 19
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
 
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+_LOOSE_TOLERANCE = 1e-3
+"""Slopes agree to this where only a start for the overlap's edges is wanted."""
+
+_LAST_STEP = 2e-5
+"""A Newton step towards an edge that is smaller than this (m) leaves less than ``_EDGE_TOLERANCE`` behind."""
+
+_EDGE_TOLERANCE = 4e-7
+"""Edges of an overlap are right to this, m; what is left of the integral of g^2 is of third order in it."""
+
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @jit(allocates=False)
-def deepest_point(geometry, pose, u):
+def deepest_point(geometry, pose, u, tolerance):
     """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
 
     Returns ``u`` itself where the overlap ends (edge of a profile) before the slopes agree.
@@ -56,7 +66,7 @@ def deepest_point(geometry, pose, u):
     new = u
     for _ in range(60):
         value, rate = slope_difference(geometry, pose, new)
-        if abs(value) < SLOPE_TOLERANCE:
+        if abs(value) < tolerance:
             return new
         if value < 0.0:
             low = new
@@ -72,21 +82,32 @@ def deepest_point(geometry, pose, u):
 
 
 @jit(allocates=False)
-def edge_of_overlap(geometry, pose, outside, inside):
-    """Zero of the gap between a point outside and one inside an overlap, to about 1e-7 m (Illinois steps).
+def _edge_by_newton(geometry, pose, u, low, high):
+    """Zero of the gap from a good guess by a few Newton steps; NaN if that does not settle in (low, high)."""
+    for _ in range(6):
+        if not low <= u <= high:
+            return np.nan
+        gap, slope = gap_and_slope(geometry, pose, u)
+        step = gap / slope
+        u -= step
+        if abs(step) < _LAST_STEP:
+            return u
+    return np.nan
 
-    What is left of the integral of g^2 there is of third order in the remaining distance.
-    """
+
+@jit(allocates=False)
+def _edge_by_bracket(geometry, pose, outside, inside):
+    """Zero of the gap between a point outside and one inside an overlap (Illinois steps)."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
     if high >= 0.5:  # the rail ends here
         return inside
     kept = 0
     for _ in range(30):
-        if abs(outside - inside) < 1e-7 or high - low <= 0.0:
+        if abs(outside - inside) < _EDGE_TOLERANCE or high - low <= 0.0:
             break
         new = (outside * low - inside * high) / (low - high)
         value = gap_at(geometry, pose, new)[0]
-        if abs(value) < 1e-7 * abs(high - low) / abs(outside - inside):
+        if abs(value) < _EDGE_TOLERANCE * abs(high - low) / abs(outside - inside):
             return new
         if value < 0.0:
             inside, low = new, value
@@ -99,6 +120,26 @@ def edge_of_overlap(geometry, pose, outside, inside):
                 low *= 0.5
             kept = 1
     return 0.5 * (outside + inside)
+
+
+@jit(allocates=False)
+def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
+    """Both ends of a narrow overlap: from the parabola at its deepest point where that leads there, else by bracketing.
+
+    ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside; ``deepest`` is a strip near the deepest one.
+    """
+    u = deepest_point(geometry, pose, deepest, _LOOSE_TOLERANCE)
+    gap, rate = gap_at(geometry, pose, u)[0], slope_difference(geometry, pose, u)[1]
+    start = end = np.nan
+    if gap < 0.0 < rate:
+        half = math.sqrt(-2.0 * gap / rate)
+        start = _edge_by_newton(geometry, pose, u - half, outside - SCAN_STEP, u)
+        end = _edge_by_newton(geometry, pose, u + half, u, beyond + SCAN_STEP)
+    if not start == start:
+        start = _edge_by_bracket(geometry, pose, outside, first)
+    if not end == end:
+        end = _edge_by_bracket(geometry, pose, beyond, last)
+    return start, end
 
 
 @jit(allocates=False)
@@ -139,7 +180,7 @@ def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
 @jit(allocates=False)
 def patch_at_maximum(geometry, pose, u, patch):
     """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
-    u = deepest_point(geometry, pose, u)
+    u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE)
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     if not on_rail(geometry, ur):
         return False

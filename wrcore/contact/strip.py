@@ -128,6 +128,14 @@ def wheel_slope(pose, slope, along):
 
 
 @jit(allocates=False)
+def gap_and_slope(geometry, pose, u):
+    """Vertical gap of the strip at u and its slope over u (but for the small turn by roll and yaw)."""
+    ur, z, _, slope, _, along = strip_point(geometry, pose, u)
+    f, rail_slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    return z - f, wheel_slope(pose, slope, along) - rail_slope
+
+
+@jit(allocates=False)
 def slope_difference(geometry, pose, u):
     """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate.
 
