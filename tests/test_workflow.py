@@ -17,6 +17,7 @@ from wrcore.results import load_run
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "results" / "smoke"
 FIGURES = ("fig1_parametrisation", "fig2_profiles", "fig3_detection", "fig4_lateral_position", "fig5_contact_points")
+CREEP_FIGURES = ("creep_curves", "creep_traction", "creep_cost", "creep_error_map", "creep_smoothness")
 
 
 def snakemake(*arguments):
@@ -38,8 +39,8 @@ def test_nothing_is_left_to_do_after_the_smoke_run(smoke):
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
-@pytest.mark.parametrize("name", FIGURES)
-def test_every_figure_of_the_paper_is_there_as_png_and_svg(smoke, name):
+@pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES)
+def test_every_figure_is_there_as_png_and_svg(smoke, name):
     assert (smoke / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (smoke / "figures" / f"{name}.svg").read_text()[:2000]
 
@@ -52,6 +53,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         table = listed.stdout.partition("Job stats:")[2].partition("total")[0]
         rules.append(set(re.findall(r"^(\w+) +\d+$", table, re.MULTILINE)))
     assert rules[0] == rules[1] >= {"creep_table", "simulate", "time_runs", "report_archive", *FIGURES}
+    assert rules[0] >= {"creep_study_table", "creep_errors", "creep_costs", *(f"fig_{name}" for name in CREEP_FIGURES)}
 
 
 @pytest.mark.parametrize(
@@ -69,6 +71,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         ),
         ({"timing": {"repetitions": 3}}, "Timing: planar and spatial runs", "wheelset_v20: planar and spatial run"),
         ({"creep_table": {"tolerance": 0.04}}, "Creep table", "Contact geometry without load"),
+        ({"creep_study": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
         ({"figures": {"detection_pose": {"y": 0.006}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
     ],
 )
@@ -101,6 +104,15 @@ def test_comparison_is_within_every_tolerance(smoke):
     assert "yes" in table["within"].tolist()
 
 
+def test_creep_laws_are_compared_in_all_files_against_both_references(smoke):
+    table = pd.read_csv(smoke / "tables" / "creep_laws.csv")
+    settings = yaml.safe_load((ROOT / "config/smoke.yaml").read_text())["creep_study"]
+    assert {row["name"] for row in settings["tables"]} < set(table["model"])
+    assert (table.groupby(["cases", "against"])["model"].nunique() >= 4 + len(settings["tables"])).all()
+    assert len(table.groupby(["cases", "against"])) == 6
+    assert (table[["force_q99", "moment_max", "us_per_case"]] > 0).all(axis=None)
+
+
 def test_notebook_was_executed_and_holds_fig4(smoke):
     cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
     outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
@@ -112,7 +124,7 @@ def test_report_holds_the_figures(smoke):
     with zipfile.ZipFile(smoke / "report.zip") as archive:
         text = "".join(archive.namelist())
         assert "report.html" in text
-        assert all(f"{name}.png" in text for name in FIGURES)
+        assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES)
 
 
 @pytest.mark.parametrize(
@@ -120,6 +132,7 @@ def test_report_holds_the_figures(smoke):
     [
         ({"timing": {"repetitions": "five"}}, "timing.repetitions: 'five' is not of type 'integer'"),
         ({"timing": {"repetition": 5}}, "'repetition' was unexpected"),
+        ({"creep_study": {"shown": "absent"}}, "creep_study.shown: expected a name under tables, got 'absent'"),
         ({"timing": {"cases": ["absent"]}}, "timing.cases: expected a name under cases, got 'absent'"),
         ({"twins": {"rtol": "1e-9"}}, "twins.rtol: '1e-9' is not of type 'number'"),
         (

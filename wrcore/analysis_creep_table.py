@@ -17,6 +17,9 @@ SIZE_RANGE = (0.01, 100.0)
 NEAR_POLE = 1e-3
 """Distance ux'/phi' (and uy'/phi') at which the smoothness lines pass the spin axis."""
 
+SPAN = 4
+"""Points over which a jump of the slope is sought: more than the three that a central difference takes."""
+
 _TIGHT = 1e-5
 
 
@@ -157,8 +160,8 @@ def smoothness_table(lines):
     -------
     pandas.DataFrame
         One row per line, source and output: slope (largest size), variation (largest minus smallest slope over the
-        largest size) and, for the table, step (largest change between neighbouring points over the same) and
-        step_ratio: that step over the one with twice the spacing. A slope without jumps gives 0.5, a jump gives 1.
+        largest size) and, for the table, step (largest change of the slope over `SPAN` points over the same) and
+        step_ratio: that step over the one of twice the span. A slope without jumps gives 0.5, a jump gives 1.
     """
     import pandas as pd
 
@@ -166,7 +169,7 @@ def smoothness_table(lines):
     for (line, source), part in lines.groupby(["line", "source"], sort=False):
         for output in ("fx", "fy", "mz"):
             slope = part.sort_values("x")[f"d{output}"].to_numpy()[1:-1]
-            step, double = (abs(np.diff(slope[::every])).max() for every in (1, 2))
+            step, double = (abs(slope[span:] - slope[:-span]).max() for span in (SPAN, 2 * SPAN))
             size = abs(slope).max()
             steps = (step / size, step / double) if source == "table" else (np.nan, np.nan)
             rows.append((line, source, output, size, np.ptp(slope) / size, *steps))
