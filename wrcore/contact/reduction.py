@@ -157,7 +157,7 @@ def overlap_moments(geometry, pose, first, last):
     return half * m0, half * m1, half * m2
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
 
@@ -215,7 +215,7 @@ def patch_at_maximum(geometry, pose, u, patch):
     return True
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
     if not m0 > 0.0:
@@ -238,7 +238,7 @@ def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     return True
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def _place(geometry, pose, patch):
     """Turn the columns X and Y from local parts into track coordinates (X from the wheelset's cross-section)."""
     patch[X] += (geometry.half_distance + patch[U_WHEEL]) * pose.ex

@@ -17,7 +17,7 @@ _CELL_SHARE = 0.6
 """Share of a rail cell by which the scan's nodes may leave it; the second reserve covers what that costs."""
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def leaves_cells(pose):
     """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly.
 
@@ -28,14 +28,14 @@ def leaves_cells(pose):
     return 0.03 * abs(pose.ez) + 1.5 * pose.tilt * pose.tilt > _CELL_SHARE * SCAN_STEP
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def rail_cell(geometry, pose, u):
     """Rail cell that really lies below the strip at u."""
     ur = strip_point(geometry, pose, u)[0]
     return min(max(int((ur - geometry.scan_rail_start) / SCAN_STEP), 0), geometry.scan_rail.shape[1] - 1)
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def window(geometry, pose):
     """First wheel node over the rail, its distance along the axle, and the track coordinate of the first rail cell."""
     offset = geometry.rail_distance + geometry.scan_rail_start - pose.side * pose.y
@@ -98,7 +98,7 @@ def scan(pose, scan_wheel, scan_rail, node, reach, offset):
     return m0, m1, m2, overlapping, first, last, close, first_close, last_close
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k):
     """Gap of the k-th strip, as in `scan`."""
     radius, along = scan_wheel[RADIUS, node + k], scan_wheel[RADIUS_SLOPE, node + k] * pose.tilt
@@ -111,7 +111,7 @@ def strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k):
     return pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
 
 
-@jit(allocates=False, fastmath=FAST)
+@jit(allocates=False, forceinline=True, fastmath=FAST)
 def any_close(pose, scan_wheel, scan_rail, node, reach, offset, first):
     """Number of strips with a gap below twice their reserve among the ``CHUNK + 8`` strips from ``first`` on."""
     count = 0
