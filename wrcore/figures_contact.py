@@ -1,12 +1,16 @@
-"""Figures of the rigid contact geometry: where the contact lies, what it does to the radii, and the conicity.
+"""Figures of the contact geometry: where the contact lies, what it does to the radii, and the conicity; what planar
+detection misses; what the reductions do to the force.
 
-The first two work on the table of `wrcore.contact.first_touch.first_touch`, the last on curves of
-`wrcore.contact.conicity.conicity_curve`. Units change here and nowhere before: lengths to mm, angles to mrad.
+The first ones work on the table of `wrcore.contact.first_touch.first_touch` and on curves of
+`wrcore.contact.conicity.conicity_curve`, the others on tables of `wrcore.analysis_contact`. Units change here and
+nowhere before: lengths to mm, angles to mrad, forces to kN.
 """
 
 import numpy as np
+from matplotlib.colors import LogNorm, TwoSlopeNorm
 from matplotlib.figure import Figure
 
+from wrcore.analysis_contact import first_order_law, over_contact_angle
 from wrcore.contact.conicity import en15302_tolerance
 from wrcore.figures import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.geometry.surface import SIDES
@@ -64,7 +68,7 @@ def _location(axes, pair, table, side):
     inner, outer = np.nanmin(np.abs(y)) - 12.0, np.nanmax(np.abs(y)) + 12.0
     axes.set(xlabel="y, to the left / mm", ylabel="z / mm", ylim=(-20, MM * LIFT + 14))
     axes.set_xlim((outer, inner) if side == "left" else (-inner, -outer))
-    axes.legend(fontsize=7, loc="lower left" if side == "right" else "lower right")
+    axes.legend(fontsize=7, loc="lower left" if side == "left" else "lower right")
 
 
 def _label_shifts(axes, shifts, across, height):
@@ -149,6 +153,201 @@ def fig_conicity(curves, reference=None):
         axes.plot(MM * curve.amplitude_m, curve.equivalent_conicity, label=label, **style)
     axes.set(xlabel="amplitude / mm", ylabel="equivalent conicity", ylim=(0, None))
     axes.legend(fontsize=8)
+    return figure
+
+
+@styled
+def fig_conicity_of_pairs(table):
+    """Equivalent conicity of several pairs over the amplitude, with and without roll.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From `wrcore.analysis_contact.conicity_table`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = _single()
+    for style, (label, rows) in zip(STYLES, table.groupby("pair", sort=False), strict=False):
+        amplitude = MM * rows.amplitude_m
+        axes.plot(amplitude, rows.conicity_with_roll, label=f"{label}, with roll", **style)
+        thin = {**style, "linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
+        axes.plot(amplitude, rows.conicity_without_roll, label="without roll (EN 15302)", **thin)
+    axes.set(xlabel="amplitude / mm", ylabel="equivalent conicity", ylim=(0, None))
+    axes.legend(fontsize=7)
+    return figure
+
+
+@styled
+def fig_location_with_yaw(table):
+    """Left wheel's contact point over the lateral shift for several yaw angles: across the wheel and along the rail.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From `wrcore.analysis_contact.location_with_yaw`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    across, along = figure.subplots(1, 2)
+    left = table[table.side == "left"]
+    for style, (yaw, rows) in zip(STYLES, left.groupby("yaw_rad"), strict=False):
+        label = f"yaw {MM * yaw:g} mrad"
+        across.plot(MM * rows.y_m, MM * rows.u_wheel_m, label=label, **style)
+        along.plot(MM * rows.y_m, MM * rows.x_m, label=label, **style)
+    across.set(ylabel="contact point on the wheel,\nto the field side / mm", title="(a) across")
+    along.set(ylabel="contact point ahead\nof the axle / mm", title="(b) along")
+    for axes in (across, along):
+        axes.set_xlabel("lateral shift y, to the left / mm")
+    across.legend(fontsize=7)
+    return figure
+
+
+BANDS = ((0.018, 0.140), (0.280, 0.560), (1.080, 1.240))
+"""Contact angles on the tread, in the flange root and on the flange, rad; S1002 on UIC60 jumps over the rest."""
+
+_CELLS = 16
+
+
+@styled
+def fig_planar_error(table):
+    """What planar detection misses, over yaw and contact angle, with the first-order law as contours.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From `wrcore.analysis_contact.planar_error_map`. Cells stay empty where no pose has such a contact angle, or
+        where planar detection has no patch there.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panels: missed normal penetration, missed longitudinal position, missed penetration over the law, and bound of
+        ``detection: auto`` over missed penetration; each in `BANDS`, flange on top.
+    """
+    table = table[table.yaw_rad > 0]
+    table = table.assign(ratio=table.missed_m / table.law_m, excess=table.bound_m / table.missed_m)
+    figure = Figure(figsize=(7.6, 6.6), layout="constrained")
+    for part, column, factor, norm, cmap, title in zip(
+        figure.subfigures(2, 2).ravel(),
+        ("missed_m", "shift_m", "ratio", "excess"),
+        (1e6, MM, 1.0, 1.0),
+        (LogNorm(1e-3, 1e3), LogNorm(1e-2, 1e2), TwoSlopeNorm(1.0, 0.8, 1.2), LogNorm(1.0, 1e3)),
+        ("cividis", "cividis", "PuOr", "cividis"),
+        (
+            "(a) missed normal penetration / \N{MICRO SIGN}m",
+            "(b) missed longitudinal position / mm",
+            "(c) missed penetration / first-order law",
+            "(d) bound of auto / missed penetration",
+        ),
+        strict=True,
+    ):
+        panels = part.subplots(len(BANDS), 1, sharex=True)
+        for axes, band in zip(panels, BANDS[::-1], strict=True):
+            mesh = _error_band(axes, table, band, column, factor, norm, cmap)
+            _law_contours(axes, table.yaw_rad.max(), band, column)
+        part.colorbar(mesh, ax=list(panels), extend="both")
+        panels[0].set_title(title, fontsize=9)
+        panels[-1].set_xlabel("yaw / mrad")
+        part.supylabel("contact angle / mrad", fontsize=9)
+    return figure
+
+
+def _error_band(axes, table, band, column, factor, norm, cmap):
+    """Cells of one band of contact angles."""
+    limits = np.geomspace(*band, _CELLS + 1)
+    grid = over_contact_angle(table, limits, column)
+    yaw = MM * grid.columns.to_numpy()
+    half = 0.5 * np.diff(yaw)
+    edges = np.concatenate([[yaw[0] - half[0]], yaw[:-1] + half, [yaw[-1] + half[-1]]])
+    values = factor * grid.to_numpy(dtype=float)
+    axes.set(facecolor="0.9", xlim=(0.0, edges[-1]), ylim=(MM * band[0], MM * band[1]))
+    axes.grid(visible=False)
+    return axes.pcolormesh(edges, MM * limits, values, norm=norm, cmap=cmap, rasterized=True)
+
+
+def _law_contours(axes, largest_yaw, band, column):
+    """Contours of the first-order laws of the missed penetration (um) and of the longitudinal shift (mm)."""
+    yaw, angle = np.meshgrid(np.linspace(0.01 * largest_yaw, largest_yaw, 80), np.linspace(*band, 60))
+    if column == "missed_m":
+        values, levels = 1e6 * first_order_law(yaw, angle), [1e-3, 1e-2, 0.1, 1, 10, 100, 300]
+    elif column == "shift_m":
+        values, levels = MM * 0.46 * yaw * np.tan(angle), [0.1, 0.3, 1, 3, 10, 30]
+    else:
+        return
+    lines = axes.contour(MM * yaw, MM * angle, values, levels=levels, colors="k", linewidths=0.8)
+    for text in axes.clabel(lines, fmt=lambda level: f"{level:g}", fontsize=7):
+        text.set_bbox({"facecolor": "w", "edgecolor": "none", "pad": 0.4, "alpha": 0.8})
+
+
+REDUCTION_LINES = {
+    "maximum": {"color": "#CC79A7", "linestyle": "-", "linewidth": 0.8},
+    "moment": {"color": "#009E73", "linestyle": (0, (4, 2))},
+}
+"""Not the colours of planar and spatial detection."""
+
+
+@styled
+def fig_lateral_sweep(sweep):
+    """Vertical force while the loaded pair is swept sideways at fixed height, and its steps per micrometre.
+
+    Parameters
+    ----------
+    sweep : pandas.DataFrame
+        From `wrcore.analysis_contact.lateral_sweep`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(6.6, 4.6), layout="constrained")
+    force, steps = figure.subplots(2, 1, sharex=True)
+    y = MM * sweep.y_m.to_numpy()
+    per_micrometre = 1e-6 / np.diff(sweep.y_m)
+    for name, style in REDUCTION_LINES.items():
+        values = 1e-3 * sweep[f"{name}_N"].to_numpy()
+        force.plot(y, values, label=name, rasterized=True, **style)
+        change = np.maximum(np.abs(np.diff(values)) * per_micrometre, 1e-6)
+        steps.semilogy(0.5 * (y[1:] + y[:-1]), change, label=name, rasterized=True, **style)
+    force.set(ylabel="vertical force of both wheels / kN", xmargin=0)
+    steps.set(xlabel="lateral shift y, to the left / mm", ylabel="change per µm / kN", ylim=(1e-4, 1e3))
+    force.legend(fontsize=8)
+    return figure
+
+
+@styled
+def fig_patch_forces(tables):
+    """Normal force of each patch of the left wheel over its lowering: coexisting patches, and where they merge.
+
+    Parameters
+    ----------
+    tables : dict of str to pandas.DataFrame
+        From `wrcore.analysis_contact.force_over_height`, by title of the panel.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    panels = figure.subplots(1, len(tables), squeeze=False)[0]
+    for axes, (title, table) in zip(panels, tables.items(), strict=True):
+        lowering = 1e6 * table.lowering_m
+        single = table.patches == 1
+        for label, values, style in (
+            ("only patch", table.N_1_N.where(single), STYLES[0]),
+            ("flange-side patch", table.N_1_N.where(~single), STYLES[1]),
+            ("tread-side patch", table.N_2_N, STYLES[2]),
+        ):
+            axes.plot(lowering, 1e-3 * values, label=label, **style)
+        axes.plot(lowering, 1e-3 * table.vertical_N, color="0.4", linewidth=0.7, label="vertical force, sum")
+        axes.set(xlabel="lowering after first touch / µm", ylabel="force / kN")
+        axes.set_title(title, fontsize=9)
+    panels[0].legend(fontsize=7)
     return figure
 
 

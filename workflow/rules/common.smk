@@ -65,6 +65,10 @@ CORE = {
     "creep_study": sources("creep", "analysis_creep", "analysis_creep_table"),
     "creep_figures": sources("creep", "analysis_creep", "analysis_creep_table", "figures", "figures_creep"),
     "geometry": sources("geometry", "contact", *SCENE),
+    "contact_search": sources("geometry", "contact", "analysis_contact", "analysis_contact_search"),
+    "contact_figures": sources(
+        "geometry", "contact", "analysis_contact", "analysis_contact_reference", "figures", "figures_contact"
+    ),
     "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, "simulate", "results"),
     "analysis": sources("simulate", "results", "analysis"),
     "figures": sources("geometry", "contact", *SCENE, "simulate", "results", "analysis", "figures"),

@@ -98,6 +98,7 @@ rule study:
         rules.comparison_table.output,
         rules.first_light_notebook.output,
         rules.creep_study.input,
+        rules.contact_study.input,
 
 
 rule report_archive:

@@ -1,0 +1,149 @@
+# Contact geometry: pairs of profiles, planar against spatial detection, reductions against CONTACT, the search's bar.
+# CONTACT's cases are read where the tests keep them: one copy, whose provenance stands in its first lines.
+
+CONTACT = config["contact_study"]
+CONTACT_PAIR = list(CONTACT["pairs"].values())[0]
+CONTACT_PAIR_FIGURES = ["location", "radius_difference", "angle", "conicity", "location_with_yaw"]
+
+
+rule contact_pairs:
+    message:
+        "Contact geometry of the pairs"
+    input:
+        core=CORE["contact_figures"],
+    output:
+        touch="<results>/tables/contact/touch.csv",
+        conicity="<results>/tables/contact/conicity.csv",
+        yaw="<results>/tables/contact/location_with_yaw.csv",
+        location=report(
+            "<results>/figures/contact_location.png",
+            caption="../report/contact_location.rst",
+            category="Contact geometry",
+            labels={"figure": "contact points"},
+        ),
+        radius=report(
+            "<results>/figures/contact_radius_difference.png",
+            caption="../report/contact_radius_difference.rst",
+            category="Contact geometry",
+            labels={"figure": "rolling radius difference"},
+        ),
+        angle=report(
+            "<results>/figures/contact_angle.png",
+            caption="../report/contact_angle.rst",
+            category="Contact geometry",
+            labels={"figure": "contact angle"},
+        ),
+        conicity_figure=report(
+            "<results>/figures/contact_conicity.png",
+            caption="../report/contact_conicity.rst",
+            category="Contact geometry",
+            labels={"figure": "equivalent conicity"},
+        ),
+        yaw_figure=report(
+            "<results>/figures/contact_location_with_yaw.png",
+            caption="../report/contact_location_with_yaw.rst",
+            category="Contact geometry",
+            labels={"figure": "contact points with yaw"},
+        ),
+        svg=expand("<results>/figures/contact_{name}.svg", name=CONTACT_PAIR_FIGURES),
+    log:
+        "<logs>/contact_pairs.log",
+    params:
+        pairs=CONTACT["pairs"],
+        shifts=CONTACT["shifts"],
+        yaws=CONTACT["yaws"],
+        amplitudes=CONTACT["amplitudes"],
+    script:
+        "../scripts/contact_pairs.py"
+
+
+rule contact_planar_error:
+    message:
+        "Error of planar detection over yaw and contact angle"
+    input:
+        core=CORE["contact_figures"],
+    output:
+        table="<results>/tables/contact/planar_error.csv",
+        figure=report(
+            "<results>/figures/contact_planar_error.png",
+            caption="../report/contact_planar_error.rst",
+            category="Contact geometry",
+            labels={"figure": "planar against spatial"},
+        ),
+        svg="<results>/figures/contact_planar_error.svg",
+    log:
+        "<logs>/contact_planar_error.log",
+    params:
+        pair=CONTACT_PAIR,
+        settings=CONTACT["planar_error"],
+    script:
+        "../scripts/contact_planar_error.py"
+
+
+rule contact_reductions:
+    message:
+        "Reductions: continuity, coexisting patches, agreement with CONTACT"
+    input:
+        core=CORE["contact_figures"],
+        reference=CONTACT["reductions"]["reference"],
+    output:
+        cases="<results>/tables/contact/reductions_cases.csv",
+        summary=report(
+            "<results>/tables/contact/reductions.csv",
+            caption="../report/contact_reductions.rst",
+            category="Contact geometry",
+            labels={"table": "reductions against CONTACT"},
+        ),
+        jumps="<results>/tables/contact/force_steps.csv",
+        patches="<results>/tables/contact/patch_forces.csv",
+        sweep_figure=report(
+            "<results>/figures/contact_force_sweep.png",
+            caption="../report/contact_force_sweep.rst",
+            category="Contact geometry",
+            labels={"figure": "force in a lateral sweep"},
+        ),
+        patch_figure=report(
+            "<results>/figures/contact_patch_forces.png",
+            caption="../report/contact_patch_forces.rst",
+            category="Contact geometry",
+            labels={"figure": "two patches"},
+        ),
+        svg=expand("<results>/figures/contact_{name}.svg", name=["force_sweep", "patch_forces"]),
+    log:
+        "<logs>/contact_reductions.log",
+    params:
+        pair=CONTACT_PAIR,
+        settings=CONTACT["reductions"],
+    script:
+        "../scripts/contact_reductions.py"
+
+
+rule contact_search:
+    message:
+        "Contact search against a dense one at random poses"
+    input:
+        core=CORE["contact_search"],
+    output:
+        report(
+            "<results>/tables/contact/search.csv",
+            caption="../report/contact_search.rst",
+            category="Contact geometry",
+            labels={"table": "search against dense search"},
+        ),
+    log:
+        "<logs>/contact_search.log",
+    benchmark:
+        "<benchmarks>/contact_search.tsv"
+    params:
+        pair=CONTACT_PAIR,
+        settings=CONTACT["search"],
+    script:
+        "../scripts/contact_search.py"
+
+
+rule contact_study:
+    input:
+        rules.contact_pairs.output,
+        rules.contact_planar_error.output,
+        rules.contact_reductions.output,
+        rules.contact_search.output,

@@ -1,0 +1,380 @@
+"""Tables of the contact study: geometry of pairs, error of planar detection, reductions against CONTACT, patches.
+
+All tables are pandas frames in SI units; a column carries its unit.
+"""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from wrcore._jit import jit
+from wrcore.contact.conicity import conicity_curve
+from wrcore.contact.detection import planar_error_bound
+from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
+from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.poses import solve_poses
+from wrcore.contact.reduction import (
+    ANGLE,
+    MAX_PATCHES,
+    MAXIMUM,
+    NORMAL,
+    PATCH_COLUMNS,
+    REDUCTIONS,
+    SEMI_A,
+    U_WHEEL,
+)  # fmt: skip
+from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
+from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
+from wrcore.geometry.standards import named_profile
+from wrcore.geometry.track import Track
+
+MATERIAL = {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}
+"""Steel as in the reference cases of CONTACT, Pa and -."""
+
+TOUCH = 1e-3
+"""Wheel load at which a wheelset counts as just touching, N: penetration below 1 nm."""
+
+_DESCENT = 2e-5  # m
+
+
+def study_pair(settings):
+    """A wheelset on its track from one entry of the study's pairs.
+
+    Parameters
+    ----------
+    settings : dict
+        wheel, rail: names of profiles; inclination (ratio), gauge, rolling_radius, half_distance (m).
+
+    Returns
+    -------
+    WheelsetOnTrack
+    """
+    wheel = named_profile(settings["wheel"], "wheel")
+    rail = named_profile(settings["rail"], "rail", settings["inclination"])
+    sizes = (settings["gauge"], settings["rolling_radius"], settings["half_distance"])
+    return WheelsetOnTrack.alike(wheel, rail, *sizes)
+
+
+def pair_geometry(pair):
+    """The same pair, compiled for the contact search.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+        With equal sides.
+
+    Returns
+    -------
+    ContactGeometry
+    """
+    one = pair.left
+    return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
+
+
+def touch_table(pairs, shifts):
+    """Rigid first touch of several pairs: contact points, contact angles, rolling radius difference; no yaw.
+
+    Parameters
+    ----------
+    pairs : dict of str to WheelsetOnTrack
+    shifts : array_like, shape (n,)
+        Lateral positions, m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``pair`` and the columns of :func:`wrcore.contact.first_touch.first_touch` (with roll).
+    """
+    tables = {label: first_touch(pair, shifts) for label, pair in pairs.items()}
+    return pd.concat(tables, names=["pair"]).reset_index(level="pair").reset_index(drop=True)
+
+
+def conicity_table(pairs, amplitudes):
+    """Equivalent conicity over the amplitude with roll and, as EN 15302 has it, without.
+
+    Parameters
+    ----------
+    pairs : dict of str to WheelsetOnTrack
+    amplitudes : array_like, shape (n,)
+        m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        pair, amplitude_m, conicity_with_roll, conicity_without_roll.
+    """
+    rows = []
+    for label, pair in pairs.items():
+        curves = [conicity_curve(pair, amplitudes, roll).equivalent_conicity for roll in (True, False)]
+        columns = {"pair": label, "amplitude_m": amplitudes}
+        rows.append(pd.DataFrame(columns | {"conicity_with_roll": curves[0], "conicity_without_roll": curves[1]}))
+    return pd.concat(rows, ignore_index=True)
+
+
+def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
+    """Where a yawed wheelset touches without load: the most loaded patch of each wheel, with roll.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    shifts, yaws : array_like
+        Lateral positions (m) and yaw angles (rad); all combinations.
+    detection : {"planar", "spatial"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        yaw_rad, y_m, side, roll_rad, the patch's position and contact angle, and the wheel's rolling radius.
+    """
+    yaw, y = (grid.ravel() for grid in np.meshgrid(yaws, shifts, indexing="ij"))
+    poses = pd.DataFrame({"pose_id": np.arange(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
+    patches = solve_poses(poses, geometry, TOUCH, detection, "maximum")
+    patches = patches.sort_values("N_N").groupby(["pose_id", "side"], sort=True).last().reset_index()
+    table = poses[["pose_id", "yaw_rad", "y_m"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
+    radius = [_radius(geometry, u) for u in table.u_wheel_m]
+    columns = ["yaw_rad", "y_m", "side", "roll_rad", "u_wheel_m", "u_rail_m", "x_m", "contact_angle_rad"]
+    return table[columns].assign(rolling_radius_m=radius)
+
+
+def _radius(geometry, u):
+    return geometry.rolling_radius + cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
+
+
+# ---------------------------------------------------------------------------------- planar against spatial
+
+
+def first_order_law(yaw, angle, radius=0.46):
+    """Normal penetration that planar detection misses, to first order: r psi^2 tan^2(delta) cos(delta)/2, m.
+
+    Parameters
+    ----------
+    yaw, angle, radius : array_like
+        Yaw and contact angle (rad), rolling radius (m).
+
+    Returns
+    -------
+    ndarray
+    """
+    return 0.5 * radius * np.square(yaw) * np.square(np.tan(angle)) * np.cos(angle)
+
+
+@jit
+def _descend(geometry, pose, u):
+    """Local minimum of the gap downhill from strip ``u``: walk, then golden section to 1e-9 m."""
+    here = gap_at(geometry, pose, u)[0]
+    while here > 0.5 and u < 0.0:  # beside the rail's gauge face: start at the face
+        u += _DESCENT
+        here = gap_at(geometry, pose, u)[0]
+    step = _DESCENT if gap_at(geometry, pose, u + _DESCENT)[0] < here else -_DESCENT
+    for _ in range(3000):
+        ahead = gap_at(geometry, pose, u + step)[0]
+        if ahead >= here:
+            break
+        u, here = u + step, ahead
+    low, high, part = u - _DESCENT, u + _DESCENT, 0.5 * (math.sqrt(5.0) - 1.0)
+    while high - low > 1e-9:
+        a, b = high - part * (high - low), low + part * (high - low)
+        if gap_at(geometry, pose, a)[0] < gap_at(geometry, pose, b)[0]:
+            high = b
+        else:
+            low = a
+    return 0.5 * (low + high)
+
+
+@jit
+def _planar_errors(geometry, hertz, modulus, load, shifts, yaws, out):
+    """Rows of `planar_error_map`; left wheel, no roll."""
+    rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    i = 0
+    for yaw in yaws:
+        for y in shifts:
+            row = out[i]
+            i += 1
+            row[:] = np.nan
+            row[0], row[1] = yaw, y
+            z = height_at_load(geometry, hertz, modulus, 1.0, y, 0.0, yaw, True, MAXIMUM, load, geometry.rolling_radius,
+                               rows)  # fmt: skip
+            if np.isnan(z):
+                continue
+            count, _ = wheel_at_rest(geometry, hertz, modulus, 1.0, y, z, 0.0, yaw, True, MAXIMUM, rows)
+            k = np.argmax(rows[:count, NORMAL])
+            ex, ey = -math.sin(yaw), math.cos(yaw)
+            spatial, planar = make_pose(1.0, y, z, ex, ey, 0.0, True), make_pose(1.0, y, z, ex, ey, 0.0, False)
+            at = _descend(geometry, spatial, rows[k, U_WHEEL])
+            below = _descend(geometry, planar, at)
+            gap, slope = gap_at(geometry, spatial, at)
+            planar_gap, planar_slope = gap_at(geometry, planar, below)
+            _, _, radius, _, _, along = strip_point(geometry, spatial, at)
+            row[2], row[3], row[4], row[5] = rows[k, ANGLE], radius, at, below
+            row[6] = -gap / math.sqrt(1.0 + slope * slope)
+            row[7] = -planar_gap / math.sqrt(1.0 + planar_slope * planar_slope)
+            row[8] = (planar_gap - gap) / math.sqrt(1.0 + slope * slope)
+            row[9] = radius * along * spatial.q + (at - below) * ex
+            row[10] = planar_error_bound(geometry, 1.0, y, z, ex, ey, 0.0)
+            row[11] = rows[k, SEMI_A]
+
+
+def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
+    """What planar detection misses at the most loaded spatial patch of a wheel, over lateral shift and yaw.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    shifts, yaws : array_like
+        Lateral positions to the left (m) and yaw angles (rad). The left wheel is taken, without roll, at the height
+        at which it carries ``load`` with spatial detection and the reduction ``maximum``.
+    load : float
+        Vertical load, N.
+    same_patch : float
+        Planar detection's lowest strip further than this from the spatial one belongs to another patch, m: its row
+        then has no error (NaN).
+
+    Returns
+    -------
+    pandas.DataFrame
+        yaw_rad, y_m, contact_angle_rad, radius_m (rolling radius), u_spatial_m, u_planar_m (deepest strips),
+        spatial_m and planar_m (penetration along the normal at the same pose, negative where planar detection sees
+        no contact), missed_m (lower overlap along the common normal), shift_m (missed longitudinal position), bound_m
+        (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law).
+    """
+    modulus = contact_modulus(**MATERIAL)
+    out = np.empty((len(shifts) * len(yaws), 12))
+    shifts, yaws = np.asarray(shifts, dtype=float), np.asarray(yaws, dtype=float)
+    _planar_errors(geometry, hertz_table(), modulus, float(load), shifts, yaws, out)
+    names = ["yaw_rad", "y_m", "contact_angle_rad", "radius_m", "u_spatial_m", "u_planar_m", "spatial_m", "planar_m",
+             "missed_m", "shift_m", "bound_m", "a_m"]  # fmt: skip
+    table = pd.DataFrame(out, columns=names)
+    other = (table.u_spatial_m - table.u_planar_m).abs() > same_patch
+    other |= table.planar_m < -0.1  # past the end of the rail's profile
+    table.loc[other, ["planar_m", "missed_m", "shift_m"]] = np.nan
+    return table.assign(law_m=first_order_law(table.yaw_rad, table.contact_angle_rad, table.radius_m))
+
+
+def over_contact_angle(table, edges, column):
+    """Median of a column of `planar_error_map` per contact angle and yaw.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+    edges : array_like, shape (n + 1,)
+        Limits of the classes of contact angle, rad.
+    column : str
+
+    Returns
+    -------
+    pandas.DataFrame, shape (n, yaws)
+        NaN where no pose has such an angle: this pair's contact jumps over it.
+    """
+    classes = pd.cut(table.contact_angle_rad, edges, labels=range(len(edges) - 1))
+    median = table.groupby([classes, "yaw_rad"], observed=False)[column].median()
+    return median.unstack("yaw_rad")
+
+
+# ---------------------------------------------------------------------------------- reductions
+
+
+@jit
+def _sweep(geometry, hertz, modulus, y, z, spatial, reduction, force):
+    rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    for i in range(y.shape[0]):
+        force[i] = 0.0
+        for wheel in range(2):
+            side = 1.0 - 2.0 * wheel
+            force[i] += wheel_at_rest(geometry, hertz, modulus, side, y[i], z, 0.0, 0.0, spatial, reduction, rows)[1]
+
+
+def lateral_sweep(geometry, reach, step, load, detection="spatial"):
+    """Vertical force of the centred, loaded pair while it is swept sideways at fixed height, without roll and yaw.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    reach, step : float
+        Sweep from -reach to reach in steps, m.
+    load : float
+        Vertical load per wheel at y = 0, which gives the height, N.
+    detection : {"planar", "spatial"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        y_m and, per reduction, the force of both wheels: ``maximum_N``, ``moment_N``.
+    """
+    hertz, modulus, spatial = hertz_table(), contact_modulus(**MATERIAL), detection == "spatial"
+    count = round(reach / step)
+    table = pd.DataFrame({"y_m": step * np.arange(-count, count + 1)})
+    for name, reduction in REDUCTIONS.items():
+        z = settle(geometry, hertz, modulus, 0.0, 0.0, spatial, reduction, load, geometry.rolling_radius)[1]
+        force = np.empty(len(table))
+        _sweep(geometry, hertz, modulus, table.y_m.to_numpy(), z, spatial, reduction, force)
+        table[f"{name}_N"] = force
+    return table
+
+
+def sweep_jumps(sweep, reaches):
+    """How continuous the force of `lateral_sweep` is.
+
+    Parameters
+    ----------
+    sweep : pandas.DataFrame
+    reaches : sequence of float
+        Parts -reach..reach that are looked at, m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        reach_m, reduction, largest_step_N (between neighbouring positions), smooth_step_N (99th percentile of the
+        steps: the smooth slope), ratio of both, at_m (where).
+    """
+    rows = []
+    for reach in reaches:
+        part = sweep[sweep.y_m.abs() <= reach + 1e-12]
+        for name in REDUCTIONS:
+            steps = np.abs(np.diff(part[f"{name}_N"]))
+            smooth = np.percentile(steps, 99)
+            row = {"reach_m": reach, "reduction": name, "largest_step_N": steps.max(), "smooth_step_N": smooth}
+            rows.append(row | {"ratio": steps.max() / smooth, "at_m": part.y_m.iloc[int(np.argmax(steps))]})
+    return pd.DataFrame(rows)
+
+
+@jit
+def _force_over_depth(geometry, hertz, modulus, y, yaw, heights, reduction, out):
+    rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    for i in range(heights.shape[0]):
+        count, force = wheel_at_rest(geometry, hertz, modulus, 1.0, y, heights[i], 0.0, yaw, True, reduction, rows)
+        out[i] = np.nan
+        out[i, 0], out[i, 1], out[i, 2] = heights[i], count, force
+        for k in range(count):
+            out[i, 3 + 2 * k], out[i, 4 + 2 * k] = rows[k, U_WHEEL], rows[k, NORMAL]
+
+
+def force_over_height(geometry, y, yaw, lowering, reduction="moment"):
+    """Patches of the left wheel while it is lowered: where they appear, how they share the force, where they merge.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    y, yaw : float
+        Lateral position (m) and yaw (rad); no roll.
+    lowering : array_like, shape (n,)
+        Lowering below the height at which the wheel just touches, m.
+    reduction : {"maximum", "moment"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        lowering_m, patches, vertical_N and, per patch from the flange to the field side, u_wheel_m and N_N (NaN where
+        there is none).
+    """
+    hertz, modulus = hertz_table(), contact_modulus(**MATERIAL)
+    rows, nominal = np.empty((MAX_PATCHES, PATCH_COLUMNS)), geometry.rolling_radius
+    rule = REDUCTIONS[reduction]
+    top = height_at_load(geometry, hertz, modulus, 1.0, y, 0.0, yaw, True, MAXIMUM, TOUCH, nominal, rows)
+    lowering = np.asarray(lowering, dtype=float)
+    out = np.empty((lowering.size, 3 + 2 * MAX_PATCHES))
+    _force_over_depth(geometry, hertz, modulus, y, yaw, top - lowering, rule, out)
+    names = ["lowering_m", "patches", "vertical_N"]
+    names += [f"{name}_{k + 1}_{unit}" for k in range(MAX_PATCHES) for name, unit in (("u_wheel", "m"), ("N", "N"))]
+    return pd.DataFrame(out, columns=names).assign(lowering_m=lowering, patches=out[:, 1].astype(int))

@@ -1,0 +1,368 @@
+"""Is every patch found, and none invented? The contact search against a dense one at random poses.
+
+The dense search looks at a strip every 0.02 mm and refines what comes close: nothing is skipped by a bound, so that it
+cannot share an error of the search's reserves. It costs some 100 us per wheel.
+"""
+
+import math
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.contact.detection import find_patches
+from wrcore.contact.geometry import SCAN_STEP
+from wrcore.contact.reduction import (
+    ANGLE,
+    CURVATURE_Y,
+    MAX_PATCHES,
+    MOMENT,
+    PATCH_COLUMNS,
+    PENETRATION,
+    REDUCTIONS,
+    U_WHEEL,
+)  # fmt: skip
+from wrcore.contact.strip import gap_at, make_pose
+
+DENSE_STEP = 2e-5
+"""Distance of the dense search's strips, m."""
+
+SEPARATION = 2e-4
+"""Overlaps closer to one another than this may count as one, m: the step at which the search looks closer."""
+
+WIDE = 0.006
+"""With ``moment`` the search integrates overlaps wider than this over its scan nodes, m; parts of such an overlap that
+are closer than a scan step may count as one."""
+
+DEPTH = 1e-7
+"""Normal penetration from which an overlap must be found, m."""
+
+POSE_RANGES = {"y": 0.012, "lift": 0.003, "roll": 0.010, "yaw": 0.030}
+"""Random poses lie within +- these, m and rad."""
+
+_MAX_OVERLAPS = 32
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+_CLOSE = 2e-6  # a dip between two dense strips is shallower: M h^2/8 with M up to 1e4 1/m
+_LOW, _HIGH, _DEPTH, _GROUP = range(4)
+FOUND, MISSED, INVENTED, SPLIT, BAD = range(5)
+OUTCOMES = ("found", "missed", "invented", "split", "bad number")
+
+
+@jit
+def _lowest(geometry, pose, low, high):
+    """Strip of the smallest gap between two strips (golden section), its gap, and the depth along the rail's normal."""
+    a, b = low, high
+    c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+    gap_c, gap_d = gap_at(geometry, pose, c)[0], gap_at(geometry, pose, d)[0]
+    while b - a > 1e-10:
+        if gap_c < gap_d:
+            b, d, gap_d = d, c, gap_c
+            c = b - _GOLDEN * (b - a)
+            gap_c = gap_at(geometry, pose, c)[0]
+        else:
+            a, c, gap_c = c, d, gap_d
+            d = a + _GOLDEN * (b - a)
+            gap_d = gap_at(geometry, pose, d)[0]
+    u = 0.5 * (a + b)
+    gap, slope = gap_at(geometry, pose, u)
+    return u, gap, -gap / math.sqrt(1.0 + slope * slope)
+
+
+@jit
+def _note(overlaps, count, low, high, depth):
+    """Append an overlap if there is room; returns the new count."""
+    if count < overlaps.shape[0]:
+        overlaps[count, _LOW], overlaps[count, _HIGH], overlaps[count, _DEPTH] = low, high, depth
+        return count + 1
+    return count
+
+
+@jit
+def dense_overlaps(geometry, pose, overlaps):
+    """All overlaps of one wheel by a dense search.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    pose : Pose
+    overlaps : numpy.ndarray, shape (n, 4)
+        Filled: first and last strip in overlap (m), greatest depth along the rail's normal (m); the fourth column is
+        left alone.
+
+    Returns
+    -------
+    int
+        Number of overlaps, from the flange to the field side.
+    """
+    strips = int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / DENSE_STEP) + 1
+    count = 0
+    first = last = depth = 0.0
+    inside = False
+    two_back = one_back = 1.0
+    for k in range(strips + 1):
+        u = geometry.wheel_start + k * DENSE_STEP
+        gap, slope = gap_at(geometry, pose, u) if k < strips else (1.0, 0.0)
+        if gap < 0.0:
+            if not inside:
+                inside, first, depth = True, u, 0.0
+            last = u
+            depth = max(depth, -gap / math.sqrt(1.0 + slope * slope))
+        elif inside:
+            inside = False
+            count = _note(overlaps, count, first, last, depth)
+        if 0.0 <= one_back < _CLOSE and one_back <= two_back and one_back <= gap:
+            at, dip, deep = _lowest(geometry, pose, u - 2.0 * DENSE_STEP, u)
+            if dip < 0.0:
+                count = _note(overlaps, count, at, at, deep)
+        two_back, one_back = one_back, gap
+    return count
+
+
+@jit
+def _group(overlaps, count, reduction):
+    """Number the groups of overlaps that may count as one; returns how many there are.
+
+    That is, those closer than `SEPARATION`; with ``moment`` also those closer than a scan step that are wide enough
+    together to be integrated over the scan's nodes.
+    """
+    group = 0
+    start = overlaps[0, _LOW]
+    for j in range(count):
+        if j > 0:
+            distance = overlaps[j, _LOW] - overlaps[j - 1, _HIGH]
+            wide = reduction == MOMENT and overlaps[j, _HIGH] - start > WIDE
+            if not (distance < SEPARATION or (wide and distance < SCAN_STEP)):
+                group, start = group + 1, overlaps[j, _LOW]
+        overlaps[j, _GROUP] = group
+    return group + 1 if count > 0 else 0
+
+
+@jit
+def _in_group(overlaps, count, group, u):
+    """Whether a strip lies between the ends of a group of overlaps, to the dense search's spacing."""
+    low, high = np.inf, -np.inf
+    for j in range(count):
+        if overlaps[j, _GROUP] == group:
+            low, high = min(low, overlaps[j, _LOW]), max(high, overlaps[j, _HIGH])
+    return low - 1.5 * DENSE_STEP <= u <= high + 1.5 * DENSE_STEP
+
+
+@jit
+def _sound(rows, count):
+    """Index of the first patch with a number that is not finite, without penetration, or upright; -1 if none is."""
+    for i in range(count):
+        fine = rows[i, PENETRATION] > 0.0 and abs(rows[i, ANGLE]) < 0.5 * math.pi
+        for column in range(CURVATURE_Y + 1):
+            fine = fine and math.isfinite(rows[i, column])
+        if not fine:
+            return i
+    return -1
+
+
+@jit
+def judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps):
+    """Compare the search with the dense one for one wheel.
+
+    Parameters
+    ----------
+    geometry, side, y, z, spatial, reduction, rows
+        As for :func:`wrcore.contact.detection.find_patches`.
+    axle : tuple of float
+        The wheel's outward axle direction.
+    overlaps : numpy.ndarray, shape (n, 4)
+        Scratch: overlaps of the dense search and the groups that may count as one.
+
+    Returns
+    -------
+    outcome : int
+        FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the deepest count if there
+        are more than MAX_PATCHES), INVENTED (a patch outside all groups), SPLIT (more patches in a group than
+        overlaps) or BAD (a number that is not finite, no penetration, or an upright contact plane).
+    where, depth : float
+        Strip and depth of the overlap or patch that it is about, m.
+    expected : int
+        Number of overlaps deeper than `DEPTH`.
+    """
+    count = find_patches(geometry, side, y, z, axle[0], axle[1], axle[2], spatial, reduction, rows)
+    bad = _sound(rows, count)
+    if bad >= 0:
+        return BAD, rows[bad, U_WHEEL], rows[bad, PENETRATION], 0
+    there = dense_overlaps(geometry, make_pose(side, y, z, axle[0], axle[1], axle[2], spatial), overlaps)
+    groups = _group(overlaps, there, reduction)
+    expected = 0
+    for j in range(there):
+        expected += overlaps[j, _DEPTH] > DEPTH
+    for j in range(there):
+        depth, group = overlaps[j, _DEPTH], overlaps[j, _GROUP]
+        inside = deeper = members = 0
+        for i in range(count):
+            inside += _in_group(overlaps, there, group, rows[i, U_WHEEL])
+        for other in range(there):
+            deeper += overlaps[other, _DEPTH] > depth
+            members += overlaps[other, _GROUP] == group
+        if inside == 0 and depth > DEPTH and deeper < MAX_PATCHES:
+            return MISSED, overlaps[j, _LOW], depth, expected
+        if inside > members:
+            return SPLIT, overlaps[j, _LOW], depth, expected
+    for i in range(count):
+        inside = 0
+        for group in range(groups):
+            inside += _in_group(overlaps, there, group, rows[i, U_WHEEL])
+        if inside == 0:
+            return INVENTED, rows[i, U_WHEEL], rows[i, PENETRATION], expected
+    return FOUND, 0.0, 0.0, expected
+
+
+@jit
+def _judge_all(geometry, poses, depths, spatial, reduction, outcomes, details):
+    rows, overlaps = np.empty((MAX_PATCHES, PATCH_COLUMNS)), np.empty((_MAX_OVERLAPS, 4))
+    for i in range(poses.shape[0]):
+        y, roll, yaw = poses[i, 0], poses[i, 2], poses[i, 3]
+        for wheel in range(2):
+            side = 1.0 - 2.0 * wheel
+            cosine = side * math.cos(roll)
+            axle = (-cosine * math.sin(yaw), cosine * math.cos(yaw), side * math.sin(roll))
+            z = poses[i, 1]
+            if depths[i] > 0.0:  # lower this wheel until its deepest strip is this deep
+                z = _touching(geometry, side, y, z, axle, spatial) - depths[i]
+            outcome, where, depth, expected = judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps)
+            outcomes[i, wheel] = outcome
+            details[i, wheel, 0], details[i, wheel, 1], details[i, wheel, 2] = z, where, depth
+            details[i, wheel, 3] = expected
+
+
+@jit
+def _touching(geometry, side, y, z, axle, spatial):
+    """Height at which the wheel just touches its rail, on strips 0.1 mm apart: a micrometre is enough here."""
+    pose = make_pose(side, y, z, axle[0], axle[1], axle[2], spatial)
+    lowest = 1.0
+    for k in range(int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / 1e-4)):
+        lowest = min(lowest, gap_at(geometry, pose, geometry.wheel_start + k * 1e-4)[0])
+    return z - lowest
+
+
+@jit
+def _search_all(geometry, poses, spatial, reduction, counts):
+    """Patches of both wheels at all poses; ``counts`` (n, 2), -1 where a number is not finite or out of its range."""
+    rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    for i in range(poses.shape[0]):
+        y, z, roll, yaw = poses[i]
+        ex, ey, ez = -math.sin(yaw) * math.cos(roll), math.cos(yaw) * math.cos(roll), math.sin(roll)
+        for wheel in range(2):
+            side = 1.0 - 2.0 * wheel
+            count = find_patches(geometry, side, y, z, side * ex, side * ey, side * ez, spatial, reduction, rows)
+            counts[i, wheel] = count
+            if _sound(rows, count) >= 0:
+                counts[i, wheel] = -1
+
+
+def random_poses(count, seed=0, nominal=0.46, ranges=None):
+    """Random wheelset poses, uniform in `POSE_RANGES`.
+
+    Parameters
+    ----------
+    count, seed : int
+    nominal : float
+        Height about which the lift is counted, m.
+    ranges : dict of str to float, optional
+        Other ranges than `POSE_RANGES`.
+
+    Returns
+    -------
+    numpy.ndarray, shape (count, 4)
+        y, z (m), roll, yaw (rad).
+    """
+    half = [(POSE_RANGES | (ranges or {}))[name] for name in ("y", "lift", "roll", "yaw")]
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 4)) * half + [0.0, nominal, 0.0, 0.0]
+
+
+def count_patches(geometry, poses, detection="spatial", reduction="moment"):
+    """Number of patches per wheel at many poses.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    poses : numpy.ndarray, shape (n, 4)
+        y, z (m), roll, yaw (rad).
+    detection : {"planar", "spatial"}
+    reduction : {"maximum", "moment"}
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, 2)
+        -1 where a result is not finite, has no penetration or stands upright.
+    """
+    counts = np.empty((len(poses), 2), np.int64)
+    _search_all(geometry, poses, detection == "spatial", REDUCTIONS[reduction], counts)
+    return counts
+
+
+def compare_with_dense(geometry, poses, detection="spatial", reduction="moment", depths=None):
+    """The search against the dense one, wheel by wheel.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    poses : numpy.ndarray, shape (n, 4)
+        y, z (m), roll, yaw (rad).
+    detection : {"planar", "spatial"}
+    reduction : {"maximum", "moment"}
+    depths : array_like, shape (n,), optional
+        Penetration (m) to which each wheel is lowered by itself; the heights of ``poses`` then do not count.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per wheel: y_m, z_m, roll_rad, yaw_rad, side, outcome (found, missed, invented, split, bad number),
+        u_wheel_m and depth_m of what is wrong, overlaps (deeper than `DEPTH`).
+    """
+    import pandas as pd
+
+    depths = np.zeros(len(poses)) if depths is None else np.asarray(depths, dtype=float)
+    outcomes, details = np.empty((len(poses), 2), np.int64), np.empty((len(poses), 2, 4))
+    _judge_all(geometry, poses, depths, detection == "spatial", REDUCTIONS[reduction], outcomes, details)
+    wheels = np.repeat(np.asarray(poses), 2, axis=0)
+    return pd.DataFrame(
+        {"y_m": wheels[:, 0], "z_m": details[..., 0].ravel(), "roll_rad": wheels[:, 2], "yaw_rad": wheels[:, 3],
+         "side": np.tile(["left", "right"], len(poses)), "outcome": np.array(OUTCOMES)[outcomes.ravel()],
+         "u_wheel_m": details[..., 1].ravel(), "depth_m": details[..., 2].ravel(),
+         "overlaps": details[..., 3].ravel().astype(int)}
+    )  # fmt: skip
+
+
+def search_table(geometry, poses, dense, seed=0):
+    """The bar of the contact search: how often it fails, misses or invents, per detection and reduction.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    poses : int
+        Random poses that must give finite patches.
+    dense : int
+        Random poses that are compared with the dense search, and as many wheels lowered to a depth between `DEPTH` and
+        0.5 mm, where patches are small.
+    seed : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        detection, reduction, wheels_searched, bad; wheels_compared, overlaps (deeper than `DEPTH`), wheels with
+        several, missed, invented, split.
+    """
+    import pandas as pd
+
+    depths = 10.0 ** np.random.default_rng(seed + 1).uniform(math.log10(DEPTH), -3.3, dense)
+    rows = []
+    for detection in ("planar", "spatial"):
+        for reduction in REDUCTIONS:
+            counts = count_patches(geometry, random_poses(poses, seed), detection, reduction)
+            compared = pd.concat(
+                compare_with_dense(geometry, random_poses(dense, seed + 2), detection, reduction, lowered)
+                for lowered in (None, depths)
+            )
+            row = {"detection": detection, "reduction": reduction, "wheels_searched": counts.size}
+            row |= {"bad": int((counts < 0).sum() + (compared.outcome == OUTCOMES[BAD]).sum())}
+            row |= {"wheels_compared": len(compared), "overlaps": int(compared.overlaps.sum())}
+            row |= {"wheels_with_several": int((compared.overlaps > 1).sum())}
+            outcomes = {OUTCOMES[k]: int((compared.outcome == OUTCOMES[k]).sum()) for k in (MISSED, INVENTED, SPLIT)}
+            rows.append(row | outcomes)
+    return pd.DataFrame(rows)
