@@ -1,6 +1,7 @@
 """The creep table: accuracy, symmetry, limits, smoothness, and its life on disk."""
 
 import os
+from itertools import product
 
 import numpy as np
 import pytest
@@ -193,6 +194,24 @@ def test_slope_is_continuous(any_table):
             w = np.outer(1 - s, start[2]) + np.outer(s, end[2])
             jumps.append(largest_jump_of_slope(any_table, (g, (1 - s) * start[1] + s * end[1], w)))
         assert jumps[1] < 0.1 * jumps[0] and jumps[1] < 1e-3
+
+
+def test_slope_is_steady_beside_the_spin_axis(any_table):
+    """Lines past the pole of (alpha, beta) at a thousandth of the spin, at twelve patches and spins, four directions.
+
+    The slope within 0.5 % of the spin, without its linear trend, varies by 3 % at most (0.5 % in the median); plain
+    interpolation in polar inputs makes that 75 % (4 %).
+    """
+    wiggles = []
+    for g, phi, turn in product((0.1, 0.3, 1.3, 4.0), (0.1, 0.3, 1.0), (0.0, 0.5, 1.0, 1.57)):
+        x = np.linspace(-0.005, 0.005, 801) * phi
+        along, beside = np.array([np.cos(turn), np.sin(turn), 0]), np.array([-np.sin(turn), np.cos(turn), 0])
+        w = np.outer(x, along) + 1e-3 * phi * beside + [0, 0, phi]
+        slope = np.gradient(look(any_table, g, 0.0, w)[0][:, :2], x, axis=0)[1:-1]
+        trend = np.polynomial.polynomial.polyfit(x[1:-1], slope, 1)
+        rest = slope - trend[0] - np.outer(x[1:-1], trend[1])
+        wiggles.append(np.ptp(rest, axis=0).max() / np.linalg.norm(slope, axis=1).max())
+    assert max(wiggles) < 0.04 and np.median(wiggles) < 0.01
 
 
 def test_coordinates():

@@ -14,8 +14,8 @@ not (it has a term r abs(r)). Stored is what remains of the force beside its lin
 
 so that the slope at zero creepage is Kalker's exactly: R = 0 at t = 0 for the ellipse. Symmetries are used, not
 approximated: F(-w) = -F(w) leaves beta >= 0, and mirroring y leaves psi >= 0 and, for the ellipse, ux >= 0.
-R is the tensor product of quadratic B-splines that interpolates the nodes: once continuously differentiable,
-three taps per axis.
+R is the tensor product of quadratic B-splines that interpolates the nodes (beside the spin axis nearly so, see
+`build.spline_coefficients`): once continuously differentiable, three taps per axis.
 """
 
 from typing import NamedTuple
