@@ -38,7 +38,17 @@ from wrcore.contact.reduction import (
     patch_at_maximum,
     patch_from_moments,
 )
-from wrcore.contact.scan import CHUNK, any_close, leaves_cells, planar_bound, rail_cell, scan, strip_gap, window
+from wrcore.contact.scan import (
+    CHUNK,
+    any_close,
+    fine_sums,
+    leaves_cells,
+    planar_bound,
+    rail_cell,
+    scan,
+    strip_gap,
+    window,
+)
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.errors import InputError
 
@@ -50,7 +60,8 @@ _PARTS = 3
 """Sub-intervals of a scan step where the search looks closer."""
 
 _WIDE = 10
-"""Overlaps of at least this many scan nodes are integrated over the nodes, narrower ones by Gauss-Legendre."""
+"""Overlaps of at least this many scan nodes are integrated over them, narrower ones over the profiles' own nodes, and
+those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
 
 
 @jit(allocates=False)
@@ -75,9 +86,11 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
             middle = first
             m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP, m2 * SCAN_STEP
         else:
-            start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
-            middle = 0.5 * (start + end)
-            m0, m1, m2 = overlap_moments(geometry, pose, start, end)
+            m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, outside, beyond)
+            if fine_nodes < _WIDE:
+                start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
+                middle = 0.5 * (start + end)
+                m0, m1, m2 = overlap_moments(geometry, pose, start, end)
         found = patch_from_moments(geometry, pose, middle, m0, m1, m2, patches[row])
     else:
         found = patch_at_maximum(geometry, pose, deepest, patches[row])

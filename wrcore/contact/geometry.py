@@ -36,6 +36,10 @@ class ContactGeometry(NamedTuple):
     """(6, cells): the rail in each scan cell as a cubic of the distance from the cell's start (4 coefficients), the
     reserve, and the cosine of its inclination; padding lies 1 m below the track. The reserves of a wheel node and its
     rail cell together bound how much deeper than the nodes the gap between them can go (M h^2/8)."""
+    fine_wheel: np.ndarray
+    """(2, n): R and R' at the profile's own nodes."""
+    fine_rail: np.ndarray
+    """(4, m - 1): the rail between its own nodes, as in ``scan_rail``; no cells where the two spacings differ."""
     wheel_start: float
     wheel_step: float
     rail_start: float
@@ -78,7 +82,8 @@ def contact_geometry(wheel, rail, track, rolling_radius, half_distance):
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
     return ContactGeometry(
         np.column_stack([-wheel.f, -wheel.df, -wheel.d2f]), np.column_stack([rail.f, rail.df, rail.d2f]),
-        scan_wheel, scan_rail, float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
+        scan_wheel, scan_rail, np.stack([rolling_radius - wheel.f, -wheel.df]), _fine_rail(wheel, rail),
+        float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
         float(rolling_radius), float(half_distance), float(track.rail_distance(rail)),
     )  # fmt: skip
@@ -105,18 +110,30 @@ def _wheel_scan(wheel, rolling_radius, window):
     return nodes, float(u[0] - window * SCAN_STEP)
 
 
+def _fine_rail(wheel, rail):
+    """Cubics of the rail between its nodes, or none if wheel and rail nodes are not equally far apart."""
+    step = rail.spacing
+    if abs(wheel.spacing - step) > 1e-9 * step:
+        return np.zeros((4, 0))
+    return _cubics(rail.f, rail.df, step)
+
+
+def _cubics(f, df, step):
+    """Coefficients (4, n - 1) of the cubic Hermite interpolant through values and slopes (n,)."""
+    rise = np.diff(f) / step
+    second, third = (3.0 * rise - 2.0 * df[:-1] - df[1:]) / step, (df[:-1] + df[1:] - 2.0 * rise) / step**2
+    return np.stack([f[:-1], df[:-1], second, third])
+
+
 def _rail_scan(rail):
     """Scan cells of the rail, padded to whole vectors of eight, and where they start."""
     count = int((rail.u[-1] - rail.u[0]) / SCAN_STEP + 1e-9)
     u = rail.u[0] + SCAN_STEP * np.arange(count + 1)
     f, df = rail(u), rail(u, 1)
-    rise = np.diff(f) / SCAN_STEP
     cells = np.zeros((6, 8 * math.ceil((count + 2 * _MARGIN) / 8)))
     cells[0], cells[RAIL_COSINE] = -1.0, 1.0
     middle = slice(_MARGIN, _MARGIN + count)
-    cells[0, middle], cells[1, middle] = f[:-1], df[:-1]
-    cells[2, middle] = (3.0 * rise - 2.0 * df[:-1] - df[1:]) / SCAN_STEP
-    cells[3, middle] = (df[:-1] + df[1:] - 2.0 * rise) / SCAN_STEP**2
+    cells[:4, middle] = _cubics(f, df, SCAN_STEP)
     cells[RAIL_RESERVE, middle] = _reserve(rail, u[:-1] + 0.5 * SCAN_STEP)
     cells[RAIL_COSINE, middle] = 1.0 / np.sqrt(1.0 + (0.5 * (df[:-1] + df[1:])) ** 2)
     return cells, float(u[0] - _MARGIN * SCAN_STEP)

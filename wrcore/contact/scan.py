@@ -98,6 +98,56 @@ def scan(pose, scan_wheel, scan_rail, node, reach, offset):
     return m0, m1, m2, overlapping, first, last, close, first_close, last_close
 
 
+@jit(allocates=False, fastmath=FAST)
+def fine_sums(geometry, pose, first, last):
+    """Moments of g^2 over the strips at the wheel profile's own nodes from ``first`` to ``last``.
+
+    Returns
+    -------
+    m0, m1, m2 : float
+        Integrals of g^2, g^2 e, g^2 e^2 over the overlap, e from the position ``origin``.
+    origin : float
+        m.
+    nodes : float
+        Number of nodes in overlap; 0 where the nodes of wheel and rail do not go together.
+    """
+    step = geometry.wheel_step
+    begin = max(int((first - geometry.wheel_start) / step), 0)
+    end = min(int((last - geometry.wheel_start) / step) + 2, geometry.fine_wheel.shape[1])
+    middle = (begin + end) // 2
+    ur = strip_point(geometry, pose, geometry.wheel_start + middle * step)[0]
+    ahead = int(math.floor((ur - geometry.rail_start) / step)) - middle  # cell less node
+    begin, end = max(begin, -ahead), min(end, geometry.fine_rail.shape[1] - ahead)
+    origin = geometry.wheel_start + begin * step
+    count, cell = end - begin, begin + ahead
+    if count <= 0:
+        return 0.0, 0.0, 0.0, origin, 0.0
+    radii, slopes = geometry.fine_wheel[0, begin : begin + count], geometry.fine_wheel[1, begin : begin + count]
+    c0, c1 = geometry.fine_rail[0, cell : cell + count], geometry.fine_rail[1, cell : cell + count]
+    c2, c3 = geometry.fine_rail[2, cell : cell + count], geometry.fine_rail[3, cell : cell + count]
+    reach = geometry.half_distance + origin
+    offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
+    side_y = pose.side * pose.ey
+    y_down, y_along = pose.side * pose.y_down, pose.side * pose.y_along
+    m0 = m1 = m2 = nodes = 0.0
+    for k in range(count):
+        radius, along = radii[k], slopes[k] * pose.tilt
+        square = along * along
+        down = 1.0 - square * (0.5 + square * (0.125 + square * 0.0625))
+        position = k * step
+        axial = reach + position
+        d = axial * side_y + radius * (down * y_down + along * y_along) - offset - position
+        rail = c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k]))
+        gap = pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
+        negative = min(gap, 0.0)
+        square = negative * negative
+        m0 += square
+        m1 += square * position
+        m2 += square * position * position
+        nodes += 1.0 if gap < 0.0 else 0.0
+    return m0 * step, m1 * step, m2 * step, origin, nodes
+
+
 @jit(allocates=False, forceinline=True)
 def strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k):
     """Gap of the k-th strip, as in `scan`."""
