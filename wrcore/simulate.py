@@ -130,6 +130,7 @@ def _derailment(model, work):
     pose = np.empty((1, 5))
 
     def stop(t, state):
+        """Reason to end the run at this state, or an empty string."""
         for k, body in enumerate(model.bodies.wheelsets):
             y = state[STATE_SIZE * body + 1]
             if not model.track.tangent:
