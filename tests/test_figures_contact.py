@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from wrcore import figures_contact
+from wrcore import analysis_contact, figures_contact
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
-from wrcore.figures import save_figure
+from wrcore.figures import LINES, save_figure
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +80,77 @@ def test_files_are_reproducible(pair, table, tmp_path):
     for name in ("a.svg", "b.svg"):
         save_figure(figures_contact.fig_contact_location(pair, table), tmp_path / name)
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+
+
+# ------------------------------------------------------------------------------------------ tables of the contact study
+
+
+def test_conicity_of_pairs_with_and_without_roll(pair):
+    table = analysis_contact.conicity_table({"ours": pair}, 1e-3 * np.arange(1, 6))
+    axes = figures_contact.fig_conicity_of_pairs(table).axes[0]
+    # 3 mm: 0.1836 and 0.1805, see test_conicity.ONE_IN_40
+    assert lines(axes, "ours, with roll").get_xydata()[2] == pytest.approx([3.0, 0.1836], rel=1e-2)
+    assert lines(axes, "without roll (EN 15302)").get_xydata()[2] == pytest.approx([3.0, 0.1805], rel=1e-2)
+    assert axes.get_xlabel() == "amplitude / mm"
+
+
+def test_location_with_yaw_draws_one_line_per_yaw(benchmark_pair):
+    table = analysis_contact.location_with_yaw(benchmark_pair, [0.001, 0.003], [0.0, 0.01])
+    across, along = figures_contact.fig_location_with_yaw(table).axes
+    left = table[(table.side == "left") & (table.yaw_rad == 0.01)]
+    drawn = lines(across, "yaw 10 mrad").get_xydata()
+    assert drawn == pytest.approx(1e3 * left[["y_m", "u_wheel_m"]].to_numpy())
+    assert lines(along, "yaw 10 mrad").get_ydata() == pytest.approx(1e3 * left.x_m.to_numpy())
+    assert across.get_ylabel().endswith("/ mm") and along.get_ylabel().endswith("/ mm")
+
+
+def test_planar_error_map_shows_the_table_in_bands(benchmark_pair):
+    yaws = np.linspace(0.0, 0.03, 4)
+    table = analysis_contact.planar_error_map(benchmark_pair, np.linspace(0.0, 0.009, 46), yaws, 2e4)
+    figure = figures_contact.fig_planar_error(table)
+    panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+    assert len(panels) == 4 * len(figures_contact.BANDS)
+    flange, _, tread = panels[:3]
+    for axes, (low, high) in ((tread, figures_contact.BANDS[0]), (flange, figures_contact.BANDS[-1])):
+        mesh = next(c for c in axes.collections if c.get_array() is not None and c.get_array().ndim == 2)
+        cells = mesh.get_array()
+        part = table[table.contact_angle_rad.between(low, high) & (table.yaw_rad == yaws[3])]
+        assert axes.get_ylim() == pytest.approx((1e3 * low, 1e3 * high))
+        assert np.nanmin(cells[:, 2]) >= 1e6 * part.missed_m.min() * (1 - 1e-12)
+        assert np.nanmax(cells[:, 2]) <= 1e6 * part.missed_m.max() * (1 + 1e-12)
+    titles = [axes.get_title() for axes in panels if axes.get_title()]
+    assert [title[:3] for title in titles] == ["(a)", "(b)", "(c)", "(d)"]
+    assert titles[0].endswith("/ \N{MICRO SIGN}m") and titles[1].endswith("/ mm")
+
+
+def test_law_contours_lie_on_the_law(benchmark_pair):
+    table = analysis_contact.planar_error_map(benchmark_pair, np.linspace(0.001, 0.004, 7), [0.0, 0.015, 0.03], 2e4)
+    tread = [axes for axes in figures_contact.fig_planar_error(table).axes if axes.get_label() != "<colorbar>"][2]
+    contours = next(c for c in tread.collections if hasattr(c, "levels"))
+    paths = dict(zip(contours.levels, contours.get_paths(), strict=True))
+    yaw, angle = 1e-3 * paths[1.0].vertices.T
+    # r psi^2 tan^2(delta) cos(delta)/2 = 1 um; the contour is linear between nodes 0.4 mrad apart
+    assert 0.5 * 0.46 * yaw**2 * np.tan(angle) ** 2 * np.cos(angle) == pytest.approx(1e-6, rel=5e-3)
+
+
+def test_lateral_sweep_in_kn_and_per_micrometre(benchmark_pair):
+    sweep = analysis_contact.lateral_sweep(benchmark_pair, 1e-3, 1e-5, 54546.0)
+    force, steps = figures_contact.fig_lateral_sweep(sweep).axes
+    drawn = lines(force, "moment").get_xydata()
+    assert drawn[100] == pytest.approx([0.0, 2 * 54.546], abs=1e-6)
+    jump = np.abs(np.diff(sweep.maximum_N)).max()
+    assert lines(steps, "maximum").get_ydata().max() == pytest.approx(1e-3 * jump / 10)  # 10 um per step
+    assert force.get_ylabel().endswith("/ kN") and steps.get_ylabel() == "change per \N{MICRO SIGN}m / kN"
+    assert {line["color"] for line in figures_contact.REDUCTION_LINES.values()}.isdisjoint(
+        line["color"] for line in LINES.values()
+    )
+
+
+def test_patch_forces_by_panel(benchmark_pair):
+    table = analysis_contact.force_over_height(benchmark_pair, 5.1e-3, 0.0, np.linspace(0.0, 8e-5, 41))
+    axes = figures_contact.fig_patch_forces({"two": table}).axes[0]
+    both = (table.patches == 2).to_numpy()
+    assert axes.get_title() == "two"
+    assert lines(axes, "field-side patch").get_ydata()[both] == pytest.approx(1e-3 * table.N_2_N[both])
+    assert lines(axes, "flange-side patch").get_xdata()[both] == pytest.approx(1e6 * table.lowering_m[both])
+    assert np.isnan(lines(axes, "only patch").get_ydata()[both]).all()

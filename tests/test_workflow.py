@@ -17,6 +17,12 @@ from wrcore.results import load_run
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "results" / "smoke"
 FIGURES = ("fig1_parametrisation", "fig2_profiles", "fig3_detection", "fig4_lateral_position", "fig5_contact_points")
+CONTACT_FIGURES = tuple(
+    f"contact_{name}"
+    for name in ("location", "radius_difference", "angle", "conicity", "location_with_yaw", "planar_error",
+                 "force_sweep", "patch_forces")
+)  # fmt: skip
+CONTACT_RULES = {"contact_pairs", "contact_planar_error", "contact_reductions", "contact_search"}
 CREEP_FIGURES = ("creep_curves", "creep_traction", "creep_cost", "creep_error_map", "creep_smoothness")
 
 
@@ -39,7 +45,7 @@ def test_nothing_is_left_to_do_after_the_smoke_run(smoke):
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
-@pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES)
+@pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES + CONTACT_FIGURES)
 def test_every_figure_is_there_as_png_and_svg(smoke, name):
     assert (smoke / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (smoke / "figures" / f"{name}.svg").read_text()[:2000]
@@ -53,6 +59,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         table = listed.stdout.partition("Job stats:")[2].partition("total")[0]
         rules.append(set(re.findall(r"^(\w+) +\d+$", table, re.MULTILINE)))
     assert rules[0] == rules[1] >= {"creep_table", "simulate", "time_runs", "report_archive", *FIGURES}
+    assert rules[0] >= CONTACT_RULES
     assert rules[0] >= {"creep_study_table", "creep_errors", "creep_costs", *(f"fig_{name}" for name in CREEP_FIGURES)}
 
 
@@ -72,6 +79,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         ({"timing": {"repetitions": 3}}, "Timing: planar and spatial runs", "wheelset_v20: planar and spatial run"),
         ({"creep_table": {"tolerance": 0.04}}, "Creep table", "Contact geometry without load"),
         ({"creep_study": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
+        ({"contact_study": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
         ({"figures": {"detection_pose": {"y": 0.006}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
     ],
 )
@@ -113,6 +121,18 @@ def test_creep_laws_are_compared_in_all_files_against_both_references(smoke):
     assert (table[["force_q99", "moment_max", "us_per_case"]] > 0).all(axis=None)
 
 
+def test_contact_search_of_the_study_finds_everything(smoke):
+    table = pd.read_csv(smoke / "tables" / "contact" / "search.csv")
+    assert len(table) == 4 and (table.wheels_searched > 0).all()
+    assert (table[["bad", "missed", "invented", "split"]] == 0).all(axis=None), table.to_string()
+
+
+def test_reductions_of_the_study_are_compared_in_all_cases(smoke):
+    table = pd.read_csv(smoke / "tables" / "contact" / "reductions.csv")
+    assert dict(table.groupby("set").cases.first()) == {"A22": 20, "light100N": 44, "light1N": 44, "load10kN": 44}
+    assert set(table.reduction) == {"maximum", "moment"}
+
+
 def test_notebook_was_executed_and_holds_fig4(smoke):
     cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
     outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
@@ -124,7 +144,7 @@ def test_report_holds_the_figures(smoke):
     with zipfile.ZipFile(smoke / "report.zip") as archive:
         text = "".join(archive.namelist())
         assert "report.html" in text
-        assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES)
+        assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES)
 
 
 @pytest.mark.parametrize(

@@ -273,7 +273,7 @@ def _error_band(axes, table, band, column, factor, norm, cmap):
 
 def _law_contours(axes, largest_yaw, band, column):
     """Contours of the first-order laws of the missed penetration (um) and of the longitudinal shift (mm)."""
-    yaw, angle = np.meshgrid(np.linspace(0.01 * largest_yaw, largest_yaw, 80), np.linspace(*band, 60))
+    yaw, angle = np.meshgrid(np.linspace(largest_yaw / 30, largest_yaw, 80), np.linspace(*band, 60))
     if column == "missed_m":
         values, levels = 1e6 * first_order_law(yaw, angle), [1e-3, 1e-2, 0.1, 1, 10, 100, 300]
     elif column == "shift_m":
@@ -341,7 +341,7 @@ def fig_patch_forces(tables):
         for label, values, style in (
             ("only patch", table.N_1_N.where(single), STYLES[0]),
             ("flange-side patch", table.N_1_N.where(~single), STYLES[1]),
-            ("tread-side patch", table.N_2_N, STYLES[2]),
+            ("field-side patch", table.N_2_N, STYLES[2]),
         ):
             axes.plot(lowering, 1e-3 * values, label=label, **style)
         axes.plot(lowering, 1e-3 * table.vertical_N, color="0.4", linewidth=0.7, label="vertical force, sum")
