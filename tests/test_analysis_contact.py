@@ -10,10 +10,13 @@ from tests.conftest import DATA
 from wrcore import analysis_contact as study
 from wrcore import analysis_contact_search as search
 from wrcore.analysis_contact_reference import compare_with_contact, longitudinal_excess, summarise
-from wrcore.contact.detection import axle_direction
+from wrcore.contact.detection import axle_direction, detect
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
+from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS
+from wrcore.contact.statics import height_at_load
 from wrcore.contact.strip import make_pose
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
@@ -185,6 +188,22 @@ def test_coexisting_patches_share_the_force_until_they_merge(benchmark_pair):
     assert (both.vertical_N < both.N_1_N + both.N_2_N).all()
     assert both[["N_1_N", "N_2_N"]].diff().iloc[1:].gt(0.0).all(axis=None)
     assert table[table.patches == 1].N_2_N.isna().all()
+    # lowered by a depth d after first touch: Hertz, N = K (d cos(delta))^1.5 with both curvatures at the point
+    depth = table.lowering_m[5]
+    hertz, modulus, patch = hertz_table(), contact_modulus(8.2e10, 0.28), np.zeros((MAX_PATCHES, PATCH_COLUMNS))
+    z = height_at_load(benchmark_pair, hertz, modulus, 1.0, 5.1e-3, 0.0, 0.0, True, MAXIMUM, 1e-3, 0.46, patch) - depth
+    left = [p for p in detect(benchmark_pair, 5.1e-3, z, reduction="moment") if p.side == "left"]
+    stiffness = hertz_ellipse(hertz, left[0].curvature_x_per_m, left[0].curvature_y_per_m)[0]
+    assert table.N_1_N[5] == pytest.approx(modulus * stiffness * left[0].penetration_m ** 1.5, rel=1e-9)
+
+
+def test_of_two_patches_the_most_loaded_is_taken(benchmark_pair, monkeypatch):
+    monkeypatch.setattr(study, "TOUCH", 2e4)  # at 5.1 mm tread and flange root touch under load
+    poses = pd.DataFrame({"pose_id": [0], "y_m": [5.1e-3], "yaw_rad": [0.0], "roll_rad": [np.nan], "z_m": [np.nan]})
+    both = solve_poses(poses, benchmark_pair, 2e4, "spatial", "maximum").query("side == 'left'")
+    taken = rows(study.location_with_yaw(benchmark_pair, [5.1e-3], [0.0]), side="left")
+    assert len(both) == 2
+    assert taken.u_wheel_m.tolist() == [both.loc[both.N_N.idxmax(), "u_wheel_m"]]
 
 
 # ------------------------------------------------------------------------------------------ the search's bar
