@@ -91,7 +91,7 @@ def smooth_lines(axes):
     def zero(x):
         return 1.3 + 0 * x, 0 * x, np.stack([0.3 * x, 0.2 * x, 0.3 * x], axis=-1)
 
-    return {"cells": (cells, 1.0), "axis": (axis, 0.02), "zero": (zero, 1.0)}
+    return {"cells": (cells, 1.0), "axis": (axis, 0.005), "zero": (zero, 1.0)}
 
 
 def smoothness(model, level, points, exact_points):

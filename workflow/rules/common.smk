@@ -62,7 +62,7 @@ def sources(*rooms):
 SCENE = ("vehicle", "schemas", "checked_yaml", "scene")
 CORE = {
     "creep": sources("creep"),
-    "creep_study": sources("creep", "analysis_creep", "analysis_creep_table"),
+    "creep_study": sources("creep", "analysis_creep"),
     "creep_figures": sources("creep", "analysis_creep", "analysis_creep_table", "figures", "figures_creep"),
     "geometry": sources("geometry", "contact", *SCENE),
     "contact_search": sources("geometry", "contact", "analysis_contact", "analysis_contact_search"),
