@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wrcore._jit import jit
 from wrcore.creep.build import RESOLUTIONS, build_data, count_cases, random_errors
 from wrcore.creep.cases import check_cases, nondimensional
 from wrcore.creep.halfspace import RollingContact
-from wrcore.creep.laws import LAWS, creep_data, creep_force
+from wrcore.creep.laws import LAWS, creep_data, creep_forces
 
 DATA = Path(__file__).parent.parent / "tests" / "data" / "creep"
 FILES = {"ellipse": "ellipse_cases", "sdec": "sdec_cases", "extremes": "kbt_extremes"}
@@ -56,14 +55,6 @@ def time_exact(g, psi, creepages, levels):
     return forces, seconds
 
 
-@jit
-def apply_law(law, data, g, psi, creepages, forces):
-    """One law over a file."""
-    for i in range(g.size):
-        ux, uy, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], _ = creep_force(law, data, g[i], psi[i], ux, uy, phi)
-
-
 def time_laws(g, psi, creepages, laws):
     """Forces and best seconds per case of each (law, data); the laws take turns, several rounds."""
     forces, seconds = np.empty((len(laws), len(g), 3)), np.full(len(laws), np.inf)
@@ -72,7 +63,7 @@ def time_laws(g, psi, creepages, laws):
         for k, (law, data) in enumerate(laws):
             start = time.process_time()
             for _ in range(repeat[k]):
-                apply_law(law, data, g, psi, creepages, forces[k])
+                creep_forces(law, data, g, psi, creepages, forces[k])
             if turn > 0:
                 seconds[k] = min(seconds[k], (time.process_time() - start) / repeat[k] / len(g))
     return forces, seconds
@@ -140,7 +131,7 @@ def time_look_up(table, count=100_000):
     data, forces, best = creep_data(NU, table), np.empty((count, 3)), np.inf
     for _ in range(ROUNDS):
         start = time.process_time()
-        apply_law(LAWS["table"], data, g, psi, creepages, forces)
+        creep_forces(LAWS["table"], data, g, psi, creepages, forces)
         best = min(best, time.process_time() - start)
     return 1e9 * best / count
 

@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.creep.build import A_OVER_B, PSI_MAX, Resolution, build_data, random_errors
 from wrcore.creep.cases import check_cases, nondimensional
 from wrcore.creep.halfspace import RollingContact
-from wrcore.creep.laws import LAWS, CreepData, creep_data, creep_force
+from wrcore.creep.laws import LAWS, CreepData, creep_data, creep_forces
 from wrcore.creep.table import build_table, table_info
 from wrcore.errors import InputError
 
@@ -104,22 +103,11 @@ def table_model(name, table):
     return Model(name, f"table {table.planes}", LAWS["table"], creep_data(table.nu, table.kernel_data()))
 
 
-@jit
-def apply_law(law, data, g, psi, creepages, forces):
-    """One law over n patches and creepages, written to ``forces`` (n, 3); returns how many lay out of range."""
-    outside = 0
-    for i in range(g.size):
-        ux, uy, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
-        outside += flag
-    return outside
-
-
 def law_forces(model, g, psi, creepages):
     """Forces (n, 3) of a `Model` for g and psi (scalars or (n,)) and creepages (n, 3), and the count out of range."""
     forces = np.empty((len(creepages), 3))
     g, psi = (np.broadcast_to(np.asarray(value, dtype=float), len(creepages)).copy() for value in (g, psi))
-    outside = apply_law(model.law, model.data, g, psi, np.ascontiguousarray(creepages, dtype=float), forces)
+    outside = creep_forces(model.law, model.data, g, psi, np.ascontiguousarray(creepages, dtype=float), forces)
     return forces, outside
 
 
@@ -220,7 +208,7 @@ def _time_law(model):
     g, psi, creepages = random_arguments(count, "ellipse" if model.family == "table ellipse" else "sdec")
     forces = np.empty((count, 3))
     start = time.process_time()
-    apply_law(model.law, model.data, g, psi, creepages, forces)
+    creep_forces(model.law, model.data, g, psi, creepages, forces)
     return (time.process_time() - start) / count
 
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
-from wrcore.creep.laws import LAWS, creep_data, creep_force
+from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
 from wrcore.errors import InputError
 
@@ -180,17 +179,6 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
                 raise InputError(source, f"nu, row {rows[0] + 1}", f"expected the table's {given.nu}, got {value}")
             kernel_table = (given or ensure_table(float(value), planes, DEFAULT_TOLERANCE, progress)).kernel_data()
         data, part = creep_data(value, kernel_table), np.empty((len(rows), 3))
-        outside += _apply(LAWS[model], data, g[rows], psi[rows], creepages[rows], part)
+        outside += creep_forces(LAWS[model], data, g[rows], psi[rows], creepages[rows], part)
         forces[rows] = part
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
-
-
-@jit
-def _apply(law, data, g, psi, creepages, forces):
-    """One law over all rows; returns how many patches were out of range."""
-    outside = 0
-    for i in range(g.size):
-        ux, uy, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
-        outside += flag
-    return outside

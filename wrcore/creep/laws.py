@@ -157,3 +157,30 @@ def creep_force(law, data, g, psi, ux, uy, phi):
     else:
         fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, ux, uy, phi)
     return fx, fy, mz, outside
+
+
+@jit
+def creep_forces(law, data, g, psi, creepages, forces):
+    """One law over many cases.
+
+    Parameters
+    ----------
+    law : int
+    data : CreepData
+    g, psi : ndarray (n,)
+    creepages : ndarray (n, 3)
+        ux', uy', phi'.
+    forces : ndarray (n, 3)
+        Filled: fx, fy, mz.
+
+    Returns
+    -------
+    int
+        Number of cases whose patch lay out of range.
+    """
+    outside = 0
+    for i in range(g.size):
+        ux, uy, phi = creepages[i]
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
+        outside += flag
+    return outside
