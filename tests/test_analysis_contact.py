@@ -15,7 +15,7 @@ from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.poses import solve_poses
-from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS
+from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.strip import make_pose
 from wrcore.geometry.standards import named_profile
@@ -274,11 +274,9 @@ def test_judge_tells_each_kind_of_failure(benchmark_pair, monkeypatch):
 
 def test_close_overlaps_may_count_as_one():
     overlaps = np.zeros((4, 4))
-    overlaps[:4, :2] = [[0.0, 1e-3], [1.1e-3, 2e-3], [2.3e-3, 9e-3], [9.5e-3, 1e-2]]  # 0.1, 0.3, 0.5 mm apart
-    assert search._group(overlaps, 4, MAXIMUM) == 3
-    assert overlaps[:, 3].tolist() == [0.0, 0.0, 1.0, 2.0]
-    assert search._group(overlaps, 4, MOMENT) == 1  # more than 6 mm wide: integrated over nodes 0.6 mm apart
-    assert overlaps[:, 3].tolist() == [0.0, 0.0, 0.0, 0.0]
+    overlaps[:4, :2] = [[0.0, 1e-3], [1.1e-3, 2e-3], [2.7e-3, 9e-3], [9.5e-3, 1e-2]]  # 0.1, 0.7, 0.5 mm apart
+    assert search._group(overlaps, 4) == 2
+    assert overlaps[:, 3].tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
 def test_search_table_counts_every_wheel(benchmark_pair):

@@ -15,7 +15,6 @@ from wrcore.contact.reduction import (
     ANGLE,
     CURVATURE_Y,
     MAX_PATCHES,
-    MOMENT,
     PATCH_COLUMNS,
     PENETRATION,
     REDUCTIONS,
@@ -26,12 +25,8 @@ from wrcore.contact.strip import gap_at, make_pose
 DENSE_STEP = 2e-5
 """Distance of the dense search's strips, m."""
 
-SEPARATION = 2e-4
-"""Overlaps closer to one another than this may count as one, m: the step at which the search looks closer."""
-
-WIDE = 0.006
-"""With ``moment`` the search integrates overlaps wider than this over its scan nodes, m; parts of such an overlap that
-are closer than a scan step may count as one."""
+SEPARATION = SCAN_STEP
+"""Overlaps closer to one another than this may count as one, m: the distance of the search's nodes."""
 
 DEPTH = 1e-7
 """Normal penetration from which an overlap must be found, m."""
@@ -118,20 +113,12 @@ def dense_overlaps(geometry, pose, overlaps):
 
 
 @jit
-def _group(overlaps, count, reduction):
-    """Number the groups of overlaps that may count as one; returns how many there are.
-
-    That is, those closer than `SEPARATION`; with ``moment`` also those closer than a scan step that are wide enough
-    together to be integrated over the scan's nodes.
-    """
+def _group(overlaps, count):
+    """Number the groups of overlaps that may count as one (closer than `SEPARATION`); returns how many there are."""
     group = 0
-    start = overlaps[0, _LOW]
     for j in range(count):
-        if j > 0:
-            distance = overlaps[j, _LOW] - overlaps[j - 1, _HIGH]
-            wide = reduction == MOMENT and overlaps[j, _HIGH] - start > WIDE
-            if not (distance < SEPARATION or (wide and distance < SCAN_STEP)):
-                group, start = group + 1, overlaps[j, _LOW]
+        if j > 0 and overlaps[j, _LOW] - overlaps[j - 1, _HIGH] >= SEPARATION:
+            group += 1
         overlaps[j, _GROUP] = group
     return group + 1 if count > 0 else 0
 
@@ -187,7 +174,7 @@ def judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps):
     if bad >= 0:
         return BAD, rows[bad, U_WHEEL], rows[bad, PENETRATION], 0
     there = dense_overlaps(geometry, make_pose(side, y, z, axle[0], axle[1], axle[2], spatial), overlaps)
-    groups = _group(overlaps, there, reduction)
+    groups = _group(overlaps, there)
     expected = 0
     for j in range(there):
         expected += overlaps[j, _DEPTH] > DEPTH

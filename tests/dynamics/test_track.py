@@ -123,8 +123,8 @@ def test_rails_that_run_askew_are_yaw(tmp_path):
 
 
 def test_a_curve_is_run_through_and_reported_in_the_tracks_frame():
-    # 600 m left curve at 20 m/s: arc length V t, and a shift to the outside (to the right, y < 0), which gives the outer
-    # wheel the larger radius
+    # 600 m left curve at 20 m/s: arc length V t, and a shift to the outside (to the right, y < 0): it gives the
+    # outer wheel the larger radius
     path = [{"tangent": 20}, {"transition": 40}, {"curve": 400, "radius": 600, "cant": 0.06}]
     overrides = [f"track={json.dumps({'path': path})}", "initial.y=0", "integration.duration=8"]
     run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", overrides))

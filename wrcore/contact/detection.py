@@ -59,6 +59,9 @@ PLANAR, SPATIAL, AUTO = 0, 1, 2
 _PARTS = 3
 """Sub-intervals of a scan step where the search looks closer."""
 
+_FLANK = 2
+"""Close strips on either side of an overlap that are taken for its own flanks."""
+
 _WIDE = 10
 """Overlaps of at least this many scan nodes are integrated over them, narrower ones over the profiles' own nodes, and
 those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
@@ -236,7 +239,9 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     )
     if close == 0:
         return 0
+    # one overlap, and next to its ends no more close strips than its own flanks make
     one_overlap = last - first + 1 == overlapping and last_close - first_close + 1 == close
+    one_overlap = one_overlap and first - first_close <= _FLANK and last_close - last <= _FLANK
     if reduction == MOMENT and overlapping >= _WIDE and one_overlap:
         start = geometry.scan_wheel_start + node * SCAN_STEP
         m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3

@@ -44,7 +44,7 @@ PATCH_COLUMNS = 19
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
 
-_LOOSE_TOLERANCE = 1e-3
+_LOOSE_TOLERANCE = 1e-9
 """Slopes agree to this where only a start for the overlap's edges is wanted."""
 
 _LAST_STEP = 2e-5
