@@ -139,8 +139,10 @@ def _search(geometry, pose, reduction, node, reach, offset, first_close, last_cl
         cosine = scan_rail[RAIL_COSINE, cell]
         parts = _PARTS if 0.0 <= min(coarse, before) < reserve else 1
         for part in range(1, parts + 1):
-            u = at - SCAN_STEP * (parts - part) / parts
-            gap = coarse if part == parts else gap_at(geometry, pose, u)[0]
+            u, gap = at, coarse
+            if part < parts:
+                u -= (parts - part) * (SCAN_STEP / _PARTS)
+                gap = gap_at(geometry, pose, u)[0]
             if gap < 0.0:
                 if not inside:
                     inside, outside, first, deepest, depth = True, one_back_at, u, u, 0.0
