@@ -1,0 +1,60 @@
+"""The wrench of a wheel against vector algebra on its patches."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.contact import reduction as columns
+from wrcore.contact.normal import damping_factor, hertz_ellipse
+from wrcore.creep.laws import LAWS, creep_force
+from wrcore.dynamics.wheel import wheel_wrench
+from wrcore.geometry.track import rotation
+from wrcore.scene import compile_scene, load_scene
+
+POSES = [  # side, y, roll, yaw: tread, both sides, and a flange contact
+    (1.0, 0.002, 1e-4, 0.004), (-1.0, 0.002, 1e-4, 0.004), (-1.0, -0.0068, -1.5e-3, -0.006),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("side", "y", "roll", "yaw"), POSES)
+@pytest.mark.parametrize("patch", ["maximum", "moment"])
+def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
+    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["contact.creep.model=fastsim", f"contact.patch={patch}"])
+    model = compile_scene(scene)[0].contact
+    v, w = np.array([20.0, 0.03, -0.01]), np.array([0.02, 43.6, 0.05])
+    axle = rotation(roll, yaw)[:, 1]
+    z = next(z for z in np.arange(0.4625, 0.4590, -2e-5) if _loaded(model, side, y, z, axle))
+    rows = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    *wrench, count, _, _ = wheel_wrench(model, side, y, z, *axle, *v, *w, 0.0, 0.0, rows)
+    assert count >= 1
+    force, moment = np.zeros(3), np.zeros(3)
+    for row in rows[:count]:
+        angle, delta = row[columns.ANGLE], row[columns.PENETRATION]
+        t1, t2, n = np.array([[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]])
+        arm = row[[columns.X, columns.Y, columns.Z]] - [0.0, y, z]
+        slip = v + np.cross(w, arm)  # velocity of the wheel's material at the contact; the rail is at rest
+        np.testing.assert_allclose(row[[columns.XI, columns.ETA]], [slip @ t1 / 20, slip @ t2 / 20], atol=1e-12)
+        assert row[columns.PHI] == pytest.approx(w @ n / 20, rel=1e-12)
+        # Eq. (7), and the creep law in its own, nondimensional terms
+        factor = damping_factor(-slip @ n, 0.8, 0.05)
+        stiffness, p, q = hertz_ellipse(model.hertz, row[columns.CURVATURE_X], row[columns.CURVATURE_Y])
+        normal = factor * 8.2e10 / 0.72 * stiffness * delta**1.5
+        assert row[columns.NORMAL] == pytest.approx(normal, rel=1e-12)
+        a, b = np.array([p, q]) * (normal / (8.2e10 / 0.72 * stiffness)) ** (1 / 3)  # the ellipse that carries N
+        np.testing.assert_allclose(row[[columns.SEMI_A, columns.SEMI_B]], [a, b], rtol=1e-12)
+        c, limit = np.sqrt(a * b), 0.3 * normal
+        xi, eta, phi = row[[columns.XI, columns.ETA, columns.PHI]] * 8.2e10 * c**2 / limit * [1, 1, c]
+        f1, f2, m3, _ = creep_force(LAWS["fastsim"], model.creep, a / b, 0.0, xi, eta, phi)
+        np.testing.assert_allclose(
+            row[[columns.FX, columns.FY, columns.MZ]], limit * np.array([f1, f2, c * m3]), rtol=1e-9, atol=1e-9
+        )
+        push = row[columns.NORMAL] * n + row[columns.FX] * t1 + row[columns.FY] * t2
+        force += push
+        moment += np.cross(arm, push) + row[columns.MZ] * n
+    np.testing.assert_allclose(wrench[:3], force, rtol=1e-12)
+    np.testing.assert_allclose(wrench[3:], moment, rtol=1e-9, atol=1e-9 * np.abs(moment).max())
+
+
+def _loaded(model, side, y, z, axle):
+    rows = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    return wheel_wrench(model, side, y, z, *axle, 20.0, 0, 0, 0, 43.6, 0, 0.0, 0.0, rows)[2] > 4e4
