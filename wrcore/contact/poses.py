@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from wrcore.checked_csv import read_csv_table
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
@@ -38,18 +39,13 @@ def read_poses(path):
     """
     import pandas as pd
 
-    try:
-        frame = pd.read_csv(path, dtype={"pose_id": str}, skipinitialspace=True, comment="#")
-    except OSError as error:
-        raise InputError(path, "", f"expected a readable CSV file: {error.strerror}") from None
-    except (ValueError, pd.errors.ParserError) as error:  # includes EmptyDataError and UnicodeDecodeError
-        raise InputError(path, "", f"expected a CSV table: {error}") from None
+    frame = read_csv_table(path, "pose_id")
     known = ("pose_id", "y_m", "yaw_rad", "roll_rad", "z_m")
     for name in known[:3]:
         if name not in frame:
             raise InputError(path, name, f"expected this column; found {', '.join(map(str, frame.columns))}")
-    for name in frame.columns:
-        if name not in known:
+    for name in frame.columns:  # other columns are left alone, but not a pose in another unit or spelling
+        if name not in known and str(name).split("_")[0].strip().lower() in ("y", "yaw", "roll", "z"):
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
     for name, limit in (("y_m", 0.1), ("yaw_rad", 0.5), ("roll_rad", 0.5), ("z_m", 2.0)):
         if name not in frame:

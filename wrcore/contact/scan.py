@@ -167,14 +167,7 @@ def any_close(pose, scan_wheel, scan_rail, node, reach, offset, first):
     count = 0
     for i in range(CHUNK + 8):
         k = first + i
-        radius, along = scan_wheel[RADIUS, node + k], scan_wheel[RADIUS_SLOPE, node + k] * pose.tilt
-        square = along * along
-        down = 1.0 - square * (0.5 + square * (0.125 + square * 0.0625))
-        axial = reach + k * SCAN_STEP
-        lateral = axial * pose.ey + radius * (down * pose.y_down + along * pose.y_along)
-        d = pose.side * lateral - offset - k * SCAN_STEP
-        rail = scan_rail[0, k] + d * (scan_rail[1, k] + d * (scan_rail[2, k] + d * scan_rail[3, k]))
-        gap = pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
+        gap = strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k)
         count += gap < 2.0 * (scan_wheel[WHEEL_RESERVE, node + k] + scan_rail[RAIL_RESERVE, k])
     return count
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wrcore.checked_csv import read_csv_table
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
@@ -29,12 +30,7 @@ def read_cases(path):
     InputError
         If the file cannot be read as a table.
     """
-    import pandas as pd
-
-    try:
-        frame = pd.read_csv(path, dtype={"case_id": str}, skipinitialspace=True)
-    except (OSError, ValueError) as error:  # pandas' parser errors are ValueErrors
-        raise InputError(path, "", f"expected a CSV file with a header line ({error})") from error
+    frame = read_csv_table(path, "case_id")
     frame.attrs["source"] = str(path)
     return frame
 
