@@ -26,6 +26,6 @@ def read_csv_table(path, text):
     try:
         return pd.read_csv(path, dtype={text: str}, skipinitialspace=True, comment="#")
     except OSError as error:
-        raise InputError(path, "", f"expected a readable CSV file: {error.strerror}") from None
+        raise InputError(path, "", f"expected a CSV file with a header line: {error.strerror}") from None
     except ValueError as error:  # pandas' parser errors and UnicodeDecodeError are ValueErrors
-        raise InputError(path, "", f"expected a CSV table with a header line: {error}") from None
+        raise InputError(path, "", f"expected a CSV file with a header line: {error}") from None
