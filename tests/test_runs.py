@@ -20,7 +20,7 @@ def test_conical_wheelset_follows_klingel():
     """Cone 1:20 on circular rail heads, 3 m/s, 0.5 mm: Klingel's wavelength 2 pi sqrt(r b / gamma) within 1 %.
 
     The wheelset's roll shifts the contact on a rail head of radius R, which makes the effective conicity
-    gamma b / (b - R gamma) (Wickens, Fundamentals of Rail Vehicle Dynamics, 2003, section 2): within 0.1 % with it.
+    gamma b / (b - R gamma): roll gamma y/b moves the contact by R gamma y/b, which adds to y: within 0.1 %.
     """
     gamma, radius = 0.05, 0.3
     overrides = [

@@ -4,15 +4,12 @@ import numpy as np
 import pandas as pd
 
 from wrcore.contact.geometry import contact_geometry
-from wrcore.contact.poses import solve_poses
+from wrcore.contact.poses import geometry_table as rigid_contact
 from wrcore.simulate import simulate
 
 FLANGE_ANGLE = 0.7
 """Contact angle from which a contact counts as flange contact, rad. S1002 on UIC60 at 1:40 jumps across this value:
 from the flange root to the flange, whose face stands at 1.22 rad (70 degrees)."""
-
-RIGID_LOAD = 1e-3
-"""Wheel load at which the wheelset counts as rigid, N: the approach is then below a nanometre."""
 
 SIDES = ("left", "right")
 
@@ -288,38 +285,22 @@ def time_runs(cases, repetitions):
     return samples[samples["repetition"] > 0].reset_index(drop=True)
 
 
-def geometry_table(scene, y, load=RIGID_LOAD):
-    """Rigid contact geometry of a scene's wheelset over its lateral position, with roll, without yaw.
+def geometry_table(scene, y):
+    """Rigid contact geometry of a scene's wheelset, see :func:`wrcore.contact.poses.geometry_table`.
 
     Parameters
     ----------
     scene : Scene
     y : sequence of float
         Lateral positions of the wheelset, m.
-    load : float
-        Vertical load per wheel, N; small, so that deformation does not count.
 
     Returns
     -------
     pandas.DataFrame
-        Columns y_m, roll_rad, lowering_m (of the wheelset's centre below the nominal radius), radius_difference_m
-        (left less right) and, per side, u_wheel, u_rail (m) and contact angle (rad) of the most loaded patch.
     """
     vehicle = scene.vehicle
     geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
-    poses = pd.DataFrame({"pose_id": range(len(y)), "y_m": y, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan})
-    touching = solve_poses(poses, geometry, load, scene.detection, "maximum")
-    patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
-    table = pd.DataFrame({"y_m": y})
-    for side in SIDES:
-        rows = patches.xs(side, level="side").reindex(range(len(y)))
-        for name in ("u_wheel_m", "u_rail_m", "contact_angle_rad"):
-            table[f"{side}_{name}"] = rows[name].to_numpy()
-    table.insert(1, "roll_rad", rows["roll_rad"].to_numpy())
-    table.insert(2, "lowering_m", vehicle.rolling_radius - rows["z_wheelset_m"].to_numpy())
-    left, right = (scene.wheel(table[f"{side}_u_wheel_m"].to_numpy()) for side in SIDES)
-    table.insert(3, "radius_difference_m", right - left)
-    return table
+    return rigid_contact(geometry, y, scene.detection)
 
 
 def timing_table(samples):

@@ -67,8 +67,9 @@ class WheelsetOnTrack:
     gauge : float
         Distance between the rails' innermost points within ``gauge_depth`` of their tops, m.
     gauge_depth : float
-        m; 14 mm (EN 13848-1). The reference rail of UIC 519 is drawn about a point 0.492 mm lower than its top, from
-        which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies at 750 mm.
+        m; 14 mm in the Manchester contact benchmark. The reference rail of UIC 519 is drawn about a point 0.492 mm
+        lower than its top, from which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies
+        at 750 mm.
     """
 
     left: WheelOnRail

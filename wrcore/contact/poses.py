@@ -125,8 +125,12 @@ def solve_poses(
     return pd.DataFrame(rows, columns=names)
 
 
+RIGID_LOAD = 1e-3
+"""Wheel load at which the wheelset counts as rigid, N: the approach is then below a nanometre."""
+
+
 def geometry_table(geometry, shifts, detection="planar"):
-    """Rigid contact geometry of a wheelset without load and yaw: what a conicity study starts from.
+    """Rigid contact geometry of a wheelset without load and yaw, with roll: what a conicity study starts from.
 
     Parameters
     ----------
@@ -138,27 +142,31 @@ def geometry_table(geometry, shifts, detection="planar"):
     Returns
     -------
     pandas.DataFrame
-        Columns y_m, roll_rad, lowering_m (of the wheelset against its nominal height), rolling_radius_difference_m
-        (left less right: positive when shifted to the left), u_wheel and contact angle per side. Touching is taken as
-        a wheel load of 1 mN (penetration below 1 nm).
+        Columns y_m, roll_rad, lowering_m (of the wheelset's centre below the nominal radius), radius_difference_m
+        (left less right) and, per side, u_wheel, u_rail (m) and contact angle (rad) of the most loaded patch.
     """
     import pandas as pd
 
-    touch = 1e-3
-    poses = pd.DataFrame({"pose_id": [str(i) for i in range(len(shifts))], "y_m": shifts})
-    poses = poses.assign(yaw_rad=0.0, roll_rad=np.nan, z_m=np.nan)
-    table = solve_poses(poses, geometry, touch, detection, "maximum")
-    rows = []
-    for pose in poses.itertuples():
-        found = table[table.pose_id == pose.pose_id]
-        deepest = {side: found[found.side == side].nlargest(1, "N_N").iloc[0] for side in SIDES}
-        row = {"y_m": pose.y_m, "roll_rad": deepest["left"].roll_rad,
-               "lowering_m": geometry.rolling_radius - deepest["left"].z_wheelset_m}  # fmt: skip
-        radius = {}
-        for side, patch in deepest.items():
-            u, start, step = patch.u_wheel_m, geometry.wheel_start, geometry.wheel_step
-            radius[side] = geometry.rolling_radius + cubic_at(geometry.wheel, start, step, u)[0]
-            row |= {f"u_wheel_{side}_m": u, f"contact_angle_{side}_rad": patch.contact_angle_rad}
-        row["rolling_radius_difference_m"] = radius["left"] - radius["right"]
-        rows.append(row)
-    return pd.DataFrame(rows)
+    poses = pd.DataFrame(
+        {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
+    )
+    touching = solve_poses(poses, geometry, RIGID_LOAD, detection, "maximum")
+    patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
+    table = pd.DataFrame({"y_m": shifts})
+    for side in SIDES:
+        rows = patches.xs(side, level="side").reindex(range(len(shifts)))
+        for name in ("u_wheel_m", "u_rail_m", "contact_angle_rad"):
+            table[f"{side}_{name}"] = rows[name].to_numpy()
+    table.insert(1, "roll_rad", rows["roll_rad"].to_numpy())
+    table.insert(2, "lowering_m", geometry.rolling_radius - rows["z_wheelset_m"].to_numpy())
+    left, right = (
+        np.array(
+            [
+                cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
+                for u in table[f"{side}_u_wheel_m"]
+            ]
+        )
+        for side in SIDES
+    )
+    table.insert(3, "radius_difference_m", left - right)
+    return table

@@ -18,7 +18,7 @@ from wrcore.geometry.irregularity import (
 from wrcore.geometry.path import PathData, path_data, tangent_path
 
 GAUGE_DEPTH = 0.014
-"""Height below the rail top at which the gauge is measured, m (EN 13848-1; Manchester contact benchmark)."""
+"""Height below the rail top at which the gauge is measured, m (Manchester contact benchmark)."""
 
 LEAST_RADIUS = 20.0
 """Smaller radii are taken for another unit, m."""
