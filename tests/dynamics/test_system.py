@@ -10,7 +10,8 @@ from tests.dynamics.test_body import matrix_of
 from wrcore.dynamics.body import STATE_SIZE, euler_parameters
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import COORDINATE, SPHERICAL, Joints, constraint_equations
-from wrcore.dynamics.suspension import FRAME, SpringDampers
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.suspension import SpringDampers
 from wrcore.dynamics.system import Bodies, Model, right_hand_side, workspace
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.irregularity import no_irregularity

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore._jit import jit
-from wrcore.dynamics.suspension import FRAME, marker_motion
+from wrcore.dynamics.marker import FRAME, marker_motion
 
 COORDINATE, SPHERICAL = 0, 1
 KINDS = {"coordinate": COORDINATE, "spherical": SPHERICAL}

@@ -18,7 +18,8 @@ from wrcore._jit import jit
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.joint import Joints, constraint_equations
-from wrcore.dynamics.suspension import FRAME, SpringDampers, spring_damper_forces
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.suspension import SpringDampers, spring_damper_forces
 from wrcore.dynamics.track import TrackModel, add_rail_wrenches
 from wrcore.dynamics.wheel import ContactModel, wheel_wrench
 

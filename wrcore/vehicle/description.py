@@ -7,7 +7,8 @@ import numpy as np
 
 from wrcore.checked_yaml import read_yaml, validate
 from wrcore.dynamics.joint import EQUATIONS, KINDS, Joints
-from wrcore.dynamics.suspension import FRAME, SpringDampers
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.suspension import SpringDampers
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 
