@@ -162,13 +162,15 @@ def test_reduced_solution_equals_the_full_matrix_of_eq_8(contact):
         A = work.rotations[b]
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = masses[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = A @ np.diag(inertias[b]) @ A.T
+    constraints = work.constraints
     for row in range(7):
         for end in range(2):
-            if work.owner[row, end] != FRAME:
-                D[row, 6 * work.owner[row, end] : 6 * work.owner[row, end] + 6] += work.jacobian[row, end]
+            body = constraints.owner[row, end]
+            if body != FRAME:
+                D[row, 6 * body : 6 * body + 6] += constraints.jacobian[row, end]
     velocity_rates = lambda r: np.concatenate([r[STATE_SIZE * b + 7 : STATE_SIZE * b + 13] for b in range(2)])  # noqa: E731
     g = M @ velocity_rates(unconstrained)
-    right = work.gamma - 2 * 3.0 * work.phi_rate - 7.0**2 * work.phi
+    right = constraints.gamma - 2 * 3.0 * constraints.phi_rate - 7.0**2 * constraints.phi
     full = np.linalg.solve(np.block([[M, D.T], [D, np.zeros((7, 7))]]), np.concatenate([g, right]))
     np.testing.assert_allclose(velocity_rates(rate), full[:12], rtol=1e-9, atol=1e-9)
 
@@ -189,11 +191,11 @@ def test_constraints_match_finite_differences(contact):
     for t, y in zip(times, [backwards[2], backwards[1], state, forwards[1], forwards[2]], strict=True):
         work = workspace(model)
         right_hand_side(model, work)(t, y)
+        c = work.constraints
         constraint_equations(
-            model.joints, model.track, t, 0.0, y, work.rotations, work.phi, work.phi_rate, work.jacobian, work.gamma,
-            work.owner,
-        )  # fmt: skip
-        values.append((work.phi.copy(), work.phi_rate.copy(), work.gamma.copy()))
+            model.joints, model.track, t, 0.0, y, work.rotations, c.phi, c.phi_rate, c.jacobian, c.gamma, c.owner
+        )
+        values.append((c.phi.copy(), c.phi_rate.copy(), c.gamma.copy()))
     phi = np.array([v[0] for v in values])
     np.testing.assert_allclose((phi[0] - 8 * phi[1] + 8 * phi[3] - phi[4]) / (12 * h), values[2][1], atol=1e-8)
     second = (-phi[0] + 16 * phi[1] - 30 * phi[2] + 16 * phi[3] - phi[4]) / (12 * h * h)

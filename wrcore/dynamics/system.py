@@ -8,7 +8,6 @@ from the small system (D M^-1 D^T) lambda = D M^-1 g - gamma*, and the full matr
 without joints does not run any of this.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,8 @@ from numba.typed import List
 from wrcore._jit import jit
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
-from wrcore.dynamics.joint import Joints, constraint_equations
-from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
+from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import SpringDampers, spring_damper_forces
 from wrcore.dynamics.track import TrackModel, add_rail_wrenches
 from wrcore.dynamics.wheel import ContactModel, wheel_wrench
@@ -70,15 +69,7 @@ class Workspace(NamedTuple):
     """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
     counters: np.ndarray
     """(2,) int: evaluations, creep look-ups out of range."""
-    phi: np.ndarray
-    phi_rate: np.ndarray
-    gamma: np.ndarray
-    jacobian: np.ndarray
-    owner: np.ndarray
-    solved: np.ndarray
-    multipliers: np.ndarray
-    """(m,): Lagrange multipliers of the last evaluation."""
-    matrix: np.ndarray
+    constraints: ConstraintWork
     frames: np.ndarray
     irregularity: np.ndarray
 
@@ -94,26 +85,13 @@ def workspace(model):
     -------
     Workspace
     """
-    n, k, m = len(model.bodies.mass), len(model.bodies.wheelsets), model.joints.equations
+    n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
     return Workspace(
         np.zeros((n + 1, 3, 3)), np.full(k, np.nan), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
-        np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((m, 2, 6)), np.zeros((m, 2), np.int64),
-        np.zeros((m, 2, 6)), np.zeros(m), np.zeros((m, m)), np.zeros((2, 3, 3)), np.zeros((3, 4)),
+        constraint_workspace(model.joints), np.zeros((2, 3, 3)), np.zeros((3, 4)),
     )  # fmt: skip
-
-
-@jit(allocates=False)
-def _apply_inverse_inertia(inertia, matrix, wrench, out):
-    """out = J^-1 n for the moment part of a wrench (6,), J = A diag(inertia) A^T."""
-    for i in range(3):
-        out[i] = 0.0
-    for k in range(3):
-        local = matrix[0, k] * wrench[3] + matrix[1, k] * wrench[4] + matrix[2, k] * wrench[5]
-        local /= inertia[k]
-        for i in range(3):
-            out[i] += matrix[i, k] * local
 
 
 @jit(allocates=False)
@@ -129,67 +107,6 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[3] -= wy * hz - wz * hy
     wrench[4] -= wz * hx - wx * hz
     wrench[5] -= wx * hy - wy * hx
-
-
-@jit(allocates=False)
-def _solve_in_place(matrix, right):
-    """Solve a symmetric positive definite system by Cholesky's factorisation; both arguments are overwritten."""
-    n = right.shape[0]
-    for i in range(n):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = math.sqrt(total) if i == j else total / matrix[j, j]
-    for i in range(n):
-        for k in range(i):
-            right[i] -= matrix[i, k] * right[k]
-        right[i] /= matrix[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            right[i] -= matrix[k, i] * right[k]
-        right[i] /= matrix[i, i]
-
-
-@jit(allocates=False)
-def _add_reactions(model, t, state, work):
-    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches."""
-    m = model.joints.equations
-    mass, inertia = model.bodies.mass, model.bodies.inertia
-    owner, jacobian, solved, multipliers = work.owner, work.jacobian, work.solved, work.multipliers
-    constraint_equations(
-        model.joints, model.track, t, model.speed, state, work.rotations, work.phi, work.phi_rate, jacobian,
-        work.gamma, owner,
-    )  # fmt: skip
-    for row in range(m):
-        feedback = 2.0 * model.alpha * work.phi_rate[row] + model.beta * model.beta * work.phi[row]
-        multipliers[row] = feedback - work.gamma[row]
-        for end in range(2):
-            body = owner[row, end]
-            if body == FRAME:
-                continue
-            block = solved[row, end]  # M^-1 D^T, block by block
-            _apply_inverse_inertia(inertia[body], work.rotations[body], jacobian[row, end], block[3:])
-            for i in range(6):
-                if i < 3:
-                    block[i] = jacobian[row, end, i] / mass[body]
-                multipliers[row] += block[i] * work.wrenches[body, i]
-    for row in range(m):
-        for column in range(m):
-            entry = 0.0
-            for end in range(2):
-                for other in range(2):
-                    if owner[row, end] != FRAME and owner[row, end] == owner[column, other]:
-                        for i in range(6):
-                            entry += jacobian[row, end, i] * solved[column, other, i]
-            work.matrix[row, column] = entry
-    _solve_in_place(work.matrix, multipliers)
-    for row in range(m):
-        for end in range(2):
-            body = owner[row, end]
-            if body != FRAME:
-                for i in range(6):
-                    work.wrenches[body, i] -= multipliers[row] * jacobian[row, end, i]
 
 
 @jit(allocates=False)
@@ -247,7 +164,7 @@ def fill_derivatives(t, state, model, work, rate):
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
-        _add_reactions(model, t, state, work)
+        add_reactions(model, t, state, work)
     for b in range(n):
         at = STATE_SIZE * b
         wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
@@ -259,7 +176,7 @@ def fill_derivatives(t, state, model, work, rate):
         for i in range(3):
             rate[at + i] = state[at + 7 + i]
             rate[at + 7 + i] = work.wrenches[b, i] / bodies.mass[b]
-        _apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + 10 : at + 13])
+        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + 10 : at + 13])
 
 
 @jit
