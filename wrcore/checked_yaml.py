@@ -12,12 +12,16 @@ import yaml
 from wrcore.errors import InputError
 
 
+MERGE = "tag:yaml.org,2002:merge"
+"""``<<: *anchor`` takes over the keys of another mapping; those written beside it win."""
+
+
 class _Loader(yaml.SafeLoader):
     """Safe loader that refuses repeated keys and reads 1e-6 as a number."""
 
 
 def _mapping(loader, node, deep=False):
-    keys = [loader.construct_object(key, deep=True) for key, _ in node.value]
+    keys = [loader.construct_object(key, deep=True) for key, _ in node.value if key.tag != MERGE]
     for i, key in enumerate(keys):
         if key in keys[:i]:
             raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} is given twice", node.start_mark)

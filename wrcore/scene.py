@@ -16,8 +16,9 @@ from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table, load_table
-from wrcore.dynamics.body import STATE_SIZE, euler_of
-from wrcore.dynamics.system import Model
+from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
+from wrcore.dynamics.equilibrium import solve_equilibrium
+from wrcore.dynamics.system import Model, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
@@ -25,10 +26,13 @@ from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track, rotation
-from wrcore.vehicle.description import Vehicle, load_vehicle
+from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 
-GRAVITY = 9.81
-"""m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
+FRICTIONLESS = 1e-9
+"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
+
+LARGEST_REST = 1e-6 * GRAVITY
+"""A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
 
 POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
@@ -94,7 +98,8 @@ def load_scene(scene, overrides=()):
     for override in overrides:
         _override(data, override)
     data = validate(data, "scene", source)
-    vehicle = load_vehicle(_find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters"))
+    parameters = _find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
+    vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
     wheel = _profile(data, "wheel", folder, source, 0.0)
     rail = _profile(data, "rail", folder, source, _ratio(data["rail"]["inclination"], source, "rail.inclination"))
     if "table" in data["contact"]["creep"]:
@@ -198,47 +203,113 @@ def compile_scene(scene, progress=None):
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
         ),
-        vehicle.springs, vehicle.joints,
+        vehicle.elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
-    return model, _initial_state(scene, model)
+    return model, initial_state(scene, model)
 
 
-def _initial_state(scene, model):
-    data, vehicle, contact = scene.data, scene.vehicle, model.contact
-    state = np.zeros(STATE_SIZE * len(vehicle.body_names))
-    y, yaw, speed = float(data["initial"]["y"]), float(data["initial"]["yaw"]), model.speed
-    spatial = scene.detection != "planar"
-    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
-    for body in vehicle.bodies.wheelsets:
-        load = 0.5 * vehicle.axle_load(body, GRAVITY)
-        if load <= 0.0:
-            raise InputError(
-                scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
-            )
-        roll, z = settle(
-            contact.geometry, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load,
-            vehicle.rolling_radius,
+def static_equilibrium(scene, model):
+    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+
+    Returns
+    -------
+    Equilibrium
+        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
+
+    Raises
+    ------
+    InputError
+        If there is none near the nominal position.
+    """
+    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity), contact=contact)
+    state = np.zeros(state_size(model))
+    for body, position in enumerate(vehicle.positions):
+        at = STATE_SIZE * body
+        state[at : at + 8] = *position, 1.0, 0.0, 0.0, 0.0, model.speed
+        if body in wheelsets:
+            load = vehicle.nominal_wheel_load(body)
+            if load <= 0.0:
+                raise InputError(
+                    scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
+                )
+            state[at + 2] = _settled(scene, model, 0.0, 0.0, load)[1]
+    equilibrium = solve_equilibrium(level, state)
+    if not equilibrium.residual < LARGEST_REST or np.any(equilibrium.wheel_loads <= 0.0):
+        raise InputError(
+            scene.source, "vehicle", "expected a vehicle that rests on its wheels near its nominal position, got"
+            f" accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel load of"
+            f" {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
         )  # fmt: skip
-        if not math.isfinite(z):
-            raise InputError(scene.source, "initial", "expected a position in which both wheels can stand on the rails")
-        patches = detect(
-            contact.geometry, y, z, roll, yaw, "spatial" if spatial else "planar", data["contact"]["patch"]
-        )
-        radius = np.mean([vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
-        state[STATE_SIZE * body : STATE_SIZE * (body + 1)] = _rolling(
-            model.track.path, vehicle.positions[body, 0], y, z, roll, yaw, speed, speed / radius
-        )
+    for body in wheelsets:
+        part = equilibrium.state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        roll, _, yaw = angles(part[3:7])
+        part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
+    return equilibrium
+
+
+def _rolling(scene, model, y, z, roll, yaw):
+    """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
+    detection = "planar" if scene.detection == "planar" else "spatial"
+    patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
+    radius = np.mean([scene.vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
+    return rotation(roll, yaw)[:, 1] * model.speed / radius
+
+
+def _settled(scene, model, y, yaw, load):
+    """Roll and height of a wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
+    contact = model.contact
+    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
+    roll, z = settle(
+        contact.geometry, contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
+        scene.vehicle.rolling_radius,
+    )  # fmt: skip
+    if not math.isfinite(z):
+        raise InputError(
+            scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
+            f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
+        )  # fmt: skip
+    return roll, z
+
+
+def initial_state(scene, model):
+    """State at the start: static equilibrium, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
+
+    Wheelsets keep their static loads: height and roll are those at which each wheel carries half of its wheelset's.
+    """
+    vehicle, data = scene.vehicle, scene.data
+    equilibrium = static_equilibrium(scene, model)
+    y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
+    state = equilibrium.state.copy()
+    for body, (s, _, _) in enumerate(vehicle.positions):
+        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        if body in vehicle.bodies.wheelsets and (y or yaw):
+            k = int(np.flatnonzero(vehicle.bodies.wheelsets == body)[0])
+            roll, z = _settled(scene, model, y, yaw, float(np.mean(equilibrium.wheel_loads[k])))
+            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
+            part[10:13] = _rolling(scene, model, y, z, roll, yaw)
+        else:
+            part[1] += y
+        if not model.track.tangent:
+            part[:] = _on_path(model.track.path, s, part)
     return state
 
 
-def _rolling(path, s, y, z, roll, yaw, speed, spin):
-    """State of a wheelset that rolls along the track at arc length s, in a pose relative to the track's frame."""
+def _on_path(path, s, part):
+    """State of one body at arc length s of the path, from its state at the same place of a tangent track along x."""
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)
-    turned = frame @ rotation(roll, yaw)
-    position = np.array([station.x, station.y, station.z]) + frame[:, 1:] @ np.array([y, z])
-    turn = frame @ np.array(frame_turn(station)) * speed  # the frame's own turn along the path
-    return np.concatenate([position, euler_of(turned), speed * frame[:, 0], turned[:, 1] * spin + turn])
+    turn = frame @ np.array(frame_turn(station)) * part[7]  # the frame's own turn along the path
+    arm = frame @ np.array([part[0] - s, part[1], part[2]])
+    position = np.array([station.x, station.y, station.z]) + arm
+    velocity = frame @ part[7:10] + np.cross(turn, arm)
+    return np.concatenate([position, euler_of(frame @ matrix_of(part[3:7])), velocity, frame @ part[10:13] + turn])

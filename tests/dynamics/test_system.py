@@ -11,7 +11,7 @@ from wrcore.dynamics.body import STATE_SIZE, euler_parameters
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import COORDINATE, SPHERICAL, Joints, constraint_equations
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import SpringDampers
+from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import Bodies, Model, right_hand_side, workspace
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.irregularity import no_irregularity
@@ -37,12 +37,15 @@ def contact(request):
 
 def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, speed=0.0, alpha=5.0, beta=5.0):
     """A model without wheels. springs: bodies, markers, k, c, preload, rest; joints: kind, bodies, markers, axis."""
-    n, m = len(springs), len(joints)
+    m = len(joints)
     wheelless = np.zeros(len(masses), np.int64), np.zeros(0, np.int64)
     bodies = Bodies(np.array(masses, float), np.array(inertias, float), *wheelless)
-    shapes = (2, 3), (3,), (3,), (3,), (3,)
-    columns = [np.array([s[i + 1] for s in springs], float).reshape(n, *shape) for i, shape in enumerate(shapes)]
-    elements = SpringDampers(np.array([s[0] for s in springs], np.int64).reshape(n, 2), *columns)
+    elements = pack_elements(
+        [
+            ((*ends, 0.0), [*markers[0], *np.add(markers[1], rest), *k, *c, *preload])
+            for ends, markers, k, c, preload, rest in springs
+        ]
+    )
     equations = sum(3 if j[0] == SPHERICAL else 1 for j in joints)
     joined = Joints(
         np.array([j[0] for j in joints], np.int64), np.array([j[1] for j in joints], np.int64).reshape(m, 2),

@@ -48,6 +48,13 @@ def euler_of(matrix):
     return p if p[0] >= 0.0 else -p
 
 
+def matrix_of(p):
+    """Rotation matrix (3, 3) of Euler parameters (4,)."""
+    matrix = np.empty((3, 3))
+    rotation_matrix(np.concatenate([np.zeros(3), p]), 0, matrix)
+    return matrix
+
+
 def angles(p):
     """Roll, pitch and yaw (rad) of Euler parameters, the inverse of :func:`euler_parameters`.
 

@@ -1,65 +1,244 @@
-"""Force elements between two bodies."""
+"""Force elements between two bodies, evaluated pair by pair.
 
+All elements between one first body i and one second body j share the relative motion of the two, which is computed
+once in the axes of j: with A the rotation matrices, r the positions, v the velocities and w the angular velocities,
+
+    R = Aj^T Ai,  rho = Aj^T (ri - rj),  u = Aj^T (vi - vj - wj x (ri - rj)),  W = Aj^T (wi - wj).
+
+A marker m of i and a marker n of j are then apart by d = rho + R m - n, at the rate d' = u + W x R m. A force F on i
+acts at i's marker; the opposite force acts on j at that same point, so that the pair neither gains angular momentum nor,
+without dampers, energy: with U(d) the spring's energy, F = -dU/dd is its force along the axes of j exactly.
+
+The angular velocity w of a wheelset leaves out the spin (its frame does not spin, see wrcore.dynamics.body).
+"""
+
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from wrcore._jit import jit
-from wrcore.dynamics.marker import FRAME, add_force, marker_motion
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.track import moving_frame
+
+LINEAR, DISPLACEMENT, VELOCITY, SERIES, SERIES_VELOCITY = range(5)
+"""Laws of an element that acts along one direction."""
+
+LINE = 3
+"""Direction along the line between the markers; 0, 1 and 2 are the axes of the second body."""
 
 
-class SpringDampers(NamedTuple):
-    """Linear spring-dampers between two markers, acting along the axes of the second body, for kernels.
+class Elements(NamedTuple):
+    """Force elements of a model, sorted by pair, for kernels."""
 
-    The force on the first body is ``preload - k * (d - d0) - c * d'`` per axis, with d the position of the first
-    marker minus that of the second one; the second body gets the opposite force at its own marker.
+    pairs: np.ndarray
+    """(p, 2) int: first and second body; FRAME as the second one for the moving frame."""
+    ahead: np.ndarray
+    """(p,): for the moving frame, arc length of its cross-section ahead of the frame's origin, m."""
+    turning: np.ndarray
+    """(p, 2, 3): stiffness (N m/rad) and damping (N m s/rad) against relative rotation about the second body's axes."""
+    first_spring: np.ndarray
+    """(p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]."""
+    springs: np.ndarray
+    """(n, 15): along all three axes; marker of i, position relative to j at which the element is at rest (m),
+    stiffness (N/m), damping (N s/m), preload (N, on i)."""
+    first_directed: np.ndarray
+    """(p + 1,) int, as first_spring."""
+    directed: np.ndarray
+    """(m, 10): along one direction; marker of i, marker of j or rest position (m), length at rest (LINE only, m),
+    stiffness (N/m; of the series spring for series laws), damping (N s/m), preload (N; positive pushes i along
+    the direction)."""
+    law: np.ndarray
+    """(m, 5) int: direction, law, first and last + 1 point of the characteristic, number of the element's own state."""
+    table: np.ndarray
+    """(q, 2): points of all characteristics: displacement or speed and force; SERIES_VELOCITY: force and speed."""
+    states: int
+    """Number of own states: displacements (m) of dampers that act in series with a spring."""
+
+
+def pack_elements(springs=(), directed=(), turning=()):
+    """Sort elements by pair.
+
+    Parameters
+    ----------
+    springs : sequence of (pair, row)
+        Elements along three axes: pair = (first body, second body, ahead) and the 15 numbers of a row of
+        ``Elements.springs``.
+    directed : sequence of (pair, row, direction, law, points)
+        Elements along one direction: the 10 numbers of a row of ``Elements.directed``, direction, law, and the points
+        (q, 2) of the characteristic, or None.
+    turning : sequence of (pair, stiffness, damping)
+        Against relative rotation, three numbers each; summed pair by pair.
+
+    Returns
+    -------
+    Elements
     """
-
-    bodies: np.ndarray
-    """(n, 2) int: first and second body; FRAME for the moving frame."""
-    markers: np.ndarray
-    """(n, 2, 3): marker positions in body axes, m."""
-    stiffness: np.ndarray
-    """(n, 3), N/m."""
-    damping: np.ndarray
-    """(n, 3), N s/m."""
-    preload: np.ndarray
-    """(n, 3): force on the first body at d = d0, N."""
-    rest: np.ndarray
-    """(n, 3): d0, m."""
-
-
-@jit(allocates=False, inline="always")
-def _along_axis(elements, k, axis, distance, rate):
-    """Force of element k along one of its axes, for a distance of its markers and its rate there."""
-    stretch = distance - elements.rest[k, axis]
-    return elements.preload[k, axis] - elements.stiffness[k, axis] * stretch - elements.damping[k, axis] * rate
+    pairs = sorted({item[0] for group in (springs, directed, turning) for item in group})
+    springs, directed = (sorted(group, key=lambda item: item[0]) for group in (springs, directed))
+    rotational = np.zeros((len(pairs), 2, 3))
+    for pair, stiffness, damping in turning:
+        rotational[pairs.index(pair)] += (stiffness, damping)
+    points, laws, states = [], [], 0
+    for _, _, direction, law, polygon in directed:
+        own = states if law in (SERIES, SERIES_VELOCITY) else -1
+        states += own >= 0
+        start = len(points)
+        points += [] if polygon is None else list(polygon)
+        laws.append((direction, law, start, len(points), own))
+    first_spring, first_directed = (
+        np.array([sum(item[0] < pair for item in group) for pair in pairs] + [len(group)], np.int64)
+        for group in (springs, directed)
+    )
+    return Elements(
+        np.array([pair[:2] for pair in pairs], np.int64).reshape(-1, 2), np.array([pair[2] for pair in pairs], float),
+        rotational,
+        first_spring, np.array([row for _, row in springs], float).reshape(-1, 15),
+        first_directed, np.array([item[1] for item in directed], float).reshape(-1, 10),
+        np.array(laws, np.int64).reshape(-1, 5), np.array(points, float).reshape(-1, 2), states,
+    )  # fmt: skip
 
 
 @jit(allocates=False)
-def spring_damper_forces(elements, track, t, speed, state, rotations, wrenches):
-    """Add the forces of all spring-dampers to the wrenches (n, 6) of the bodies."""
-    for k in range(elements.bodies.shape[0]):
-        i, j = elements.bodies[k, 0], elements.bodies[k, 1]
-        mark = elements.markers
-        p, arm, v = marker_motion(track, speed, t, state, rotations, i, mark[k, 0, 0], mark[k, 0, 1], mark[k, 0, 2])
-        q, other_arm, u = marker_motion(
-            track, speed, t, state, rotations, j, mark[k, 1, 0], mark[k, 1, 1], mark[k, 1, 2]
-        )
-        dx, dy, dz = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-        rx, ry, rz = v[0] - u[0], v[1] - u[1], v[2] - u[2]
-        if j == FRAME and track.tangent:  # the axes are the absolute ones
-            fx = _along_axis(elements, k, 0, dx, rx)
-            fy = _along_axis(elements, k, 1, dy, ry)
-            fz = _along_axis(elements, k, 2, dz, rz)
+def characteristic(table, first, last, x):
+    """Value at x of the polygon through the points ``first`` to ``last - 1``, continued with its outer slopes."""
+    k = first
+    while k < last - 2 and x > table[k + 1, 0]:
+        k += 1
+    return table[k, 1] + (x - table[k, 0]) * (table[k + 1, 1] - table[k, 1]) / (table[k + 1, 0] - table[k, 0])
+
+
+@jit(allocates=False, forceinline=True)
+def _directed_force(elements, k, stretch, speed, state, own):
+    """Force against stretch and speed of the k-th element along one direction, and the rate of its own state."""
+    row, law = elements.directed[k], elements.law[k]
+    if law[1] == SERIES:
+        force = row[7] * (stretch - state[own + law[4]])
+        return force - row[9], force / row[8]
+    if law[1] == SERIES_VELOCITY:
+        force = row[7] * (stretch - state[own + law[4]])
+        return force - row[9], characteristic(elements.table, law[2], law[3], force)
+    force = row[7] * stretch + row[8] * speed - row[9]
+    if law[1] == DISPLACEMENT:
+        force += characteristic(elements.table, law[2], law[3], stretch)
+    elif law[1] == VELOCITY:
+        force += characteristic(elements.table, law[2], law[3], speed)
+    return force, 0.0
+
+
+@jit(allocates=False)
+def element_forces(elements, track, t, speed, state, rotations, turns, wrenches, rate):
+    """Add the forces of all elements to the wrenches of the bodies and write the rates of the elements' own states.
+
+    Parameters
+    ----------
+    elements : Elements
+    track : TrackModel
+    t, speed : float
+        Time (s), speed of the moving frame (m/s).
+    state : numpy.ndarray
+        State vector of all bodies, followed by the elements' own states.
+    rotations : numpy.ndarray, shape (n + 1, 3, 3)
+        Rotation matrices of the bodies; the last one is the moving frame's.
+    turns : numpy.ndarray, shape (n, 3)
+        Angular velocities of the bodies' frames in track axes, rad/s.
+    wrenches : numpy.ndarray, shape (n, 6)
+        Added to: force and moment about the centre of mass of each body, track axes.
+    rate : numpy.ndarray
+        Written at the places of the elements' own states: m/s.
+    """
+    own = STATE_SIZE * wrenches.shape[0]
+    for p in range(elements.pairs.shape[0]):
+        i, j = elements.pairs[p, 0], elements.pairs[p, 1]
+        at = STATE_SIZE * i
+        # relative motion of the pair in track axes
+        if j == FRAME:
+            axes = rotations[rotations.shape[0] - 1]
+            if track.tangent:
+                origin, velocity, turn = (speed * t + elements.ahead[p], 0.0, 0.0), (speed, 0.0, 0.0), (0.0, 0.0, 0.0)
+            else:
+                origin, velocity, turn = moving_frame(track, speed, t, elements.ahead[p], axes)
         else:
-            axes = rotations.shape[0] - 1 if j == FRAME else j
-            fx = fy = fz = 0.0
-            for axis in range(3):
-                ax, ay, az = rotations[axes, 0, axis], rotations[axes, 1, axis], rotations[axes, 2, axis]
-                size = _along_axis(elements, k, axis, ax * dx + ay * dy + az * dz, ax * rx + ay * ry + az * rz)
-                fx += ax * size
-                fy += ay * size
-                fz += az * size
-        add_force(i, arm, fx, fy, fz, wrenches)
-        add_force(j, other_arm, -fx, -fy, -fz, wrenches)
+            axes = rotations[j]
+            other = STATE_SIZE * j
+            origin = (state[other], state[other + 1], state[other + 2])
+            velocity = (state[other + 7], state[other + 8], state[other + 9])
+            turn = (turns[j, 0], turns[j, 1], turns[j, 2])
+        dx, dy, dz = state[at] - origin[0], state[at + 1] - origin[1], state[at + 2] - origin[2]
+        vx = state[at + 7] - velocity[0] - turn[1] * dz + turn[2] * dy
+        vy = state[at + 8] - velocity[1] - turn[2] * dx + turn[0] * dz
+        vz = state[at + 9] - velocity[2] - turn[0] * dy + turn[1] * dx
+        wx, wy, wz = turns[i, 0] - turn[0], turns[i, 1] - turn[1], turns[i, 2] - turn[2]
+        # the same in the axes of the second body
+        body = rotations[i]
+        a00, a01, a02 = axes[0, 0], axes[0, 1], axes[0, 2]
+        a10, a11, a12 = axes[1, 0], axes[1, 1], axes[1, 2]
+        a20, a21, a22 = axes[2, 0], axes[2, 1], axes[2, 2]
+        px, py, pz = a00 * dx + a10 * dy + a20 * dz, a01 * dx + a11 * dy + a21 * dz, a02 * dx + a12 * dy + a22 * dz
+        ux, uy, uz = a00 * vx + a10 * vy + a20 * vz, a01 * vx + a11 * vy + a21 * vz, a02 * vx + a12 * vy + a22 * vz
+        ox, oy, oz = a00 * wx + a10 * wy + a20 * wz, a01 * wx + a11 * wy + a21 * wz, a02 * wx + a12 * wy + a22 * wz
+        b00, b01, b02 = body[0, 0], body[0, 1], body[0, 2]
+        b10, b11, b12 = body[1, 0], body[1, 1], body[1, 2]
+        b20, b21, b22 = body[2, 0], body[2, 1], body[2, 2]
+        r00, r01, r02 = (
+            a00 * b00 + a10 * b10 + a20 * b20, a00 * b01 + a10 * b11 + a20 * b21, a00 * b02 + a10 * b12 + a20 * b22,
+        )  # fmt: skip
+        r10, r11, r12 = (
+            a01 * b00 + a11 * b10 + a21 * b20, a01 * b01 + a11 * b11 + a21 * b21, a01 * b02 + a11 * b12 + a21 * b22,
+        )  # fmt: skip
+        r20, r21, r22 = (
+            a02 * b00 + a12 * b10 + a22 * b20, a02 * b01 + a12 * b11 + a22 * b21, a02 * b02 + a12 * b12 + a22 * b22,
+        )  # fmt: skip
+        turning = elements.turning[p]
+        fx = fy = fz = 0.0
+        mx = -0.5 * turning[0, 0] * (r21 - r12) - turning[1, 0] * ox
+        my = -0.5 * turning[0, 1] * (r02 - r20) - turning[1, 1] * oy
+        mz = -0.5 * turning[0, 2] * (r10 - r01) - turning[1, 2] * oz
+        for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
+            row = elements.springs[k]
+            bx = r00 * row[0] + r01 * row[1] + r02 * row[2]
+            by = r10 * row[0] + r11 * row[1] + r12 * row[2]
+            bz = r20 * row[0] + r21 * row[1] + r22 * row[2]
+            gx = row[12] - row[6] * (px + bx - row[3]) - row[9] * (ux + oy * bz - oz * by)
+            gy = row[13] - row[7] * (py + by - row[4]) - row[10] * (uy + oz * bx - ox * bz)
+            gz = row[14] - row[8] * (pz + bz - row[5]) - row[11] * (uz + ox * by - oy * bx)
+            fx, fy, fz = fx + gx, fy + gy, fz + gz
+            mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx
+        for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
+            row, direction = elements.directed[k], elements.law[k, 0]
+            bx = r00 * row[0] + r01 * row[1] + r02 * row[2]
+            by = r10 * row[0] + r11 * row[1] + r12 * row[2]
+            bz = r20 * row[0] + r21 * row[1] + r22 * row[2]
+            ex, ey, ez = px + bx - row[3], py + by - row[4], pz + bz - row[5]
+            nx, ny, nz = 1.0 * (direction == 0), 1.0 * (direction == 1), 1.0 * (direction == 2)
+            length = 0.0
+            if direction == LINE:
+                length = math.sqrt(ex * ex + ey * ey + ez * ez)
+                nx, ny, nz = ex / length, ey / length, ez / length
+            stretch = nx * ex + ny * ey + nz * ez - row[6]
+            along = nx * (ux + oy * bz - oz * by) + ny * (uy + oz * bx - ox * bz) + nz * (uz + ox * by - oy * bx)
+            force, own_rate = _directed_force(elements, k, stretch, along, state, own)
+            if elements.law[k, 4] >= 0:
+                rate[own + elements.law[k, 4]] = own_rate
+            gx, gy, gz = -force * nx, -force * ny, -force * nz
+            fx, fy, fz = fx + gx, fy + gy, fz + gz
+            mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx
+        # back to track axes: on i at its centre, and the opposite on j
+        gx, gy, gz = a00 * fx + a01 * fy + a02 * fz, a10 * fx + a11 * fy + a12 * fz, a20 * fx + a21 * fy + a22 * fz
+        tx, ty, tz = a00 * mx + a01 * my + a02 * mz, a10 * mx + a11 * my + a12 * mz, a20 * mx + a21 * my + a22 * mz
+        wrench = wrenches[i]
+        wrench[0] += gx
+        wrench[1] += gy
+        wrench[2] += gz
+        wrench[3] += tx
+        wrench[4] += ty
+        wrench[5] += tz
+        if j != FRAME:
+            wrench = wrenches[j]
+            wrench[0] -= gx
+            wrench[1] -= gy
+            wrench[2] -= gz
+            wrench[3] -= tx + dy * gz - dz * gy
+            wrench[4] -= ty + dz * gx - dx * gz
+            wrench[5] -= tz + dx * gy - dy * gx

@@ -18,7 +18,7 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
 from wrcore.dynamics.joint import Joints
-from wrcore.dynamics.suspension import SpringDampers, spring_damper_forces
+from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, add_rail_wrenches
 from wrcore.dynamics.wheel import ContactModel, wheel_wrench
 
@@ -41,7 +41,7 @@ class Model(NamedTuple):
 
     bodies: Bodies
     contact: ContactModel
-    springs: SpringDampers
+    elements: Elements
     joints: Joints
     track: TrackModel
     speed: float
@@ -60,7 +60,10 @@ class Workspace(NamedTuple):
     """(n + 1, 3, 3): of the bodies, and of the moving frame on a curved track."""
     arc_lengths: np.ndarray
     """(k,): last arc length of each wheelset, m; where the search for the next one starts."""
+    turns: np.ndarray
+    """(n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin."""
     wrenches: np.ndarray
+    """(n, 6): force and moment about the centre of mass of each body."""
     patches: np.ndarray
     """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
     counts: np.ndarray
@@ -72,6 +75,11 @@ class Workspace(NamedTuple):
     constraints: ConstraintWork
     frames: np.ndarray
     irregularity: np.ndarray
+
+
+def state_size(model):
+    """Length of the state vector: 13 numbers per body and the force elements' own states."""
+    return STATE_SIZE * len(model.bodies.mass) + model.elements.states
 
 
 def workspace(model):
@@ -87,7 +95,7 @@ def workspace(model):
     """
     n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
     return Workspace(
-        np.zeros((n + 1, 3, 3)), np.full(k, np.nan), np.zeros((n, 6)),
+        np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
         constraint_workspace(model.joints), np.zeros((2, 3, 3)), np.zeros((3, 4)),
@@ -117,20 +125,27 @@ def fill_derivatives(t, state, model, work, rate):
     ----------
     t : float
         Time, s.
-    state : numpy.ndarray, shape (13 n,)
-        Per body: position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes.
+    state : numpy.ndarray, shape (state_size(model),)
+        Per body: position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the force
+        elements' own states (m).
     model : Model
     work : Workspace
         Overwritten; patches and counts belong to this evaluation afterwards.
-    rate : numpy.ndarray, shape (13 n,)
+    rate : numpy.ndarray
         Filled: time derivative of the state.
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
     work.counters[0] += 1
     for b in range(n):
-        rotation_matrix(state, STATE_SIZE * b, work.rotations[b])
-        wrench = work.wrenches[b]
+        at = STATE_SIZE * b
+        matrix, turn, wrench = work.rotations[b], work.turns[b], work.wrenches[b]
+        rotation_matrix(state, at, matrix)
+        wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
+        spin = 0.0
+        if bodies.spins[b] == 1:
+            spin = wx * matrix[0, 1] + wy * matrix[1, 1] + wz * matrix[2, 1]
+        turn[0], turn[1], turn[2] = wx - spin * matrix[0, 1], wy - spin * matrix[1, 1], wz - spin * matrix[2, 1]
         wrench[:] = 0.0
         wrench[2] = -model.gravity * bodies.mass[b]
     for k in range(bodies.wheelsets.shape[0]):
@@ -160,19 +175,14 @@ def fill_derivatives(t, state, model, work, rate):
             wrench[3] += mx
             wrench[4] += my
             wrench[5] += mz
-    spring_damper_forces(model.springs, model.track, t, model.speed, state, work.rotations, work.wrenches)
+    element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
         add_reactions(model, t, state, work)
     for b in range(n):
         at = STATE_SIZE * b
-        wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
-        if bodies.spins[b] == 1:
-            axle = work.rotations[b]
-            spin = wx * axle[0, 1] + wy * axle[1, 1] + wz * axle[2, 1]
-            wx, wy, wz = wx - spin * axle[0, 1], wy - spin * axle[1, 1], wz - spin * axle[2, 1]
-        euler_rates(state, at, wx, wy, wz, model.alpha, rate)
+        euler_rates(state, at, work.turns[b, 0], work.turns[b, 1], work.turns[b, 2], model.alpha, rate)
         for i in range(3):
             rate[at + i] = state[at + 7 + i]
             rate[at + 7 + i] = work.wrenches[b, i] / bodies.mass[b]
@@ -181,7 +191,7 @@ def fill_derivatives(t, state, model, work, rate):
 
 @jit
 def derivatives(t, state, model, work):
-    """Right-hand side in a new array (13 n,); arguments as for :func:`fill_derivatives`."""
+    """Right-hand side in a new array; arguments as for :func:`fill_derivatives`."""
     rate = np.empty_like(state)
     fill_derivatives(t, state, model, work, rate)
     return rate

@@ -136,33 +136,28 @@ def add_rail_wrenches(contact, track, state, at, axle, guess, frames, values, pa
 
 
 @jit(allocates=False)
-def frame_marker(track, speed, t, ahead, y, z, rotations, last):
-    """Position and velocity of a marker on the frame that runs along the track at constant speed.
+def moving_frame(track, speed, t, ahead, axes):
+    """The track's frame that runs ahead along the track at constant speed.
 
     Parameters
     ----------
     track : TrackModel
     speed, t : float
         m/s and s.
-    ahead, y, z : float
-        Marker: arc length ahead of the frame's start, and lateral and vertical position in the track's frame, m.
-    rotations : numpy.ndarray, shape (n, 3, 3)
-        Matrix ``last`` is filled with the track's frame there.
-    last : int
+    ahead : float
+        Arc length ahead of the frame's start, m.
+    axes : numpy.ndarray, shape (3, 3)
+        Filled with the frame.
 
     Returns
     -------
-    point, velocity : tuple of float
-        Absolute axes, m and m/s.
+    origin, velocity, turn : tuple of float
+        Position (m), velocity (m/s) and angular velocity (rad/s) in absolute axes.
     """
-    frame = rotations[last]
-    station = track_frame(track.path, ahead + speed * t, frame)
+    station = track_frame(track.path, ahead + speed * t, axes)
     along, left, up = frame_turn(station)
-    # d/ds of r + y n + z b, with the frame turning by D = (along, left, up) per metre
-    rt, rn, rb = 1.0 + left * z - up * y, -along * z, along * y
-    gx, gy, gz = _turn_back(frame, 0.0, y, z)
-    vx, vy, vz = _turn_back(frame, speed * rt, speed * rn, speed * rb)
-    return (station.x + gx, station.y + gy, station.z + gz), (vx, vy, vz)
+    velocity = (speed * axes[0, 0], speed * axes[1, 0], speed * axes[2, 0])
+    return (station.x, station.y, station.z), velocity, _turn_back(axes, speed * along, speed * left, speed * up)
 
 
 @jit

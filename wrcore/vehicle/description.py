@@ -8,11 +8,21 @@ import numpy as np
 from wrcore.checked_yaml import read_yaml, validate
 from wrcore.dynamics.joint import EQUATIONS, KINDS, Joints
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import SpringDampers
+from wrcore.dynamics.suspension import Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
+from wrcore.vehicle.elements import check_element, compile_elements
+from wrcore.vehicle.layout import Layout
 
-FRAME_NAME = "frame"
+GRAVITY = 9.81
+"""m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
+
+BODY_KEYS = {
+    "wheelset": (("rolling_radius", "tape_circle_half_distance"), ()),
+    "body": ((), ()),
+    "axle_box": (("wheelset",), ()),
+}
+"""Keys of each kind of body beside kind, mass, inertia and position: those it needs and those it may have."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +37,9 @@ class Vehicle:
     positions : numpy.ndarray, shape (n, 3)
         Nominal centres of mass, m.
     rolling_radius, half_distance : float
-        Of the wheelsets, m.
+        Of the wheelsets, m; NaN for a vehicle without wheelsets.
     bodies : Bodies
-    springs : SpringDampers
+    elements : Elements
     joints : Joints
     data : dict
         The file's content with defaults, for provenance.
@@ -42,25 +52,34 @@ class Vehicle:
     rolling_radius: float
     half_distance: float
     bodies: Bodies
-    springs: SpringDampers
+    elements: Elements
     joints: Joints
     data: dict
 
-    def axle_load(self, body, gravity):
-        """Vertical force (N) that the rails carry for a wheelset in nominal position: weight less preloads."""
-        preload = sum(
-            np.where(self.springs.bodies[:, end] == body, sign, 0.0) @ self.springs.preload[:, 2]
-            for end, sign in ((0, 1.0), (1, -1.0))
-        )
-        return self.bodies.mass[body] * gravity - float(preload)
+    @property
+    def wheelset_names(self):
+        """Names of the wheelsets from the front."""
+        return tuple(self.body_names[b] for b in self.bodies.wheelsets)
+
+    def nominal_wheel_load(self, body):
+        """Rough vertical load of a wheel of a wheelset in nominal position, N.
+
+        All bodies' weight in equal parts where springs carry bodies, else the wheelset's own weight less its preloads.
+        """
+        if len(self.bodies.mass) > len(self.bodies.wheelsets):
+            return float(np.sum(self.bodies.mass)) * GRAVITY / (2 * len(self.bodies.wheelsets))
+        pair = np.repeat(self.elements.pairs[:, 0], np.diff(self.elements.first_spring))
+        return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, 14]))
 
 
-def load_vehicle(path):
+def load_vehicle(path, axle_boxes=True):
     """Read and check a vehicle file.
 
     Parameters
     ----------
     path : str or Path
+    axle_boxes : bool
+        False: axle boxes become part of their wheelsets.
 
     Returns
     -------
@@ -71,88 +90,110 @@ def load_vehicle(path):
     InputError
         Naming the file, the element and what was expected.
     """
-    return build_vehicle(read_yaml(path), str(Path(path).name))
+    return build_vehicle(read_yaml(path), str(Path(path).name), axle_boxes)
 
 
-def build_vehicle(data, source):
-    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors."""
+def build_vehicle(data, source, axle_boxes=True):
+    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors.
+
+    Without ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and
+    yaw; in pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset.
+    """
     data = validate(data, "vehicle", source)
-    names = tuple(data["bodies"])
-    parts = list(data["bodies"].values())
-    wheelset = parts[0]
-    for name, part in data["bodies"].items():
-        for key in ("rolling_radius", "tape_circle_half_distance"):
-            if part[key] != wheelset[key]:
-                raise InputError(source, f"bodies.{name}.{key}", f"expected {wheelset[key]} as for {names[0]}")
-    positions = np.array([part["position"] for part in parts], float)
+    _check_bodies(data["bodies"], source)
+    for item in data["elements"]:
+        check_element(item, source)
+    if not axle_boxes:
+        data = {**data, "bodies": _lumped(data["bodies"])}
+    layout = _layout(data, source)
+    parts = [data["bodies"][name] for name in layout.names]
+    wheelsets = np.flatnonzero(layout.spins)
+    wheelsets = wheelsets[np.argsort(-layout.positions[wheelsets, 0], kind="stable")]  # numbered from the front
     bodies = Bodies(
-        np.array([part["mass"] for part in parts], float),
+        layout.mass,
         np.array([[part["inertia"][k] for k in ("roll", "pitch", "yaw")] for part in parts], float),
-        np.array([part["kind"] == "wheelset" for part in parts], np.int64),
-        np.array([i for i, part in enumerate(parts) if part["kind"] == "wheelset"], np.int64),
-    )
-    for name, moments in zip(names, bodies.inertia, strict=True):
-        if moments[0] != moments[2]:
-            raise InputError(
-                source, f"bodies.{name}.inertia", "expected equal roll and yaw moments (body of revolution)"
-            )
+        layout.spins.astype(np.int64), wheelsets,
+    )  # fmt: skip
+    first = parts[wheelsets[0]] if wheelsets.size else {}
+    joints = data["joints"] + [
+        {"name": name, "kind": "revolute", "bodies": [part["wheelset"], name], "axis": "y",
+         "at": [data["bodies"][part["wheelset"]]["position"][0], part["position"][1],
+                data["bodies"][part["wheelset"]]["position"][2]]}
+        for name, part in zip(layout.names, parts, strict=True) if part["kind"] == "axle_box"
+    ]  # fmt: skip
     return Vehicle(
-        data["name"], source, names, positions, float(wheelset["rolling_radius"]),
-        float(wheelset["tape_circle_half_distance"]), bodies,
-        _springs(data["elements"], names, positions, source), _joints(data["joints"], names, positions, source), data,
+        data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
+        float(first.get("tape_circle_half_distance", np.nan)), bodies,
+        compile_elements(data["elements"], layout, GRAVITY), _joints(joints, layout, source), data,
     )  # fmt: skip
 
 
-def _ends(item, field, names, source):
-    """Body numbers of the two ends of an element or joint."""
-    numbers = []
-    for name in item["bodies"]:
-        if name != FRAME_NAME and name not in names:
+def _check_bodies(bodies, source):
+    """Keys of each kind of body, equal wheelsets, and what a frame that does not spin asks of a wheelset."""
+    wheelsets = {name: part for name, part in bodies.items() if part["kind"] == "wheelset"}
+    for name, part in bodies.items():
+        needed, optional = BODY_KEYS[part["kind"]]
+        for key in needed:
+            if key not in part:
+                raise InputError(source, f"bodies.{name}.{key}", f"expected a value, as kind {part['kind']} needs one")
+        for key in part:
+            if key not in ("kind", "mass", "inertia", "position", *needed, *optional):
+                raise InputError(source, f"bodies.{name}.{key}", f"unknown for kind {part['kind']}")
+        if part["kind"] == "axle_box" and part["wheelset"] not in wheelsets:
+            raise InputError(source, f"bodies.{name}.wheelset", f"expected a wheelset, got {part['wheelset']!r}")
+    for name, part in wheelsets.items():
+        for key in ("rolling_radius", "tape_circle_half_distance"):
+            first = next(iter(wheelsets))
+            if part[key] != wheelsets[first][key]:
+                raise InputError(source, f"bodies.{name}.{key}", f"expected {wheelsets[first][key]} as for {first}")
+        if part["inertia"]["roll"] != part["inertia"]["yaw"]:
             raise InputError(
-                source, f"{field}.bodies", f"expected {FRAME_NAME} or one of {', '.join(names)}, got {name!r}"
+                source, f"bodies.{name}.inertia", "expected equal roll and yaw moments (body of revolution)"
             )
-        numbers.append(FRAME if name == FRAME_NAME else names.index(name))
-    if numbers[0] == numbers[1]:
-        raise InputError(source, f"{field}.bodies", f"expected two different bodies, got {item['bodies'][0]!r} twice")
-    return numbers
 
 
-def _markers(point, ends, positions, field, source):
-    """The point in the axes of both bodies. Wheelset frames do not spin: their markers must lie on the axle."""
-    markers = np.array([np.array(point, float) - (0.0 if b == FRAME else positions[b]) for b in ends])
-    for body, marker in zip(ends, markers, strict=True):
-        if body != FRAME and (abs(marker[0]) > 1e-9 or abs(marker[2]) > 1e-9):
-            raise InputError(source, f"{field}.at", f"expected a point on the axle's axis, got {list(point)}")
-    return markers
+def _lumped(bodies):
+    """The bodies with each axle box made part of its wheelset; the boxes keep their places, for elements' names."""
+    bodies = {name: {**part, "inertia": dict(part["inertia"])} for name, part in bodies.items()}
+    for part in bodies.values():
+        if part["kind"] == "axle_box":
+            wheelset = bodies[part["wheelset"]]
+            wheelset["mass"] += part["mass"]
+            across = part["mass"] * (part["position"][1] - wheelset["position"][1]) ** 2
+            own = 0.5 * (part["inertia"]["roll"] + part["inertia"]["yaw"])  # a body of revolution again
+            for key in ("roll", "yaw"):
+                wheelset["inertia"][key] += across + own
+            part["kind"] = "lumped"
+    return bodies
 
 
-def _springs(elements, names, positions, source):
-    n = len(elements)
-    bodies, markers = np.zeros((n, 2), np.int64), np.zeros((n, 2, 3))
-    for k, item in enumerate(elements):
-        field = f"elements.{item['name']}"
-        bodies[k] = _ends(item, field, names, source)
-        markers[k] = _markers(item["at"], bodies[k], positions, field, source)
-    vectors = [
-        np.array([item[key] for item in elements], float).reshape(n, 3) for key in ("stiffness", "damping", "preload")
-    ]
-    return SpringDampers(bodies, markers, *vectors, np.zeros((n, 3)))
+def _layout(data, source):
+    parts = {name: part for name, part in data["bodies"].items() if part["kind"] != "lumped"}
+    joined = {item["bodies"][k]: item["bodies"][1 - k] for item in data["joints"] for k in (0, 1)}
+    wheelsets = [name for name, part in parts.items() if part["kind"] == "wheelset"]
+    return Layout(
+        source, tuple(parts), np.array([part["position"] for part in parts.values()], float),
+        np.array([part["mass"] for part in parts.values()], float),
+        np.array([part["kind"] == "wheelset" for part in parts.values()]),
+        np.array([part["kind"] == "body" and joined.get(name) not in wheelsets for name, part in parts.items()]),
+        {name: part["wheelset"] for name, part in data["bodies"].items() if part["kind"] == "lumped"},
+    )  # fmt: skip
 
 
-def _joints(joints, names, positions, source):
+def _joints(joints, layout, source):
     n = len(joints)
     bodies, markers = np.zeros((n, 2), np.int64), np.zeros((n, 2, 3))
     for k, item in enumerate(joints):
         field = f"joints.{item['name']}"
-        bodies[k] = _ends(item, field, names, source)
+        bodies[k] = layout.ends(item, field)
         if item["kind"] == "coordinate":
-            if bodies[k, 0] == FRAME or bodies[k, 1] != FRAME or "axis" not in item:
+            if bodies[k, 1] != FRAME or "axis" not in item:
                 raise InputError(source, field, "expected bodies: [a body, frame] and an axis")
-            markers[k, 1] = positions[bodies[k, 0]]
+            markers[k, 1] = layout.positions[bodies[k, 0]]
         else:
             if "at" not in item:
                 raise InputError(source, field, "expected the joint's point 'at'")
-            markers[k] = _markers(item["at"], bodies[k], positions, field, source)
+            markers[k] = [layout.marker(item["at"], body, field) for body in bodies[k]]
     return Joints(
         np.array([KINDS[item["kind"]] for item in joints], np.int64), bodies, markers,
         np.array(["xyz".index(item.get("axis", "x")) for item in joints], np.int64),

@@ -1,0 +1,161 @@
+"""Static equilibrium: the vehicle rolls straight ahead at constant speed and nothing accelerates.
+
+Unknown are small displacements of all bodies (three translations, three rotations in track axes), with the spin rate of
+a wheelset in place of its rotation about the axle, which its frame does not have, and the force elements' own states.
+Newton's method on the accelerations; directions in which nothing holds a body (along the track, say) stay as they are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.system import fill_derivatives, state_size, workspace
+
+STEP = 1e-7
+"""Of the difference quotients: m, rad, and a hundred times that in rad/s."""
+
+RESIDUAL = 1e-9
+"""Accelerations below this count as none, m/s^2 and rad/s^2."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Vehicle at rest relative to the moving frame.
+
+    Attributes
+    ----------
+    state : numpy.ndarray
+    wheel_loads : numpy.ndarray, shape (k, 2)
+        Vertical force of the rails on each wheel, N: wheelsets as in ``model.bodies.wheelsets``, left and right.
+    residual : float
+        Largest acceleration left, m/s^2 or rad/s^2. With friction, nothing drives a free wheelset: the power of its
+        spin creepage slows it down (3e-4 m/s^2), and that is left here.
+    """
+
+    state: np.ndarray
+    wheel_loads: np.ndarray
+    residual: float
+
+
+@jit
+def evaluate(t, states, model, work, rates):
+    """Right-hand sides of several states, row by row."""
+    for i in range(states.shape[0]):
+        fill_derivatives(t, states[i], model, work, rates[i])
+
+
+def displaced(state, model, displacement):
+    """A state with displaced bodies.
+
+    Parameters
+    ----------
+    state : numpy.ndarray
+    model : Model
+    displacement : numpy.ndarray, shape (6 n + states,)
+        Per body: translation (m), rotation vector in track axes (rad); then changes of the elements' own states (m).
+        Along the axle of a wheelset, the rotation is a change of its spin rate (rad/s) instead.
+
+    Returns
+    -------
+    numpy.ndarray
+    """
+    out = state.copy()
+    n = len(model.bodies.mass)
+    for b in range(n):
+        at, q = STATE_SIZE * b, displacement[6 * b : 6 * b + 6]
+        out[at : at + 3] += q[:3]
+        turn = q[3:].copy()
+        e0, e1, e2, e3 = state[at + 3 : at + 7]
+        if model.bodies.spins[b]:
+            axle = np.array([2 * (e1 * e2 - e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 + e0 * e1)])
+            out[at + 10 : at + 13] += axle * (turn @ axle)
+            turn -= axle * (turn @ axle)
+        out[at + 3 : at + 7] = _turned((e0, e1, e2, e3), turn)
+    out[STATE_SIZE * n :] += displacement[6 * n :]
+    return out
+
+
+def _turned(p, turn):
+    """Euler parameters after a further rotation by a rotation vector in track axes."""
+    angle = np.linalg.norm(turn)
+    scale = 0.5 * np.sinc(0.5 * angle / np.pi)
+    a0, (a1, a2, a3) = np.cos(0.5 * angle), scale * turn
+    e0, e1, e2, e3 = p
+    turned = np.array([
+        a0 * e0 - a1 * e1 - a2 * e2 - a3 * e3, a0 * e1 + a1 * e0 + a2 * e3 - a3 * e2,
+        a0 * e2 + a2 * e0 + a3 * e1 - a1 * e3, a0 * e3 + a3 * e0 + a1 * e2 - a2 * e1,
+    ])  # fmt: skip
+    return turned / np.linalg.norm(turned)
+
+
+def _accelerations(rates, model):
+    """Rows of accelerations, six per body, and rates of the elements' own states, from rows of state rates."""
+    n = len(model.bodies.mass)
+    bodies = rates[:, : STATE_SIZE * n].reshape(len(rates), n, STATE_SIZE)[:, :, 7:].reshape(len(rates), 6 * n)
+    return np.hstack([bodies, rates[:, STATE_SIZE * n :]])
+
+
+def solve_equilibrium(model, state, iterations=50):
+    """Newton's method from a nearby state.
+
+    Parameters
+    ----------
+    model : Model
+        On a tangent track.
+    state : numpy.ndarray, shape (state_size(model),)
+        All bodies moving ahead at the speed of the frame, wheels about to touch the rails or pressed onto them.
+    iterations : int
+
+    Returns
+    -------
+    Equilibrium
+        Check ``residual``: it is large where Newton's method found no equilibrium.
+    """
+    work = workspace(model)
+    model = model._replace(beta=model.beta or 1.0)  # without feedback a joint's violation would not show
+    size = 6 * len(model.bodies.mass) + model.elements.states
+    spins = np.zeros(size, bool)
+    spins[[6 * b + 4 for b in np.flatnonzero(model.bodies.spins)]] = True
+    steps = np.where(spins, 100 * STEP, STEP)
+    rates = np.empty((2 * size + 1, state_size(model)))
+    residual = np.inf
+    for _ in range(iterations):
+        rows = [displaced(state, model, h * row) for h in (1.0, -1.0) for row in np.diag(steps)]
+        evaluate(0.0, np.array([*rows, state]), model, work, rates)
+        values = _accelerations(rates, model)
+        residual = float(np.max(np.abs(values[-1]))) if size else 0.0
+        if residual < RESIDUAL:
+            break
+        slopes = ((values[:size] - values[size:-1]) / (2.0 * steps[:, None])).T
+        scale = np.where(spins, 1.0, 1e-3)  # steps of 1 rad/s count like steps of 1 mm
+        largest = np.max(np.abs(slopes * scale), axis=1)
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        step = np.linalg.lstsq(weights[:, None] * slopes * scale, -weights * values[-1], rcond=1e-11)[0] * scale
+        better = _improved(state, step, model, work, residual)
+        if better is None:
+            break
+        state = better
+    return Equilibrium(state, wheel_loads(model, work, state), residual)
+
+
+def _improved(state, step, model, work, residual):
+    """The state after the longest of the step, its half, its quarter, ... that comes closer to equilibrium, or None."""
+    rates = np.empty((1, len(state)))
+    for halvings in range(12):
+        new = displaced(state, model, step * 0.5**halvings)
+        evaluate(0.0, new[None, :], model, work, rates)
+        if np.max(np.abs(_accelerations(rates, model))) < residual:
+            return new
+    return None
+
+
+def wheel_loads(model, work, state):
+    """Vertical force of the rails on each wheel, N, shape (k, 2)."""
+    evaluate(0.0, state[None, :], model, work, np.empty((1, len(state))))
+    rows = work.patches
+    cosine, sine = np.cos(rows[..., reduction.ANGLE]), np.sin(rows[..., reduction.ANGLE])
+    vertical = rows[..., reduction.NORMAL] * cosine + rows[..., reduction.FY] * sine
+    return np.where(np.arange(rows.shape[2]) < work.counts[..., None], vertical, 0.0).sum(axis=2)
