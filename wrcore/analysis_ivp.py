@@ -1,0 +1,207 @@
+"""The Test Set's problem "Wheelset" as a study: how well the constrained equations are solved, and what that costs.
+
+The equations of `wrcore.analysis_ivp_wheelset` are integrated as everywhere else, with Baumgarte's feedback of Eq. (8):
+by `wrcore.dynamics.integrate` over the compiled right-hand side, or by the same embedded pair in a compiled loop, which
+can also project each step onto the constraints.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import RK45
+
+from wrcore.analysis_ivp_problem import CONTACT, MULTIPLIERS, STATE, UNITS, workspace
+from wrcore.analysis_ivp_wheelset import right_hand_side, run_pair
+from wrcore.dynamics.integrate import integrate
+
+ATOL_OVER_RTOL = 1e-3
+COMPILED = {"compiled_rk45": False, "compiled_rk45_projected": True}
+"""Methods of the compiled loop, and whether they project each step."""
+
+
+class Run(NamedTuple):
+    """A run of the benchmark: its last state, and what it cost."""
+
+    status: str
+    """As of `wrcore.dynamics.integrate.Trajectory`."""
+    state: np.ndarray
+    """(11,)"""
+    contact: np.ndarray
+    """(2, 2), as of `wrcore.analysis_ivp_problem.Problem`."""
+    multipliers: np.ndarray
+    """(2,), N."""
+    violation: np.ndarray
+    """(2,): the larger |Phi| (m) and the larger |Phi'| (m/s) at the last state."""
+    history: np.ndarray
+    """(n, 2): violation at the first step past each time; NaN where the method does not keep it."""
+    steps: int
+    rejected: int
+    evaluations: int
+    seconds: float
+
+
+def solve(problem, method, rtol, alpha=0.0, beta=0.0, times=None):
+    """Integrate the benchmark.
+
+    Parameters
+    ----------
+    problem : Problem
+    method : str
+        One of `COMPILED` or of `wrcore.dynamics.integrate`.
+    rtol : float
+        Relative tolerance; the absolute one is `ATOL_OVER_RTOL` times this.
+    alpha, beta : float
+        Baumgarte's parameters, 1/s. Zero: the constraints hold as accelerations only.
+    times : numpy.ndarray, shape (n,), optional
+        Increasing, from 0; the last one ends the run. The reference's time if not given.
+
+    Returns
+    -------
+    Run
+    """
+    wheelset, work = problem.wheelset._replace(alpha=float(alpha), beta=float(beta)), workspace(problem)
+    times = np.array([0.0, problem.reference.time]) if times is None else np.asarray(times, float)
+    function = right_hand_side(wheelset, work)
+    history = np.full((len(times), 2), np.nan)
+    if method in COMPILED:
+        state, start = problem.state.copy(), time.perf_counter()
+        steps, rejected = run_pair(
+            *_tableau(), wheelset, work, state, times, history, rtol, ATOL_OVER_RTOL * rtol, COMPILED[method]
+        )
+        seconds, status = time.perf_counter() - start, "completed" if steps >= 0 else "failed"
+    else:
+        path = integrate(function, problem.state, times, method=method, rtol=rtol, atol=ATOL_OVER_RTOL * rtol)
+        state, steps, rejected, status = path.states[-1], path.steps, path.rejected, path.status
+        seconds = path.wall_s
+    evaluations = int(work.counters[0])
+    function(times[-1], state)
+    violation = np.array([abs(work.phi).max(), abs(work.phi_rate).max()])
+    return Run(status, state, work.contact, work.multipliers, violation, history, steps, rejected, evaluations, seconds)
+
+
+def _tableau():
+    """Dormand and Prince's 5(4) pair: square matrix of stages, weights, weights of the error."""
+    return np.hstack([RK45.A, np.zeros((RK45.n_stages, 1))]), RK45.B, RK45.E
+
+
+def error_of(problem, run):
+    """Error of x at the reference's time (m), and the largest relative error of the eleven state variables."""
+    error = abs(run.state - problem.reference.state)
+    return error[0], (error / abs(problem.reference.state)).max()
+
+
+def value_table(problem, run):
+    """All seventeen unknowns beside the reference.
+
+    Parameters
+    ----------
+    problem : Problem
+    run : Run
+        Up to the reference's time.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns quantity, unit, reference, found, difference.
+    """
+    import pandas as pd
+
+    names = [*STATE, *CONTACT, *(f"lambda_{side}" for side in MULTIPLIERS)]
+    reference, found = (
+        np.concatenate([part.state, part.contact.ravel(), part.multipliers]) for part in (problem.reference, run)
+    )
+    columns = {"quantity": names, "unit": [UNITS.get(name, "N") for name in names]}
+    return pd.DataFrame({**columns, "reference": reference, "found": found, "difference": found - reference})
+
+
+def work_precision(problem, tolerances, repetitions):
+    """Error of x against evaluations and seconds.
+
+    Parameters
+    ----------
+    problem : Problem
+    tolerances : dict of str to list of float
+        Relative tolerances of each method.
+    repetitions : int
+        Passes over all runs in turn; the seconds are medians. A short run of each method that compiles comes first.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns method, rtol, status, steps, rejected, evaluations, seconds, error_x_m, error_max (relative, over all
+        eleven state variables).
+    """
+    import pandas as pd
+
+    for method in tolerances:
+        solve(problem, method, 1e-3, times=[0.0, 1e-3])
+    cases = [(method, rtol) for method, values in tolerances.items() for rtol in values]
+    runs = [[solve(problem, method, rtol) for method, rtol in cases] for _ in range(repetitions)]
+    rows = []
+    for i, (method, rtol) in enumerate(cases):
+        run, seconds = runs[0][i], np.median([turn[i].seconds for turn in runs])
+        errors = error_of(problem, run) if run.status == "completed" else (np.nan, np.nan)
+        rows.append((method, rtol, run.status, run.steps, run.rejected, run.evaluations, seconds, *errors))
+    names = ["method", "rtol", "status", "steps", "rejected", "evaluations", "seconds", "error_x_m", "error_max"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def treatments(parameters):
+    """What can be done about drift: (name, method, Baumgarte's alpha = beta), the projection last."""
+    found = [("Baumgarte", "compiled_rk45", float(value)) for value in parameters]
+    return [*found, ("projection", "compiled_rk45_projected", 0.0)]
+
+
+def stabilisation_table(problem, parameters, tolerances):
+    """Effect of Baumgarte's parameters, and of projection, on the error, the drift and the cost.
+
+    Parameters
+    ----------
+    problem : Problem
+    parameters : list of float
+        Values of alpha = beta, 1/s.
+    tolerances : list of float
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns treatment, alpha_per_s, rtol, evaluations, error_x_m, error_max, phi_m, phi_rate_m_per_s (violation of
+        position and velocity constraints at the end).
+    """
+    import pandas as pd
+
+    rows = []
+    for rtol in tolerances:
+        for treatment, method, value in treatments(parameters):
+            run = solve(problem, method, rtol, value, value)
+            rows.append((treatment, value, rtol, run.evaluations, *error_of(problem, run), *run.violation))
+    names = ["treatment", "alpha_per_s", "rtol", "evaluations", "error_x_m", "error_max", "phi_m", "phi_rate_m_per_s"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def violation_history(problem, parameters, rtol, points):
+    """Violation of the constraints over time, at accepted steps.
+
+    Parameters
+    ----------
+    problem : Problem
+    parameters : list of float
+        Values of alpha = beta, 1/s.
+    rtol : float
+    points : int
+        Times, equally spaced.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns treatment, alpha_per_s, t_s, phi_m, phi_rate_m_per_s (larger of the two wheels).
+    """
+    import pandas as pd
+
+    times, parts = np.linspace(0.0, problem.reference.time, points), []
+    for treatment, method, value in treatments(parameters):
+        history = solve(problem, method, rtol, value, value, times).history
+        columns = {"t_s": times, "phi_m": history[:, 0], "phi_rate_m_per_s": history[:, 1]}
+        parts.append(pd.DataFrame({"treatment": treatment, "alpha_per_s": value, **columns}))
+    return pd.concat(parts, ignore_index=True)
