@@ -23,6 +23,7 @@ CONTACT_FIGURES = tuple(
                  "force_sweep", "patch_forces")
 )  # fmt: skip
 CONTACT_RULES = {"contact_pairs", "contact_planar_error", "contact_reductions", "contact_search"}
+BENCHMARK_FIGURES = ("ivp_work_precision", "ivp_constraints")
 CREEP_FIGURES = ("creep_curves", "creep_traction", "creep_cost", "creep_error_map", "creep_smoothness")
 
 
@@ -45,7 +46,7 @@ def test_nothing_is_left_to_do_after_the_smoke_run(smoke):
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
-@pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES + CONTACT_FIGURES)
+@pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)
 def test_every_figure_is_there_as_png_and_svg(smoke, name):
     assert (smoke / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (smoke / "figures" / f"{name}.svg").read_text()[:2000]
@@ -59,7 +60,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         table = listed.stdout.partition("Job stats:")[2].partition("total")[0]
         rules.append(set(re.findall(r"^(\w+) +\d+$", table, re.MULTILINE)))
     assert rules[0] == rules[1] >= {"creep_table", "simulate", "time_runs", "report_archive", *FIGURES}
-    assert rules[0] >= CONTACT_RULES
+    assert rules[0] >= CONTACT_RULES | {"ivp_wheelset", "fig_ivp"}
     assert rules[0] >= {"creep_study_table", "creep_errors", "creep_costs", *(f"fig_{name}" for name in CREEP_FIGURES)}
 
 
@@ -80,6 +81,7 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
         ({"creep_table": {"tolerance": 0.04}}, "Creep table", "Contact geometry without load"),
         ({"creep_study": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
         ({"contact_study": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
+        ({"ivp_wheelset": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
         ({"figures": {"detection_pose": {"y": 0.006}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
     ],
 )
@@ -133,6 +135,14 @@ def test_reductions_of_the_study_are_compared_in_all_cases(smoke):
     assert set(table.reduction) == {"maximum", "moment"}
 
 
+def test_benchmark_of_the_study_meets_its_bar(smoke):
+    table = pd.read_csv(smoke / "tables" / "ivp_work_precision.csv")
+    bar = yaml.safe_load((ROOT / "config/study.yaml").read_text())["ivp_wheelset"]["bar"]
+    assert bar == 1e-6 and (table.status == "completed").all()
+    assert (table.error_x_m[table.rtol <= 1e-6] < bar).all(), table.to_string()
+    assert len(pd.read_csv(smoke / "tables" / "ivp_values.csv")) == 17
+
+
 def test_notebook_was_executed_and_holds_fig4(smoke):
     cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
     outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
@@ -144,7 +154,7 @@ def test_report_holds_the_figures(smoke):
     with zipfile.ZipFile(smoke / "report.zip") as archive:
         text = "".join(archive.namelist())
         assert "report.html" in text
-        assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES)
+        assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)
 
 
 @pytest.mark.parametrize(

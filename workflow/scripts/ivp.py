@@ -1,0 +1,18 @@
+"""The Test Set's wheelset: values at the end, error against work, effect of stabilisation, drift over time."""
+
+import sys
+
+from wrcore.analysis_ivp import solve, stabilisation_table, value_table, violation_history, work_precision
+from wrcore.analysis_ivp_problem import read_problem
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+settings, output = snakemake.params.settings, snakemake.output
+problem = read_problem(snakemake.input.problem)
+parameters, drift = settings["baumgarte"], settings["drift"]
+for path, table in (
+    (output.work_precision, work_precision(problem, settings["tolerances"], settings["repetitions"])),
+    (output.stabilisation, stabilisation_table(problem, parameters, settings["stabilisation_tolerances"])),
+    (output.values, value_table(problem, solve(problem, **settings["values"]))),
+    (output.history, violation_history(problem, parameters, drift["rtol"], drift["points"])),
+):
+    table.to_csv(path, index=False)
