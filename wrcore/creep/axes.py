@@ -24,6 +24,7 @@ import numpy as np
 
 from wrcore._jit import jit
 from wrcore.creep.kalker import KalkerData, coefficients_at
+from wrcore.creep.lanes import scaled_sum, three_rows
 
 LEVER = 0.25
 SPIN_FLOOR = 0.8
@@ -32,8 +33,11 @@ WIDE = 0.1
 PEAK, PEAK_WIDTH = 0.43, 0.1
 _PEAK_LOW = -PEAK / np.hypot(PEAK, PEAK_WIDTH)
 _PEAK_HIGH = (1 - PEAK) / np.hypot(1 - PEAK, PEAK_WIDTH)
+_STRETCH = 1 / (1 + PEAK_WIDTH * (_PEAK_HIGH - _PEAK_LOW))
 _LARGE = 1e12
+_FUSED = {"contract"}
 _HALF_PI = 0.5 * np.pi
+_PER_TURN = 0.5 / np.pi
 
 
 class TableAxes(NamedTuple):
@@ -75,21 +79,18 @@ class CreepTableData(NamedTuple):
     coefficients: np.ndarray
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
 def _atan(z):
     """atan for 0 <= z <= 1 within 1e-8; exact at 1, so that `_atan2` has no step (nor a kink: slope 1/2 there)."""
     s = z * z
-    p = 0.00257596204804535 * s - 0.014952970057209986
-    p = p * s + 0.040838569517279953
-    p = p * s - 0.073433958870568999
-    p = p * s + 0.10563281351540649
-    p = p * s - 0.14183326803556859
-    p = p * s + 0.19990074492491161
-    p = p * s - 0.33332972964484753
+    s2 = s * s
+    low = -0.33332972964484753 + 0.19990074492491161 * s + s2 * (-0.14183326803556859 + 0.10563281351540649 * s)
+    high = -0.073433958870568999 + 0.040838569517279953 * s + s2 * (-0.014952970057209986 + 0.00257596204804535 * s)
+    p = low + s2 * s2 * high
     return z + z * s * p
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
 def _atan2(y, x):
     """Angle of (x, y) in -pi..pi within 1e-7; 0 at the origin."""
     ax, ay = abs(x), abs(y)
@@ -100,21 +101,28 @@ def _atan2(y, x):
     return -angle if y < 0 else angle
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
 def scales(g, c11, c22, c23):
     """Factors of ux', uy', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
     root = np.sqrt(g)
-    lever = LEVER * (root + 1 / root)
-    rate = RATE * np.sqrt(1 + WIDE / g)
-    return c11 / 3, c22 / 3, lever * c11 / 3, np.sqrt((c23 / 1.5) ** 2 + SPIN_FLOOR**2), rate
+    inverse = 1 / root
+    lever = LEVER * (root + inverse)
+    rate = RATE * np.sqrt(1 + WIDE * inverse * inverse)
+    sx = c11 * (1 / 3)
+    return sx, c22 * (1 / 3), lever * sx, np.sqrt((c23 * (1 / 1.5)) ** 2 + SPIN_FLOOR**2), rate
 
 
-@jit
+@jit(forceinline=True, fastmath=_FUSED)
+def _bend(far, whole):
+    """What the stretched axis adds to t = far/whole; as a fraction, so that the root need not wait for the division."""
+    d, width = far - PEAK * whole, PEAK_WIDTH * whole
+    return PEAK_WIDTH * (d / np.sqrt(d * d + width * width) - _PEAK_LOW)
+
+
+@jit(forceinline=True, fastmath=_FUSED)
 def _stretch(t):
     """Position along t, 0 to 1: up to twice as many nodes around PEAK, where spin saturates with a sharp bend."""
-    d = t - PEAK
-    bend = d / np.sqrt(d * d + PEAK_WIDTH * PEAK_WIDTH)
-    return (t + PEAK_WIDTH * (bend - _PEAK_LOW)) / (1 + PEAK_WIDTH * (_PEAK_HIGH - _PEAK_LOW))
+    return (t + _bend(t, 1.0)) * _STRETCH
 
 
 def node_distances(n_t):
@@ -146,39 +154,32 @@ def creepages_at(g, t, alpha, beta, kalker):
     return direction * (t / ((1 - t) * rate * length))[..., None]
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
 def _taps(position, last):
     """Nearest node and the three quadratic B-spline weights at a position in node spacings, clamped to 0..last."""
     position = min(position, float(last)) if position > 0 else 0.0
     node = int(position + 0.5)
     f = position - node
-    return node, 0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)
+    return node, (0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f))
 
 
-@jit
-def _block(c, start, row, layer, wt, wa, wb):
-    """Sum over three neighbours each in t (stride ``layer``), alpha (stride ``row``) and beta (stride 4).
-
-    Indices are unsigned: numba then leaves out the treatment of negative ones, which costs a third of the look-up.
-    """
-    one, two = np.uint64(1), np.uint64(2)
-    fx = fy = mz = 0.0
-    for i in range(3):
-        x = y = z = 0.0
-        for j in range(3):
-            p = start + np.uint64(j) * row
-            q, r = p + np.uint64(4), p + np.uint64(8)
-            x += wa[j] * (wb[0] * c[p] + wb[1] * c[q] + wb[2] * c[r])
-            y += wa[j] * (wb[0] * c[p + one] + wb[1] * c[q + one] + wb[2] * c[r + one])
-            z += wa[j] * (wb[0] * c[p + two] + wb[1] * c[q + two] + wb[2] * c[r + two])
-        fx += wt[i] * x
-        fy += wt[i] * y
-        mz += wt[i] * z
-        start += layer
-    return fx, fy, mz
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+def _plane(c, start, row, wa, wb):
+    """Sum over three neighbours each in alpha (stride ``row``) and beta (stride 4)."""
+    one = three_rows(c, start, *wb)
+    two = three_rows(c, start + row, *wb)
+    return scaled_sum(wa[0], one, wa[1], two, wa[2], three_rows(c, start + row + row, *wb))
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+def _solid(c, start, row, layer, wt, wa, wb):
+    """The same over three planes along t (stride ``layer``)."""
+    one = _plane(c, start, row, wa, wb)
+    two = _plane(c, start + layer, row, wa, wb)
+    return scaled_sum(wt[0], one, wt[1], two, wt[2], _plane(c, start + layer + layer, row, wa, wb))
+
+
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
 def table_lookup(table, g, psi, ux, uy, phi):
     """Creep force from the table.
 
@@ -197,10 +198,15 @@ def table_lookup(table, g, psi, ux, uy, phi):
     out_of_range : int
         1 where a/b or psi lay outside.
     """
+    return table_lookup_at(table, np.log(g), g, psi, ux, uy, phi)
+
+
+@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
+    """`table_lookup` where ln(a/b) is known."""
     axes, c = table.axes, table.coefficients
-    if not abs(g + psi + ux + uy + phi) < np.inf:
+    if not abs(log_g + psi + ux + uy + phi) < np.inf:
         return np.nan, np.nan, np.nan, 1
-    log_g = np.log(g)
     outside = 0
     if not axes.log_g_min - 1e-12 <= log_g <= axes.log_g_max + 1e-12:
         outside = 1
@@ -222,52 +228,41 @@ def table_lookup(table, g, psi, ux, uy, phi):
         ux, uy, phi = ux / size * _LARGE, uy / size * _LARGE, phi / size * _LARGE
     x, y, p, q = ux * sx, uy * sy, phi * sp, phi * spin
     flat = x * x + y * y
-    stick = 1 / (1 + rate * np.sqrt(flat + q * q))
-    t = 1 - stick
+    far = rate * np.sqrt(flat + q * q)
+    whole = 1 + far
+    stick = 1 / whole
+    t = far * stick
     angle = _atan2(y, x)
     rise = _atan2(p, np.sqrt(flat))
-    k, w0, w1, w2 = _taps(_stretch(t) * (axes.n_t - 1), axes.n_t - 1)
-    wt = (w0, w1, w2)
-    turn = axes.n_alpha / (2 * np.pi)
-    if axes.n_psi == 1:
-        last = axes.n_alpha // 2
-        m, w0, w1, w2 = _taps((angle + _HALF_PI) * turn, last)
-    else:
-        last = axes.n_alpha
-        m, w0, w1, w2 = _taps((angle + np.pi) * turn, last)
-    wa = (w0, w1, w2)
-    n, w0, w1, w2 = _taps(rise * ((axes.n_beta - 1) / _HALF_PI), axes.n_beta - 1)
-    wb = (w0, w1, w2)
-    i, w0, w1, w2 = _taps((log_g - axes.log_g_min) * ((axes.n_g - 1) / (axes.log_g_max - axes.log_g_min)), axes.n_g - 1)
-    wg = (w0, w1, w2)
+    # Unsigned: numba then leaves out the treatment of negative indices.
     row = np.uint64(4 * (axes.n_beta + 2))
+    last = axes.n_alpha // 2 if axes.n_psi == 1 else axes.n_alpha
     layer = row * np.uint64(last + 3)
     patch = layer * np.uint64(axes.n_t + 2)
+    first_angle = _HALF_PI if axes.n_psi == 1 else np.pi
+    k, wt = _taps((t + _bend(far, whole)) * (_STRETCH * (axes.n_t - 1)), axes.n_t - 1)
+    m, wa = _taps((angle + first_angle) * (axes.n_alpha * _PER_TURN), last)
+    n, wb = _taps(rise * ((axes.n_beta - 1) * (4 * _PER_TURN)), axes.n_beta - 1)
+    i, wg = _taps((log_g - axes.log_g_min) * ((axes.n_g - 1) / (axes.log_g_max - axes.log_g_min)), axes.n_g - 1)
     start = np.uint64(k) * layer + np.uint64(m) * row + np.uint64(4 * n)
-    fx = fy = mz = 0.0
     if axes.n_psi == 1:
         start += np.uint64(i) * patch
-        for u in range(3):
-            bx, by, bz = _block(c, start, row, layer, wt, wa, wb)
-            fx += wg[u] * bx
-            fy += wg[u] * by
-            mz += wg[u] * bz
-            start += patch
+        one = _solid(c, start, row, layer, wt, wa, wb)
+        two = _solid(c, start + patch, row, layer, wt, wa, wb)
+        total = scaled_sum(wg[0], one, wg[1], two, wg[2], _solid(c, start + patch + patch, row, layer, wt, wa, wb))
     else:
-        j, w0, w1, w2 = _taps(abs(psi) * ((axes.n_psi - 1) / axes.psi_max), axes.n_psi - 1)
-        wp = (w0, w1, w2)
+        j, wp = _taps(abs(psi) * ((axes.n_psi - 1) / axes.psi_max), axes.n_psi - 1)
         plane = np.uint64(axes.n_psi + 2) * patch
         start += np.uint64(i) * plane + np.uint64(j) * patch
+        total = (0.0, 0.0, 0.0, 0.0)
         for u in range(3):
-            for v in range(3):
-                bx, by, bz = _block(c, start + np.uint64(v) * patch, row, layer, wt, wa, wb)
-                weight = wg[u] * wp[v]
-                fx += weight * bx
-                fy += weight * by
-                mz += weight * bz
+            one = _solid(c, start, row, layer, wt, wa, wb)
+            two = _solid(c, start + patch, row, layer, wt, wa, wb)
+            three = _solid(c, start + patch + patch, row, layer, wt, wa, wb)
+            total = scaled_sum(1.0, total, wg[u], scaled_sum(wp[0], one, wp[1], two, wp[2], three), 0.0, total)
             start += plane
     linear = stick * stick
-    fx = t * fx - linear * c11 * ux
-    fy = t * fy - linear * (c22 * uy + c23 * phi)
-    mz = t * mz + linear * (c23 * uy - c33 * phi)
+    fx = t * total[0] - linear * c11 * ux
+    fy = t * total[1] - linear * (c22 * uy + c23 * phi)
+    mz = t * total[2] + linear * (c23 * uy - c33 * phi)
     return flip * flip_x * fx, flip * flip_y * fy, flip * flip_y * mz, outside

@@ -29,7 +29,7 @@ class FastsimData(NamedTuple):
     elliptic: int
 
 
-@jit
+@jit(allocates=False)
 def fastsim(settings, kalker, g, psi, ux, uy, phi):
     """Creep force by FASTSIM with three flexibilities.
 

@@ -131,7 +131,7 @@ def kalker_data(nu):
     return KalkerData(float(nu), float(log_g[0]), float(log_g[1] - log_g[0]), cubic)
 
 
-@jit
+@jit(allocates=False, forceinline=True, fastmath={"contract"})
 def coefficients_at(log_g, data):
     """C11, C22, C23, C33 at ln(a/b); outside the stored range the value at its end."""
     cells = data.cubic.shape[0]
@@ -147,7 +147,7 @@ def coefficients_at(log_g, data):
     return c11, c22, c23, c33
 
 
-@jit
+@jit(allocates=False, forceinline=True)
 def kalker_coefficients(g, data):
     """C11, C22, C23, C33 at a/b = g; outside 1/32..32 the values at the end of the range.
 
