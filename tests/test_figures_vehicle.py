@@ -1,0 +1,61 @@
+"""Figures of vehicles: units on every axis, both detections, every wheelset."""
+
+import copy
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.synthetic import hunting_run
+from wrcore.analysis_vehicle import speed_row
+from wrcore.figures_vehicle import HUNTING, RESPONSE, guiding_forces, lateral_motion, over_speed
+
+
+def vehicle_run(detection):
+    run = hunting_run(detection)
+    run.scene["integration"] = {"duration": 4.0}
+    for k in (1, 2):
+        for group in ("wheelset", "wheelset/left", "wheelset/right"):
+            run.groups[group.replace("wheelset", f"wheelset_{k}")] = copy.deepcopy(run.groups[group])
+    for group in ("wheelset", "wheelset/left", "wheelset/right"):
+        del run.groups[group]
+    return run
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {detection: vehicle_run(detection) for detection in ("planar", "spatial")}
+
+
+def labels(figure):
+    return [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
+
+
+def test_lateral_motion_shows_every_wheelset_in_mm(runs):
+    figure = lateral_motion({"20 m/s": runs, "60 m/s": runs})
+    assert len(figure.axes) == 4
+    drawn = figure.axes[0].lines[0].get_ydata()
+    np.testing.assert_allclose(drawn, 1e3 * runs["planar"]["wheelset_1"].y_m)
+    assert set(labels(figure)) == {"y / mm", "time / s"}
+
+
+def test_guiding_forces_show_both_wheels_in_kN(runs):
+    figure = guiding_forces(runs["spatial"], "any")
+    assert len(figure.axes) == 6
+    assert [len(axes.lines) for axes in figure.axes] == [2] * 6
+    assert figure.axes[0].lines[0].get_ydata()[0] == pytest.approx(8.9 * np.cos(0.03))
+    assert {"Q / kN", "Y / kN", "Y/Q", "time / s"} == set(labels(figure))
+
+
+@pytest.mark.parametrize("quantities", [HUNTING, RESPONSE])
+def test_over_speed_draws_a_line_per_vehicle_and_detection(runs, quantities):
+    rows = []
+    for detection, run in runs.items():
+        for speed in (20.0, 40.0, 60.0):
+            row = speed_row(run) | {"speed_m_per_s": speed, "detection": detection, "track": "released"}
+            rows.append(row | {column: 1.0 for column, _, _ in quantities})
+    table = pd.DataFrame(rows)
+    figure = over_speed({"wheelset": table, "coach": table}, "released", quantities)
+    assert [len(axes.lines) for axes in figure.axes] == [4] * len(quantities)
+    assert "speed / (m/s)" in labels(figure)
+    assert {label for _, _, label in quantities} <= set(labels(figure))

@@ -1,0 +1,204 @@
+"""Speed against error: every modelling and integration choice run on a scene, timed, and compared with a reference.
+
+The reference runs with spatial detection, the moment reduction and the finest creep table at the tightest tolerance, by
+two independent integrators; their difference says how far the reference itself can be trusted.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis import amplitude, hunting_frequency
+from wrcore.analysis_vehicle import wear_number, wheel_forces, wheelsets_of
+from wrcore.scene import load_scene
+from wrcore.simulate import simulate
+
+SIDES = ("left", "right")
+
+ATOL_PER_RTOL = 1e-3
+"""Absolute tolerance (m, m/s, rad/s) for a relative one of 1."""
+
+
+class Choice(NamedTuple):
+    """One way to run a scene."""
+
+    detection: str
+    patch: str
+    creep: str
+    """Creep law; a table with the 99 % error it is built for, as in ``table 0.01``."""
+    method: str
+    rtol: float
+
+    def overrides(self):
+        """Changes to a scene, as :func:`wrcore.scene.load_scene` takes them."""
+        law, _, tolerance = self.creep.partition(" ")
+        changes = [
+            f"contact.detection={self.detection}",
+            f"contact.patch={self.patch}",
+            f"contact.creep.model={law}",
+            f"integration.method={self.method}",
+            f"integration.rtol={self.rtol:g}",
+            f"integration.atol={ATOL_PER_RTOL * self.rtol:g}",
+        ]
+        return [*changes, f"contact.creep.tolerance={tolerance}"] if tolerance else changes
+
+
+def combinations(grids):
+    """All choices of several grids, each once.
+
+    Parameters
+    ----------
+    grids : sequence of dict
+        Lists of detections, patches, creeps, methods and rtols by the names of :class:`Choice`'s fields.
+
+    Returns
+    -------
+    list of Choice
+    """
+    found = [Choice(*values) for grid in grids for values in product(*(grid[name] for name in Choice._fields))]
+    return list(dict.fromkeys(found))
+
+
+def run_errors(run, reference, until=np.inf):
+    """How far a run is from its reference.
+
+    Parameters
+    ----------
+    run, reference : Run
+        With the same output times, as far as both go.
+    until : float
+        End of the comparison, s.
+
+    Returns
+    -------
+    dict
+        RMS and maximum over all wheelsets of the lateral position's error (m); RMS over all wheels of the error of Q
+        and Y (N); relative errors of mean wear number, amplitude and frequency over the second half.
+    """
+    if run.t[-1] < min(until, reference.t[-1]) - 1e-9:
+        return dict.fromkeys(ERRORS, np.nan)  # did not get there
+    here = reference.t[: run.t.size] <= until
+    names = wheelsets_of(reference)
+    gaps = np.array([(run[name].y_m - reference[name].y_m)[here] for name in names])
+    forces, wear, sure_wear = [], [], []
+    for name, side in product(names, SIDES):
+        forces.append(np.subtract(wheel_forces(run, name, side), wheel_forces(reference, name, side))[:, here])
+        wear.append(np.mean(wear_number(run, name, side)[here]))
+        sure_wear.append(np.mean(wear_number(reference, name, side)[here]))
+    late = here & (reference.t >= 0.5 * min(until, reference.t[-1]))
+    leading = names[0]
+    motion = [(r.t[late], r[leading].y_m[late]) for r in (run, reference)]
+    (size, sure_size), (beat, sure_beat) = (
+        [amplitude(y) for _, y in motion],
+        [hunting_frequency(t, y) for t, y in motion],
+    )
+    return {
+        "y_rms_m": float(np.sqrt(np.mean(gaps**2))),
+        "y_max_m": float(np.max(np.abs(gaps))),
+        "force_rms_N": float(np.sqrt(np.mean(np.square(forces)))),
+        "wear_number_relative": float(abs(np.mean(wear) / np.mean(sure_wear) - 1.0)),
+        "amplitude_relative": float(abs(size / sure_size - 1.0)),
+        "frequency_relative": float(abs(beat / sure_beat - 1.0)),
+    }
+
+
+ERRORS = ("y_rms_m", "y_max_m", "force_rms_N", "wear_number_relative", "amplitude_relative", "frequency_relative")
+COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
+
+
+def reference_runs(source, overrides, reference, finest):
+    """The reference run and its independent twin.
+
+    Parameters
+    ----------
+    source, overrides
+        Scene, as for :func:`wrcore.scene.load_scene`.
+    reference : dict
+        methods (two names) and rtol.
+    finest : str
+        Creep of the reference, as in :class:`Choice`.
+
+    Returns
+    -------
+    run, twin : Run
+    """
+    choices = [Choice("spatial", "moment", finest, method, reference["rtol"]) for method in reference["methods"]]
+    return [simulate(load_scene(source, [*overrides, *choice.overrides()])) for choice in choices]
+
+
+def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None):
+    """Run every choice on a scene.
+
+    Parameters
+    ----------
+    source, overrides
+        Scene, as for :func:`wrcore.scene.load_scene`.
+    choices : sequence of Choice
+    reference : Run
+    until : float
+        End of the comparison, s.
+    repetitions : int
+        Timed runs of each choice; all choices run in turn in each pass, so that a slow moment of the machine does not
+        hit one alone.
+    progress : callable, optional
+        Wraps the list of choices in each pass, e.g. ``tqdm.tqdm``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per choice: its fields, status, errors, median wall time (s), its spread (largest less least over the
+        median), real-time factor and counters.
+    """
+    scenes = {choice: load_scene(source, [*overrides, *choice.overrides()]) for choice in choices}
+    rows, times = {}, {choice: [] for choice in choices}
+    for repetition in range(repetitions):
+        for choice in (progress or iter)(list(choices)):
+            run = simulate(scenes[choice])
+            times[choice].append(run.counters["wall_s"])
+            if repetition == 0:
+                costs = {name: run.counters.get(name, 0) for name in COSTS}
+                errors = run_errors(run, reference, until)
+                rows[choice] = choice._asdict() | {"status": run.status} | errors | costs
+    for choice, row in rows.items():
+        wall = np.array(times[choice])
+        row["wall_s"] = float(np.median(wall))
+        row["wall_spread"] = float(np.ptp(wall) / np.median(wall))
+        row["real_time_factor"] = float(scenes[choice].data["integration"]["duration"]) / row["wall_s"]
+    return pd.DataFrame(list(rows.values()))
+
+
+def pareto_front(table, error="y_rms_m", cost="wall_s"):
+    """Rows that no other row beats in both error and cost, from cheap and rough to dear and accurate.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    usable = table[(table["status"] == "completed") & table[error].notna()].sort_values([cost, error])
+    return usable[usable[error] < usable[error].cummin().shift(fill_value=np.inf)]
+
+
+def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
+    """The cheapest choice for each wanted accuracy.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From :func:`study`.
+    accuracies : sequence of float
+        Largest error that is accepted, in the error's unit, each a row.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Accuracies that nothing reaches are left out.
+    """
+    front = pareto_front(table, error, cost)
+    rows = []
+    for accuracy in sorted(accuracies, reverse=True):
+        enough = front[front[error] <= accuracy]
+        if len(enough):
+            rows.append({"accuracy_m": accuracy} | enough.iloc[0].to_dict())
+    return pd.DataFrame(rows)
