@@ -1,8 +1,9 @@
 """Static equilibrium: the vehicle rolls straight ahead at constant speed and nothing accelerates.
 
-Unknown are small displacements of all bodies (three translations, three rotations in track axes), with the spin rate of
-a wheelset in place of its rotation about the axle, which its frame does not have, and the force elements' own states.
-Newton's method on the accelerations; directions in which nothing holds a body (along the track, say) stay as they are.
+Unknown are small displacements of all bodies (three translations, three rotations in track axes) but for a wheelset's
+rotation about its axle, which its frame does not have, and the force elements' own states. Newton's method on the
+accelerations, without a wheelset's about its axle; directions in which nothing holds a body (along the track, say) stay
+as they are.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.system import fill_derivatives, state_size, workspace
 
 STEP = 1e-7
-"""Of the difference quotients: m, rad, and a hundred times that in rad/s."""
+"""Of the difference quotients: m and rad."""
 
 RESIDUAL = 1e-9
 """Accelerations below this count as none, m/s^2 and rad/s^2."""
@@ -31,8 +32,7 @@ class Equilibrium:
     wheel_loads : numpy.ndarray, shape (k, 2)
         Vertical force of the rails on each wheel, N: wheelsets as in ``model.bodies.wheelsets``, left and right.
     residual : float
-        Largest acceleration left, m/s^2 or rad/s^2. With friction, nothing drives a free wheelset: the power of its
-        spin creepage slows it down (3e-4 m/s^2), and that is left here.
+        Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle.
     """
 
     state: np.ndarray
@@ -56,7 +56,6 @@ def displaced(state, model, displacement):
     model : Model
     displacement : numpy.ndarray, shape (6 n + states,)
         Per body: translation (m), rotation vector in track axes (rad); then changes of the elements' own states (m).
-        Along the axle of a wheelset, the rotation is a change of its spin rate (rad/s) instead.
 
     Returns
     -------
@@ -67,13 +66,7 @@ def displaced(state, model, displacement):
     for b in range(n):
         at, q = STATE_SIZE * b, displacement[6 * b : 6 * b + 6]
         out[at : at + 3] += q[:3]
-        turn = q[3:].copy()
-        e0, e1, e2, e3 = state[at + 3 : at + 7]
-        if model.bodies.spins[b]:
-            axle = np.array([2 * (e1 * e2 - e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 + e0 * e1)])
-            out[at + 10 : at + 13] += axle * (turn @ axle)
-            turn -= axle * (turn @ axle)
-        out[at + 3 : at + 7] = _turned((e0, e1, e2, e3), turn)
+        out[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], q[3:])
     out[STATE_SIZE * n :] += displacement[6 * n :]
     return out
 
@@ -89,6 +82,13 @@ def _turned(p, turn):
         a0 * e2 + a2 * e0 + a3 * e1 - a1 * e3, a0 * e3 + a3 * e0 + a1 * e2 - a2 * e1,
     ])  # fmt: skip
     return turned / np.linalg.norm(turned)
+
+
+def _unknowns(model):
+    """Mask (6 n + states,) of the displacements that are unknown: all but a wheelset's rotation about its axle."""
+    unknown = np.ones(6 * len(model.bodies.mass) + model.elements.states, bool)
+    unknown[6 * np.flatnonzero(model.bodies.spins) + 4] = False
+    return unknown
 
 
 def _accelerations(rates, model):
@@ -116,24 +116,22 @@ def solve_equilibrium(model, state, iterations=50):
     """
     work = workspace(model)
     model = model._replace(beta=model.beta or 1.0)  # without feedback a joint's violation would not show
-    size = 6 * len(model.bodies.mass) + model.elements.states
-    spins = np.zeros(size, bool)
-    spins[[6 * b + 4 for b in np.flatnonzero(model.bodies.spins)]] = True
-    steps = np.where(spins, 100 * STEP, STEP)
+    unknown = _unknowns(model)
+    size = int(unknown.sum())
     rates = np.empty((2 * size + 1, state_size(model)))
     residual = np.inf
     for _ in range(iterations):
-        rows = [displaced(state, model, h * row) for h in (1.0, -1.0) for row in np.diag(steps)]
+        rows = [displaced(state, model, h * row) for h in (STEP, -STEP) for row in np.eye(len(unknown))[unknown]]
         evaluate(0.0, np.array([*rows, state]), model, work, rates)
-        values = _accelerations(rates, model)
-        residual = float(np.max(np.abs(values[-1]))) if size else 0.0
+        values = _accelerations(rates, model)[:, unknown]
+        residual = float(np.max(np.abs(values[-1])))
         if residual < RESIDUAL:
             break
-        slopes = ((values[:size] - values[size:-1]) / (2.0 * steps[:, None])).T
-        scale = np.where(spins, 1.0, 1e-3)  # steps of 1 rad/s count like steps of 1 mm
-        largest = np.max(np.abs(slopes * scale), axis=1)
+        slopes = ((values[:size] - values[size:-1]) / (2.0 * STEP)).T
+        largest = np.max(np.abs(slopes), axis=1)
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
-        step = np.linalg.lstsq(weights[:, None] * slopes * scale, -weights * values[-1], rcond=1e-11)[0] * scale
+        step = np.zeros(len(unknown))
+        step[unknown] = np.linalg.lstsq(weights[:, None] * slopes, -weights * values[-1], rcond=1e-11)[0]
         better = _improved(state, step, model, work, residual)
         if better is None:
             break
@@ -147,7 +145,7 @@ def _improved(state, step, model, work, residual):
     for halvings in range(12):
         new = displaced(state, model, step * 0.5**halvings)
         evaluate(0.0, new[None, :], model, work, rates)
-        if np.max(np.abs(_accelerations(rates, model))) < residual:
+        if np.max(np.abs(_accelerations(rates, model)[:, _unknowns(model)])) < residual:
             return new
     return None
 

@@ -6,8 +6,13 @@ once in the axes of j: with A the rotation matrices, r the positions, v the velo
     R = Aj^T Ai,  rho = Aj^T (ri - rj),  u = Aj^T (vi - vj - wj x (ri - rj)),  W = Aj^T (wi - wj).
 
 A marker m of i and a marker n of j are then apart by d = rho + R m - n, at the rate d' = u + W x R m. A force F on i
-acts at i's marker; the opposite force acts on j at that same point, so that the pair neither gains angular momentum nor,
-without dampers, energy: with U(d) the spring's energy, F = -dU/dd is its force along the axes of j exactly.
+acts at i's marker; the opposite force acts on j at that same point, so that the pair gains neither angular momentum
+nor, without dampers, energy: with U(d) the spring's energy, F = -dU/dd is its force along the axes of j exactly. The
+same holds for rotation stiffnesses (kx, ky, kz) about the axes of j: their moment is that of the energy
+
+    U(R) = c . (1 - diag R),   cx = (ky + kz - kx)/2 and so on,
+
+which is kx roll^2/2 + ky pitch^2/2 + kz yaw^2/2 for small angles and kx (1 - cos roll) for a rotation about x alone.
 
 The angular velocity w of a wheelset leaves out the spin (its frame does not spin, see wrcore.dynamics.body).
 """
@@ -37,7 +42,7 @@ class Elements(NamedTuple):
     ahead: np.ndarray
     """(p,): for the moving frame, arc length of its cross-section ahead of the frame's origin, m."""
     turning: np.ndarray
-    """(p, 2, 3): stiffness (N m/rad) and damping (N m s/rad) against relative rotation about the second body's axes."""
+    """(p, 2, 3): factors c of the energy U(R) (N m/rad) and damping (N m s/rad) about the second body's axes."""
     first_spring: np.ndarray
     """(p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]."""
     springs: np.ndarray
@@ -69,7 +74,7 @@ def pack_elements(springs=(), directed=(), turning=()):
         Elements along one direction: the 10 numbers of a row of ``Elements.directed``, direction, law, and the points
         (q, 2) of the characteristic, or None.
     turning : sequence of (pair, stiffness, damping)
-        Against relative rotation, three numbers each; summed pair by pair.
+        Against relative rotation about the second body's axes, three numbers each; summed pair by pair.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def pack_elements(springs=(), directed=(), turning=()):
     springs, directed = (sorted(group, key=lambda item: item[0]) for group in (springs, directed))
     rotational = np.zeros((len(pairs), 2, 3))
     for pair, stiffness, damping in turning:
-        rotational[pairs.index(pair)] += (stiffness, damping)
+        rotational[pairs.index(pair)] += (0.5 * np.sum(stiffness) - np.asarray(stiffness, float), damping)
     points, laws, states = [], [], 0
     for _, _, direction, law, polygon in directed:
         own = states if law in (SERIES, SERIES_VELOCITY) else -1
@@ -192,9 +197,10 @@ def element_forces(elements, track, t, speed, state, rotations, turns, wrenches,
         )  # fmt: skip
         turning = elements.turning[p]
         fx = fy = fz = 0.0
-        mx = -0.5 * turning[0, 0] * (r21 - r12) - turning[1, 0] * ox
-        my = -0.5 * turning[0, 1] * (r02 - r20) - turning[1, 1] * oy
-        mz = -0.5 * turning[0, 2] * (r10 - r01) - turning[1, 2] * oz
+        c0, c1, c2 = turning[0, 0], turning[0, 1], turning[0, 2]
+        mx = c2 * r12 - c1 * r21 - turning[1, 0] * ox
+        my = c0 * r20 - c2 * r02 - turning[1, 1] * oy
+        mz = c1 * r01 - c0 * r10 - turning[1, 2] * oz
         for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
             row = elements.springs[k]
             bx = r00 * row[0] + r01 * row[1] + r02 * row[2]

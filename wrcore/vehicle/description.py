@@ -11,7 +11,8 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
-from wrcore.vehicle.elements import check_element, compile_elements
+from wrcore.vehicle.element_checks import check_element
+from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
 
 GRAVITY = 9.81
@@ -23,6 +24,9 @@ BODY_KEYS = {
     "axle_box": (("wheelset",), ()),
 }
 """Keys of each kind of body beside kind, mass, inertia and position: those it needs and those it may have."""
+
+LARGEST_LIFT = 0.02
+"""Wheelsets whose centre lies further than this from its rolling radius above the rails are taken for a mistake, m."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +103,9 @@ def build_vehicle(data, source, axle_boxes=True):
     Without ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and
     yaw; in pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset.
     """
-    data = validate(data, "vehicle", source)
+    data = _validated(data, source)
     _check_bodies(data["bodies"], source)
+    _check_names(data, source)
     for item in data["elements"]:
         check_element(item, source)
     if not axle_boxes:
@@ -121,11 +126,34 @@ def build_vehicle(data, source, axle_boxes=True):
                 data["bodies"][part["wheelset"]]["position"][2]]}
         for name, part in zip(layout.names, parts, strict=True) if part["kind"] == "axle_box"
     ]  # fmt: skip
+    compiled = _joints(joints, layout, source)
     return Vehicle(
         data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
         float(first.get("tape_circle_half_distance", np.nan)), bodies,
-        compile_elements(data["elements"], layout, GRAVITY), _joints(joints, layout, source), data,
+        compile_elements(data["elements"], layout, joints, GRAVITY), compiled, data,
     )  # fmt: skip
+
+
+def _validated(data, source):
+    """The data checked against the schema; errors name an element or joint instead of its place in the list."""
+    try:
+        return validate(data, "vehicle", source)
+    except InputError as error:
+        group, *path = error.field.split(".")
+        if group in ("elements", "joints") and path:
+            item = data[group][int(path[0])]
+            if isinstance(item, dict) and isinstance(item.get("name"), str) and item["name"]:
+                path[0] = item["name"]
+        raise InputError(source, ".".join([group, *path]), error.expected) from None
+
+
+def _check_names(data, source):
+    """No two elements, and no two joints, of the same name."""
+    for group in ("elements", "joints"):
+        names = [item["name"] for item in data[group]]
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                raise InputError(source, f"{group}.{name}", f"expected a name of its own for each of the {group}")
 
 
 def _check_bodies(bodies, source):
@@ -146,6 +174,10 @@ def _check_bodies(bodies, source):
             first = next(iter(wheelsets))
             if part[key] != wheelsets[first][key]:
                 raise InputError(source, f"bodies.{name}.{key}", f"expected {wheelsets[first][key]} as for {first}")
+        x, y, z = part["position"]
+        if y != 0.0 or abs(z - part["rolling_radius"]) > LARGEST_LIFT:
+            expected = f"expected y = 0 and z within {LARGEST_LIFT:g} m of the rolling radius, got {[x, y, z]}"
+            raise InputError(source, f"bodies.{name}.position", expected)
         if part["inertia"]["roll"] != part["inertia"]["yaw"]:
             raise InputError(
                 source, f"bodies.{name}.inertia", "expected equal roll and yaw moments (body of revolution)"
@@ -169,13 +201,10 @@ def _lumped(bodies):
 
 def _layout(data, source):
     parts = {name: part for name, part in data["bodies"].items() if part["kind"] != "lumped"}
-    joined = {item["bodies"][k]: item["bodies"][1 - k] for item in data["joints"] for k in (0, 1)}
-    wheelsets = [name for name, part in parts.items() if part["kind"] == "wheelset"]
     return Layout(
         source, tuple(parts), np.array([part["position"] for part in parts.values()], float),
         np.array([part["mass"] for part in parts.values()], float),
         np.array([part["kind"] == "wheelset" for part in parts.values()]),
-        np.array([part["kind"] == "body" and joined.get(name) not in wheelsets for name, part in parts.items()]),
         {name: part["wheelset"] for name, part in data["bodies"].items() if part["kind"] == "lumped"},
     )  # fmt: skip
 

@@ -1,0 +1,113 @@
+"""Static equilibrium against statics by hand."""
+
+import copy
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.conftest import ROOT, SCENES
+from wrcore.checked_yaml import read_yaml
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
+
+TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
+CAR = 32000 * GRAVITY
+
+
+@pytest.fixture
+def equilibrium_of(tmp_path):
+    """Scene, model and equilibrium of a vehicle's data."""
+
+    def find(data, *overrides):
+        (tmp_path / "vehicle.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
+        overrides = [f"vehicle.parameters={tmp_path / 'vehicle.yaml'}", "contact.creep.model=linear", *overrides]
+        scene = load_scene(SCENES / "trailer_vehicle.yaml", ["vehicle.axle_boxes=false", "initial.y=0", *overrides])
+        model = compile_scene(scene)[0]
+        return scene, model, static_equilibrium(scene, model)
+
+    return find
+
+
+def heights(scene, equilibrium):
+    """Height of each body's centre in equilibrium, m, by name."""
+    names = scene.vehicle.body_names
+    return {name: equilibrium.state[STATE_SIZE * b + 2] for b, name in enumerate(names)}
+
+
+def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of):
+    scene, model, equilibrium = equilibrium_of(TRAILER)
+    # 44 482 kg on eight wheels: 54 546 N (derived from the masses of Manchester vehicle 1)
+    assert equilibrium.wheel_loads.shape == (4, 2)
+    weight = sum(part["mass"] for part in TRAILER["bodies"].values()) * GRAVITY
+    np.testing.assert_allclose(equilibrium.wheel_loads, weight / 8, rtol=1e-6)
+    assert weight / 8 == pytest.approx(54546, abs=0.5)
+    # springs hold the nominal position: what is left is the wheelsets' lowering onto the rails, under 0.3 mm
+    lowered = {name: heights(scene, equilibrium)[name] - place[2] for name, place in zip(
+        scene.vehicle.body_names, scene.vehicle.positions, strict=True)}  # fmt: skip
+    assert -3e-4 < lowered["wheelset_1"] < 0.0
+    np.testing.assert_allclose(list(lowered.values()), lowered["wheelset_1"], atol=1e-8)
+    assert equilibrium.residual < 1e-6
+    np.testing.assert_allclose(equilibrium.state[7 * STATE_SIZE :], 0.0, atol=1e-9)  # dampers' springs are relaxed
+
+
+def test_load_off_the_centre(equilibrium_of):
+    data, x, y = copy.deepcopy(TRAILER), 0.6, 0.08
+    data["bodies"]["car_body"]["position"] = [x, y, 1.8]
+    scene, model, equilibrium = equilibrium_of(data)
+    loads = equilibrium.wheel_loads
+    rest = (2615 + 2 * 1813) * GRAVITY
+    front = CAR * (0.5 + x / 19.0) + rest  # level: moments about the rear bogie's centre
+    assert loads[:2].sum() == pytest.approx(front, rel=1e-5)
+    assert loads.sum() == pytest.approx(CAR + 2 * rest, rel=1e-9)
+    # moments of all forces on the vehicle about the track's centre line, with the places where wheels do touch
+    work = workspace(model)
+    right_hand_side(model._replace(contact=model.contact._replace(friction=1e-9)), work)(0.0, equilibrium.state)
+    moment = 0.0
+    for wheelset in range(4):
+        for side in range(2):
+            for row in work.patches[wheelset, side, : work.counts[wheelset, side]]:
+                angle = row[reduction.ANGLE]
+                across, up = row[reduction.NORMAL] * np.array([-np.sin(angle), np.cos(angle)])
+                moment += row[reduction.Y] * up - row[reduction.Z] * across
+    centres = equilibrium.state[: STATE_SIZE * 7].reshape(7, STATE_SIZE)[:, 1]
+    assert moment == pytest.approx(GRAVITY * scene.vehicle.bodies.mass @ centres, rel=1e-6)
+    assert moment == pytest.approx(CAR * y, rel=0.02)  # the wheelsets give way by a millimetre or so
+    assert np.all(loads[:, 0] > 1.05 * loads[:, 1])
+
+
+def test_a_vehicle_without_enough_preload_sinks_onto_its_springs(equilibrium_of):
+    data = copy.deepcopy(TRAILER)
+    for item in data["elements"]:
+        if item["name"].startswith("secondary_spring"):
+            item["preload"] = [0.0, 0.0, 0.0]
+    scene, _, equilibrium = equilibrium_of(data)
+    found, nominal = heights(scene, equilibrium), heights(*equilibrium_of(TRAILER)[::2])
+    sunk = {name: nominal[name] - found[name] for name in found}
+    # four secondary springs of 430 kN/m, eight primary springs of 1.22 MN/m that were preloaded for the bogies alone
+    assert sunk["bogie_1"] == pytest.approx(CAR / 8 / 1.22e6, rel=1e-6)
+    assert sunk["car_body"] - sunk["bogie_1"] == pytest.approx(CAR / 4 / 430e3, rel=1e-6)
+    np.testing.assert_allclose(equilibrium.wheel_loads, 54546.05, rtol=1e-6)
+
+
+def test_a_bogie_under_a_frame_that_carries_load(equilibrium_of):
+    # the front half: the car body's weight comes from the moving frame, as a stated preload
+    data = copy.deepcopy(TRAILER)
+    keep = ("bogie_1", "wheelset_1", "wheelset_2", "axle_box_1_left", "axle_box_1_right", "axle_box_2_left",
+            "axle_box_2_right")  # fmt: skip
+    data["bodies"] = {name: part for name, part in data["bodies"].items() if name in keep}
+    data["elements"] = [
+        item for item in data["elements"] if all(name in keep for name in item["bodies"])
+    ] + [
+        {"name": f"load_{side}", "kind": "spring_damper", "bodies": ["bogie_1", "frame"], "at": [9.5, y, 0.8275],
+         "stiffness": [160e3, 160e3, 430e3], "preload": [0.0, 0.0, -CAR / 4]}
+        for side, y in (("left", 1.0), ("right", -1.0))
+    ]  # fmt: skip
+    scene, _, equilibrium = equilibrium_of(data)
+    # the springs to the frame stretch by the wheelsets' lowering of about 0.2 mm and carry that much less
+    lowered = scene.vehicle.positions[0, 2] - heights(scene, equilibrium)["bogie_1"]
+    weight = CAR / 2 + (2615 + 2 * 1813) * GRAVITY - 2 * 430e3 * lowered
+    np.testing.assert_allclose(equilibrium.wheel_loads, weight / 4, rtol=1e-6)
+    assert 0.0 < lowered < 3e-4

@@ -1,0 +1,147 @@
+"""Which springs carry a vehicle in its nominal position, and with which preloads.
+
+Wheelsets stand on the rails and the moving frame stays where it is; every other body may move by a small q, a
+translation and a rotation. With B the motion of an element's two ends relative to each other per unit of q, K the sum
+of B^T k B over the springs' vertical stiffnesses k and C q = 0 the joints, the vehicle's weight f sinks it by
+
+    [ K  C^T ] [ q      ]   [ f ]
+    [ C   0  ] [ lambda ] = [ 0 ],
+
+and each spring's share of the load is its preload, -k B q. In nominal position nothing then accelerates, and horizontal
+springs, traction rods and bump stops are free of load.
+"""
+
+import numpy as np
+
+from wrcore.dynamics.marker import FRAME
+from wrcore.errors import InputError
+from wrcore.vehicle.element_data import end_points, on_line, rotational
+
+UNCARRIED = 1e-6
+"""Part of a body's weight that nothing may be left to carry."""
+
+SPRINGS = ("spring_damper", "shear_spring")
+"""Kinds that take a preload by themselves."""
+
+
+def preloads(items, layout, joints, gravity):
+    """Vertical preloads of the springs that state none, such that the vehicle rests in nominal position.
+
+    They share what the elements with a stated preload leave over, as linear springs would.
+
+    Parameters
+    ----------
+    items : list of dict
+        From :func:`wrcore.vehicle.element_data.single_elements`.
+    layout : Layout
+    joints : list of dict
+    gravity : float
+        m/s^2.
+
+    Returns
+    -------
+    dict of str to float
+        N on the first body, by name of the element.
+
+    Raises
+    ------
+    InputError
+        Naming a body that neither springs nor joints carry.
+    """
+    size = 6 * len(layout.names)
+    weight, load = np.zeros(size), np.zeros(size)
+    weight[2::6] = -gravity * layout.mass
+    fixed = np.repeat(layout.spins, 6)
+    free, shared, holding = np.zeros((size, size)), np.zeros((size, size)), {}
+    for item in items:
+        motion = _relative_motion(item, layout)
+        stiffness = _stiffness(item, layout)
+        free += motion.T @ stiffness @ motion
+        if "preload" in item:
+            load += motion[:3].T @ _stated(item)
+        elif item["kind"] in SPRINGS:
+            holding[item["name"]] = stiffness[2, 2] * motion[2]
+            shared += np.outer(motion[2], holding[item["name"]])
+    constraints = np.vstack([np.zeros((0, size)), *(_constraints(item, layout) for item in joints)])
+    left = _solve(free, constraints, weight, fixed)[1]
+    for body, name in enumerate(layout.names):
+        part = slice(6 * body, 6 * body + 6)
+        if np.max(np.abs(left[part])) > UNCARRIED * -weight[6 * body + 2]:
+            expected = "expected springs or joints that carry the body in nominal position; a force or moment of"
+            got = f"{np.max(np.abs(left[part])):.4g} N or N m is left of its weight"
+            raise InputError(layout.source, f"bodies.{name}", f"{expected} {got}")
+    sunk = _solve(shared, constraints, weight + load, fixed)[0]
+    return {name: -float(force @ sunk) for name, force in holding.items()}
+
+
+def _solve(stiffness, constraints, load, fixed):
+    """Displacements under a load, and the load that nothing carries, with some of the unknowns held at zero."""
+    n, scale = len(load), max(np.max(np.abs(stiffness)), 1.0)
+    columns = np.flatnonzero(~fixed)
+    rows = constraints[:, columns] * scale
+    matrix = np.block([[stiffness[np.ix_(columns, columns)], rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    right = np.concatenate([load[columns], np.zeros(len(rows))])
+    if not columns.size:
+        return np.zeros(n), np.zeros(n)
+    solved = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    displacement, left = np.zeros(n), np.zeros(n)
+    displacement[columns] = solved[: len(columns)]
+    left[columns] = (right - matrix @ solved)[: len(columns)]
+    return displacement, left
+
+
+def _point_motion(body, point, layout):
+    """Motion (6, size) of a point of a body: translation and rotation per unit of all unknowns."""
+    motion = np.zeros((6, 6 * len(layout.names)))
+    if body != FRAME:
+        x, y, z = np.asarray(point) - layout.positions[body]
+        at = 6 * body
+        motion[:, at : at + 6] = np.eye(6)
+        motion[:3, at + 3 : at + 6] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return motion
+
+
+def _relative_motion(item, layout):
+    """Motion (6, size) of an element's first end relative to the second body at the same point."""
+    first, second = layout.ends(item, f"elements.{item['name']}")
+    here = end_points(item)[0]
+    return _point_motion(first, here, layout) - _point_motion(second, here, layout)
+
+
+def _direction(item):
+    """Unit vector of an element that acts along one direction."""
+    if not on_line(item):
+        return np.eye(3)["xyz".index(item["direction"])]
+    here, there = end_points(item)
+    return (here - there) / max(np.linalg.norm(here - there), 1e-9)
+
+
+def _stiffness(item, layout):
+    """Stiffness (6, 6) of an element against relative translation and rotation; of a characteristic, the steepest."""
+    stiffness = np.zeros((6, 6))
+    stiffness[range(3, 6), range(3, 6)] = rotational(item, layout)[0]
+    if item["kind"] in SPRINGS:
+        stiffness[range(3), range(3)] = item.get("stiffness", 0.0)
+    elif item["kind"] in ("traction_rod", "bump_stop"):
+        points = item["points"]
+        slope = item["stiffness"] if points is None else np.max(np.diff(points[:, 1]) / np.diff(points[:, 0]))
+        stiffness[:3, :3] = slope * np.outer(_direction(item), _direction(item))
+    return stiffness
+
+
+def _stated(item):
+    """Stated preload of an element as a force on its first body, N."""
+    return np.array(item["preload"], float) if item["kind"] in SPRINGS else item["preload"] * _direction(item)
+
+
+def _constraints(item, layout):
+    """Rows (m, size) of a joint: what it does not let move, in nominal position."""
+    first, second = layout.ends(item, f"joints.{item['name']}")
+    if item["kind"] == "coordinate":
+        return _point_motion(first, layout.positions[first], layout)[["xyz".index(item["axis"])]]
+    at = np.array(item["at"], float).reshape(-1, 3)
+    motion = _point_motion(first, at[0], layout) - _point_motion(second, at[-1], layout)
+    if item["kind"] == "rigid_link":
+        return ((at[0] - at[1]) / np.linalg.norm(at[0] - at[1]))[None, :] @ motion[:3]
+    turns = [k for k in range(3, 6) if item["kind"] == "revolute" and k != 3 + "xyz".index(item["axis"])]
+    return motion[[0, 1, 2, *turns]]
