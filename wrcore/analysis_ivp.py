@@ -1,30 +1,32 @@
 """The Test Set's problem "Wheelset" as a study: how well the constrained equations are solved, and what that costs.
 
-The equations of `wrcore.analysis_ivp_wheelset` are integrated as everywhere else, with Baumgarte's feedback of Eq. (8):
-by `wrcore.dynamics.integrate` over the compiled right-hand side, or by the same embedded pair in a compiled loop, which
-can also project each step onto the constraints.
+The equations of `wrcore.analysis_ivp_wheelset` are stabilised as everywhere else, by Baumgarte's feedback of Eq. (8),
+and integrated by an explicit pair in a compiled loop. Besides, each step can be projected onto the constraints, and
+scipy's solvers run for comparison.
 """
 
 import time
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import RK45
+from scipy.integrate import RK45, solve_ivp
 
 from wrcore.analysis_ivp_problem import CONTACT, MULTIPLIERS, STATE, UNITS, workspace
 from wrcore.analysis_ivp_wheelset import right_hand_side, run_pair
-from wrcore.dynamics.integrate import integrate
 
 ATOL_OVER_RTOL = 1e-3
-COMPILED = {"compiled_rk45": False, "compiled_rk45_projected": True}
-"""Methods of the compiled loop, and whether they project each step."""
+TABLEAUS = {"rk45": (np.hstack([RK45.A, np.zeros((RK45.n_stages, 1))]), RK45.B, RK45.E)}
+"""Square matrix of stages, weights, weights of the error: Dormand and Prince's 5(4) pair."""
+PROJECTED = "_projected"
+"""Ending of the methods that project each step."""
+SCIPY = {"scipy_rk45": "RK45", "scipy_dop853": "DOP853", "scipy_lsoda": "LSODA", "scipy_radau": "Radau"}
 
 
 class Run(NamedTuple):
     """A run of the benchmark: its last state, and what it cost."""
 
     status: str
-    """As of `wrcore.dynamics.integrate.Trajectory`."""
+    """completed or failed."""
     state: np.ndarray
     """(11,)"""
     contact: np.ndarray
@@ -34,9 +36,10 @@ class Run(NamedTuple):
     violation: np.ndarray
     """(2,): the larger |Phi| (m) and the larger |Phi'| (m/s) at the last state."""
     history: np.ndarray
-    """(n, 2): violation at the first step past each time; NaN where the method does not keep it."""
+    """(n, 2): largest violation over the steps up to each time; NaN for scipy's solvers."""
     steps: int
-    rejected: int
+    rejected: float
+    """Rejected attempts; NaN for scipy's solvers, which do not count them."""
     evaluations: int
     seconds: float
 
@@ -48,7 +51,7 @@ def solve(problem, method, rtol, alpha=0.0, beta=0.0, times=None):
     ----------
     problem : Problem
     method : str
-        One of `COMPILED` or of `wrcore.dynamics.integrate`.
+        A pair of `TABLEAUS`, alone or with the ending `PROJECTED`, or one of `SCIPY`.
     rtol : float
         Relative tolerance; the absolute one is `ATOL_OVER_RTOL` times this.
     alpha, beta : float
@@ -62,27 +65,35 @@ def solve(problem, method, rtol, alpha=0.0, beta=0.0, times=None):
     """
     wheelset, work = problem.wheelset._replace(alpha=float(alpha), beta=float(beta)), workspace(problem)
     times = np.array([0.0, problem.reference.time]) if times is None else np.asarray(times, float)
-    function = right_hand_side(wheelset, work)
-    history = np.full((len(times), 2), np.nan)
-    if method in COMPILED:
-        state, start = problem.state.copy(), time.perf_counter()
-        steps, rejected = run_pair(
-            *_tableau(), wheelset, work, state, times, history, rtol, ATOL_OVER_RTOL * rtol, COMPILED[method]
-        )
-        seconds, status = time.perf_counter() - start, "completed" if steps >= 0 else "failed"
-    else:
-        path = integrate(function, problem.state, times, method=method, rtol=rtol, atol=ATOL_OVER_RTOL * rtol)
-        state, steps, rejected, status = path.states[-1], path.steps, path.rejected, path.status
-        seconds = path.wall_s
-    evaluations = int(work.counters[0])
+    function, history = right_hand_side(wheelset, work), np.full((len(times), 2), np.nan)
+    run = _scipy_run if method in SCIPY else _compiled_run
+    started = time.perf_counter()
+    completed, state, steps, rejected = run(function, wheelset, work, problem.state, method, rtol, times, history)
+    seconds, evaluations = time.perf_counter() - started, int(work.counters[0])
     function(times[-1], state)
-    violation = np.array([abs(work.phi).max(), abs(work.phi_rate).max()])
-    return Run(status, state, work.contact, work.multipliers, violation, history, steps, rejected, evaluations, seconds)
+    return Run(
+        "completed" if completed else "failed", state, work.contact, work.multipliers,
+        np.array([abs(work.phi).max(), abs(work.phi_rate).max()]), history, steps, rejected, evaluations, seconds,
+    )  # fmt: skip
 
 
-def _tableau():
-    """Dormand and Prince's 5(4) pair: square matrix of stages, weights, weights of the error."""
-    return np.hstack([RK45.A, np.zeros((RK45.n_stages, 1))]), RK45.B, RK45.E
+def _compiled_run(function, wheelset, work, state, method, rtol, times, history):
+    stages, weights, error = TABLEAUS[method.removesuffix(PROJECTED)]
+    state = state.copy()
+    steps, rejected = run_pair(
+        stages, weights, error, wheelset, work, state, times, history, rtol, ATOL_OVER_RTOL * rtol,
+        method.endswith(PROJECTED),
+    )  # fmt: skip
+    return steps >= 0, state, steps, float(rejected)
+
+
+def _scipy_run(function, wheelset, work, state, method, rtol, times, history):
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # a wild trial step is rejected by its error estimate
+            path = solve_ivp(function, times[[0, -1]], state, SCIPY[method], rtol=rtol, atol=ATOL_OVER_RTOL * rtol)
+    except ValueError:  # implicit solvers refuse a Jacobian that is not finite
+        return False, np.full_like(state, np.nan), 0, np.nan
+    return path.success, path.y[:, -1], len(path.t) - 1, np.nan
 
 
 def error_of(problem, run):
@@ -115,7 +126,7 @@ def value_table(problem, run):
     return pd.DataFrame({**columns, "reference": reference, "found": found, "difference": found - reference})
 
 
-def work_precision(problem, tolerances, repetitions):
+def work_precision(problem, tolerances, repetitions, feedback=0.0):
     """Error of x against evaluations and seconds.
 
     Parameters
@@ -125,6 +136,8 @@ def work_precision(problem, tolerances, repetitions):
         Relative tolerances of each method.
     repetitions : int
         Passes over all runs in turn; the seconds are medians. A short run of each method that compiles comes first.
+    feedback : float
+        Baumgarte's alpha = beta, 1/s.
 
     Returns
     -------
@@ -137,7 +150,7 @@ def work_precision(problem, tolerances, repetitions):
     for method in tolerances:
         solve(problem, method, 1e-3, times=[0.0, 1e-3])
     cases = [(method, rtol) for method, values in tolerances.items() for rtol in values]
-    runs = [[solve(problem, method, rtol) for method, rtol in cases] for _ in range(repetitions)]
+    runs = [[solve(problem, *case, feedback, feedback) for case in cases] for _ in range(repetitions)]
     rows = []
     for i, (method, rtol) in enumerate(cases):
         run, seconds = runs[0][i], np.median([turn[i].seconds for turn in runs])
@@ -149,8 +162,8 @@ def work_precision(problem, tolerances, repetitions):
 
 def treatments(parameters):
     """What can be done about drift: (name, method, Baumgarte's alpha = beta), the projection last."""
-    found = [("Baumgarte", "compiled_rk45", float(value)) for value in parameters]
-    return [*found, ("projection", "compiled_rk45_projected", 0.0)]
+    found = [("Baumgarte", "rk45", float(value)) for value in parameters]
+    return [*found, ("projection", "rk45" + PROJECTED, 0.0)]
 
 
 def stabilisation_table(problem, parameters, tolerances):

@@ -12,13 +12,13 @@ from wrcore.figures import ACCENT, styled
 MICRO = 1e6
 
 METHOD_STYLES = {
-    "compiled_rk45": {"label": "Dormand-Prince 5(4), compiled", "color": "#0072B2", "marker": "o", "linestyle": "-"},
-    "compiled_rk45_projected": {
-        "label": "the same, projected", "color": "#56B4E9", "marker": "s", "linestyle": (0, (4, 2)),
-    },
-    "rk45": {"label": "Dormand-Prince 5(4), scipy", "color": "#E69F00", "marker": "^", "linestyle": "-."},
-    "dop853": {"label": "DOP853, scipy", "color": "#009E73", "marker": "v", "linestyle": (0, (6, 1, 1, 1))},
-}  # fmt: skip
+    "rk45": {"label": "Dormand-Prince 5(4)", "color": "#000000", "marker": "o", "linestyle": "-"},
+    "rk45_projected": {"label": "the same, projected", "color": "#CC79A7", "marker": "s", "linestyle": (0, (1, 1))},
+    "scipy_rk45": {"label": "scipy: RK45", "color": "#56B4E9", "marker": "^", "linestyle": "-."},
+    "scipy_dop853": {"label": "scipy: DOP853", "color": "#009E73", "marker": "v", "linestyle": (0, (6, 1, 1, 1))},
+    "scipy_lsoda": {"label": "scipy: LSODA", "color": "#E69F00", "marker": "P", "linestyle": (0, (3, 1))},
+    "scipy_radau": {"label": "scipy: Radau", "color": "#D55E00", "marker": "X", "linestyle": (0, (6, 2, 2, 2))},
+}
 """Okabe-Ito colours; marker and line tell the methods apart in grey too."""
 
 TREATMENT_STYLES = (
@@ -62,7 +62,7 @@ def fig_ivp_work_precision(table, effort, bar):
     panels[0].axvline(effort["evaluations"], color="0.5", linestyle=":", label=f"reference: {effort['solver']}")
     panels[0].set(xlabel="right-hand sides / 1", ylabel=r"error of $x$ at the end / µm", title="(a) evaluations")
     panels[1].set(xlabel="wall time / s", title="(b) time")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     return figure
 
 

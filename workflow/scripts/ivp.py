@@ -9,8 +9,9 @@ sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output
 problem = read_problem(snakemake.input.problem)
 parameters, drift = settings["baumgarte"], settings["drift"]
+work = {key: settings[key] for key in ("tolerances", "repetitions", "feedback")}
 for path, table in (
-    (output.work_precision, work_precision(problem, settings["tolerances"], settings["repetitions"])),
+    (output.work_precision, work_precision(problem, **work)),
     (output.stabilisation, stabilisation_table(problem, parameters, settings["stabilisation_tolerances"])),
     (output.values, value_table(problem, solve(problem, **settings["values"]))),
     (output.history, violation_history(problem, parameters, drift["rtol"], drift["points"])),
