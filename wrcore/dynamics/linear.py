@@ -1,0 +1,168 @@
+"""Small motions about steady running: the equations of motion, linearised in independent coordinates.
+
+Coordinates of a body are the displacement of its centre (track axes) and the small rotation of its frame about its own
+axes; with them go the velocity of its centre (track axes) and its angular velocity (body axes). Displacements q and
+velocities u are then related by q' = u, and only accelerations and the rates of the force elements' own states need
+difference quotients. The frame of a wheelset does not spin (see wrcore.dynamics.body): a wheelset has no rotation about
+its axle, and its spin rate is a velocity alone.
+
+Joints are eliminated: with the columns of N a basis of the null space of their Jacobian D, q = N a and u = N b obey all
+of them to first order, whatever the wheelsets' spin.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.equilibrium import evaluate
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.system import workspace
+
+DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Coordinates of a body; pitch of a wheelset is its spin."""
+
+STEP = 1e-7
+"""Of the difference quotients in displacements (m) and rotations (rad)."""
+
+VELOCITY_STEP = 1e-5
+"""Of the difference quotients in velocities (m/s) and angular velocities (rad/s)."""
+
+RANK = 1e-9
+"""Singular values of D below this part of the largest one count as zero."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """x' = A x for small motions about a steady state.
+
+    Attributes
+    ----------
+    matrix : numpy.ndarray, shape (m, m)
+        A, in independent coordinates.
+    basis : numpy.ndarray, shape (12 n + states, m)
+        Turns independent coordinates into those of the n bodies, as :func:`moved_states` takes them.
+    state : numpy.ndarray
+        The steady state.
+    speed : float
+        m/s.
+    """
+
+    matrix: np.ndarray
+    basis: np.ndarray
+    state: np.ndarray
+    speed: float
+
+
+def linearise(model, state):
+    """Linearise the equations of motion about a steady state.
+
+    Parameters
+    ----------
+    model : Model
+        On a tangent track.
+    state : numpy.ndarray, shape (state_size(model),)
+        All bodies run ahead without turning (wheelsets spin) and without acceleration: as
+        :func:`wrcore.dynamics.equilibrium.solve_equilibrium` leaves them.
+
+    Returns
+    -------
+    Linearisation
+
+    Notes
+    -----
+    Central differences in all independent coordinates; all right-hand sides in one compiled call.
+    """
+    size = 6 * len(model.bodies.mass)
+    work = workspace(model)
+    evaluate(0.0, state[None, :], model, work, np.empty((1, len(state))))  # leaves the joints' Jacobian
+    places, speeds = _independent_motions(model, state, work)
+    basis = block_diag(places, speeds, np.eye(model.elements.states))
+    steps = np.full(basis.shape[1], STEP)
+    steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
+    moves = steps[:, None] * basis.T
+    states = moved_states(model, state, np.vstack([moves, -moves]))
+    rates = np.empty_like(states)
+    evaluate(0.0, states, model, work, rates)
+    changes = _accelerations(model, states, rates)
+    slopes = (changes[: len(moves)] - changes[len(moves) :]).T / (2.0 * steps)
+    kinematic = np.zeros((places.shape[1], len(moves)))
+    kinematic[:, places.shape[1] : places.shape[1] + speeds.shape[1]] = places.T @ speeds
+    matrix = np.vstack([kinematic, speeds.T @ slopes[:size], slopes[size:]])
+    return Linearisation(matrix, basis, state, float(model.speed))
+
+
+def moved_states(model, state, moves):
+    """States with displaced bodies and changed velocities.
+
+    Parameters
+    ----------
+    model : Model
+    state : numpy.ndarray, shape (size,)
+    moves : numpy.ndarray, shape (k, 12 n + states)
+        Displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s,
+        track axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states.
+
+    Returns
+    -------
+    numpy.ndarray, shape (k, size)
+    """
+    n = len(model.bodies.mass)
+    states = np.tile(state, (len(moves), 1))
+    parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
+    place, speed = moves[:, : 12 * n].reshape(-1, 2, n, 6).swapaxes(0, 1)
+    turning = _into_body(parts[..., 3:7], parts[..., 10:13])
+    parts[..., :3] += place[..., :3]
+    parts[..., 3:7] = _turned(parts[..., 3:7], place[..., 3:])
+    parts[..., 7:10] += speed[..., :3]
+    parts[..., 10:13] = _out_of_body(parts[..., 3:7], turning + speed[..., 3:])
+    states[:, STATE_SIZE * n :] += moves[:, 12 * n :]
+    return states
+
+
+def _turned(p, turn):
+    """Euler parameters (..., 4) after a further rotation by a rotation vector in body axes (..., 3)."""
+    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+    c, s = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * turn
+    e0, e = p[..., :1], p[..., 1:]
+    return np.concatenate([e0 * c - np.sum(e * s, -1, keepdims=True), e0 * s + c * e + np.cross(e, s)], axis=-1)
+
+
+def _out_of_body(p, vector):
+    """Vectors (..., 3) in track axes from vectors in body axes, by Euler parameters (..., 4)."""
+    e0, e = p[..., :1], p[..., 1:]
+    return vector + 2.0 * np.cross(e, np.cross(e, vector) + e0 * vector)
+
+
+def _into_body(p, vector):
+    return _out_of_body(p * np.array([1.0, -1.0, -1.0, -1.0]), vector)
+
+
+def _accelerations(model, states, rates):
+    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of the elements' own states."""
+    n = len(model.bodies.mass)
+    parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))
+    turning, change = (_into_body(parts[..., 3:7], rows[..., 10:13]) for rows in (parts, slopes))
+    frame = turning.copy()
+    frame[:, model.bodies.spins == 1, 1] = 0.0
+    both = np.concatenate([slopes[..., 7:10], change - np.cross(frame, turning)], axis=-1)
+    return np.hstack([both.reshape(-1, 6 * n), rates[:, STATE_SIZE * n :]])
+
+
+def _independent_motions(model, state, work):
+    """Displacements (6 n, a) and velocities (6 n, b) that the joints leave free; without joints, of single bodies."""
+    n = len(model.bodies.mass)
+    spins = 6 * np.flatnonzero(model.bodies.spins) + 4
+    turning = np.delete(np.arange(6 * n), spins)
+    jacobian = np.zeros((model.joints.equations, n, 6))
+    for row, (owners, blocks) in enumerate(zip(work.constraints.owner, work.constraints.jacobian, strict=True)):
+        for body, block in zip(owners, blocks, strict=True):
+            if body != FRAME:
+                jacobian[row, body] += block
+    jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 3:7], jacobian[..., 3:])
+    places = np.eye(6 * n)[:, turning]
+    if len(jacobian):
+        _, values, vectors = np.linalg.svd(jacobian.reshape(-1, 6 * n)[:, turning])
+        places = places @ vectors[np.count_nonzero(values > RANK * values[0]) :].T
+    return places, np.hstack([places, np.eye(6 * n)[:, spins]])
