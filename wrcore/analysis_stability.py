@@ -24,8 +24,7 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.equilibrium import solve_equilibrium
-from wrcore.dynamics.linear import DIRECTIONS, linearise
+from wrcore.dynamics.linear import DIRECTIONS, steady_running
 
 NEUTRAL = 1e-3
 """Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
@@ -91,8 +90,7 @@ def steady_motion(model, state, speed):
     -------
     Linearisation
     """
-    model, state = at_speed(model, state, speed)
-    return linearise(model, solve_equilibrium(model, state).state)
+    return steady_running(*at_speed(model, state, speed))
 
 
 def families(vehicle):
@@ -139,7 +137,8 @@ class _Namer:
         """Name of a mode: displacements and velocities (n, 6) of the bodies, displacements of dampers."""
         if abs(eigenvalue) < NEUTRAL:
             return "neutral"
-        energy = {name: np.sum(self.energies(speed)[members], axis=0) for name, members in self.groups.items()}
+        energies = self.energies(speed)
+        energy = {name: np.sum(energies[members], axis=0) for name, members in self.groups.items()}
         family = max(energy, key=lambda name: np.sum(energy[name]))
         direction = int(np.argmax(energy[family]))
         if -eigenvalue.real / abs(eigenvalue) > OVERDAMPED:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import evaluate
+from wrcore.dynamics.equilibrium import RESIDUAL, evaluate
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import workspace
 
@@ -30,7 +30,7 @@ VELOCITY_STEP = 1e-5
 """Of the difference quotients in velocities (m/s) and angular velocities (rad/s)."""
 
 RANK = 1e-9
-"""Singular values of D below this part of the largest one count as zero."""
+"""Singular values below this part of the largest one count as zero."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +40,25 @@ class Linearisation:
     Attributes
     ----------
     matrix : numpy.ndarray, shape (m, m)
-        A, in independent coordinates.
+        A, in independent coordinates: first displacements, then velocities, then the force elements' own states.
     basis : numpy.ndarray, shape (12 n + states, m)
         Turns independent coordinates into those of the n bodies, as :func:`moved_states` takes them.
     state : numpy.ndarray
         The steady state.
     speed : float
         m/s.
+    places : int
+        Number of independent displacements.
+    residual : numpy.ndarray, shape (m,)
+        What should be zero at a steady state: x' there, without the velocities (m/s^2, rad/s^2, m/s).
     """
 
     matrix: np.ndarray
     basis: np.ndarray
     state: np.ndarray
     speed: float
+    places: int
+    residual: np.ndarray
 
 
 def linearise(model, state):
@@ -63,8 +69,7 @@ def linearise(model, state):
     model : Model
         On a tangent track.
     state : numpy.ndarray, shape (state_size(model),)
-        All bodies run ahead without turning (wheelsets spin) and without acceleration: as
-        :func:`wrcore.dynamics.equilibrium.solve_equilibrium` leaves them.
+        All bodies run ahead without turning (wheelsets spin) and without acceleration, as in :func:`steady_running`.
 
     Returns
     -------
@@ -82,15 +87,51 @@ def linearise(model, state):
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
-    states = moved_states(model, state, np.vstack([moves, -moves]))
+    states = moved_states(model, state, np.vstack([moves, -moves, np.zeros((1, len(basis)))]))
     rates = np.empty_like(states)
     evaluate(0.0, states, model, work, rates)
     changes = _accelerations(model, states, rates)
-    slopes = (changes[: len(moves)] - changes[len(moves) :]).T / (2.0 * steps)
+    slopes = (changes[: len(moves)] - changes[len(moves) : -1]).T / (2.0 * steps)
     kinematic = np.zeros((places.shape[1], len(moves)))
     kinematic[:, places.shape[1] : places.shape[1] + speeds.shape[1]] = places.T @ speeds
     matrix = np.vstack([kinematic, speeds.T @ slopes[:size], slopes[size:]])
-    return Linearisation(matrix, basis, state, float(model.speed))
+    rest = np.concatenate([np.zeros(places.shape[1]), changes[-1, :size] @ speeds, changes[-1, size:]])
+    return Linearisation(matrix, basis, state, float(model.speed), places.shape[1], rest)
+
+
+def steady_running(model, state, iterations=10):
+    """Linearise about the steady state near a given one: Newton's method on the displacements and the wheelsets' spins.
+
+    Parameters
+    ----------
+    model : Model
+        On a tangent track.
+    state : numpy.ndarray, shape (state_size(model),)
+        All bodies run ahead at the model's speed, wheels pressed onto the rails.
+    iterations : int
+
+    Returns
+    -------
+    Linearisation
+        Check ``residual``. A free wheelset keeps some: nothing drives it, and its spin creepage slows it down. A
+        displacement that nothing resists, such as that along the track, stays as it is.
+    """
+    best = linearise(model, state)
+    places, size = best.places, len(best.matrix)
+    own = size - model.elements.states
+    columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
+    for _ in range(iterations):
+        if np.max(np.abs(best.residual)) < RESIDUAL:
+            break
+        slopes = best.matrix[places:, columns]
+        largest = np.max(np.abs(slopes), axis=1)
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        step = np.linalg.lstsq(weights[:, None] * slopes, -weights * best.residual[places:], rcond=RANK)[0]
+        new = linearise(model, moved_states(model, best.state, (best.basis[:, columns] @ step)[None, :])[0])
+        if not np.max(np.abs(new.residual)) < np.max(np.abs(best.residual)):
+            break
+        best = new
+    return best
 
 
 def moved_states(model, state, moves):
