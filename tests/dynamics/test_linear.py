@@ -15,7 +15,6 @@ from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.equilibrium import evaluate
 from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.joint import SPHERICAL
 from wrcore.dynamics.linear import linearise, moved_states, steady_running
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model, right_hand_side, state_size, workspace
@@ -150,7 +149,7 @@ def test_damper_in_series_with_a_spring(contact):
 def test_joints_are_eliminated(contact):
     """A body hung from the frame by a spherical joint: two pendulum modes w^2 = m g l/(J + m l^2) and a free yaw."""
     m, length, inertia = 3.0, 0.8, (0.5, 0.7, 0.2)
-    joint = (SPHERICAL, (0, FRAME), [[0, 0, length], [0, 0, 0]], 0)
+    joint = ("spherical", (0, FRAME), [[0, 0, length], [0, 0, 0]], 0)
     model = make_model(contact, [m], [inertia], joints=[joint], speed=7.0)
     linear = linearise(model, body_state((0, 0, -length), velocity=(7.0, 0, 0)))
     assert linear.matrix.shape == (6, 6)

@@ -7,9 +7,9 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.dynamics.test_body import matrix_of
-from wrcore.dynamics.body import STATE_SIZE, euler_parameters
+from wrcore.dynamics.body import euler_parameters
 from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.joint import COORDINATE, SPHERICAL, Joints, constraint_equations
+from wrcore.dynamics.joint import Joint, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import Bodies, Model, right_hand_side, workspace
@@ -37,7 +37,6 @@ def contact(request):
 
 def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, speed=0.0, alpha=5.0, beta=5.0):
     """A model without wheels. springs: bodies, markers, k, c, preload, rest; joints: kind, bodies, markers, axis."""
-    m = len(joints)
     wheelless = np.zeros(len(masses), np.int64), np.zeros(0, np.int64)
     bodies = Bodies(np.array(masses, float), np.array(inertias, float), *wheelless)
     elements = pack_elements(
@@ -46,11 +45,7 @@ def make_model(contact, masses, inertias, springs=(), joints=(), gravity=9.81, s
             for ends, markers, k, c, preload, rest in springs
         ]
     )
-    equations = sum(3 if j[0] == SPHERICAL else 1 for j in joints)
-    joined = Joints(
-        np.array([j[0] for j in joints], np.int64), np.array([j[1] for j in joints], np.int64).reshape(m, 2),
-        np.array([j[2] for j in joints], float).reshape(m, 2, 3), np.array([j[3] for j in joints], np.int64), equations,
-    )  # fmt: skip
+    joined = build_joints([Joint(str(k), *joint) for k, joint in enumerate(joints)], bodies.spins)
     return Model(bodies, contact, elements, joined, LEVEL, speed, gravity, alpha, beta)
 
 
@@ -114,7 +109,7 @@ def test_pendulum_by_lagrange_multipliers(contact):
     from scipy.special import ellipk
 
     m, length, moment, start = 3.0, 0.8, 0.5, 0.7
-    joint = (SPHERICAL, (0, FRAME), [[0, 0, length], [0, 0, 0]], 0)
+    joint = ("spherical", (0, FRAME), [[0, 0, length], [0, 0, 0]], 0)
     model = make_model(contact, [m], [[moment, moment, moment]], joints=[joint])
     position = (0, length * math.sin(start), -length * math.cos(start))
     period = 4 * math.sqrt((moment + m * length**2) / (m * 9.81 * length)) * ellipk(math.sin(start / 2) ** 2)
@@ -128,78 +123,8 @@ def test_pendulum_by_lagrange_multipliers(contact):
 
 def test_baumgarte_removes_a_violation_at_its_own_rate(contact):
     # prescribed x with alpha = beta = 5: Phi'' + 10 Phi' + 25 Phi = 0, so Phi = (1 + 5 t) exp(-5 t) Phi_0
-    joint = (COORDINATE, (0, FRAME), [[0, 0, 0], [0, 0, 0]], 0)
+    joint = ("coordinate", (0, FRAME), [[0, 0, 0], [0, 0, 0]], 0)
     model = make_model(contact, [4.0], [[1, 1, 1]], joints=[joint], speed=3.0)
     result = run(model, body_state((0.01, 0, 0), velocity=(3.0, 0, 0)), 1.0)
     violation = result.states[:, 0] - 3.0 * result.t
     np.testing.assert_allclose(violation, 0.01 * (1 + 5 * result.t) * np.exp(-5 * result.t), atol=1e-10)
-
-
-def test_reduced_solution_equals_the_full_matrix_of_eq_8(contact):
-    # two bodies joined by a spherical joint, one also to the frame: Eq. (8) assembled and solved densely
-    rng = np.random.default_rng(3)
-    joints = [
-        (SPHERICAL, (0, 1), [[0.3, 0.1, -0.2], [-0.4, 0.2, 0.1]], 0),
-        (SPHERICAL, (1, FRAME), [[0.5, 0, 0.2], [0.2, 0.3, 0.4]], 0),
-        (COORDINATE, (0, FRAME), [[0, 0, 0], [0.1, 0, 0]], 0),
-    ]
-    springs = [
-        (
-            (0, 1),
-            rng.normal(size=(2, 3)),
-            rng.uniform(1, 9, 3),
-            rng.uniform(1, 9, 3),
-            rng.normal(size=3),
-            rng.normal(size=3),
-        )
-    ]
-    inertias, masses = rng.uniform(1, 3, (2, 3)), [2.0, 5.0]
-    model = make_model(contact, masses, inertias, springs, joints, speed=2.0, alpha=3.0, beta=7.0)
-    state = np.concatenate([body_state(*rng.normal(size=(4, 3))) for _ in range(2)])
-    work = workspace(model)
-    rate = right_hand_side(model, work)(0.4, state)
-    free = make_model(contact, masses, inertias, springs, [], speed=2.0)
-    unconstrained = right_hand_side(free, workspace(free))(0.4, state)
-    M, D = np.zeros((12, 12)), np.zeros((7, 12))
-    for b in range(2):
-        A = work.rotations[b]
-        M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = masses[b] * np.eye(3)
-        M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = A @ np.diag(inertias[b]) @ A.T
-    constraints = work.constraints
-    for row in range(7):
-        for end in range(2):
-            body = constraints.owner[row, end]
-            if body != FRAME:
-                D[row, 6 * body : 6 * body + 6] += constraints.jacobian[row, end]
-    velocity_rates = lambda r: np.concatenate([r[STATE_SIZE * b + 7 : STATE_SIZE * b + 13] for b in range(2)])  # noqa: E731
-    g = M @ velocity_rates(unconstrained)
-    right = constraints.gamma - 2 * 3.0 * constraints.phi_rate - 7.0**2 * constraints.phi
-    full = np.linalg.solve(np.block([[M, D.T], [D, np.zeros((7, 7))]]), np.concatenate([g, right]))
-    np.testing.assert_allclose(velocity_rates(rate), full[:12], rtol=1e-9, atol=1e-9)
-
-
-def test_constraints_match_finite_differences(contact):
-    # D and gamma against differences of Phi along a motion with constant velocities: Phi' = D v, Phi'' = -gamma
-    rng = np.random.default_rng(4)
-    joints = [(SPHERICAL, (0, 1), rng.normal(size=(2, 3)), 0), (COORDINATE, (1, FRAME), [[0, 0, 0], [0, 0.2, 0]], 1)]
-    model = make_model(contact, [1.0, 1.0], np.ones((2, 3)), joints=joints, gravity=0.0)
-    state = np.concatenate([body_state(*rng.normal(size=(4, 3))) for _ in range(2)])
-    free = make_model(contact, [1.0, 1.0], np.ones((2, 3)), gravity=0.0)  # unit spheres: w stays constant
-    h = 1e-3
-    times = np.array([-2, -1, 0, 1, 2]) * h
-    function = right_hand_side(free, workspace(free))
-    backwards = integrate(lambda t, y: -function(t, y), state, [0, h, 2 * h], "dop853", 1e-13, 1e-14).states
-    forwards = integrate(function, state, [0, h, 2 * h], "dop853", 1e-13, 1e-14).states
-    values = []
-    for t, y in zip(times, [backwards[2], backwards[1], state, forwards[1], forwards[2]], strict=True):
-        work = workspace(model)
-        right_hand_side(model, work)(t, y)
-        c = work.constraints
-        constraint_equations(
-            model.joints, model.track, t, 0.0, y, work.rotations, c.phi, c.phi_rate, c.jacobian, c.gamma, c.owner
-        )
-        values.append((c.phi.copy(), c.phi_rate.copy(), c.gamma.copy()))
-    phi = np.array([v[0] for v in values])
-    np.testing.assert_allclose((phi[0] - 8 * phi[1] + 8 * phi[3] - phi[4]) / (12 * h), values[2][1], atol=1e-8)
-    second = (-phi[0] + 16 * phi[1] - 30 * phi[2] + 16 * phi[3] - phi[4]) / (12 * h * h)
-    np.testing.assert_allclose(second, -values[2][2], atol=1e-5)

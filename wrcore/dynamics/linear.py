@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.equilibrium import RESIDUAL, evaluate
-from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.joint import joint_jacobian
 from wrcore.dynamics.system import workspace
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -196,11 +196,7 @@ def _independent_motions(model, state, work):
     n = len(model.bodies.mass)
     spins = 6 * np.flatnonzero(model.bodies.spins) + 4
     turning = np.delete(np.arange(6 * n), spins)
-    jacobian = np.zeros((model.joints.equations, n, 6))
-    for row, (owners, blocks) in enumerate(zip(work.constraints.owner, work.constraints.jacobian, strict=True)):
-        for body, block in zip(owners, blocks, strict=True):
-            if body != FRAME:
-                jacobian[row, body] += block
+    jacobian = joint_jacobian(model.joints, work.constraints.joints, n)
     jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 3:7], jacobian[..., 3:])
     places = np.eye(6 * n)[:, turning]
     if len(jacobian):

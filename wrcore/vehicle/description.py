@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.checked_yaml import read_yaml, validate
-from wrcore.dynamics.joint import EQUATIONS, KINDS, Joints
+from wrcore.dynamics.joint import Joint, Joints, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import Elements
 from wrcore.dynamics.system import Bodies
@@ -210,21 +210,24 @@ def _layout(data, source):
 
 
 def _joints(joints, layout, source):
-    n = len(joints)
-    bodies, markers = np.zeros((n, 2), np.int64), np.zeros((n, 2, 3))
-    for k, item in enumerate(joints):
-        field = f"joints.{item['name']}"
-        bodies[k] = layout.ends(item, field)
+    items = []
+    for item in joints:
+        field, length = f"joints.{item['name']}", 0.0
+        bodies = layout.ends(item, field)
+        if item["kind"] in ("coordinate", "revolute") and "axis" not in item:
+            raise InputError(source, field, "expected an axis: x, y or z")
         if item["kind"] == "coordinate":
-            if bodies[k, 1] != FRAME or "axis" not in item:
-                raise InputError(source, field, "expected bodies: [a body, frame] and an axis")
-            markers[k, 1] = layout.positions[bodies[k, 0]]
+            if bodies[1] != FRAME:
+                raise InputError(source, f"{field}.bodies", "expected [a body, frame]")
+            markers = [np.zeros(3), layout.positions[bodies[0]]]
         else:
             if "at" not in item:
                 raise InputError(source, field, "expected the joint's point 'at'")
-            markers[k] = [layout.marker(item["at"], body, field) for body in bodies[k]]
-    return Joints(
-        np.array([KINDS[item["kind"]] for item in joints], np.int64), bodies, markers,
-        np.array(["xyz".index(item.get("axis", "x")) for item in joints], np.int64),
-        sum(EQUATIONS[item["kind"]] for item in joints),
-    )  # fmt: skip
+            at = np.array(item["at"], float).reshape(-1, 3)
+            if len(at) != (2 if item["kind"] == "rigid_link" else 1):
+                raise InputError(source, f"{field}.at", "expected two points for a rigid link, one for other joints")
+            length = float(np.linalg.norm(at[0] - at[-1]))
+            markers = [layout.marker(point, body, field) for point, body in zip(at[[0, -1]], bodies, strict=True)]
+        axis = "xyz".index(item.get("axis", "x"))
+        items.append(Joint(item["name"], item["kind"], tuple(bodies), np.array(markers), axis, length))
+    return build_joints(items, layout.spins, source)

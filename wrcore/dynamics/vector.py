@@ -1,0 +1,33 @@
+"""Vectors of three numbers as tuples, which the compiler keeps in registers."""
+
+from wrcore._jit import jit
+
+
+@jit(allocates=False, inline="always")
+def dot(a, b):
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit(allocates=False, inline="always")
+def cross(a, b):
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@jit(allocates=False, inline="always")
+def minus(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@jit(allocates=False, inline="always")
+def load(array, start):
+    """Three numbers of an array from ``start`` on."""
+    return array[start], array[start + 1], array[start + 2]
+
+
+@jit(allocates=False, inline="always")
+def store(vector, array):
+    """Write the first three numbers of an array."""
+    array[0], array[1], array[2] = vector
