@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT, SCENES
+from wrcore.analysis_modes import families, modes, shape_table
 from wrcore.analysis_stability import (
     at_speed,
     critical_speed,
-    families,
     growth,
-    modes,
     root_locus,
-    shape_table,
     steady_motion,
+    straight_ahead,
 )
 from wrcore.dynamics.linear import DIRECTIONS
+from wrcore.errors import InputError
 from wrcore.scene import compile_scene, load_scene
 
 
@@ -44,7 +44,7 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
     """
     vehicle, model, state = trailer
     linear = steady_motion(model, state, speed)
-    table, shapes = modes(vehicle, linear)
+    table, shapes, _ = modes(vehicle, linear)
     count = table["name"].value_counts()
     for name in ("lower sway", "upper sway", "bounce", "pitch", "yaw", "surge"):
         assert count[f"car body {name}"] == 1
@@ -70,7 +70,7 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
 def test_lower_sway_turns_about_a_pole_below_the_centre_of_mass(trailer):
     """A point h above the centre moves by y - h roll: it rests at h = y/roll."""
     vehicle, model, state = trailer
-    table, shapes = modes(vehicle, steady_motion(model, state, 20.0))
+    table, shapes, _ = modes(vehicle, steady_motion(model, state, 20.0))
     poles = {}
     for name in ("lower sway", "upper sway"):
         shape = shapes[table.index[table["name"] == f"car body {name}"][0], 0]
@@ -80,7 +80,7 @@ def test_lower_sway_turns_about_a_pole_below_the_centre_of_mass(trailer):
 
 def test_shape_table(suspended):
     vehicle, model, state = suspended
-    table, shapes = modes(vehicle, steady_motion(model, state, 40.0))
+    table, shapes, _ = modes(vehicle, steady_motion(model, state, 40.0))
     rows = shape_table(vehicle, table, shapes)
     k = table.index[table["name"] == "wheelset hunting"][0]
     row = rows[(rows["mode"] == k) & (rows["coordinate"] == "yaw")].iloc[0]
@@ -99,7 +99,7 @@ def test_free_wheelset_hunts_at_klingel_s_frequency():
         "wheel": {"profile": "cone:1/100"}, "rail": {"profile": "circle:0.3"},
     })  # fmt: skip
     model, state = compile_scene(scene)
-    table, _ = modes(scene.vehicle, steady_motion(model, state, 5.0))
+    table, _, _ = modes(scene.vehicle, steady_motion(model, state, 5.0))
     slope, radius = 0.01, 0.46
     b = scene.track.rail_distance(scene.rail) - 0.3 * math.sin(math.atan(slope))
     conicity = slope * (b + 0.3 * slope) / (b - radius * slope)
@@ -121,12 +121,25 @@ def test_critical_speed_is_where_the_largest_real_part_changes_sign(suspended):
     assert critical_speed(vehicle, model, state, [70.0, 80.0])["critical_speed_m_per_s"] == -math.inf
 
 
+def test_no_steady_motion_is_told(suspended):
+    vehicle, model, state = suspended
+    with pytest.raises(InputError, match="straight ahead"):
+        steady_motion(model, state + 0.02 * (np.arange(13) == 2), 20.0)  # 20 mm above the rails, pressed down
+
+
+def test_where_a_scene_starts_is_of_no_influence(suspended):
+    _, model, state = suspended
+    aside, there = straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.003"]))
+    np.testing.assert_allclose(there, state, atol=1e-9)
+    assert growth(aside, there, 70.0) == pytest.approx(growth(model, state, 70.0), rel=1e-6)
+
+
 def test_root_locus_is_a_table_of_modes_over_speed(suspended):
     vehicle, model, state = suspended
     locus = root_locus(vehicle, model, state, [20.0, 60.0])
     assert locus.columns[0] == "speed_m_per_s"
     for speed, rows in locus.groupby("speed_m_per_s"):
-        alone, _ = modes(vehicle, steady_motion(model, state, speed))
+        alone, _, _ = modes(vehicle, steady_motion(model, state, speed))
         np.testing.assert_allclose(rows["real_per_s"], alone["real_per_s"], rtol=1e-6)
 
 
@@ -138,3 +151,22 @@ def test_a_motion_at_another_speed_rolls_as_before(suspended):
     assert there[0] == pytest.approx(state[0] - 2.0 * 20.0)  # where the frame's origin has been put
     assert there[11] / there[7] == pytest.approx(state[11] / state[7], rel=1e-12)  # spin over speed
     np.testing.assert_allclose(again[1:], (state + 0.001 * (np.arange(13) == 1))[1:], rtol=1e-12)
+
+
+def test_axle_boxes_add_their_pitch_and_leave_the_other_modes(trailer):
+    """An axle box on its axle pitches against its spring alone: w^2 = k/J = 1e5/5 (as in trailer_vehicle.yaml).
+
+    That spring holds the bogie against the wheelset's frame where the box is part of it, hence the bogie's pitch moves.
+    """
+    vehicle, model, state = trailer
+    scene = load_scene(SCENES / "trailer_vehicle.yaml", ["initial.y=0.0", "vehicle.axle_boxes=true"])
+    lumped, _, _ = modes(vehicle, steady_motion(model, state, 60.0))
+    table, _, _ = modes(scene.vehicle, steady_motion(*compile_scene(scene), 60.0))
+    values = (table["real_per_s"] + 1j * table["imag_rad_per_s"]).to_numpy()
+    for mode in lumped[lumped["damping_ratio"] < 0.95].itertuples():
+        value = complex(mode.real_per_s, mode.imag_rad_per_s)
+        far = 0.02 if "bogie pitch" in mode.name else 1e-3
+        assert np.min(np.abs(values - value)) < far * abs(value), mode.name
+    boxes = table[table["name"].str.startswith("axle box pitch")]
+    assert len(boxes) == 8
+    np.testing.assert_allclose(np.hypot(boxes["real_per_s"], boxes["imag_rad_per_s"]), math.sqrt(1e5 / 5.0), rtol=0.02)

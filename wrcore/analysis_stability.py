@@ -1,49 +1,34 @@
-"""Stability of small motions: named modes, root locus over speed, linear critical speed.
-
-Modes are named after their shapes. Bodies form families: those named alike up to a number (``bogie_1``, ``bogie_2``);
-axle boxes belong to the wheelsets. Energies are kinetic, as parts of the mode's whole. In this order:
-
-* *neutral*: the eigenvalue is below `NEUTRAL`; a displacement that nothing resists, such as that along the track;
-* *series damper*: hardly oscillates (`OVERDAMPED`), and dampers in series with springs move more than any body;
-* *spin, lateral, yaw creep*: hardly oscillates, wheelsets have most energy, in that coordinate;
-* *contact bounce, contact roll*: oscillates, wheelsets have most energy, in that coordinate;
-* *hunting*: oscillates (damping ratio below `LIGHT`); wheelsets roll where they point, y' = V psi (the two differ by
-  less than half of their sum); they have more energy sideways than in yaw, in both together at least `HUNTING` and two
-  thirds of that of any family but the heaviest;
-* else *surge, lateral, bounce, roll, pitch, yaw*: the coordinate with most energy. Of the heaviest family, lateral
-  motion and roll come together: *lower sway* about a pole below its centre of mass, *upper sway* about one above.
-
-Hunting and what follows it are named after the heaviest family that moves at least half as much in that coordinate
-as the one that moves most. A family's front and rear half move *in phase* or *in antiphase*, or one of them alone.
-"""
-
-import re
+"""Stability of small motions over speed: root locus and linear critical speed."""
 
 import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
+from wrcore.analysis_modes import NEUTRAL, energy_table, modes, shape_table
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.linear import DIRECTIONS, steady_running
+from wrcore.dynamics.linear import steady_running
+from wrcore.errors import InputError
+from wrcore.scene import compile_scene, static_equilibrium
 
-NEUTRAL = 1e-3
-"""Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
+LARGEST_REST = 1e-3
+"""Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
+nothing balances, is a quarter of it."""
 
-OVERDAMPED = 0.95
-"""Damping ratio above which a mode hardly oscillates."""
 
-LIGHT = 0.7
-"""Damping ratio below which a mode can be hunting; the other lateral motions of wheelsets creep back faster."""
+def straight_ahead(scene):
+    """Model of a scene, and its vehicle in static equilibrium at the track's centre, wherever the scene lets it start.
 
-HUNTING = 0.05
-"""Least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode."""
+    Parameters
+    ----------
+    scene : Scene
 
-ALONE = 0.9
-"""Part of a family's motion that makes the front or the rear the only one that moves."""
-
-WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
-CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
-Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
+    Returns
+    -------
+    model : Model
+    state : numpy.ndarray
+    """
+    model, _ = compile_scene(scene)
+    return model, static_equilibrium(scene, model).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):
@@ -89,169 +74,40 @@ def steady_motion(model, state, speed):
     Returns
     -------
     Linearisation
+
+    Raises
+    ------
+    InputError
+        If there is no steady motion near the state.
     """
-    return steady_running(*at_speed(model, state, speed))
+    motion = steady_running(*at_speed(model, state, speed))
+    if not np.max(np.abs(motion.residual)) < LARGEST_REST:
+        raise InputError(
+            "steady motion", f"speed {speed:g} m/s", "expected a vehicle that can run straight ahead near the given"
+            f" state, but accelerations of {np.max(np.abs(motion.residual)):.2g} m/s^2 are left",
+        )  # fmt: skip
+    return motion
 
 
-def families(vehicle):
-    """Bodies named alike up to a number.
+def modes_in_full(scene, speed):
+    """Modes of a scene's vehicle at one speed, with their energies and shapes.
 
     Parameters
     ----------
-    vehicle : Vehicle
-
-    Returns
-    -------
-    dict of str to list of int
-        Body numbers by name, in words; axle boxes count as wheelsets.
-    """
-    found = {}
-    for number, name in enumerate(vehicle.body_names):
-        part = vehicle.data["bodies"][name]
-        name = part["wheelset"] if part["kind"] == "axle_box" else name
-        found.setdefault(re.sub(r"_\d+$", "", name).replace("_", " "), []).append(number)
-    return found
-
-
-class _Namer:
-    """Names modes of one vehicle about one steady motion."""
-
-    def __init__(self, vehicle, linearisation):
-        bodies = vehicle.bodies
-        n = len(bodies.mass)
-        self.speed, self.along = linearisation.speed, linearisation.state[: STATE_SIZE * n : STATE_SIZE]
-        self.mass = np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
-        self.wheelsets = bodies.wheelsets
-        groups = families(vehicle)
-        weight = {name: np.max(bodies.mass[members]) for name, members in groups.items()}
-        self.groups = {name: groups[name] for name in sorted(groups, key=weight.get, reverse=True)}
-        self.heaviest = next(iter(self.groups))
-        self.rolling = next((name for name, members in groups.items() if {*members} & {*self.wheelsets}), None)
-
-    def energies(self, speed):
-        """Kinetic energies (n, 6) of the bodies' coordinates as parts of the whole."""
-        energy = self.mass * np.abs(speed) ** 2
-        return energy / np.sum(energy)
-
-    def __call__(self, eigenvalue, place, speed, own):
-        """Name of a mode: displacements and velocities (n, 6) of the bodies, displacements of dampers."""
-        if abs(eigenvalue) < NEUTRAL:
-            return "neutral"
-        energies = self.energies(speed)
-        energy = {name: np.sum(energies[members], axis=0) for name, members in self.groups.items()}
-        family = max(energy, key=lambda name: np.sum(energy[name]))
-        direction = int(np.argmax(energy[family]))
-        if -eigenvalue.real / abs(eigenvalue) > OVERDAMPED:
-            if np.max(np.abs(own), initial=0.0) > np.max(np.abs(place)):
-                return "series damper"
-            if family == self.rolling and direction in CREEP:
-                return self._with_phase(f"{family} {CREEP[direction]} creep", family, direction, speed)
-        elif family == self.rolling and direction in (Z, ROLL):
-            return self._with_phase(f"{family} contact {WORDS[direction]}", family, direction, speed)
-        elif self._hunts(eigenvalue, energy, place):
-            family = self._carrier(Y, speed)
-            return self._with_phase(f"{family} hunting", family, Y, speed)
-        family = self._carrier(direction, speed)
-        word = WORDS[direction]
-        if family == self.heaviest != self.rolling and direction in (Y, ROLL):
-            first = self.groups[family][0]
-            below = np.real(speed[first, Y] * np.conj(speed[first, ROLL])) < 0.0
-            word = "lower sway" if below else "upper sway"
-        return self._with_phase(f"{family} {word}", family, direction, speed)
-
-    def _hunts(self, eigenvalue, energy, place):
-        if self.rolling is None or -eigenvalue.real > LIGHT * abs(eigenvalue):
-            return False
-        sideways = {name: part[Y] + part[YAW] for name, part in energy.items()}
-        own = energy[self.rolling]
-        others = [part for name, part in sideways.items() if name not in (self.heaviest, self.rolling)]
-        drift, heading = eigenvalue * place[self.wheelsets, Y], self.speed * place[self.wheelsets, YAW]
-        rolls = np.linalg.norm(drift - heading) < 0.5 * (np.linalg.norm(drift) + np.linalg.norm(heading))
-        leads = sideways[self.rolling] >= max(others, default=0.0) / 1.5
-        return bool(rolls and own[Y] > own[YAW] and leads and sideways[self.rolling] >= HUNTING)
-
-    def _carrier(self, direction, speed):
-        """The heaviest family that moves at least half as much as the one that moves most."""
-        moves = {name: np.max(np.abs(speed[members, direction])) for name, members in self.groups.items()}
-        return next(name for name, move in moves.items() if move >= 0.5 * max(moves.values()))
-
-    def _with_phase(self, name, family, direction, speed):
-        """The name, and how the family's front and rear half move."""
-        members = np.array(self.groups[family])
-        ahead = self.along[members] > np.mean(self.along[members])
-        if np.ptp(self.along[members]) < 1e-6:
-            return name
-        front, rear = (speed[members[half], direction] for half in (ahead, ~ahead))
-        part = np.sum(np.abs(front) ** 2) / np.sum(np.abs(speed[members, direction]) ** 2)
-        if part > ALONE or part < 1.0 - ALONE:
-            return f"{name}, {'front' if part > ALONE else 'rear'}"
-        together = np.real(np.sum(front) * np.conj(np.sum(rear))) > 0.0
-        return f"{name}, in {'phase' if together else 'antiphase'}"
-
-
-def modes(vehicle, linearisation):
-    """Modes of small motions.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    linearisation : Linearisation
-        Of this vehicle.
+    scene : Scene
+    speed : float
+        m/s.
 
     Returns
     -------
     table : pandas.DataFrame
-        One row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s, imag_rad_per_s (not
-        negative), frequency_Hz, damping_ratio (negative for a growing mode, NaN for a neutral one), the coordinate
-        with most energy, and its part.
-    shapes : numpy.ndarray, shape (rows, n, 6), complex
-        Displacements (m) and rotations (rad) of the bodies, see `wrcore.dynamics.linear.DIRECTIONS`; the largest is 1.
-        Zero for a mode in which only speeds change.
+        That of `wrcore.analysis_modes.modes`, followed by the columns of `energy_table`.
+    shapes : pandas.DataFrame
+        From `shape_table`.
     """
-    values, vectors = np.linalg.eig(linearisation.matrix)
-    kept = np.flatnonzero(values.imag >= 0.0)
-    kept = kept[np.lexsort((values.real[kept], values.imag[kept]))]
-    vectors = (linearisation.basis @ vectors[:, kept]).T
-    n = len(vehicle.bodies.mass)
-    namer = _Namer(vehicle, linearisation)
-    rows, shapes = [], np.zeros((len(kept), n, 6), complex)
-    for k, (value, vector) in enumerate(zip(values[kept], vectors, strict=True)):
-        place, speed = vector[: 12 * n].reshape(2, n, 6)
-        energy = namer.energies(speed) if np.any(speed) else np.zeros((n, 6))
-        body, direction = np.unravel_index(np.argmax(energy), energy.shape)
-        largest = place.flat[np.argmax(np.abs(place))]
-        shapes[k] = place / largest if largest != 0.0 else 0.0
-        rows.append({
-            "name": namer(value, place, speed, vector[12 * n :]),
-            "real_per_s": value.real, "imag_rad_per_s": value.imag, "frequency_Hz": value.imag / (2.0 * np.pi),
-            "damping_ratio": -value.real / abs(value) if abs(value) >= NEUTRAL else np.nan,
-            "most_energy": f"{vehicle.body_names[body]} {DIRECTIONS[direction]}", "part": energy[body, direction],
-        })  # fmt: skip
-    return pd.DataFrame(rows), shapes
-
-
-def shape_table(vehicle, table, shapes):
-    """Shapes of modes in a long table.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    table, shapes
-        From :func:`modes`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per mode, body and coordinate: mode (row of the table), name, body, coordinate, amplitude (m or rad, the
-        largest in a mode is 1) and phase_rad.
-    """
-    bodies = len(vehicle.body_names)
-    return pd.DataFrame({
-        "mode": np.repeat(np.arange(len(table)), 6 * bodies), "name": np.repeat(table["name"].to_numpy(), 6 * bodies),
-        "body": np.tile(np.repeat(vehicle.body_names, 6), len(table)),
-        "coordinate": np.tile(DIRECTIONS, bodies * len(table)),
-        "amplitude": np.abs(shapes).ravel(), "phase_rad": np.angle(shapes).ravel(),
-    })  # fmt: skip
+    table, shapes, energies = modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
+    full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
+    return full, shape_table(scene.vehicle, table, shapes)
 
 
 def root_locus(vehicle, model, state, speeds):
@@ -268,11 +124,11 @@ def root_locus(vehicle, model, state, speeds):
     Returns
     -------
     pandas.DataFrame
-        Tables of :func:`modes` below each other, after a column speed_m_per_s.
+        Tables of `wrcore.analysis_modes.modes` below each other, after a column speed_m_per_s.
     """
     tables = []
     for speed in speeds:
-        table, _ = modes(vehicle, steady_motion(model, state, speed))
+        table, _, _ = modes(vehicle, steady_motion(model, state, speed))
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -314,7 +170,7 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
     if before is None:
         return {"critical_speed_m_per_s": -np.inf, **nothing}
     found = brentq(lambda v: growth(model, state, v), before, speed, xtol=tolerance)
-    table, _ = modes(vehicle, steady_motion(model, state, found))
+    table, _, _ = modes(vehicle, steady_motion(model, state, found))
     lost = table.loc[table["real_per_s"].where(table["damping_ratio"].notna()).idxmax()]
     with np.errstate(divide="ignore"):
         wavelength = np.float64(found) / lost["frequency_Hz"]
@@ -322,3 +178,28 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
         "critical_speed_m_per_s": found, "mode": lost["name"], "frequency_Hz": lost["frequency_Hz"],
         "wavelength_m": wavelength,
     }  # fmt: skip
+
+
+def stability_over_speed(scenes, speeds):
+    """Root locus and linear critical speed of one vehicle in several scenes.
+
+    Parameters
+    ----------
+    scenes : dict of str to Scene
+        By detection, or by whatever else they differ in.
+    speeds : sequence of float
+        Rising, m/s.
+
+    Returns
+    -------
+    locus, critical : pandas.DataFrame
+        Tables of :func:`root_locus` and rows of :func:`critical_speed`, after a column detection.
+    """
+    loci, rows = [], []
+    for detection, scene in scenes.items():
+        model, state = straight_ahead(scene)
+        locus = root_locus(scene.vehicle, model, state, speeds)
+        locus.insert(0, "detection", detection)
+        loci.append(locus)
+        rows.append({"detection": detection, **critical_speed(scene.vehicle, model, state, speeds)})
+    return pd.concat(loci, ignore_index=True), pd.DataFrame(rows)

@@ -1,0 +1,253 @@
+"""Limit cycles of vehicles over speed: what is left of a large and of a small disturbance.
+
+A motion is followed in windows of equal length until its amplitude has settled. *Falling*: a large disturbance at the
+highest speed, and the state is carried from speed to speed downwards; it stays on a limit cycle for as long as there is
+one. *Rising*: a small disturbance at each speed, carried upwards; it stays at rest for as long as that is stable. Where
+the branches differ, the disturbance decides.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis import hunting_frequency
+from wrcore.analysis_stability import at_speed, straight_ahead
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.simulate import DERAILED_Y
+
+CYCLES = ("limit cycle", "irregular")
+"""Status of motions that do not die away."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How a motion is followed until it has settled.
+
+    Attributes
+    ----------
+    window : float
+        Length of a window, s; several periods.
+    longest : float
+        A motion that still changes after this time is taken as it is, s: growing or decaying by a fifth since half-way,
+        or irregular.
+    change : float
+        Amplitudes of two windows in a row that differ by less than this part count as settled.
+    rest : float
+        A smaller amplitude than this is no limit cycle, m.
+    disturbance : float
+        Sideways shift of the vehicle that tries whether running straight ahead is stable, m, above ``rest``.
+    rate : float
+        Samples per second of the amplitude.
+    rtol, atol : float
+        Tolerances of the integration.
+    """
+
+    window: float = 2.0
+    longest: float = 30.0
+    change: float = 0.002
+    rest: float = 5e-5
+    disturbance: float = 1e-4
+    rate: float = 500.0
+    rtol: float = 1e-6
+    atol: float = 1e-9
+
+
+def _run(model, state, settling):
+    """Lateral positions (samples, wheelsets) over a window, the state at its end, and whether the wheels stay on."""
+    times = np.linspace(0.0, settling.window, round(settling.window * settling.rate) + 1)
+    function = right_hand_side(model, workspace(model))
+    trajectory = integrate(function, state, times, "rk45", settling.rtol, settling.atol)
+    lateral = trajectory.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
+    on_rails = trajectory.status == "completed" and bool(np.all(np.abs(lateral) < DERAILED_Y))
+    return times[: len(lateral)], lateral, trajectory.states[-1], on_rails
+
+
+def settle_motion(model, state, settling):
+    """Follow a motion until its amplitude has settled.
+
+    Parameters
+    ----------
+    model : Model
+        On a tangent, perfect track.
+    state : numpy.ndarray
+    settling : Settling
+
+    Returns
+    -------
+    row : dict
+        speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest),
+        frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``, ``limit cycle``, or after
+        the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``.
+    state : numpy.ndarray
+        At the end.
+    """
+    amplitudes, elapsed, status = [], 0.0, ""
+    while not status:
+        t, lateral, state, on_rails = _run(model, state, settling)
+        _, state = at_speed(model, state, model.speed, t[-1])
+        elapsed += t[-1]
+        spans = 0.5 * np.ptp(lateral, axis=0)
+        y = lateral[:, np.argmax(spans)]
+        amplitudes.append(float(np.max(spans)))
+        status = "derailed" if not on_rails else _status(amplitudes, elapsed, settling)
+    amplitude = amplitudes[-1]
+    row = {
+        "speed_m_per_s": model.speed, "amplitude_m": amplitude,
+        "frequency_Hz": hunting_frequency(t, y - np.mean(y)) if amplitude >= settling.rest else np.nan,
+        "offset_m": float(np.mean(y)), "simulated_s": elapsed, "status": status,
+    }  # fmt: skip
+    return row, state
+
+
+def _status(amplitudes, elapsed, settling):
+    """What the amplitudes of all windows so far show; empty while they show nothing."""
+    last = amplitudes[-1]
+    if last < settling.rest:
+        return "at rest"
+    if len(amplitudes) > 1 and abs(last - amplitudes[-2]) < settling.change * last:
+        return "limit cycle"
+    if elapsed < settling.longest - 1e-9:
+        return ""
+    half = amplitudes[len(amplitudes) // 2]
+    return "decaying" if last < 0.8 * half else "growing" if last > 1.25 * half else "irregular"
+
+
+def shifted(model, state, shift):
+    """A state with all bodies shifted sideways (m)."""
+    state = state.copy()
+    state[1 : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] += shift
+    return state
+
+
+def falling_branch(model, state, speeds, settling, disturbances, resolution):
+    """Amplitude of the limit cycle from the highest speed downwards.
+
+    The motion is carried from speed to speed. Where its amplitude drops by a third or more, fresh disturbances are
+    tried as well, and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
+
+    Parameters
+    ----------
+    model : Model
+    state : numpy.ndarray
+        Running straight ahead, at the model's speed.
+    speeds : sequence of float
+        Rising, m/s.
+    settling : Settling
+    disturbances : sequence of float
+        Sideways shifts of the vehicle with which it starts, m.
+    resolution : float
+        The speed at which the limit cycle ends is halved in between to this accuracy, m/s.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Rows of :func:`settle_motion`, fastest first; the last one is the fastest motion that is none of `CYCLES`.
+    """
+    rows, carried, below, queue = [], None, None, list(speeds)
+    while queue:
+        there, straight = at_speed(model, state, queue.pop())
+        tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
+        if not tried or tried[0][0]["amplitude_m"] < 0.67 * rows[-1]["amplitude_m"]:
+            tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
+        row, end = max(tried, key=lambda motion: motion[0]["amplitude_m"])
+        if row["status"] in CYCLES:
+            rows.append(row)
+            carried = there, end
+        else:
+            below, queue = row, []
+        if below and rows and rows[-1]["speed_m_per_s"] - below["speed_m_per_s"] > resolution:
+            queue = [0.5 * (rows[-1]["speed_m_per_s"] + below["speed_m_per_s"])]
+    return pd.DataFrame(rows + [below] * (below is not None))
+
+
+def rising_branch(model, state, speeds, settling):
+    """Amplitude that a small disturbance leaves, from the lowest speed upwards; arguments as for `falling_branch`.
+
+    The motion is carried from speed to speed and disturbed again (``settling.disturbance``) at each.
+    """
+    rows = []
+    for speed in speeds:
+        model, state = at_speed(model, state, speed)
+        row, state = settle_motion(model, shifted(model, state, settling.disturbance), settling)
+        rows.append(row)
+        if row["status"] == "derailed":
+            break
+    return pd.DataFrame(rows)
+
+
+def limit_cycles(scene, speeds, settling, disturbances, resolution):
+    """Both branches of a scene's vehicle.
+
+    Parameters
+    ----------
+    scene : Scene
+        On a tangent, perfect track; where the vehicle starts is of no influence.
+    speeds, settling, disturbances, resolution
+        As for :func:`falling_branch`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
+    """
+    model, state = straight_ahead(scene)
+    tables = {
+        "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),
+        "rising": rising_branch(model, state, speeds, settling),
+    }
+    return pd.concat(tables, names=["branch"]).reset_index("branch").reset_index(drop=True)
+
+
+def nonlinear_critical_speed(table):
+    """Lowest speed with a limit cycle on the falling branch, and what it looks like.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From :func:`limit_cycles`.
+
+    Returns
+    -------
+    dict
+        nonlinear_critical_speed_m_per_s: the speed half-way between the slowest limit cycle and the fastest motion that
+        came to rest (NaN if all or none did); their distance uncertainty_m_per_s; amplitude_m and cycle_frequency_Hz of
+        that limit cycle.
+    """
+    falling = table[table["branch"] == "falling"]
+    cycles, rest = falling[falling["status"].isin(CYCLES)], falling[falling["status"].isin(["at rest", "decaying"])]
+    if cycles.empty or rest.empty:
+        return dict.fromkeys(
+            ("nonlinear_critical_speed_m_per_s", "uncertainty_m_per_s", "amplitude_m", "cycle_frequency_Hz"), np.nan
+        )
+    slowest, below = cycles.loc[cycles["speed_m_per_s"].idxmin()], rest["speed_m_per_s"].max()
+    return {
+        "nonlinear_critical_speed_m_per_s": 0.5 * (slowest["speed_m_per_s"] + below),
+        "uncertainty_m_per_s": slowest["speed_m_per_s"] - below,
+        "amplitude_m": slowest["amplitude_m"], "cycle_frequency_Hz": slowest["frequency_Hz"],
+    }  # fmt: skip
+
+
+def critical_table(linear, cycles):
+    """Linear and nonlinear critical speeds.
+
+    Parameters
+    ----------
+    linear : dict of str to pandas.DataFrame
+        Second table of `wrcore.analysis_stability.stability_over_speed`, by vehicle.
+    cycles : dict of str to pandas.DataFrame
+        Tables of :func:`limit_cycles` with a column detection, by the same vehicles.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per vehicle and detection.
+    """
+    rows = []
+    for vehicle, table in linear.items():
+        for row in table.to_dict("records"):
+            part = cycles[vehicle][cycles[vehicle]["detection"] == row["detection"]]
+            rows.append({"vehicle": vehicle, **row, **nonlinear_critical_speed(part)})
+    return pd.DataFrame(rows).rename(columns={"critical_speed_m_per_s": "linear_critical_speed_m_per_s"})

@@ -1,0 +1,138 @@
+"""Figures of stability: root locus over speed, the modes at one speed, limit cycles over speed.
+
+They work on tables of `wrcore.analysis_stability` and `wrcore.analysis_limit_cycles`. Units change here and nowhere
+before: lengths to mm.
+"""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wrcore.analysis_modes import OVERDAMPED
+from wrcore.figures import ACCENT, LINES, MM, styled
+
+GREY = "0.72"
+
+HIGHEST = 20.0
+"""Frequency up to which the root locus is drawn, Hz; contact and bush modes lie above."""
+
+LEAST_ENERGY = 0.05
+"""Coordinates with less of the energy in every mode are left out of the table of modes."""
+
+
+@styled
+def fig_root_locus(loci, linear):
+    """Damping ratio and frequency of all oscillations over speed; hunting stands out.
+
+    Parameters
+    ----------
+    loci : dict of str to pandas.DataFrame
+        First tables of `stability_over_speed`, by title of the row of panels.
+    linear : dict of str to pandas.DataFrame
+        Second ones; the linear critical speed with spatial detection is marked.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(7.0, 0.6 + 2.3 * len(loci)), layout="constrained")
+    panels = figure.subplots(len(loci), 2, sharex=True, squeeze=False)
+    for (title, locus), (damping, frequency) in zip(loci.items(), panels, strict=True):
+        shown = locus[(locus["damping_ratio"] < OVERDAMPED) & (locus["frequency_Hz"] <= HIGHEST)]
+        hunting = shown["name"].str.contains("hunting")
+        for axes, column in ((damping, "damping_ratio"), (frequency, "frequency_Hz")):
+            others = shown[~hunting]
+            axes.scatter(others["speed_m_per_s"], others[column], s=1.5, color=GREY, linewidths=0, label="other modes")
+            for (detection, line), size in zip(LINES.items(), (14, 3), strict=True):
+                rows = shown[hunting & (shown["detection"] == detection)]
+                look = {"s": size, "color": line["color"], "linewidths": 0, "zorder": 3}
+                axes.scatter(rows["speed_m_per_s"], rows[column], label=f"hunting, {detection}", **look)
+            axes.axvline(_critical(linear[title]), color=ACCENT, linewidth=0.9, linestyle="-.")
+        damping.axhline(0.0, color="0.3", linewidth=0.8)
+        damping.set(ylabel="damping ratio", ylim=(-0.4, 0.6), xmargin=0.01)
+        damping.set_title(title, loc="left")
+        frequency.set(ylabel="frequency / Hz", ylim=(0.0, None), xmargin=0.01)
+        frequency.set_title(f"linear critical speed {_critical(linear[title]):.1f} m/s", loc="right", color=ACCENT)
+    for axes in panels[-1]:
+        axes.set_xlabel("speed / (m/s)")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), markerscale=2)
+    return figure
+
+
+def _critical(table):
+    """Linear critical speed with spatial detection, m/s; NaN where there is none."""
+    speed = table.set_index("detection").loc["spatial", "critical_speed_m_per_s"]
+    return speed if np.isfinite(speed) else np.nan
+
+
+@styled
+def fig_modes(table, title):
+    """Modes at one speed: frequency, damping, and where their kinetic energy is.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        First table of `modes_in_full`; what does not oscillate is left out.
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    rows = np.flatnonzero(table["damping_ratio"] < OVERDAMPED)
+    parts = table.iloc[rows, table.columns.get_loc("part") + 1 :]
+    parts = parts.loc[:, parts.max() >= LEAST_ENERGY]
+    figure = Figure(figsize=(2.6 + 0.27 * parts.shape[1], 1.2 + 0.16 * len(rows)), layout="constrained")
+    axes = figure.subplots()
+    axes.imshow(parts, cmap="Greys", vmin=0.0, vmax=1.8, aspect="auto")
+    for (row, column), part in np.ndenumerate(parts.to_numpy()):
+        if part >= LEAST_ENERGY:
+            axes.text(column, row, f"{100 * part:.0f}", ha="center", va="center", fontsize=6)
+    labels = [
+        f"{mode.name}   {mode.frequency_Hz:.2f} Hz   {100 * mode.damping_ratio:.1f} %".replace("-", "\N{MINUS SIGN}")
+        for mode in table.iloc[rows].itertuples()
+    ]
+    axes.set_yticks(range(len(rows)), labels, fontsize=7)
+    axes.set_xticks(range(parts.shape[1]), parts.columns, fontsize=7, rotation=90)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
+    axes.grid(False)
+    axes.set_title(title, loc="left")
+    axes.set_xlabel("kinetic energy by coordinate / %", fontsize=8)
+    return figure
+
+
+@styled
+def fig_limit_cycles(tables, linear):
+    """Amplitude of wheelsets over speed: what a large and what a small disturbance leave.
+
+    Parameters
+    ----------
+    tables : dict of str to pandas.DataFrame
+        Tables of `limit_cycles` with a column detection, by title of the panel.
+    linear : dict of str to pandas.DataFrame
+        Second tables of `stability_over_speed`; the linear critical speed with spatial detection is marked.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(7.0, 0.6 + 2.4 * len(tables)), layout="constrained")
+    panels = figure.subplots(len(tables), 1, squeeze=False)[:, 0]
+    for axes, (title, table) in zip(panels, tables.items(), strict=True):
+        for (detection, branch), rows in table.sort_values("speed_m_per_s").groupby(["detection", "branch"]):
+            filled, planar = branch == "falling", detection == "planar"
+            look = {
+                **LINES[detection], "marker": "o" if planar else "D", "markersize": 5.5 if planar else 3.5,
+                "markerfacecolor": LINES[detection]["color"] if filled else "white", "linewidth": 0.9,
+                "zorder": 2 if planar else 3,
+            }  # fmt: skip
+            axes.plot(rows["speed_m_per_s"], MM * rows["amplitude_m"], label=f"{branch} speed, {detection}", **look)
+        look = {"color": ACCENT, "linewidth": 0.9, "linestyle": "-.", "label": "linear critical speed"}
+        axes.axvline(_critical(linear[title]), **look)
+        axes.set(ylabel="amplitude of y / mm", ylim=(-0.2, None))
+        axes.set_title(title, loc="left")
+    panels[-1].set_xlabel("speed / (m/s)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=8)
+    return figure
