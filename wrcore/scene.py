@@ -17,7 +17,8 @@ from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table, load_table
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
-from wrcore.dynamics.equilibrium import solve_equilibrium
+from wrcore.dynamics.equilibrium import FRICTIONLESS, solve_equilibrium, stand_on_rails
+from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
@@ -27,9 +28,6 @@ from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track, rotation
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
-
-FRICTIONLESS = 1e-9
-"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
 
 LARGEST_REST = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
@@ -107,7 +105,7 @@ def load_scene(scene, overrides=()):
         data["contact"]["creep"]["table"] = str(table)
     track = build_track(data["track"], source, folder)
     data["track"] = validate(data["track"], "track", source)
-    if not track.tangent and vehicle.joints.equations > 0:
+    if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
     return Scene(data, source, vehicle, wheel, rail, track)
 
@@ -285,21 +283,31 @@ def initial_state(scene, model):
     """State at the start: static equilibrium, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
     Wheelsets keep their static loads: height and roll are those at which each wheel carries half of its wheelset's.
+    They stand on the rails where these are out of line, too, and axle boxes stay on their axles.
     """
     vehicle, data = scene.vehicle, scene.data
     equilibrium = static_equilibrium(scene, model)
     y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
     state = equilibrium.state.copy()
-    for body, (s, _, _) in enumerate(vehicle.positions):
-        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        if body in vehicle.bodies.wheelsets and (y or yaw):
-            k = int(np.flatnonzero(vehicle.bodies.wheelsets == body)[0])
-            roll, z = _settled(scene, model, y, yaw, float(np.mean(equilibrium.wheel_loads[k])))
+    for k, body in enumerate(vehicle.bodies.wheelsets):
+        if y or yaw:
+            part, load = state[STATE_SIZE * body : STATE_SIZE * (body + 1)], float(np.mean(equilibrium.wheel_loads[k]))
+            roll, z = _settled(scene, model, y, yaw, load)
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             part[10:13] = _rolling(scene, model, y, z, roll, yaw)
-        else:
+    stand_on_rails(model, state, equilibrium.wheel_loads)
+    parts = {name: state[STATE_SIZE * b : STATE_SIZE * (b + 1)] for b, name in enumerate(vehicle.body_names)}
+    places = dict(zip(parts, vehicle.positions, strict=True))
+    for name, part in parts.items():
+        described = vehicle.data["bodies"][name]
+        if described["kind"] == "axle_box":
+            axle = parts[described["wheelset"]]
+            part[:3] = axle[:3] + matrix_of(axle[3:7]) @ (places[name] - places[described["wheelset"]])
+            part[3:7] = axle[3:7]
+        elif described["kind"] == "body":
             part[1] += y
-        if not model.track.tangent:
+    if not model.track.tangent:
+        for part, (s, _, _) in zip(parts.values(), vehicle.positions, strict=True):
             part[:] = _on_path(model.track.path, s, part)
     return state
 

@@ -9,7 +9,8 @@ import yaml
 from tests.conftest import ROOT, SCENES
 from wrcore.checked_yaml import read_yaml
 from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import STATE_SIZE, matrix_of
+from wrcore.dynamics.equilibrium import wheel_loads
 from wrcore.dynamics.system import right_hand_side, workspace
 from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
 
@@ -37,8 +38,9 @@ def heights(scene, equilibrium):
     return {name: equilibrium.state[STATE_SIZE * b + 2] for b, name in enumerate(names)}
 
 
-def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of):
-    scene, model, equilibrium = equilibrium_of(TRAILER)
+@pytest.mark.parametrize("axle_boxes", ["false", "true"])
+def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of, axle_boxes):
+    scene, model, equilibrium = equilibrium_of(TRAILER, f"vehicle.axle_boxes={axle_boxes}")
     # 44 482 kg on eight wheels: 54 546 N (derived from the masses of Manchester vehicle 1)
     assert equilibrium.wheel_loads.shape == (4, 2)
     weight = sum(part["mass"] for part in TRAILER["bodies"].values()) * GRAVITY
@@ -47,10 +49,12 @@ def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of):
     # springs hold the nominal position: what is left is the wheelsets' lowering onto the rails, under 0.3 mm
     lowered = {name: heights(scene, equilibrium)[name] - place[2] for name, place in zip(
         scene.vehicle.body_names, scene.vehicle.positions, strict=True)}  # fmt: skip
-    assert -3e-4 < lowered["wheelset_1"] < 0.0
+    assert -3e-4 < lowered["wheelset_1"] < 0.0 and len(lowered) == (15 if axle_boxes == "true" else 7)
     np.testing.assert_allclose(list(lowered.values()), lowered["wheelset_1"], atol=1e-8)
     assert equilibrium.residual < 1e-6
-    np.testing.assert_allclose(equilibrium.state[7 * STATE_SIZE :], 0.0, atol=1e-9)  # dampers' springs are relaxed
+    np.testing.assert_allclose(
+        equilibrium.state[len(lowered) * STATE_SIZE :], 0.0, atol=1e-9
+    )  # dampers' springs are relaxed
 
 
 def test_load_off_the_centre(equilibrium_of):
@@ -111,3 +115,28 @@ def test_a_bogie_under_a_frame_that_carries_load(equilibrium_of):
     weight = CAR / 2 + (2615 + 2 * 1813) * GRAVITY - 2 * 430e3 * lowered
     np.testing.assert_allclose(equilibrium.wheel_loads, weight / 4, rtol=1e-6)
     assert 0.0 < lowered < 3e-4
+
+
+@pytest.mark.parametrize("path", ["tangent", "[{tangent: 100}]"])
+def test_the_start_stands_on_rails_that_are_out_of_line(tmp_path, path):
+    # 3 mm to the left, 5 mm up, the left rail 4 mm above the right one, all along the vehicle: each wheel has its
+    # static load, axle boxes stay where their joints hold them
+    names = "s_m,alignment_m,level_m,cross_level_m\n"
+    rows = "".join(f"{s},{0.003},{0.005},{0.004}\n" for s in range(-60, 61, 2))
+    (tmp_path / "offset.csv").write_text(names + rows)
+    scene = load_scene(SCENES / "trailer_vehicle.yaml", [
+        "contact.creep.model=linear", "initial.y=0.002", "initial.yaw=0.003", f"track.path={path}",
+        f"track.irregularity={{points: {tmp_path / 'offset.csv'}, fade_in: 30, fade_out: 30}}",
+        "vehicle.axle_boxes=true",
+    ])  # fmt: skip
+    model, state = compile_scene(scene)
+    loads = wheel_loads(model._replace(contact=model.contact._replace(friction=1e-9, law=2)), workspace(model), state)
+    np.testing.assert_allclose(loads, 54546, rtol=3e-3)  # rolling at 20 m/s, yawed by 3 mrad: approach speeds, damping
+    names = scene.vehicle.body_names
+    for k in range(1, 5):
+        for side, y in (("left", 1.0), ("right", -1.0)):
+            box, axle = (
+                state[STATE_SIZE * names.index(name) : STATE_SIZE * (names.index(name) + 1)]
+                for name in (f"axle_box_{k}_{side}", f"wheelset_{k}")
+            )
+            np.testing.assert_allclose(box[:3], axle[:3] + y * matrix_of(axle[3:7])[:, 1], atol=1e-12)

@@ -12,14 +12,21 @@ import numpy as np
 
 from wrcore._jit import jit
 from wrcore.contact import reduction
+from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import fill_derivatives, state_size, workspace
+from wrcore.geometry.irregularity import irregularity_at
+from wrcore.geometry.path import tangent_path
 
 STEP = 1e-7
 """Of the difference quotients: m and rad."""
 
 RESIDUAL = 1e-9
 """Accelerations below this count as none, m/s^2 and rad/s^2."""
+
+FRICTIONLESS = 1e-9
+"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
 
 
 @dataclass(frozen=True)
@@ -157,3 +164,60 @@ def wheel_loads(model, work, state):
     cosine, sine = np.cos(rows[..., reduction.ANGLE]), np.sin(rows[..., reduction.ANGLE])
     vertical = rows[..., reduction.NORMAL] * cosine + rows[..., reduction.FY] * sine
     return np.where(np.arange(rows.shape[2]) < work.counts[..., None], vertical, 0.0).sum(axis=2)
+
+
+def stand_on_rails(model, state, loads):
+    """Move, lift and roll wheelsets that stand where rails are out of line, until their wheels carry their loads again.
+
+    Parameters
+    ----------
+    model : Model
+        Its path is taken as straight.
+    state : numpy.ndarray
+        Changed in place; wheelsets as they stand on perfect rails.
+    loads : numpy.ndarray, shape (k, 2)
+        Of left and right wheels, N; each wheelset's mean is what both of its wheels get.
+    """
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
+    bare = model._replace(elements=pack_elements(), joints=joints, track=track, contact=contact)
+    work, base, deviations = workspace(model), contact.geometry.rail_distance, np.zeros((3, 4))
+    for k, body in enumerate(model.bodies.wheelsets):
+        at, load = STATE_SIZE * body, np.mean(loads[k])
+        irregularity_at(track.irregularity, state[at], deviations)
+        if deviations[0].any():
+            state[at + 1] += 0.5 * (deviations[0, 0] + deviations[0, 2])
+            carried = _loads_when_lifted(bare, work, state, at, k)
+            _lift(state, at, _lifts_for(carried, load, deviations[0, 1::2].copy()), base)
+
+
+def _lift(state, at, lifts, base):
+    """Lift the axle of a wheelset over the left and over the right rail, m."""
+    state[at + 2] += 0.5 * (lifts[0] + lifts[1])
+    state[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0]))
+
+
+def _loads_when_lifted(model, work, state, at, k):
+    """Loads (N) of the k-th wheelset's wheels at rest as a function of the lifts of its ends."""
+
+    def carried(lifts):
+        lifted = state.copy()
+        _lift(lifted, at, lifts, model.contact.geometry.rail_distance)
+        lifted[at + 7 : at + 13] = 0.0
+        return wheel_loads(model, work, lifted)[k]
+
+    return carried
+
+
+def _lifts_for(carried, load, lifts):
+    """Lifts of both ends at which both wheels carry the load: Newton's method, lowering a wheel that hangs first."""
+    for _ in range(100):
+        missing = load - carried(lifts)
+        if np.max(np.abs(missing)) < 1e-6 * load:
+            break
+        if np.max(missing) == load:
+            lifts = lifts - 1e-4 * (missing == load)
+            continue
+        slopes = np.array([(load - carried(lifts + STEP * end) - missing) / STEP for end in np.eye(2)]).T
+        lifts = lifts + np.clip(np.linalg.solve(slopes, -missing), -5e-5, 5e-5)
+    return lifts

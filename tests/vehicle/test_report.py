@@ -1,0 +1,34 @@
+"""What reports/vehicle_files.md tells a reader to write is what the package reads."""
+
+import re
+
+import pytest
+import yaml
+
+from tests.conftest import ROOT
+from wrcore.checked_yaml import parse_value
+from wrcore.vehicle.description import build_vehicle
+from wrcore.vehicle.element_checks import KEYS
+
+TEXT = (ROOT / "reports" / "vehicle_files.md").read_text(encoding="utf-8")
+VEHICLE, *EXAMPLES = (parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL))
+BOLSTER = {"kind": "body", "mass": 500.0, "inertia": {"roll": 1.0, "pitch": 1.0, "yaw": 1.0}, "position": [0, 0, 0.9]}
+
+
+@pytest.mark.parametrize("item", [item for block in EXAMPLES for item in block], ids=lambda item: item["name"])
+def test_each_example_is_a_part_of_a_vehicle(item):
+    data = yaml.safe_load(yaml.safe_dump(VEHICLE))
+    if item["kind"] in KEYS:
+        data["elements"].append(item)
+    else:
+        data["bodies"]["bolster"] = BOLSTER
+        data["joints"] = [item]
+    assert build_vehicle(data, "report", axle_boxes=False).body_names
+
+
+def test_each_kind_and_each_of_its_keys_is_in_the_report():
+    for kind, (needed, optional) in KEYS.items():
+        heading = re.search(rf"^### {kind}:.*?(?=^##|\Z)", TEXT, re.DOTALL | re.MULTILINE)
+        assert heading, kind
+        for key in needed + optional:
+            assert key == "at" or f"`{key}`" in heading.group(), (kind, key)

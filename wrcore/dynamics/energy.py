@@ -1,0 +1,283 @@
+"""Energies and powers of a model: what a run stores, what it loses and what drives it.
+
+Sorted by what they do to the energy E = kinetic + gravitational + springs + elastic contact, the forces of the
+equations of motion have the powers
+
+    E' = P_frame + P_joints - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
+
+The rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
+
+*Elastic contact.* Eq. (7) is a spring N_el = c_d(0) K delta^1.5 and a damping N - N_el. The spring's power P_elastic =
+N_el (approach speed) is the rate of U_contact = 2/5 N_el delta where K is constant and the approach speed the rate of
+delta. Along a profile neither holds exactly, and N_el is not quite the gradient of U_contact: the last term is what
+that leaves.
+
+*Contact powers* follow from the equations of motion with all else switched off. Without friction, the power of the
+normal forces is left; without contact damping, too, that of Hertz's.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import cumulative_simpson
+
+from wrcore._jit import jit
+from wrcore.contact import reduction
+from wrcore.creep.laws import LAWS
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.equilibrium import FRICTIONLESS
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.suspension import (
+    DISPLACEMENT,
+    LINE,
+    SERIES,
+    SERIES_VELOCITY,
+    VELOCITY,
+    characteristic,
+    pack_elements,
+)
+from wrcore.dynamics.system import fill_derivatives, state_size
+from wrcore.dynamics.track import moving_frame
+from wrcore.dynamics.wheel import normal_contact
+
+CHANNELS = (
+    "kinetic_J", "gravitational_J", "springs_J", "elastic_contact_J",
+    "input_by_frame_W", "input_by_joints_W", "dissipated_by_dampers_W", "dissipated_by_creep_W",
+    "dissipated_by_contact_damping_W", "stored_by_springs_W", "stored_by_gravity_W", "stored_by_elastic_contact_W",
+)  # fmt: skip
+"""Names of the channels: stores, inputs, losses, and the powers that go into the stores."""
+
+
+class EnergyBalance(NamedTuple):
+    """Where a run's energy went, as functions of time; all arrays have shape (n,)."""
+
+    turned_over: np.ndarray
+    """Energy that has passed from one store, source or sink to another, half the integral of the sum of |powers|, J."""
+    imbalance: np.ndarray
+    """Energy that is missing: change of the stores and losses less inputs, the contact's store by its power, J."""
+    contact_remainder: np.ndarray
+    """Change of 2/5 N_el delta less the integral of the elastic contact forces' power, J."""
+
+
+@jit
+def _polygon_integral(table, first, last, x):
+    """Integral of a characteristic from the first of its points to x."""
+    total, k = 0.0, first
+    while k < last - 2 and x > table[k + 1, 0]:
+        total += 0.5 * (table[k, 1] + table[k + 1, 1]) * (table[k + 1, 0] - table[k, 0])
+        k += 1
+    return total + 0.5 * (table[k, 1] + characteristic(table, first, last, x)) * (x - table[k, 0])
+
+
+@jit
+def _directed_energy(elements, k, stretch, speed, own):
+    """Force against stretch (N), energy (J), its rate and the loss (W) of the k-th element along one direction."""
+    row, law, table = elements.directed[k], elements.law[k], elements.table
+    stiffness, damping, preload = row[7], row[8], row[9]
+    if law[1] == SERIES or law[1] == SERIES_VELOCITY:
+        force = stiffness * (stretch - own)
+        rate = force / damping if law[1] == SERIES else characteristic(table, law[2], law[3], force)
+        stored = 0.5 * stiffness * (stretch - own) ** 2 - preload * stretch
+        return force - preload, stored, force * (speed - rate) - preload * speed, force * rate
+    elastic, viscous = stiffness * stretch - preload, damping * speed
+    stored = 0.5 * stiffness * stretch**2 - preload * stretch
+    if law[1] == DISPLACEMENT:
+        elastic += characteristic(table, law[2], law[3], stretch)
+        stored += _polygon_integral(table, law[2], law[3], stretch) - _polygon_integral(table, law[2], law[3], 0.0)
+    elif law[1] == VELOCITY:
+        viscous += characteristic(table, law[2], law[3], speed)
+    return elastic + viscous, stored, elastic * speed, viscous * speed
+
+
+@jit
+def element_energies(elements, track, t, speed, state, rotations, turns):
+    """Energies and powers of all force elements; arguments as for ``wrcore.dynamics.suspension.element_forces``.
+
+    Returns
+    -------
+    stored : float
+        Energy of the springs, J; zero in nominal position, where a preload's spring is not relaxed.
+    rate, lost, driven : float
+        Rate of that energy, power dissipated by dampers and friction, and power of the moving frame's ends, W.
+    """
+    own = STATE_SIZE * turns.shape[0]
+    stored = rate = lost = driven = 0.0
+    axes = np.empty((3, 3))
+    for p in range(elements.pairs.shape[0]):
+        i, j = elements.pairs[p]
+        at = STATE_SIZE * i
+        if j != FRAME:
+            axes[:] = rotations[j]
+            other = STATE_SIZE * j
+            origin, velocity, turn = state[other : other + 3], state[other + 7 : other + 10], turns[j]
+        elif track.tangent:
+            axes[:] = np.eye(3)
+            origin, velocity = np.array([speed * t + elements.ahead[p], 0.0, 0.0]), np.array([speed, 0.0, 0.0])
+            turn = np.zeros(3)
+        else:
+            place, ahead, turning = moving_frame(track, speed, t, elements.ahead[p], axes)
+            origin, velocity, turn = np.array(place), np.array(ahead), np.array(turning)
+        # relative motion in the axes of the second body, as in wrcore.dynamics.suspension
+        into = axes.T.copy()
+        R = into @ rotations[i]
+        apart = state[at : at + 3] - origin
+        rho, u = into @ apart, into @ (state[at + 7 : at + 10] - velocity - np.cross(turn, apart))
+        W = into @ (turns[i] - turn)
+        c, d = elements.turning[p]
+        moment = np.array([
+            c[2] * R[1, 2] - c[1] * R[2, 1] - d[0] * W[0], c[0] * R[2, 0] - c[2] * R[0, 2] - d[1] * W[1],
+            c[1] * R[0, 1] - c[0] * R[1, 0] - d[2] * W[2],
+        ])  # fmt: skip
+        loss = np.sum(d * W * W)
+        stored += np.sum(c) - c[0] * R[0, 0] - c[1] * R[1, 1] - c[2] * R[2, 2]
+        rate -= np.sum(moment * W) + loss
+        lost += loss
+        force = np.zeros(3)
+        for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
+            row = elements.springs[k]
+            arm = R @ row[:3]
+            stretch, along = rho + arm - row[3:6], u + np.cross(W, arm)
+            elastic = row[12:15] - row[6:9] * stretch
+            stored += np.sum(0.5 * row[6:9] * stretch**2 - row[12:15] * stretch)
+            rate -= np.sum(elastic * along)
+            lost += np.sum(row[9:12] * along**2)
+            push = elastic - row[9:12] * along
+            force += push
+            moment += np.cross(arm, push)
+        for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
+            row, law = elements.directed[k], elements.law[k]
+            arm = R @ row[:3]
+            line = rho + arm - row[3:6]
+            n = np.zeros(3)
+            if law[0] == LINE:
+                n[:] = line / np.sqrt(np.sum(line**2))
+            else:
+                n[law[0]] = 1.0
+            along = np.sum(n * (u + np.cross(W, arm)))
+            inner = state[own + law[4]] if law[4] >= 0 else 0.0
+            against, energy, power, loss = _directed_energy(elements, k, np.sum(n * line) - row[6], along, inner)
+            stored, rate, lost = stored + energy, rate + power, lost + loss
+            force -= against * n
+            moment -= np.cross(arm, against * n)
+        if j == FRAME:  # the element's force on the first body, times the velocity of the frame's point there
+            driven += np.sum((axes @ force) * (velocity + np.cross(turn, apart))) + np.sum((axes @ moment) * turn)
+    return stored, rate, lost, driven
+
+
+@jit
+def _powers(times, states, model, work, rate):
+    """Power of all wrenches of a model at each state, W, shape (n,); gyroscopic moments have none."""
+    powers = np.zeros(times.shape[0])
+    work.arc_lengths[:] = np.nan  # the last pass ended elsewhere
+    for i in range(times.shape[0]):
+        fill_derivatives(times[i], states[i], model, work, rate)
+        for b in range(work.wrenches.shape[0]):
+            at = STATE_SIZE * b + 7
+            powers[i] += np.sum(work.wrenches[b] * states[i, at : at + 6])
+    return powers
+
+
+@jit
+def _kinetic_and_gravitational(model, rotations, state):
+    """Kinetic and gravitational energy of all bodies, J, and the rate of the latter, W."""
+    kinetic = height = rise = 0.0
+    for b in range(model.bodies.mass.shape[0]):
+        at, mass = STATE_SIZE * b, model.bodies.mass[b]
+        local = rotations[b].T.copy() @ state[at + 10 : at + 13]
+        kinetic += 0.5 * mass * np.sum(state[at + 7 : at + 10] ** 2) + 0.5 * np.sum(model.bodies.inertia[b] * local**2)
+        height, rise = height + mass * state[at + 2], rise + mass * state[at + 9]
+    return kinetic, model.gravity * height, model.gravity * rise
+
+
+@jit
+def _elastic_contact_energy(contact, work):
+    """Sum of 2/5 N_el delta over all patches of the last evaluation, J."""
+    energy = 0.0
+    for k in range(work.patches.shape[0]):
+        for wheel in range(2):
+            for i in range(work.counts[k, wheel]):
+                row = work.patches[k, wheel, i]
+                delta = row[reduction.PENETRATION]
+                force = normal_contact(contact, delta, row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], 0.0)[0]
+                energy += 0.4 * force * delta
+    return energy
+
+
+@jit
+def _energies(times, states, model, work, rate):
+    """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8)."""
+    rows = np.empty((times.shape[0], 8))
+    work.arc_lengths[:] = np.nan
+    for i in range(times.shape[0]):
+        fill_derivatives(times[i], states[i], model, work, rate)
+        kinetic, height, rise = _kinetic_and_gravitational(model, work.rotations, states[i])
+        stored, stretching, damped, driven = element_energies(
+            model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns
+        )
+        rows[i, 0], rows[i, 1], rows[i, 2] = kinetic, height, stored
+        rows[i, 3] = _elastic_contact_energy(model.contact, work)
+        rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7] = stretching, rise, damped, driven
+    return rows
+
+
+def energy_channels(model, work, times, states):
+    """Energies and powers along a run.
+
+    Parameters
+    ----------
+    model : Model
+    work : Workspace
+        Of this model; overwritten, but for its counters of creep look-ups.
+    times : numpy.ndarray, shape (n,)
+        s.
+    states : numpy.ndarray, shape (n, state_size(model))
+
+    Returns
+    -------
+    dict of str to numpy.ndarray, shape (n,)
+        Channels by name, with their unit: energies in J (gravitational from z = 0, springs from nominal position),
+        powers in W.
+    """
+    times, rate, outside = np.asarray(times, float), np.empty(state_size(model)), int(work.counters[1])
+    touching = model._replace(elements=pack_elements(), joints=model.joints._replace(equations=0), gravity=0.0)
+    smooth = touching._replace(contact=model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"]))
+    undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
+    whole, contact, normal, hertz = (
+        _powers(times, states, variant, work, rate) for variant in (model, touching, smooth, undamped)
+    )
+    kinetic, height, stored, pressed, stretching, rise, damped, driven = _energies(times, states, model, work, rate).T
+    work.counters[1] = outside
+    elastic = -0.5 * (1.0 + model.contact.damping) * hertz
+    joints = whole + rise - contact - (driven - stretching - damped)
+    rows = (kinetic, height, stored, pressed, driven, joints, damped, normal - contact, -normal - elastic,
+            stretching, rise, elastic)  # fmt: skip
+    return dict(zip(CHANNELS, rows, strict=True))
+
+
+def energy_balance(channels, times):
+    """Balance of the energy over a run, by Simpson's rule over its output times.
+
+    Parameters
+    ----------
+    channels : dict of str to numpy.ndarray, shape (n,)
+        From :func:`energy_channels`.
+    times : numpy.ndarray, shape (n,)
+        Uniform output times, s, close enough for the powers' fastest changes.
+
+    Returns
+    -------
+    EnergyBalance
+    """
+
+    def gone(name):
+        return cumulative_simpson(channels[name], x=times, initial=0.0)
+
+    stores = sum(channels[name] - channels[name][0] for name in ("kinetic_J", "gravitational_J", "springs_J"))
+    losses = sum(gone(name) for name in CHANNELS if name.startswith("dissipated"))
+    inputs = sum(gone(name) for name in CHANNELS if name.startswith("input"))
+    contact = gone("stored_by_elastic_contact_W")
+    powers = np.array([channels[name] for name in CHANNELS if name.endswith("_W")])
+    kinetic = -powers[2:].sum(axis=0) + powers[:2].sum(axis=0)
+    turned_over = 0.5 * cumulative_simpson(np.abs(powers).sum(axis=0) + np.abs(kinetic), x=times, initial=0.0)
+    remainder = channels["elastic_contact_J"] - channels["elastic_contact_J"][0] - contact
+    return EnergyBalance(turned_over, stores + contact + losses - inputs, remainder)
