@@ -111,7 +111,7 @@ def _status(amplitudes, elapsed, settling):
         return "limit cycle"
     if elapsed < settling.longest - 1e-9:
         return ""
-    half = amplitudes[len(amplitudes) // 2]
+    half = amplitudes[(len(amplitudes) - 1) // 2]
     return "decaying" if last < 0.8 * half else "growing" if last > 1.25 * half else "irregular"
 
 

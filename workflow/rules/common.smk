@@ -34,6 +34,8 @@ def check_config():
         raise WorkflowError(f"configuration: creep_study.shown: expected a name under tables, got {creep['shown']!r}")
     scenes = {f"cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["cases"].items()}
     scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
+    for vehicle, entry in config["critical_speed"]["vehicles"].items():
+        scenes[f"critical_speed.vehicles.{vehicle}"] = (entry["scene"], {})
     for key, (scene, changes) in scenes.items():
         try:
             load_scene(scene, [f"{name}={value}" for name, value in changes.items()])

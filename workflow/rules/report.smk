@@ -99,6 +99,7 @@ rule study:
         rules.first_light_notebook.output,
         rules.creep_study.input,
         rules.contact_study.input,
+        rules.critical_speed_study.input,
         rules.ivp_study.input,
 
 

@@ -1,0 +1,129 @@
+# Stability of vehicles: root locus, modes, limit cycles, critical speeds.
+
+CRITICAL = config["critical_speed"]
+HUNTING = list(CRITICAL["vehicles"])
+CORE["stability"] = CORE["simulation"] + sources("analysis", "analysis_modes", "analysis_stability", "analysis_limit_cycles")
+CORE["stability_figures"] = CORE["stability"] + sources("figures", "figures_stability")
+
+
+wildcard_constraints:
+    detection="planar|spatial",
+
+
+def critical_scene(wildcards):
+    return CRITICAL["vehicles"][wildcards.vehicle]["scene"]
+
+
+def cycle_speeds(wildcards):
+    return CRITICAL["vehicles"][wildcards.vehicle]["cycle_speeds"]
+
+
+rule root_locus:
+    message:
+        "{wildcards.vehicle}: modes over speed, linear critical speed"
+    input:
+        core=CORE["stability"],
+        scenes=SCENES,
+        scene=critical_scene,
+        table=rules.creep_table.output,
+    output:
+        locus="<results>/tables/stability/{vehicle}_modes.csv",
+        linear="<results>/tables/stability/{vehicle}_linear.csv",
+        shown="<results>/tables/stability/{vehicle}_energies.csv",
+        shapes="<results>/tables/stability/{vehicle}_shapes.csv",
+    log:
+        "<logs>/root_locus/{vehicle}.log",
+    benchmark:
+        "<benchmarks>/root_locus/{vehicle}.tsv"
+    params:
+        speeds=CRITICAL["speeds"],
+        shown=CRITICAL["shown"],
+    script:
+        "../scripts/root_locus.py"
+
+
+rule limit_cycles:
+    message:
+        "{wildcards.vehicle}, {wildcards.detection}: limit cycles over speed"
+    input:
+        core=CORE["stability"],
+        scenes=SCENES,
+        scene=critical_scene,
+        table=rules.creep_table.output,
+    output:
+        "<results>/tables/stability/{vehicle}_{detection}_limit_cycles.csv",
+    log:
+        "<logs>/limit_cycles/{vehicle}_{detection}.log",
+    benchmark:
+        "<benchmarks>/limit_cycles/{vehicle}_{detection}.tsv"
+    params:
+        speeds=cycle_speeds,
+        settings=CRITICAL["limit_cycles"],
+    script:
+        "../scripts/limit_cycles.py"
+
+
+rule critical_speeds:
+    message:
+        "Critical speeds: root locus, limit cycles, table"
+    input:
+        core=CORE["stability_figures"],
+        loci=expand(rules.root_locus.output.locus, vehicle=HUNTING),
+        linear=expand(rules.root_locus.output.linear, vehicle=HUNTING),
+        cycles=expand(rules.limit_cycles.output, vehicle=HUNTING, detection=["planar", "spatial"]),
+    output:
+        table=report(
+            "<results>/tables/critical_speeds.csv",
+            caption="../report/critical_speeds.rst",
+            category="Stability",
+            labels={"table": "critical speeds"},
+        ),
+        locus=report(
+            "<results>/figures/root_locus.png",
+            caption="../report/root_locus.rst",
+            category="Stability",
+            labels={"figure": "root locus"},
+        ),
+        cycles=report(
+            "<results>/figures/limit_cycles.png",
+            caption="../report/limit_cycles.rst",
+            category="Stability",
+            labels={"figure": "limit cycles"},
+        ),
+        svg=expand("<results>/figures/{name}.svg", name=["root_locus", "limit_cycles"]),
+    log:
+        "<logs>/critical_speeds.log",
+    params:
+        titles={name: entry["title"] for name, entry in CRITICAL["vehicles"].items()},
+        disturbance=CRITICAL["limit_cycles"]["settling"]["disturbance"],
+    script:
+        "../scripts/critical_speeds.py"
+
+
+rule fig_modes:
+    message:
+        "Modes of the {wildcards.vehicle}"
+    input:
+        core=CORE["stability_figures"],
+        modes=rules.root_locus.output.shown,
+    output:
+        report(
+            "<results>/figures/modes_{vehicle}.png",
+            caption="../report/modes.rst",
+            category="Stability",
+            labels={"figure": "modes", "vehicle": "{vehicle}"},
+        ),
+        "<results>/figures/modes_{vehicle}.svg",
+    log:
+        "<logs>/fig_modes/{vehicle}.log",
+    params:
+        speed=CRITICAL["shown"],
+    script:
+        "../scripts/fig_modes.py"
+
+
+rule critical_speed_study:
+    input:
+        rules.critical_speeds.output,
+        expand(rules.fig_modes.output, vehicle=HUNTING),
+        expand(rules.root_locus.output.shapes, vehicle=HUNTING),
