@@ -259,7 +259,7 @@ def _rolling(scene, model, y, z, roll, yaw):
     """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
     detection = "planar" if scene.detection == "planar" else "spatial"
     patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
-    radius = np.mean([scene.vehicle.rolling_radius - scene.wheel(p.u_wheel_m) for p in patches])
+    radius = np.mean([z - patch.z_m for patch in patches])
     return rotation(roll, yaw)[:, 1] * model.speed / radius
 
 

@@ -57,6 +57,17 @@ def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of, axle_boxes
     )  # dampers' springs are relaxed
 
 
+@pytest.mark.parametrize("patch", ["moment", "maximum"])
+def test_wheels_roll_without_slip_at_the_start(patch):
+    scene = load_scene(
+        SCENES / "trailer_vehicle.yaml", ["initial.y=0", f"contact.patch={patch}", "contact.creep.model=she"]
+    )
+    model, state = compile_scene(scene)
+    work = workspace(model)
+    right_hand_side(model, work)(0.0, state)
+    np.testing.assert_allclose(work.patches[:, :, 0, reduction.XI], 0.0, atol=1e-12)
+
+
 def test_load_off_the_centre(equilibrium_of):
     data, x, y = copy.deepcopy(TRAILER), 0.6, 0.08
     data["bodies"]["car_body"]["position"] = [x, y, 1.8]

@@ -24,6 +24,11 @@ def test_wheelsets_are_numbered_from_the_front_wherever_they_stand_in_the_file(t
     assert vehicle.wheelset_names == ("wheelset_1", "wheelset_2", "wheelset_3", "wheelset_4")
 
 
+def test_templates_hold_anchors_and_nothing_else(trailer):
+    trailer["templates"] = {"spring": {"stiffness": "whatever"}}
+    assert build_vehicle(trailer, "trailer", axle_boxes=False).elements.springs.shape == (15, 15)
+
+
 def set_in(element_name, /, **keys):
     """A change of an element's keys; None takes one away."""
 

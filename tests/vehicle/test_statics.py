@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.vehicle.conftest import element
+from wrcore.errors import InputError
 from wrcore.vehicle.description import GRAVITY, build_vehicle
 from wrcore.vehicle.element_data import single_elements
 from wrcore.vehicle.layout import Layout
@@ -105,6 +106,25 @@ def test_an_axle_box_with_a_trailing_arm_is_a_lever():
     rest = [shares[f"s{k}"] for k in (2, 3, 4, 5)]
     assert sum(rest) - bush - coil == pytest.approx(2e4, rel=1e-9)  # forces on the frame, and moments about its centre
     assert 0.6 * (rest[0] + rest[1] - rest[2] - rest[3]) - 0.5 * bush + 0.3 * coil == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_hinge_carries_moments_about_the_axes_it_does_not_turn_about():
+    # 100 kg one metre outside a vertical hinge at the end of a beam of 400 kg: the beam's springs at +-1 m balance both
+    bodies = {"beam": ((0, 0, 1), 400.0), "gate": ((3, 0, 1), 100.0)}
+    hinge = {"kind": "revolute", "axis": "z", "bodies": ["beam", "gate"], "at": [2, 0, 1]}
+    shares = statics_of(bodies, [spring(["beam", "frame"], [x, y, 0.5]) for x in (1, -1) for y in (0.5, -0.5)], [hinge])
+    front, rear = shares["s0"] + shares["s1"], shares["s2"] + shares["s3"]
+    assert front + rear == pytest.approx(5e3, rel=1e-9) and front - rear == pytest.approx(3 * 1e3, rel=1e-9)
+    with pytest.raises(InputError, match="bodies.gate"):
+        statics_of(bodies, [spring(["beam", "frame"], [x, 0, 0.5]) for x in (1, -1)], [{**hinge, "axis": "y"}])
+
+
+def test_links_make_a_body_turn_about_the_point_where_they_meet():
+    # two links at 45 degrees whose lines meet at y = z = 0; the weight 0.2 m, a spring 0.8 m beside that point
+    bodies = {"body": ((0, 0.2, 1.5), 1e3)}
+    links = [{"kind": "rigid_link", "bodies": ["body", "frame"], "at": [[0, y, 1], [0, 2 * y, 2]]} for y in (1, -1)]
+    shares = statics_of(bodies, [spring(["body", "frame"], [0, 0.8, 1.0])], links)
+    assert shares["s0"] == pytest.approx(1e4 * 0.2 / 0.8, rel=1e-9)
 
 
 def test_a_link_and_an_inclined_rod_carry_weight():
