@@ -111,6 +111,19 @@ def test_limit_cycle_of_a_wheelset_equals_that_of_a_plain_run():
     assert cycle["amplitude_m"] == pytest.approx(amplitude(run["wheelset"].y_m[run.t >= 4.0]), rel=0.01)
 
 
+def test_a_derailed_vehicle_is_not_on_a_limit_cycle(oscillator, suspended, monkeypatch):
+    """Runs from 11 mm on derail here; those from 5 mm are on the cycle, however far the others got."""
+    run = analysis_limit_cycles._run
+
+    def derailing(model, state, settling):
+        t, y, end, _ = run(model, state, settling)
+        return (t, y, end, True) if abs(state[1]) < 0.011 else (t, y + np.linspace(0, 1, len(y))[:, None], end, False)
+
+    monkeypatch.setattr(analysis_limit_cycles, "_run", derailing)
+    assert falling_branch(*suspended, [46.0], Settling(), [0.012, 0.005], 0.1)["status"].item() == "limit cycle"
+    assert falling_branch(*suspended, [46.0], Settling(), [0.012], 0.1)["status"].item() == "derailed"
+
+
 def test_critical_table():
     """Linear and nonlinear critical speeds of both detections side by side; nothing found stays empty."""
     linear = pd.DataFrame(

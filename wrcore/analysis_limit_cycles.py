@@ -31,8 +31,8 @@ class Settling:
     window : float
         Length of a window, s; several periods.
     longest : float
-        A motion that still changes after this time is taken as it is, s: growing or decaying by a fifth since half-way,
-        or irregular.
+        A motion that still changes after this time is taken as it is, s: growing or decaying in each window since
+        half-way, or irregular.
     change : float
         Amplitudes of two windows in a row that differ by less than this part count as settled.
     rest : float
@@ -111,8 +111,8 @@ def _status(amplitudes, elapsed, settling):
         return "limit cycle"
     if elapsed < settling.longest - 1e-9:
         return ""
-    half = amplitudes[(len(amplitudes) - 1) // 2]
-    return "decaying" if last < 0.8 * half else "growing" if last > 1.25 * half else "irregular"
+    trend = np.sign(np.diff(amplitudes[(len(amplitudes) - 1) // 2 :]))
+    return "decaying" if np.all(trend < 0.0) else "growing" if np.all(trend > 0.0) else "irregular"
 
 
 def shifted(model, state, shift):
@@ -152,7 +152,7 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
         tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
         if not tried or tried[0][0]["amplitude_m"] < 0.67 * rows[-1]["amplitude_m"]:
             tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
-        row, end = max(tried, key=lambda motion: motion[0]["amplitude_m"])
+        row, end = max(tried, key=lambda motion: (motion[0]["status"] != "derailed", motion[0]["amplitude_m"]))
         if row["status"] in CYCLES:
             rows.append(row)
             carried = there, end
