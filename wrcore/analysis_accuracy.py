@@ -108,7 +108,7 @@ ERRORS = ("y_rms_m", "y_max_m", "force_rms_N", "wear_number_relative", "amplitud
 COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
 
 
-def reference_runs(source, overrides, reference, finest):
+def reference_runs(source, overrides, reference):
     """The reference run and its independent twin.
 
     Parameters
@@ -116,16 +116,35 @@ def reference_runs(source, overrides, reference, finest):
     source, overrides
         Scene, as for :func:`wrcore.scene.load_scene`.
     reference : dict
-        methods (two names) and rtol.
-    finest : str
-        Creep of the reference, as in :class:`Choice`.
+        creep, as in :class:`Choice`, methods and rtols (two each).
 
     Returns
     -------
+    scene : Scene
     run, twin : Run
     """
-    choices = [Choice("spatial", "moment", finest, method, reference["rtol"]) for method in reference["methods"]]
-    return [simulate(load_scene(source, [*overrides, *choice.overrides()])) for choice in choices]
+    scenes = [
+        load_scene(source, [*overrides, *Choice("spatial", "moment", reference["creep"], method, rtol).overrides()])
+        for method, rtol in zip(reference["methods"], reference["rtols"], strict=True)
+    ]
+    return scenes[0], *map(simulate, scenes)
+
+
+def reference_row(scene, run, twin, until=np.inf):
+    """What is known of a reference: how far its twin is from it, and the kind of scene, in a table of one row."""
+    facts = {"kind": kind_of(scene), "speed_m_per_s": run.scene["speed"], "status": run.status}
+    counters = {
+        f"{name}_of_{which}": r.counters[name] for which, r in (("run", run), ("twin", twin)) for name in COSTS[:2]
+    }
+    return pd.DataFrame([facts | run_errors(twin, run, until) | counters])
+
+
+def kind_of(scene):
+    """``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
+    vehicle = scene.vehicle
+    if len(vehicle.body_names) > len(vehicle.wheelset_names):
+        return "vehicle"
+    return "suspended_wheelset" if len(vehicle.elements.pairs) else "free_wheelset"
 
 
 def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None):
@@ -202,3 +221,40 @@ def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
         if len(enough):
             rows.append({"accuracy_m": accuracy} | enough.iloc[0].to_dict())
     return pd.DataFrame(rows)
+
+
+def recommendation_table(tables, accuracies):
+    """:func:`recommendations` of several scenes, the title of the scene in front.
+
+    Parameters
+    ----------
+    tables : dict of str to pandas.DataFrame
+        By title.
+    accuracies : sequence of float
+        m.
+    """
+    found = {title: recommendations(table, accuracies) for title, table in tables.items()}
+    return pd.concat([rows.assign(scene=title) for title, rows in found.items()])[
+        ["scene", "accuracy_m", *Choice._fields, "y_rms_m", "real_time_factor", "rhs_evaluations"]
+    ]
+
+
+def front_table(tables, references):
+    """Fronts of several scenes: what ``wrcore simulate --accuracy`` chooses from.
+
+    Parameters
+    ----------
+    tables, references : dict of str to pandas.DataFrame
+        By title: from :func:`study` and :func:`reference_row`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        kind, speed_m_per_s, the fields of a choice, y_rms_m and real_time_factor.
+    """
+    columns = [*Choice._fields, "y_rms_m", "real_time_factor"]
+    parts = [
+        pareto_front(table)[columns].assign(**references[title].iloc[0][["kind", "speed_m_per_s"]].to_dict())
+        for title, table in tables.items()
+    ]
+    return pd.concat(parts)[["kind", "speed_m_per_s", *columns]]

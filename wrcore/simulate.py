@@ -1,6 +1,8 @@
 """From a scene to a run: compile, integrate, collect the channels."""
 
+import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
@@ -9,8 +11,9 @@ import numpy as np
 import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
-from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.integrate import Checkpoint, integrate
+from wrcore.dynamics.outputs import contacts_at
+from wrcore.dynamics.system import workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.scene import compile_scene
 
@@ -46,9 +49,11 @@ class Run:
         Channels by group. A body's group (``wheelset``) holds arrays of shape (n,); a contact's group
         (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent. Names carry the unit.
     counters : dict
-        Plain numbers: steps, rejected, rhs_evaluations, wall_s, compile_s and others.
+        Plain numbers: steps, rejected, rhs_evaluations, jacobians, factorisations, wall_s, compile_s and others.
     settings : dict
         Flat record of the numerical choices, with the package version.
+    end : Checkpoint or None
+        Where a run of the compiled engine stopped, for one that goes on from there. Not written to files.
 
     Examples
     --------
@@ -62,6 +67,7 @@ class Run:
     groups: dict[str, dict[str, np.ndarray]]
     counters: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
+    end: Checkpoint | None = None
 
     def __getitem__(self, group):
         """Channels of one group as attributes; KeyError names the groups that exist."""
@@ -70,7 +76,7 @@ class Run:
         return SimpleNamespace(**self.groups[group])
 
 
-def simulate(scene, progress=None):
+def simulate(scene, progress=None, start=None):
     """Run a scene.
 
     Parameters
@@ -78,7 +84,10 @@ def simulate(scene, progress=None):
     scene : Scene
         From :func:`wrcore.scene.load_scene`.
     progress : callable, optional
-        Called after each step with the simulated time reached, s.
+        Called now and then with the simulated time reached, s.
+    start : Checkpoint or ndarray, shape (size,), optional
+        Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at its
+        time bit by bit as if it had not stopped, or a state at time 0.
 
     Returns
     -------
@@ -87,34 +96,54 @@ def simulate(scene, progress=None):
     """
     started = time.perf_counter()
     model, state = compile_scene(scene)
-    work = workspace(model)
-    function = right_hand_side(model, work)
-    function(0.0, state)  # compiles, or loads the kernels from the cache
-    compiled = time.perf_counter()
     settings = scene.data["integration"]
-    count = int(np.floor(settings["duration"] * scene.data["output"]["rate"] + 1e-9))
-    times = np.arange(count + 1) / scene.data["output"]["rate"]
-    if times[-1] < settings["duration"]:
-        times = np.append(times, settings["duration"])
+    begin = start.t if isinstance(start, Checkpoint) else 0.0
+    times = output_times(begin, settings["duration"], scene.data["output"]["rate"])
     trajectory = integrate(
-        function,
-        state,
-        times,
-        settings["method"],
-        settings["rtol"],
-        settings["atol"],
-        _derailment(model, work),
-        progress,
-    )
-    out_of_range = int(work.counters[1])
+        model, state if start is None else start, times, settings["method"], settings["rtol"], settings["atol"],
+        settings["step"], settings["longest_step"], DERAILED_Y, progress,
+    )  # fmt: skip
+    compiled = time.perf_counter() - started - trajectory.wall_s
     counters = {
         "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
-        "wall_s": trajectory.wall_s, "compile_s": compiled - started, "table_out_of_range": out_of_range,
-        "simulated_s": float(trajectory.t[-1]),
+        "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
+        "smallest_step_s": trajectory.smallest_step, "table_out_of_range": trajectory.out_of_range,
+        "wall_s": trajectory.wall_s, "compile_s": compiled, "simulated_s": float(trajectory.t[-1]) - begin,
     }  # fmt: skip
-    groups = _channels(scene, model, work, function, trajectory)
+    groups = _channels(scene, model, trajectory)
     record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **_flat(settings)}
-    return Run(scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters, record)
+    record["method_used"] = trajectory.method
+    return Run(scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters, record, trajectory.end)
+
+
+def simulate_many(scenes, progress=None, threads=1):
+    """Run several scenes in one process, which imports, loads kernels and reads tables only once.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+    progress : callable, optional
+        Wraps the sequence of scenes, e.g. ``tqdm.tqdm``.
+    threads : int
+        Runs at the same time: the compiled part of a run lets other threads work. Results do not depend on it.
+
+    Returns
+    -------
+    list of Run
+        As :func:`simulate` gives for each scene alone.
+    """
+    with ThreadPoolExecutor(threads) as pool:
+        runs = pool.map(simulate, scenes) if threads > 1 else map(simulate, scenes)
+        return [run for _, run in zip(scenes if progress is None else progress(scenes), runs, strict=True)]
+
+
+def output_times(begin, duration, rate):
+    """Multiples of 1/rate (1/s) from a time on, and both ends of the duration (s)."""
+    end = begin + duration
+    grid = np.arange(math.ceil(begin * rate - 1e-9), math.floor(end * rate + 1e-9) + 1) / rate
+    inner = grid[(grid > begin + 1e-9 / rate) & (grid < end - 1e-9 / rate)]
+    ends = [grid[at] if len(grid) and abs(grid[at] - t) <= 1e-9 / rate else t for at, t in ((0, begin), (-1, end))]
+    return np.concatenate([ends[:1], inner, ends[1:]])
 
 
 def _flat(settings, prefix=""):
@@ -125,25 +154,7 @@ def _flat(settings, prefix=""):
     return flat
 
 
-def _derailment(model, work):
-    """Stop condition: the reason once a wheelset has left the rails."""
-    pose = np.empty((1, 5))
-
-    def stop(t, state):
-        """Reason to end the run at this state, or an empty string."""
-        for k, body in enumerate(model.bodies.wheelsets):
-            y = state[STATE_SIZE * body + 1]
-            if not model.track.tangent:
-                track_poses(model.track, state[None, :], STATE_SIZE * body, work.arc_lengths[k], pose)
-                y = pose[0, 1]
-            if not abs(y) <= DERAILED_Y:
-                return f"a wheelset is {1e3 * abs(y):.0f} mm off the track's centre at t = {t:.6g} s"
-        return ""
-
-    return stop
-
-
-def _channels(scene, model, work, function, trajectory):
+def _channels(scene, model, trajectory):
     """Output channels by group; contact forces are evaluated again at the output times."""
     wanted = scene.data["output"]["channels"]
     wheelsets = model.bodies.wheelsets
@@ -151,11 +162,8 @@ def _channels(scene, model, work, function, trajectory):
     patches = np.full(shape, np.nan)
     bounds = np.full(shape[:3], np.nan)
     if "contact" in wanted:
-        for i, (t, state) in enumerate(zip(trajectory.t, trajectory.states, strict=True)):
-            function(t, state)
-            present = np.arange(reduction.MAX_PATCHES) < work.counts[..., None]
-            patches[i][present] = work.patches[present]
-            bounds[i] = work.bounds
+        rate = np.empty(trajectory.states.shape[1])
+        contacts_at(trajectory.t, trajectory.states, model, workspace(model), rate, patches, bounds)
     groups = {}
     for body, name in enumerate(scene.vehicle.body_names):
         state = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]

@@ -39,7 +39,7 @@ def finished(request):
     model, state = compile_scene(load_scene(SCENES / f"{name}.yaml", overrides))
     work = workspace(model)
     times = np.arange(int(duration * SAMPLING) + 1) / SAMPLING
-    result = integrate(right_hand_side(model, work), state, times, "rk45", 1e-7, 1e-10)
+    result = integrate(model, state, times, "rk45", 1e-7, 1e-10)
     assert result.status == "completed"
     return model, work, result.t, result.states, energy_channels(model, work, result.t, result.states), remainder
 
@@ -85,7 +85,7 @@ def test_constant_stiffness_leaves_next_to_no_remainder():
     overrides = ["wheel.profile=cone:1/20", "rail.profile=circle:0.3", "rail.inclination=0"]
     model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", overrides))
     work, times = workspace(model), np.arange(5001) / SAMPLING
-    result = integrate(right_hand_side(model, work), state, times, "rk45", 1e-7, 1e-10)
+    result = integrate(model, state, times, "rk45", 1e-7, 1e-10)
     balance = energy_balance(energy_channels(model, work, times, result.states), times)
     total = balance.imbalance + balance.contact_remainder
     assert np.abs(total).max() < 5e-6 * balance.turned_over[-1]

@@ -18,7 +18,7 @@ from wrcore.dynamics.equilibrium import evaluate
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.linear import linearise, moved_states, steady_running
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Model, right_hand_side, state_size, workspace
+from wrcore.dynamics.system import Model, state_size, workspace
 from wrcore.scene import compile_scene, load_scene
 from wrcore.vehicle.description import build_vehicle
 
@@ -241,9 +241,7 @@ def test_steady_running_stays_as_it_is():
     model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.0"]))
     linear = steady_running(model, state)
     assert np.max(np.abs(linear.residual)) < 1e-9
-    run = integrate(
-        right_hand_side(model, workspace(model)), linear.state, np.linspace(0, 1, 11), "dop853", 1e-12, 1e-14
-    )
+    run = integrate(model, linear.state, np.linspace(0, 1, 11), "scipy_dop853", 1e-12, 1e-14)
     moved = run.states - linear.state
     moved[:, 0] -= model.speed * run.t
     np.testing.assert_allclose(moved, 0.0, atol=1e-8)  # from the start's spin, 1e-3 rad/s slower, it would not
@@ -263,5 +261,5 @@ def test_small_free_motion_grows_as_its_eigenvalue_says(speed):
     move = np.real(linear.basis @ vector / (linear.basis @ vector)[1]) * 1e-5
     start = moved_states(model, linear.state, move[None, :])[0]
     times = np.linspace(0.0, 0.5, 1001)
-    run = integrate(right_hand_side(model, workspace(model)), start, times, "dop853", 1e-9, 1e-13)
+    run = integrate(model, start, times, "scipy_dop853", 1e-9, 1e-13)
     assert growth_rate(run.t, run.states[:, 1]) == pytest.approx(mode["real_per_s"], rel=0.01)

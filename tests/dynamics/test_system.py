@@ -12,7 +12,7 @@ from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import Joint, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Bodies, Model, right_hand_side, workspace
+from wrcore.dynamics.system import Bodies, Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import tangent_path
@@ -54,9 +54,7 @@ def body_state(position=(0, 0, 0), angles=(0, 0, 0), velocity=(0, 0, 0), omega=(
 
 
 def run(model, state, duration, rtol=1e-10, points=201):
-    return integrate(
-        right_hand_side(model, workspace(model)), state, np.linspace(0, duration, points), "dop853", rtol, 1e-12
-    )
+    return integrate(model, state, np.linspace(0, duration, points), "scipy_dop853", rtol, 1e-12)
 
 
 def test_free_fall(contact):

@@ -29,10 +29,21 @@ def check_config():
             raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
     if config["comparison"]["case"] not in config["timing"]["cases"]:
         raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
+    speeds = config["speeds"]
+    for key in ("released", "disturbed"):
+        if speeds[key] not in speeds["tracks"]:
+            raise WorkflowError(f"configuration: speeds.{key}: expected a name under speeds.tracks, got {speeds[key]!r}")
+    if not set(speeds["shown"]) <= set(speeds["values"]):
+        raise WorkflowError("configuration: speeds.shown: expected some of speeds.values")
     creep = config["creep_study"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
         raise WorkflowError(f"configuration: creep_study.shown: expected a name under tables, got {creep['shown']!r}")
     scenes = {f"cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["cases"].items()}
+    for name, entry in config["accuracy_study"]["scenes"].items():
+        scenes[f"accuracy_study.scenes.{name}"] = (entry["scene"], entry["set"])
+    for vehicle, entry in config["speeds"]["vehicles"].items():
+        for track, there in config["speeds"]["tracks"].items():
+            scenes[f"speeds.vehicles.{vehicle} on speeds.tracks.{track}"] = (entry["scene"], entry["set"] | there)
     scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         scenes[f"critical_speed.vehicles.{vehicle}"] = (entry["scene"], {})
@@ -72,6 +83,10 @@ CORE = {
         "geometry", "contact", "analysis_contact", "analysis_contact_reference", "figures", "figures_contact"
     ),
     "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, "simulate", "results"),
+    "vehicle": sources("analysis", "analysis_vehicle", "sweep", "results"),
+    "vehicle_figures": sources("simulate", "results", "analysis", "analysis_vehicle", "figures", "figures_vehicle"),
+    "accuracy": sources("analysis", "analysis_vehicle", "analysis_accuracy"),
+    "accuracy_figures": sources("analysis", "analysis_vehicle", "analysis_accuracy", "figures", "figures_accuracy"),
     "analysis": sources("simulate", "results", "analysis"),
     "figures": sources("geometry", "contact", *SCENE, "simulate", "results", "analysis", "figures"),
 }
@@ -82,9 +97,13 @@ def case_scene(wildcards):
     return config["cases"][wildcards.case]["scene"]
 
 
+def changes(entries):
+    """Changes to a scene, as `wrcore simulate --set` takes them."""
+    return [f"{key}={value}" for key, value in entries.items()]
+
+
 def overrides(case):
-    """Changes to a case's scene, as `wrcore simulate --set` takes them."""
-    return [f"{key}={value}" for key, value in config["cases"][case]["set"].items()]
+    return changes(config["cases"][case]["set"])
 
 
 # Functions of the wildcards only: Snakemake does not compare params that depend on inputs with those of the last run.

@@ -101,6 +101,8 @@ rule study:
         rules.contact_study.input,
         rules.critical_speed_study.input,
         rules.ivp_study.input,
+        rules.speeds_study.input,
+        rules.speed_against_error.output,
 
 
 rule report_archive:

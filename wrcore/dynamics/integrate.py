@@ -1,16 +1,64 @@
-"""Time integration: scipy's explicit Runge-Kutta pairs over the compiled right-hand side, with counters.
+"""Time integration by name: the compiled engine's methods, and scipy's and SUNDIALS' solvers as references.
 
-``rk45`` is the Dormand-Prince 5(4) pair that MATLAB's ode45 uses. Failure is a value, never an exception: the states
-reached so far are kept.
+=====================================================  =============================================================
+``rk45``, ``tsit5``, ``rk23``, ``rk4``                 explicit pairs of order 5(4), 5(4), 3(2), 4(3), compiled
+``rodas4``, ``ros34pw2``                               Rosenbrock methods of order 4(3), 3(2), compiled
+``auto``                                               ``ros34pw2`` below `STIFF_SPEED`, else ``tsit5``
+``scipy_rk45``, ``_rk23``, ``_dop853``, ``_radau``,    scipy's solvers over the same right-hand side
+``_bdf``, ``_lsoda``
+``cvode``                                              SUNDIALS' BDF, if scikit-sundae is installed
+=====================================================  =============================================================
+
+Failure is a value, never an exception: the states reached so far are kept.
 """
 
 import time
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import DOP853, RK23, RK45
 
-METHODS = {"rk45": RK45, "rk23": RK23, "dop853": DOP853}
+from wrcore.dynamics import engine
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.engine import Control, Memory, Record, advance_explicit, new_memory, new_scratch
+from wrcore.dynamics.rosenbrock import Linear, advance_rosenbrock, new_linear
+from wrcore.dynamics.system import workspace
+from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.dynamics.track import track_poses
+
+METHODS = (*EXPLICIT, *ROSENBROCK)
+"""Methods of the compiled engine."""
+
+REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_bdf", "scipy_lsoda", "cvode")
+"""Methods of other libraries."""
+
+STIFF_SPEED = 25.0
+"""Below this speed (m/s) ``auto`` takes the Rosenbrock method."""
+
+CHUNK = 2000
+"""Attempts between two returns to Python, for progress and interrupts."""
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Everything a compiled run knows: a run taken up from it goes on bit by bit as if it had not paused.
+
+    Attributes
+    ----------
+    method : str
+    t : float
+        Last output time written, s; the run itself is up to a step ahead.
+    memory : Memory
+    linear : Linear or None
+        Of Rosenbrock methods.
+    arc_lengths : numpy.ndarray, shape (k,)
+        Of the wheelsets, m: where the search for the next ones starts.
+    """
+
+    method: str
+    t: float
+    memory: Memory
+    linear: Linear | None
+    arc_lengths: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -19,80 +67,170 @@ class Trajectory:
 
     Attributes
     ----------
+    method : str
+        The method used, where ``auto`` was asked for.
     t : numpy.ndarray, shape (n,)
         Output times reached, s.
     states : numpy.ndarray, shape (n, size)
     status : {"completed", "derailed", "failed"}
     reason : str
         Empty for a completed run.
-    steps, rejected, rhs_evaluations : int
-        Accepted steps, rejected attempts, right-hand sides in all.
+    steps, rejected, rhs_evaluations, jacobians, factorisations : int
+        Accepted steps, rejected attempts, right-hand sides in all (those of Jacobians, too), refreshed Jacobians and
+        factorised matrices.
+    out_of_range : int
+        Creep look-ups out of range.
+    smallest_step : float
+        Smallest accepted step, s.
     wall_s : float
         Seconds spent in the integration.
+    end : Checkpoint or None
+        Where a compiled run stopped.
     """
 
+    method: str
     t: np.ndarray
     states: np.ndarray
     status: str
     reason: str
-    steps: int
-    rejected: int
-    rhs_evaluations: int
-    wall_s: float
+    steps: int = 0
+    rejected: int = 0
+    rhs_evaluations: int = 0
+    jacobians: int = 0
+    factorisations: int = 0
+    out_of_range: int = 0
+    smallest_step: float = np.nan
+    wall_s: float = 0.0
+    end: Checkpoint | None = None
 
 
-def integrate(function, state, times, method="rk45", rtol=1e-6, atol=1e-9, stop=None, progress=None):
-    """Integrate from ``times[0]`` and sample at ``times``.
+def chosen_method(method, speed):
+    """The method that a name stands for at a speed (m/s): ``auto`` depends on it."""
+    if method != "auto":
+        return method
+    return "ros34pw2" if speed < STIFF_SPEED else "tsit5"
+
+
+def integrate(
+    model, start, times, method="auto", rtol=1e-4, atol=1e-7, step=0.0, longest_step=0.05, derailed_y=np.inf,
+    progress=None, chunk=CHUNK,
+):  # fmt: skip
+    """Integrate a model's equations of motion and sample them at given times.
 
     Parameters
     ----------
-    function : callable
-        ``function(t, state) -> rate``; must return a new array.
-    state : numpy.ndarray, shape (size,)
-        Initial state.
+    model : Model
+    start : numpy.ndarray, shape (size,), or Checkpoint
+        State at ``times[0]``, or the end of an earlier run, which goes on by the same method.
     times : numpy.ndarray, shape (n,)
-        Increasing output times, s; the last one ends the run.
-    method : {"rk45", "rk23", "dop853"}
+        Increasing output times, s; the last one ends the run. After a checkpoint: not before its ``t``.
+    method : str
+        One of `METHODS` or `REFERENCES`, or ``auto``.
     rtol, atol : float
-        Relative and absolute tolerance of scipy's step control.
-    stop : callable, optional
-        ``stop(t, state) -> str``: a reason to end the run, or an empty string. Called after each step.
+        Tolerance of a step: ``atol + rtol |y|``, where no more than 1 counts of a position or a Euler parameter (see
+        :mod:`wrcore.dynamics.engine`; the references count all of it).
+    step : float
+        Length of all steps, s; 0 for steps by the tolerance. Compiled methods only.
+    longest_step : float
+        Bound of the steps, s.
+    derailed_y : float
+        Lateral distance of a wheelset from the track's centre that ends the run, m.
     progress : callable, optional
-        Called with the time reached after each step.
+        Called now and then with the time reached, s.
+    chunk : int
+        Attempts between two such calls; of no influence on the result.
 
     Returns
     -------
     Trajectory
     """
-    started = time.perf_counter()
-    times = np.asarray(times, float)
-    solver = METHODS[method](function, times[0], np.array(state, float), times[-1], rtol=rtol, atol=atol)
-    first_cost = solver.nfev
-    states = np.empty((len(times), len(state)))
-    states[0] = state
-    reached, steps, attempt_cost = 1, 0, solver.n_stages
-    status, reason = "completed", ""
-    while solver.status == "running":
-        with np.errstate(over="ignore", invalid="ignore"):  # a wild trial step is rejected by its error estimate
-            message = solver.step()
-        if solver.status == "failed":
-            status, reason = "failed", f"step size fell below the resolution of time at t = {solver.t:.6g} s: {message}"
-            break
-        steps += 1
-        if not np.all(np.isfinite(solver.y)):
-            status, reason = "failed", f"the state is not finite at t = {solver.t:.6g} s"
-            break
-        upto = np.searchsorted(times, solver.t, side="right")
-        if upto > reached:
-            states[reached:upto] = solver.dense_output()(times[reached:upto]).T
-            reached = upto
-        if stop is not None and (reason := stop(solver.t, solver.y)):
-            status = "derailed"
-            break
+    times = np.ascontiguousarray(times, float)
+    method = start.method if isinstance(start, Checkpoint) else chosen_method(method, model.speed)
+    if method in REFERENCES:
+        from wrcore.dynamics.reference import integrate_by_reference
+
+        return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress)
+    tableau = EXPLICIT.get(method) or ROSENBROCK[method]
+    work = workspace(model)
+    if isinstance(start, Checkpoint):
+        memory, linear = _copied(start.memory), _copied(start.linear)
+        work.arc_lengths[:] = start.arc_lengths
+    else:
+        memory = new_memory(start, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
+        linear = new_linear(model) if method in ROSENBROCK else None
+    scratch = new_scratch(len(memory.state), len(model.bodies.mass))
+    record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
+    control = Control(float(rtol), float(atol), float(step), float(longest_step), float(derailed_y))
+
+    def advance(attempts):
+        if linear is None:
+            return advance_explicit(tableau, control, memory, scratch, record, attempts, model, work)
+        return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, model, work)
+
+    outcome = advance(0)  # compiles, or loads the kernel from the cache
+    before, started = memory.counters.copy(), time.perf_counter()
+    while outcome == engine.RUNNING:
+        outcome = advance(chunk)
         if progress is not None:
-            progress(solver.t)
-    attempts = (solver.nfev - first_cost) // attempt_cost if method != "dop853" else steps
+            progress(min(memory.clock[engine.T], times[-1]))
+    wall = time.perf_counter() - started
+    counters, reached = memory.counters - before, int(record.reached[0])
+    status, reason = _ending(outcome, model, memory, work)
+    last = times[reached - 1] if reached else times[0]
     return Trajectory(
-        times[:reached], states[:reached], status, reason, steps, attempts - steps, solver.nfev,
-        time.perf_counter() - started,
+        method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
+        int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
+        int(counters[engine.FACTORISATIONS]), int(work.counters[1]), float(memory.clock[engine.SMALLEST]), wall,
+        Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy()),
     )  # fmt: skip
+
+
+def _copied(part):
+    """Copy of a tuple of arrays, tuples of arrays and numbers."""
+    if isinstance(part, tuple):
+        return type(part)(*(_copied(item) for item in part))
+    return part.copy() if isinstance(part, np.ndarray) else part
+
+
+def _ending(outcome, model, memory, work):
+    """Status and reason of a compiled run's outcome."""
+    t = memory.clock[engine.T]
+    if outcome == engine.COMPLETED:
+        return "completed", ""
+    if outcome == engine.DERAILED:
+        return "derailed", derailment(model, t, memory.state, work.arc_lengths)
+    if not np.isfinite(memory.rate).all():
+        return "failed", f"the accelerations are not finite at t = {t:.6g} s"
+    if outcome == engine.NOT_FINITE:
+        return "failed", f"the state is not finite a step after t = {t:.6g} s"
+    return "failed", f"step size fell below the resolution of time at t = {t:.6g} s"
+
+
+def derailment(model, t, state, arc_lengths, limit=-1.0):
+    """Say how far the farthest wheelset is off the track's centre; empty if none is farther than the limit.
+
+    Parameters
+    ----------
+    model : Model
+    t : float
+        s.
+    state : numpy.ndarray, shape (size,)
+    arc_lengths : numpy.ndarray, shape (k,)
+        Of the wheelsets, roughly, m.
+    limit : float
+        m.
+
+    Returns
+    -------
+    str
+    """
+    worst, pose = 0.0, np.empty((1, 5))
+    for k, body in enumerate(model.bodies.wheelsets):
+        y = state[STATE_SIZE * body + 1]
+        if not model.track.tangent:
+            track_poses(model.track, state[None, :], STATE_SIZE * body, arc_lengths[k], pose)
+            y = pose[0, 1]
+        worst = abs(y) if not abs(y) <= worst else worst
+    if worst <= limit:
+        return ""
+    return f"a wheelset is {1e3 * worst:.0f} mm off the track's centre at t = {t:.6g} s"

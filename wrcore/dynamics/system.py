@@ -117,7 +117,7 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[5] -= wx * hy - wy * hx
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True)
 def fill_derivatives(t, state, model, work, rate):
     """Right-hand side of the equations of motion.
 

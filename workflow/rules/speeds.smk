@@ -1,0 +1,145 @@
+# Sweeps over speed: one job per vehicle, and what its runs show.
+
+SPEEDS = config["speeds"]
+VEHICLES = list(SPEEDS["vehicles"])
+SHOWN = [
+    (track, detection, speed)
+    for track in SPEEDS["tracks"]
+    for detection in ("planar", "spatial")
+    for speed in SPEEDS["shown"]
+]
+
+
+wildcard_constraints:
+    vehicle="|".join(VEHICLES),
+
+
+def vehicle_scene(wildcards):
+    return SPEEDS["vehicles"][wildcards.vehicle]["scene"]
+
+
+def vehicle_overrides(wildcards):
+    return changes(SPEEDS["vehicles"][wildcards.vehicle]["set"])
+
+
+rule sweep_speeds:
+    message:
+        "{wildcards.vehicle}: all speeds, all tracks, planar and spatial"
+    input:
+        core=CORE["simulation"] + CORE["vehicle"],
+        scenes=SCENES,
+        scene=vehicle_scene,
+        table=rules.creep_table.output,
+    output:
+        speeds="<results>/speeds/{vehicle}/speeds.csv",
+        shown=[
+            f"<results>/speeds/{{vehicle}}/{track}_{detection}_v{speed:g}.h5" for track, detection, speed in SHOWN
+        ],
+    log:
+        "<logs>/sweep_speeds/{vehicle}.log",
+    benchmark:
+        "<benchmarks>/sweep_speeds/{vehicle}.tsv"
+    params:
+        overrides=vehicle_overrides,
+        speeds=SPEEDS["values"],
+        tracks={track: changes(entry) for track, entry in SPEEDS["tracks"].items()},
+        shown=SHOWN,
+    script:
+        "../scripts/sweep_speeds.py"
+
+
+rule vehicle_lateral_motion:
+    message:
+        "Figure: lateral motion of all wheelsets of the {wildcards.vehicle}"
+    input:
+        core=CORE["vehicle_figures"],
+        runs=[
+            f"<results>/speeds/{{vehicle}}/{SPEEDS['released']}_{detection}_v{speed:g}.h5"
+            for speed in SPEEDS["shown"]
+            for detection in ("planar", "spatial")
+        ],
+    output:
+        report(
+            "<results>/figures/vehicle_lateral_motion_{vehicle}.png",
+            caption="../report/vehicle_lateral_motion.rst",
+            category="Vehicles",
+            labels={"figure": "lateral motion", "vehicle": "{vehicle}"},
+        ),
+        "<results>/figures/vehicle_lateral_motion_{vehicle}.svg",
+    log:
+        "<logs>/vehicle_lateral_motion/{vehicle}.log",
+    params:
+        speeds=SPEEDS["shown"],
+    script:
+        "../scripts/vehicle_lateral_motion.py"
+
+
+rule vehicle_guiding_forces:
+    message:
+        "Figure and table: forces of each wheel of the {wildcards.vehicle} on irregular track"
+    input:
+        core=CORE["vehicle_figures"],
+        run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][-1]:g}.h5",
+    output:
+        report(
+            "<results>/figures/vehicle_guiding_forces_{vehicle}.png",
+            caption="../report/vehicle_guiding_forces.rst",
+            category="Vehicles",
+            labels={"figure": "guiding forces", "vehicle": "{vehicle}"},
+        ),
+        "<results>/figures/vehicle_guiding_forces_{vehicle}.svg",
+        report(
+            "<results>/tables/vehicle_wheels_{vehicle}.csv",
+            caption="../report/vehicle_wheels.rst",
+            category="Vehicles",
+            labels={"table": "wheels", "vehicle": "{vehicle}"},
+        ),
+    log:
+        "<logs>/vehicle_guiding_forces/{vehicle}.log",
+    script:
+        "../scripts/vehicle_guiding_forces.py"
+
+
+rule vehicle_over_speed:
+    message:
+        "Figures and tables: wheelset and trailer vehicle over speed"
+    input:
+        core=CORE["vehicle_figures"],
+        speeds=expand(rules.sweep_speeds.output.speeds, vehicle=VEHICLES),
+        benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
+    output:
+        report(
+            "<results>/figures/vehicle_hunting.png",
+            caption="../report/vehicle_hunting.rst",
+            category="Vehicles",
+            labels={"figure": "hunting over speed"},
+        ),
+        "<results>/figures/vehicle_hunting.svg",
+        report(
+            "<results>/figures/vehicle_response.png",
+            caption="../report/vehicle_response.rst",
+            category="Vehicles",
+            labels={"figure": "response over speed"},
+        ),
+        "<results>/figures/vehicle_response.svg",
+        report(
+            "<results>/tables/vehicle_timing.csv",
+            caption="../report/vehicle_timing.rst",
+            category="Cost",
+            labels={"table": "timing over vehicles"},
+        ),
+    log:
+        "<logs>/vehicle_over_speed.log",
+    params:
+        titles={vehicle: entry["title"] for vehicle, entry in SPEEDS["vehicles"].items()},
+        released=SPEEDS["released"],
+        disturbed=SPEEDS["disturbed"],
+    script:
+        "../scripts/vehicle_over_speed.py"
+
+
+rule speeds_study:
+    input:
+        expand(rules.vehicle_lateral_motion.output, vehicle=VEHICLES),
+        expand(rules.vehicle_guiding_forces.output, vehicle=VEHICLES),
+        rules.vehicle_over_speed.output,

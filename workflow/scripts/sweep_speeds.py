@@ -1,0 +1,18 @@
+"""Run one vehicle over all speeds, on all tracks, planar and spatial; keep the runs that figures show."""
+
+import os
+import sys
+
+from wrcore.analysis_vehicle import speed_table
+from wrcore.results import write_run
+from wrcore.sweep import sweep_speeds
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+# a scene names files relative to its own folder
+table = os.path.relpath(snakemake.input.table[0], os.path.dirname(snakemake.input.scene))
+overrides = [*snakemake.params.overrides, f"contact.creep.table={table}"]
+speeds = snakemake.params.speeds
+runs = sweep_speeds(snakemake.input.scene, overrides, speeds, snakemake.params.tracks)
+speed_table(runs).to_csv(snakemake.output.speeds, index=False)
+for (track, detection, speed), path in zip(snakemake.params.shown, snakemake.output.shown, strict=True):
+    write_run(path, runs[detection, track][speeds.index(speed)])

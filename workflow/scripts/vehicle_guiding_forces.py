@@ -1,0 +1,13 @@
+"""Forces of each wheel on irregular track, over time and in a table."""
+
+import sys
+
+from wrcore.analysis_vehicle import wheel_table
+from wrcore.figures import save_figure
+from wrcore.figures_vehicle import guiding_forces
+from wrcore.results import load_run
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+run = load_run(snakemake.input.run)
+save_figure(guiding_forces(run, f"{run.scene['speed']:g} m/s on irregular track"), *snakemake.output[:2])
+wheel_table(run, 0.5 * run.t[-1]).to_csv(snakemake.output[2], index=False)

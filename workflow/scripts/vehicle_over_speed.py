@@ -1,0 +1,16 @@
+"""Wheelset and trailer vehicle, planar and spatial, over speed: motion, response, cost."""
+
+import sys
+
+import pandas as pd
+
+from wrcore.analysis_vehicle import cost_table
+from wrcore.figures import save_figure
+from wrcore.figures_vehicle import HUNTING, RESPONSE, over_speed
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+tables = dict(zip(snakemake.params.titles.values(), map(pd.read_csv, snakemake.input.speeds), strict=True))
+save_figure(over_speed(tables, snakemake.params.released, HUNTING), *snakemake.output[:2])
+save_figure(over_speed(tables, snakemake.params.disturbed, RESPONSE), *snakemake.output[2:4])
+job_seconds = [pd.read_csv(path, sep="\t")["s"].iloc[0] for path in snakemake.input.benchmarks]
+cost_table(tables, dict(zip(tables, job_seconds, strict=True))).to_csv(snakemake.output[4], index=False)

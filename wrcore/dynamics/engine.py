@@ -1,0 +1,321 @@
+"""The compiled run: explicit pairs, and what every method needs (error norm, step control, dense output, stop).
+
+A kernel advances by a number of attempts and returns; everything it knows lies in a `Memory`, so that neither where it
+pauses nor where a run is taken up again changes a bit of the result. Steps are never cut to meet an output time or the
+end: outputs are interpolated, and the last step reaches beyond the end.
+
+The error of a step is weighted component by component with ``atol + rtol |y|``, and with ``atol + rtol min(|y|, 1)`` for
+positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the track
+need its position no less accurately than at the start. The norm is the root mean square over the components.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.system import fill_derivatives
+from wrcore.geometry.path import arc_length_of, track_frame
+
+RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
+"""Outcomes of a chunk of attempts."""
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+LEAST_STEP = 1e-13
+"""Smallest step as a fraction of the time reached, or of 1 s where that is more."""
+
+FIRST_STEP = 1e-5
+"""Length of the first attempt of a run with step control, s: below every time scale of a vehicle. The steps after it
+may grow fivefold each."""
+
+(T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP), CLOCK_SIZE = range(7), 7
+"""Places in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
+step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the run (s), and the step that the factorised matrix belongs to (s)."""
+
+(STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, HAS_RATE, RETRY, AGE, SINCE_FULL), COUNTERS_SIZE = range(9), 9
+"""Places in the counters; the last four belong to the control: the rate at the state is known, the last attempt was
+rejected, steps since the Jacobian was refreshed (-1: there is none), contact refreshes since the last full one."""
+
+
+class Control(NamedTuple):
+    """What a run is asked for."""
+
+    rtol: float
+    atol: float
+    fixed_step: float
+    """s; 0 for steps by the error estimate."""
+    longest_step: float
+    """s."""
+    derailed_y: float
+    """Lateral distance of a wheelset from the track's centre that ends the run, m."""
+
+
+class Memory(NamedTuple):
+    """State of a run between two attempts."""
+
+    clock: np.ndarray
+    counters: np.ndarray
+    state: np.ndarray
+    """(n,): state reached."""
+    rate: np.ndarray
+    """(n,): its derivative, if known."""
+    old: np.ndarray
+    """(n,): state before the last step."""
+    stages: np.ndarray
+    """(s, n): derivatives (explicit pairs) or increments (Rosenbrock methods) of the last step's stages."""
+
+
+class Scratch(NamedTuple):
+    """Arrays that hold nothing between two attempts."""
+
+    trial: np.ndarray
+    """(n,)."""
+    slope: np.ndarray
+    """(n,)."""
+    caps: np.ndarray
+    """(n,): largest size that counts in a component's error weight."""
+
+
+class Record(NamedTuple):
+    """Output times and the states there."""
+
+    times: np.ndarray
+    """(m,), s."""
+    states: np.ndarray
+    """(m, n)."""
+    reached: np.ndarray
+    """(1,) int: outputs written."""
+
+
+def new_memory(state, start, stages, first_step):
+    """Memory of a run that has not begun.
+
+    Parameters
+    ----------
+    state : numpy.ndarray, shape (n,)
+    start : float
+        s.
+    stages : int
+        Number of stages of the method.
+    first_step : float
+        s.
+
+    Returns
+    -------
+    Memory
+    """
+    clock = np.array([start, start, first_step, 1.0, np.inf, start, 0.0])
+    counters = np.zeros(COUNTERS_SIZE, np.int64)
+    counters[AGE] = -1
+    state = np.array(state, float)
+    return Memory(clock, counters, state, np.zeros_like(state), state.copy(), np.zeros((stages, len(state))))
+
+
+def new_scratch(size, bodies):
+    """Scratch arrays for a state vector of a length and a number of bodies."""
+    caps = np.ones(size)
+    for b in range(bodies):
+        caps[STATE_SIZE * b + VELOCITY : STATE_SIZE * (b + 1)] = np.inf
+    return Scratch(np.zeros(size), np.zeros(size), caps)
+
+
+@jit(allocates=False, inline="always")
+def copy_into(target, source):
+    """Copy numbers one by one; an assignment of slices might allocate."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@jit(allocates=False)
+def error_size(control, caps, old, new, errors):
+    """Weighted root mean square of the components' errors; NaN or infinite if any number is not finite."""
+    total = 0.0
+    for i in range(old.shape[0]):
+        scale = control.atol + control.rtol * min(max(abs(old[i]), abs(new[i])), caps[i])
+        ratio = errors[i] / scale
+        total += ratio * ratio + 0.0 * new[i]
+    return math.sqrt(total / old.shape[0])
+
+
+@jit(allocates=False)
+def judge(control, exponent, hold, memory, error):
+    """Accept or reject an attempt by its error and choose the next step's length.
+
+    Proportional-integral control with exponents 0.7 and 0.4 (Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533-554):
+    where stability bounds the step it settles on the bound, while control by the last error alone swings about it.
+
+    Parameters
+    ----------
+    control : Control
+    exponent : float
+        Order of the error estimate in h.
+    hold : float
+        The step is kept as it is if it could grow by less than this factor.
+    memory : Memory
+    error : float
+
+    Returns
+    -------
+    bool
+    """
+    clock, counters = memory.clock, memory.counters
+    step = clock[NEXT]
+    if control.fixed_step > 0.0:
+        return math.isfinite(error)
+    if error <= 1.0:
+        now, before = max(error, 1e-10), max(clock[ERROR], 1e-4)
+        factor = SAFETY * now ** (-0.7 / exponent) * before ** (0.4 / exponent)
+        factor = min(max(factor, SHRINK), 1.0 if counters[RETRY] else GROW)
+        if 1.0 < factor < hold:
+            factor = 1.0
+        clock[NEXT] = min(step * factor, control.longest_step)
+        clock[ERROR] = error
+        counters[RETRY] = 0
+        return True
+    factor = SHRINK
+    if math.isfinite(error):
+        factor = max(SHRINK, SAFETY * error ** (-1.0 / exponent))
+    clock[NEXT] = step * factor
+    counters[RETRY] = 1
+    counters[REJECTED] += 1
+    return False
+
+
+@jit(allocates=False)
+def accept(control, memory, trial, step):
+    """Make the trial state the state reached."""
+    clock, counters = memory.clock, memory.counters
+    counters[STEPS] += 1
+    clock[T_OLD] = clock[T]
+    clock[T] += step
+    if control.fixed_step > 0.0:  # no drift
+        clock[T] = clock[START] + counters[STEPS] * step
+    if control.fixed_step > 0.0 or clock[NEXT] < GROW * step:
+        clock[SMALLEST] = min(clock[SMALLEST], step)
+    for i in range(trial.shape[0]):
+        memory.old[i] = memory.state[i]
+        memory.state[i] = trial[i]
+
+
+@jit(allocates=False)
+def _on_the_rails(limit, state, model, work):
+    """Whether all wheelsets are within a lateral distance (m) from the track's centre."""
+    for k in range(model.bodies.wheelsets.shape[0]):
+        at = STATE_SIZE * model.bodies.wheelsets[k]
+        x, y, z = state[at], state[at + 1], state[at + 2]
+        if not model.track.tangent:
+            frame = work.frames[0]
+            s = arc_length_of(model.track.path, x, y, z, work.arc_lengths[k])
+            station = track_frame(model.track.path, s, frame)
+            y = (x - station.x) * frame[0, 1] + (y - station.y) * frame[1, 1] + (z - station.z) * frame[2, 1]
+        if not abs(y) <= limit:
+            return False
+    return True
+
+
+@jit(allocates=False)
+def take_stock(control, dense, scale, memory, record, model, work):
+    """Write the outputs that the run has come to and say whether it goes on.
+
+    Parameters
+    ----------
+    control : Control
+    dense : numpy.ndarray, shape (s, d)
+    scale : float
+        Factor of the stages in the dense output.
+    memory : Memory
+    record : Record
+    model : Model
+    work : Workspace
+
+    Returns
+    -------
+    int
+        RUNNING, COMPLETED, DERAILED or TOO_SMALL.
+    """
+    clock, stages = memory.clock, memory.stages
+    times, reached = record.times, record.reached[0]
+    while reached < times.shape[0] and times[reached] <= clock[T]:
+        out = record.states[reached]
+        if times[reached] == clock[T]:
+            copy_into(out, memory.state)
+        else:
+            theta = (times[reached] - clock[T_OLD]) / (clock[T] - clock[T_OLD])
+            copy_into(out, memory.old)
+            for i in range(stages.shape[0]):
+                weight = 0.0
+                for k in range(dense.shape[1] - 1, -1, -1):
+                    weight = (weight + dense[i, k]) * theta
+                weight *= scale
+                for j in range(out.shape[0]):
+                    out[j] += weight * stages[i, j]
+        reached += 1
+    record.reached[0] = reached
+    if reached == times.shape[0]:
+        return COMPLETED
+    if not _on_the_rails(control.derailed_y, memory.state, model, work):
+        return DERAILED
+    if clock[NEXT] < LEAST_STEP * max(1.0, abs(clock[T])):
+        return TOO_SMALL
+    return RUNNING
+
+
+@jit(allocates=False, nogil=True)
+def advance_explicit(tableau, control, memory, scratch, record, budget, model, work):
+    """Advance a run by an explicit pair.
+
+    Parameters
+    ----------
+    tableau : ExplicitTableau
+    control : Control
+    memory : Memory
+    scratch : Scratch
+    record : Record
+    budget : int
+        Attempts before the kernel returns.
+    model : Model
+    work : Workspace
+
+    Returns
+    -------
+    int
+        Outcome.
+    """
+    clock, counters, state, stages, trial = memory.clock, memory.counters, memory.state, memory.stages, scratch.trial
+    n, last = state.shape[0], stages.shape[0] - 1
+    while True:
+        outcome = take_stock(control, tableau.dense, clock[T] - clock[T_OLD], memory, record, model, work)
+        if outcome != RUNNING or budget == 0:
+            return outcome
+        budget -= 1
+        step = clock[NEXT]
+        for i in range(last + 1):
+            stage = stages[i]
+            if i == 0 and counters[HAS_RATE]:
+                copy_into(stage, memory.rate)
+                continue
+            copy_into(trial, state)
+            for j in range(i):
+                weight = step * tableau.stages[i, j]
+                if weight != 0.0:
+                    for k in range(n):
+                        trial[k] += weight * stages[j, k]
+            fill_derivatives(clock[T] + tableau.nodes[i] * step, trial, model, work, stage)
+            counters[EVALUATIONS] += 1
+            if i == 0:
+                copy_into(memory.rate, stage)
+                counters[HAS_RATE] = 1
+        errors = scratch.slope
+        errors[:] = 0.0
+        for i in range(last + 1):
+            weight = step * tableau.error[i]
+            for k in range(n):
+                errors[k] += weight * stages[i, k]
+        error = error_size(control, scratch.caps, state, trial, errors)
+        if judge(control, tableau.exponent, 1.0, memory, error):
+            accept(control, memory, trial, step)
+            copy_into(memory.rate, stages[last])
+        elif control.fixed_step > 0.0:
+            return NOT_FINITE

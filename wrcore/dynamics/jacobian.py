@@ -1,0 +1,297 @@
+"""The Jacobian of the equations of motion by finite differences, in blocks that make use of their structure.
+
+Unknown are, per body, a displacement (r, and a rotation vector in track axes that turns the Euler parameters by
+``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the force elements' own states. Only the accelerations and the
+rates of the elements' own states need differences; that positions change at the rate of the velocities is known.
+
+A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
+bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). The contact of a wheelset, which
+changes fastest, only meets rows of the wheelset and of bodies joined to it: a sweep of ten evaluations refreshes it for
+all wheelsets that no element links.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore._jit import jit
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.engine import copy_into
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.system import fill_derivatives, state_size
+
+DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
+"""Differences: m, rad, m/s and rad/s."""
+
+MOMENT = 1e-6
+"""Difference of time, s."""
+
+DIRECTIONS = 12
+"""Columns of a body: displacement, rotation, velocity, angular velocity."""
+
+
+class Sweep(NamedTuple):
+    """Which columns one evaluation each perturbs together, and the rows that each column reaches."""
+
+    starts: np.ndarray
+    """(e + 1,) int: evaluation i perturbs the columns starts[i] <= k < starts[i + 1]."""
+    columns: np.ndarray
+    """(p,) int: displacements of all bodies (6 each), velocities of all bodies (6 each), elements' own states."""
+    row_starts: np.ndarray
+    """(p + 1,) int."""
+    rows: np.ndarray
+    """(q,) int: accelerations of all bodies (6 each), rates of the elements' own states."""
+    with_time: bool
+    """Whether the derivative with respect to time is refreshed, too."""
+
+
+class Jacobian(NamedTuple):
+    """Blocks of the Jacobian, stored column by column; columns and rows as in `Sweep`."""
+
+    by_position: np.ndarray
+    """(6 n, m): with respect to displacements."""
+    by_velocity: np.ndarray
+    """(m, m): with respect to velocities and the elements' own states."""
+    turning: np.ndarray
+    """(n, 4, 6): rate of the rotation vector, and of the length of p, with respect to rotation and angular velocity."""
+    by_time: np.ndarray
+    """(size,): partial time derivative of the state's rate."""
+    axes: np.ndarray
+    """(n, 4, 4): rows of E(p), then p, where the Jacobian was taken."""
+
+
+def _links(model):
+    """For each body the set of bodies joined to it, and the set of those whose accelerations depend on its motion."""
+    n = len(model.bodies.mass)
+    joined, linked = [{b} for b in range(n)], [{b} for b in range(n)]
+    for i, j in model.joints.bodies:
+        if i != FRAME and j != FRAME:  # bodies joined to one another accelerate together
+            joined[i] |= joined[j]
+            for body in joined[i]:
+                joined[body] = joined[i]
+    for i, j in [*model.elements.pairs, *model.joints.bodies]:
+        if i != FRAME and j != FRAME:
+            linked[i].add(int(j))
+            linked[j].add(int(i))
+    return joined, [set().union(*(joined[k] for k in linked[body])) for body in range(n)]
+
+
+def _own_states(model):
+    """Pair of bodies (FRAME left out) of each element with a state of its own."""
+    elements = model.elements
+    pairs = [set() for _ in range(elements.states)]
+    for p, ends in enumerate(elements.pairs):
+        for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
+            if elements.law[k, 4] >= 0:
+                pairs[elements.law[k, 4]] = {int(b) for b in ends if b != FRAME}
+    return pairs
+
+
+def _groups(reach):
+    """Groups of columns whose rows do not overlap; ``reach`` holds the rows of each column."""
+    groups = []
+    for item, rows in enumerate(reach):
+        for members, taken in groups:
+            if not taken & rows:
+                members.append(item)
+                taken |= rows
+                break
+        else:
+            groups.append(([item], set(rows)))
+    return [members for members, _ in groups]
+
+
+def _sweep(evaluations, with_time):
+    """Sweep from a list of evaluations, each a list of (column, rows)."""
+    columns = [item for evaluation in evaluations for item in evaluation]
+    return Sweep(
+        np.cumsum([0] + [len(evaluation) for evaluation in evaluations]),
+        np.array([column for column, _ in columns], np.int64),
+        np.cumsum([0] + [len(rows) for _, rows in columns]),
+        np.array([row for _, rows in columns for row in sorted(rows)], np.int64), with_time,
+    )  # fmt: skip
+
+
+def plan_sweeps(model):
+    """Plan the evaluations for the whole Jacobian and for a refresh of the contacts.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    full, contact : Sweep
+    """
+    n, own = len(model.bodies.mass), _own_states(model)
+    joined, reached = _links(model)
+
+    def column(body, direction):
+        return 6 * body + direction if direction < 6 else 6 * n + 6 * body + direction - 6
+
+    rows = [{6 * b + k for b in reached[body] for k in range(6)} for body in range(n)]
+    for state, ends in enumerate(own):
+        for body in ends:
+            rows[body].add(6 * n + state)
+    full = [
+        [(column(body, direction), rows[body]) for body in group]
+        for group in _groups(rows)
+        for direction in range(DIRECTIONS)
+    ]
+    own_rows = [
+        {6 * n + state} | {6 * b + k for body in ends for b in reached[body] for k in range(6)}
+        for state, ends in enumerate(own)
+    ]
+    full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
+    wheelsets = [int(b) for b in model.bodies.wheelsets]
+    if not wheelsets:
+        return _sweep(full, True), _sweep(full, True)
+    along = (0, 4) if model.track.tangent else ()  # a tangent rail is the same everywhere, and a wheel all around
+    contact = [
+        [(column(body, direction), {6 * b + k for b in joined[body] for k in range(6)}) for body in group]
+        for group in _apart(wheelsets, joined, reached)
+        for direction in range(DIRECTIONS)
+        if direction not in along
+    ]
+    return _sweep(full, True), _sweep(contact, False)
+
+
+def _apart(wheelsets, joined, reached):
+    """Groups of wheelsets none of which reaches bodies joined to another one."""
+    groups = []
+    for body in wheelsets:
+        for members in groups:
+            if not any(joined[body] & reached[k] or joined[k] & reached[body] for k in members):
+                members.append(body)
+                break
+        else:
+            groups.append([body])
+    return groups
+
+
+def elimination_order(model):
+    """Unknowns (velocities of all bodies, elements' own states) in an order of elimination that creates few entries.
+
+    Minimum degree: what has the lightest remaining neighbours goes first, and links them to one another. On a vehicle
+    that is the elements' states, then wheelsets, bogies, and the car body last.
+
+    Returns
+    -------
+    numpy.ndarray, shape (m,), int
+    """
+    n = len(model.bodies.mass)
+    reached = _links(model)[1]
+    links = {b: {k for k in range(n) if k != b and (k in reached[b] or b in reached[k])} for b in range(n)}
+    for state, ends in enumerate(_own_states(model)):
+        links[n + state] = set().union(*(reached[body] for body in ends))
+        for body in links[n + state]:
+            links[body].add(n + state)
+    order = []
+    while links:
+        first = min(links, key=lambda node: (sum(6 if k < n else 1 for k in links[node]), node))
+        order += range(6 * first, 6 * first + 6) if first < n else [5 * n + first]
+        rest = links.pop(first)
+        for node in rest:
+            links[node] = (links[node] | rest) - {node, first}
+    return np.array(order, np.int64)
+
+
+def new_jacobian(model):
+    """Blocks of zeros for a model."""
+    n, size = len(model.bodies.mass), state_size(model)
+    m = size - 7 * n
+    return Jacobian(np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(size), np.zeros((n, 4, 4)))
+
+
+@jit(allocates=False)
+def _take_axes(state, axes):
+    """Write E(p) and p of all bodies, see :class:`Jacobian`."""
+    for b in range(axes.shape[0]):
+        at = STATE_SIZE * b
+        e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
+        rows = axes[b]
+        rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = -e1, e0, -e3, e2
+        rows[1, 0], rows[1, 1], rows[1, 2], rows[1, 3] = -e2, e3, e0, -e1
+        rows[2, 0], rows[2, 1], rows[2, 2], rows[2, 3] = -e3, -e2, e1, e0
+        rows[3, 0], rows[3, 1], rows[3, 2], rows[3, 3] = e0, e1, e2, e3
+
+
+@jit(allocates=False)
+def _perturb(trial, column, axes):
+    """Perturb one unknown and return by how much."""
+    n = axes.shape[0]
+    if column >= 12 * n:
+        at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
+    elif column >= 6 * n:
+        k = (column - 6 * n) % 6
+        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + 7 + k, SPEED if k < 3 else SPIN
+    else:
+        k = column % 6
+        at, difference = STATE_SIZE * (column // 6) + k, DISPLACEMENT
+        if k >= 3:
+            for i in range(4):
+                trial[at - k + 3 + i] += 0.5 * TURN * axes[column // 6, k - 3, i]
+            return TURN
+    before = trial[at]
+    trial[at] += difference
+    return trial[at] - before
+
+
+@jit(allocates=False)
+def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences, model, work):
+    """Refresh the columns of a sweep.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    jacobian : Jacobian
+        Overwritten where the sweep reaches.
+    t : float
+    state, rate : numpy.ndarray, shape (size,)
+        Where the Jacobian is taken, and the right-hand side there.
+    trial, slope : numpy.ndarray, shape (size,)
+        Scratch.
+    differences : numpy.ndarray, shape (p,)
+        Scratch, at least as many as the largest number of columns perturbed together.
+    model : Model
+    work : Workspace
+
+    Returns
+    -------
+    int
+        Number of evaluations.
+    """
+    n = jacobian.axes.shape[0]
+    _take_axes(state, jacobian.axes)
+    evaluations = sweep.starts.shape[0] - 1 + (1 if sweep.with_time else 0)
+    for i in range(evaluations):
+        copy_into(trial, state)
+        in_time = i == sweep.starts.shape[0] - 1
+        first, last = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
+        for k in range(first, last):
+            differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes)
+        fill_derivatives(t + MOMENT if in_time else t, trial, model, work, slope)
+        if in_time:
+            for j in range(state.shape[0]):
+                jacobian.by_time[j] = (slope[j] - rate[j]) / MOMENT
+        for k in range(first, last):
+            column, difference = sweep.columns[k], differences[k - first]
+            for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
+                row = sweep.rows[j]
+                at = STATE_SIZE * (row // 6) + 7 + row % 6 if row < 6 * n else 7 * n + row
+                value = (slope[at] - rate[at]) / difference
+                if column < 6 * n:
+                    jacobian.by_position[column, row] = value
+                else:
+                    jacobian.by_velocity[column - 6 * n, row] = value
+            turn = column % 6
+            if column < 12 * n and turn >= 3:
+                body = (column if column < 6 * n else column - 6 * n) // 6
+                at = STATE_SIZE * body + 3
+                place = turn - 3 if column < 6 * n else turn
+                for j in range(4):
+                    value = 0.0
+                    for l in range(4):
+                        value += jacobian.axes[body, j, l] * (slope[at + l] - rate[at + l])
+                    jacobian.turning[body, j, place] = value * (2.0 if j < 3 else 1.0) / difference
+    return evaluations

@@ -1,0 +1,32 @@
+"""What an evaluation of the equations of motion leaves besides the rates, at many states."""
+
+from wrcore._jit import jit
+from wrcore.dynamics.system import fill_derivatives
+
+
+@jit(allocates=False, nogil=True)
+def contacts_at(times, states, model, work, rate, patches, bounds):
+    """Contact patches of all wheels at given states.
+
+    Parameters
+    ----------
+    times : numpy.ndarray, shape (n,)
+        s.
+    states : numpy.ndarray, shape (n, size)
+    model : Model
+    work : Workspace
+    rate : numpy.ndarray, shape (size,)
+        Scratch.
+    patches : numpy.ndarray, shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS)
+        Filled where there is a patch: wheelsets in the model's order, left and right.
+    bounds : numpy.ndarray, shape (n, k, 2)
+        Filled: bound of planar detection's error, m.
+    """
+    for i in range(times.shape[0]):
+        fill_derivatives(times[i], states[i], model, work, rate)
+        for k in range(work.counts.shape[0]):
+            for side in range(2):
+                bounds[i, k, side] = work.bounds[k, side]
+                for patch in range(work.counts[k, side]):
+                    for column in range(patches.shape[4]):
+                        patches[i, k, side, patch, column] = work.patches[k, side, patch, column]

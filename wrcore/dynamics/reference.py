@@ -1,0 +1,144 @@
+"""Independent references: scipy's solvers, and SUNDIALS' CVODE, over the same right-hand side."""
+
+import time
+
+import numpy as np
+from scipy import integrate as scipy_integrate
+
+from wrcore.dynamics.integrate import Trajectory, derailment
+from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.errors import InputError
+
+SOLVERS = {
+    "scipy_rk45": "RK45", "scipy_rk23": "RK23", "scipy_dop853": "DOP853", "scipy_radau": "Radau", "scipy_bdf": "BDF",
+    "scipy_lsoda": "LSODA",
+}  # fmt: skip
+"""scipy's classes by method name."""
+
+
+def integrate_by_reference(model, state, times, method, rtol, atol, longest_step, derailed_y, progress=None):
+    """Integrate a model with a solver of another library; arguments as for :func:`wrcore.dynamics.integrate.integrate`.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    InputError
+        ``cvode`` without scikit-sundae.
+    """
+    work = workspace(model)
+    function = right_hand_side(model, work)
+
+    def stop(t, state):
+        return derailment(model, t, state, work.arc_lengths, derailed_y)
+
+    bounded = stop if np.isfinite(derailed_y) else None
+    return integrate_function(function, state, times, method, rtol, atol, longest_step, bounded, progress)
+
+
+def integrate_function(
+    function, state, times, method="scipy_rk45", rtol=1e-6, atol=1e-9, longest_step=np.inf, stop=None, progress=None
+):
+    """Integrate any right-hand side with a solver of another library.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(t, state) -> rate``; must return a new array.
+    state : numpy.ndarray, shape (size,)
+        Initial state.
+    times : numpy.ndarray, shape (n,)
+        Increasing output times, s; the last one ends the run.
+    method : str
+        A key of `SOLVERS`, or ``cvode``.
+    rtol, atol : float
+        Tolerances of the library's step control.
+    longest_step : float
+        s.
+    stop : callable, optional
+        ``stop(t, state) -> str``: a reason to end the run, or an empty string. Asked after each step.
+    progress : callable, optional
+        Called with the time reached after each step.
+
+    Returns
+    -------
+    Trajectory
+    """
+    evaluations = 0
+
+    def counted(t, y):
+        nonlocal evaluations
+        evaluations += 1
+        return function(t, y)
+
+    times, started = np.asarray(times, float), time.perf_counter()
+    run = _by_cvode if method == "cvode" else _by_scipy
+    reached, states, status, reason, counts = run(
+        counted, np.array(state, float), times, method, rtol, atol, longest_step, stop, progress
+    )
+    if method in ("scipy_rk45", "scipy_rk23"):  # two evaluations to start with, as many as stages for each attempt
+        counts["rejected"] = (evaluations - 2) // (6 if method == "scipy_rk45" else 3) - counts["steps"]
+    return Trajectory(
+        method, times[:reached], states[:reached], status, reason, rhs_evaluations=evaluations,
+        wall_s=time.perf_counter() - started, **counts,
+    )  # fmt: skip
+
+
+def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, progress):
+    states = np.full((len(times), len(state)), np.nan)
+    states[0] = state
+    reached, steps, smallest, status, reason = 1, 0, np.inf, "completed", ""
+    solver = getattr(scipy_integrate, SOLVERS[method])(
+        function, times[0], state, times[-1], rtol=rtol, atol=atol, max_step=longest_step
+    )
+    while solver.status == "running":
+        with np.errstate(over="ignore", invalid="ignore"):  # a wild trial step is rejected by its error estimate
+            message = solver.step()
+        if solver.status == "failed":
+            status, reason = "failed", f"step size fell below the resolution of time at t = {solver.t:.6g} s: {message}"
+            break
+        steps += 1
+        smallest = min(smallest, abs(solver.t - solver.t_old))
+        if not np.all(np.isfinite(solver.y)):
+            status, reason = "failed", f"the state is not finite at t = {solver.t:.6g} s"
+            break
+        upto = np.searchsorted(times, solver.t, side="right")
+        if upto > reached:
+            states[reached:upto] = solver.dense_output()(times[reached:upto]).T
+            reached = upto
+        if stop is not None and (reason := stop(solver.t, solver.y)):
+            status = "derailed"
+            break
+        if progress is not None:
+            progress(solver.t)
+    counts = {"steps": steps, "jacobians": solver.njev, "factorisations": solver.nlu, "smallest_step": smallest}
+    return reached, states, status, reason, counts
+
+
+def _by_cvode(function, state, times, method, rtol, atol, longest_step, stop, progress):
+    try:
+        from sksundae.cvode import CVODE
+    except ImportError:
+        raise InputError(
+            "integration.method", method, "expected scikit-sundae to be installed: pip install wrcore[sundials]"
+        ) from None
+    limit = {} if np.isinf(longest_step) else {"max_step": longest_step}
+
+    def fill(t, y, rate):
+        rate[:] = function(t, np.array(y))
+
+    def stopped(t, y, events):
+        events[0] = -1.0 if stop(t, np.array(y)) else 1.0
+
+    if stop is not None:
+        limit |= {"eventsfn": stopped, "num_events": 1}
+    solution = CVODE(fill, rtol=rtol, atol=atol, max_num_steps=10**7, **limit).solve(times, state)
+    counts = {"jacobians": int(solution.njev)}
+    if not solution.success:
+        reason = f"{solution.message} at t = {solution.t[-1]:.6g} s"
+        return len(solution.t), solution.y, "failed", reason, counts
+    if solution.t[-1] < times[-1]:  # the event ended the run; its own time is the last one
+        return len(solution.t) - 1, solution.y, "derailed", stop(solution.t[-1], solution.y[-1]), counts
+    return len(solution.t), solution.y, "completed", "", counts

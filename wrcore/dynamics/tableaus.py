@@ -1,0 +1,198 @@
+"""Coefficients of the one-step methods, as data for one kernel per family.
+
+Explicit pairs advance by ``y1 = y + h sum b_i k_i`` with ``k_i = f(t + c_i h, y + h sum a_ij k_j)``. All are stiffly
+written: the last stage is taken at the new state (its row of ``a`` is b), serves as the first one of the next step, and
+is part of the error estimate ``h sum e_i k_i``.
+
+Rosenbrock methods advance by ``y1 = y + sum m_i u_i`` with one matrix for all stages (Hairer and Wanner, IV.7):
+
+    (1/(h gamma) - J) u_i = f(t + c_i h, y + sum a_ij u_j) + sum (c_ij/h) u_j + h d_i df/dt
+
+In both families a dense output is a polynomial in theta = (t - t_n)/h for each stage's weight.
+
+References
+----------
+Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; its interpolant: Shampine, Math. Comp. 46 (1986) 135-150.
+Tsitouras, Comput. Math. Appl. 62 (2011) 770-775.
+Bogacki and Shampine, Appl. Math. Lett. 2 (1989) 321-325.
+Hairer and Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), IV.10 (RODAS).
+Rang and Angermann, BIT 45 (2005) 761-787 (ROS34PW2).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class ExplicitTableau(NamedTuple):
+    """An embedded pair whose last stage is the first one of the next step."""
+
+    nodes: np.ndarray
+    """(s,): c."""
+    stages: np.ndarray
+    """(s, s): a, strictly lower; the last row holds the weights b."""
+    error: np.ndarray
+    """(s,): b less the embedded weights."""
+    dense: np.ndarray
+    """(s, d): weight of stage i at theta is the sum of dense[i, k] theta^(k + 1)."""
+    exponent: float
+    """The error estimate is of this order in h."""
+
+
+class RosenbrockTableau(NamedTuple):
+    """An embedded Rosenbrock method in the form without products of matrices and vectors."""
+
+    nodes: np.ndarray
+    """(s,)."""
+    drift: np.ndarray
+    """(s,): factors d_i of h df/dt."""
+    stages: np.ndarray
+    """(s, s): a."""
+    couplings: np.ndarray
+    """(s, s): c_ij."""
+    weights: np.ndarray
+    """(s,): m."""
+    error: np.ndarray
+    """(s,)."""
+    dense: np.ndarray
+    """(s, d), as for explicit pairs, for weights of u_i."""
+    exponent: float
+    gamma: float
+    reuse: int
+    """Steps for which a Jacobian serves: 1 where the order rests on an exact one."""
+
+
+def _lower(*rows):
+    """Square matrix from the entries left of its diagonal, row by row from the second one."""
+    matrix = np.zeros((len(rows) + 1, len(rows) + 1))
+    for i, row in enumerate(rows, 1):
+        matrix[i, : len(row)] = row
+    return matrix
+
+
+def _hermite(weights):
+    """Dense output (s, 3): the cubic that meets both states and both slopes of a step."""
+    dense = np.outer(weights, [0.0, 3.0, -2.0])
+    dense[0] += [1.0, -2.0, 1.0]
+    dense[-1] += [0.0, -1.0, 1.0]
+    return dense
+
+
+def _dormand_prince():
+    stages = _lower(
+        [1 / 5],
+        [3 / 40, 9 / 40],
+        [44 / 45, -56 / 15, 32 / 9],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    )
+    error = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+    bend = np.array([
+        -12715105075 / 11282082432, 0.0, 87487479700 / 32700410799, -10690763975 / 1880347072,
+        701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423,
+    ])  # fmt: skip
+    dense = np.pad(_hermite(stages[-1]), ((0, 0), (0, 1))) + np.outer(bend, [0.0, 1.0, -2.0, 1.0])
+    return ExplicitTableau(np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0]), stages, error, dense, 5.0)
+
+
+def _tsitouras():
+    stages = _lower(
+        [0.161],
+        [-0.008480655492356989, 0.335480655492357],
+        [2.8971530571054935, -6.359448489975075, 4.3622954328695815],
+        [5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525],
+        [5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401, -0.028269050394068383],
+        [0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774],
+    )
+    error = np.array([
+        -0.00178001105222577714, -0.0008164344596567469, 0.007880878010261995, -0.1447110071732629,
+        0.5823571654525552, -0.45808210592918697, 1 / 66,
+    ])  # fmt: skip
+    dense = np.array([
+        [1.0, -2.763706197274826, 2.9132554618219126, -1.0530884977290216],
+        [0.0, 0.1317, -0.2234, 0.1017],
+        [0.0, 3.9302962368947516, -5.941033872131505, 2.490627285651253],
+        [0.0, -12.411077166933676, 30.33818863028232, -16.548102889244902],
+        [0.0, 37.50931341651104, -88.1789048947664, 47.37952196281928],
+        [0.0, -27.896526289197286, 65.09189467479366, -34.87065786149661],
+        [0.0, 1.5, -4.0, 2.5],
+    ])  # fmt: skip
+    nodes = np.array([0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0])
+    return ExplicitTableau(nodes, stages, error, dense, 5.0)
+
+
+def _bogacki_shampine():
+    stages = _lower([1 / 2], [0.0, 3 / 4], [2 / 9, 1 / 3, 4 / 9])
+    error = np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
+    return ExplicitTableau(np.array([0.0, 1 / 2, 3 / 4, 1.0]), stages, error, _hermite(stages[-1]), 3.0)
+
+
+def _classical():
+    """Kutta's fourth-order method; weighting the slope at the new state instead of k_4 is of third order."""
+    stages = _lower([1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0], [1 / 6, 1 / 3, 1 / 3, 1 / 6])
+    error = np.array([0.0, 0.0, 0.0, 1 / 6, -1 / 6])
+    return ExplicitTableau(np.array([0.0, 1 / 2, 1 / 2, 1.0, 1.0]), stages, error, _hermite(stages[-1]), 4.0)
+
+
+def _rodas():
+    last = [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950]
+    stages = _lower(
+        [1.544],
+        [0.9466785280815826, 0.2557011698983284],
+        [3.314825187068521, 2.896124015972201, 0.9986419139977817],
+        last,
+        [*last, 1.0],
+    )
+    couplings = _lower(
+        [-5.6688],
+        [-2.430093356833875, -0.2063599157091915],
+        [-0.1073529058151375, -9.594562251023355, -20.47028614809616],
+        [7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160],
+        [8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054],
+    )
+    weights = np.array([*last, 1.0, 1.0])
+    second = np.array([10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823,
+                       1.025137723295662, 0.0])  # fmt: skip
+    third = np.array([-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386,
+                      -6.594389125716872, 0.0])  # fmt: skip
+    dense = np.stack([weights + second, third - second, -third], axis=1)
+    return RosenbrockTableau(
+        np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0]), np.array([0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0]),
+        stages, couplings, weights, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), dense, 4.0, 0.25, 1,
+    )  # fmt: skip
+
+
+def _ros34pw2():
+    gamma = 0.43586652150845900
+    alpha = _lower([0.87173304301691801], [0.84457060015369423, -0.11299064236484185], [0.0, 0.0, 1.0])
+    coupling = gamma * np.eye(4) + _lower(
+        [-0.87173304301691801],
+        [-0.90338057013044082, 0.054180672388095326],
+        [0.24212380706095346, -1.2232505839045147, 0.54526025533510214],
+    )
+    b = np.array([0.24212380706095346, -1.2232505839045147, 1.5452602553351020, 0.43586652150845900])
+    embedded = np.array([0.37810903145819369, -0.096042292212423178, 0.5, 0.21793326075422950])
+    dense = np.array([
+        [1.0564298455794094, -1.3864882699759573, 0.5721822314575016],
+        [2.296429974281067, -8.262611700275677, 4.742931142090097],
+        [-1.307599564525376, 7.250979895056055, -4.398120075195578],
+        [-1.045260255335102, 2.398120075195581, -0.9169932983520199],
+    ])  # fmt: skip
+    inverse = np.linalg.inv(coupling)
+    return RosenbrockTableau(
+        alpha.sum(axis=1), coupling.sum(axis=1), alpha @ inverse, np.eye(4) / gamma - inverse,
+        b @ inverse, (b - embedded) @ inverse, inverse.T @ dense, 3.0, gamma, 20,
+    )  # fmt: skip
+
+
+EXPLICIT = {
+    "rk45": _dormand_prince(),
+    "tsit5": _tsitouras(),
+    "rk23": _bogacki_shampine(),
+    "rk4": _classical(),
+}
+"""Explicit pairs by name: orders 5(4), 5(4), 3(2) and 4(3)."""
+
+ROSENBROCK = {"rodas4": _rodas(), "ros34pw2": _ros34pw2()}
+"""Rosenbrock methods by name: orders 4(3) and 3(2)."""
