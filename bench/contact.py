@@ -19,7 +19,7 @@ from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
 from wrcore.contact.statics import height_at_load
 from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.system import fill_derivatives, right_hand_side, workspace
+from wrcore.dynamics.system import fill_derivatives, workspace
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
 from wrcore.scene import compile_scene, load_scene
@@ -100,7 +100,7 @@ def report_right_hand_side(passes, repeat):
     model, state = compile_scene(scene)
     work = workspace(model)
     times = np.linspace(0.0, 2.0, 401)
-    trajectory = integrate(right_hand_side(model, work), state, times)
+    trajectory = integrate(model, state, times)
     for label, states in (("tread (0 to 0.5 s)", trajectory.states[:100]), ("0 to 2 s", trajectory.states)):
         states = np.ascontiguousarray(np.tile(states, (repeat, 1)))
         rate = np.empty_like(state)

@@ -16,7 +16,7 @@ from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator, CubicSpline
+from scipy.interpolate import CubicSpline, krogh_interpolate
 
 from wrcore._jit import jit
 from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
@@ -126,7 +126,7 @@ def kalker_data(nu):
     rows = np.loadtxt(text.splitlines(), delimiter=",", skiprows=2)
     values = rows[:, 2:].reshape(len(GRID_NU), len(GRID_A_OVER_B), 4)
     log_g = np.log(GRID_A_OVER_B)
-    spline = CubicSpline(log_g, BarycentricInterpolator(GRID_NU, values)(nu))
+    spline = CubicSpline(log_g, krogh_interpolate(GRID_NU, values, nu))
     cubic = np.ascontiguousarray(np.moveaxis(spline.c[::-1], 0, 1))
     return KalkerData(float(nu), float(log_g[0]), float(log_g[1] - log_g[0]), cubic)
 
