@@ -151,3 +151,4 @@ def test_the_start_stands_on_rails_that_are_out_of_line(tmp_path, path):
                 for name in (f"axle_box_{k}_{side}", f"wheelset_{k}")
             )
             np.testing.assert_allclose(box[:3], axle[:3] + y * matrix_of(axle[3:7])[:, 1], atol=1e-12)
+            assert axle[1] == pytest.approx(0.002 + 0.003, abs=1e-9)
