@@ -11,7 +11,6 @@ import yaml
 
 from wrcore.errors import InputError
 
-
 MERGE = "tag:yaml.org,2002:merge"
 """``<<: *anchor`` takes over the keys of another mapping; those written beside it win."""
 
