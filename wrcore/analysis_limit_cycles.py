@@ -15,7 +15,6 @@ from wrcore.analysis import hunting_frequency
 from wrcore.analysis_stability import at_speed, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.system import right_hand_side, workspace
 from wrcore.simulate import DERAILED_Y
 
 CYCLES = ("limit cycle", "irregular")
@@ -41,8 +40,9 @@ class Settling:
         Sideways shift of the vehicle that tries whether running straight ahead is stable, m, above ``rest``.
     rate : float
         Samples per second of the amplitude.
+    method : str
     rtol, atol : float
-        Tolerances of the integration.
+        Integration method and tolerances, see `wrcore.dynamics.integrate.integrate`.
     """
 
     window: float = 2.0
@@ -51,18 +51,17 @@ class Settling:
     rest: float = 5e-5
     disturbance: float = 1e-4
     rate: float = 500.0
-    rtol: float = 1e-6
-    atol: float = 1e-9
+    method: str = "auto"
+    rtol: float = 1e-5
+    atol: float = 1e-8
 
 
 def _run(model, state, settling):
     """Lateral positions (samples, wheelsets) over a window, the state at its end, and whether the wheels stay on."""
     times = np.linspace(0.0, settling.window, round(settling.window * settling.rate) + 1)
-    function = right_hand_side(model, workspace(model))
-    trajectory = integrate(function, state, times, "rk45", settling.rtol, settling.atol)
-    lateral = trajectory.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
-    on_rails = trajectory.status == "completed" and bool(np.all(np.abs(lateral) < DERAILED_Y))
-    return times[: len(lateral)], lateral, trajectory.states[-1], on_rails
+    run = integrate(model, state, times, settling.method, settling.rtol, settling.atol, derailed_y=DERAILED_Y)
+    lateral = run.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
+    return run.t, lateral, run.states[-1], run.status == "completed"
 
 
 def settle_motion(model, state, settling):
