@@ -64,6 +64,9 @@ def _add_simulate(commands):
     command.add_argument("--set", action="append", default=[], metavar="key.path=value", dest="overrides")
     command.add_argument("--out", metavar="run.h5", help="write the run here")
     command.add_argument("--json", action="store_true", help="end with one line of JSON")
+    command.add_argument(
+        "--accuracy", type=float, metavar="m", help="choose the fastest model and integrator with this error of y (rms)"
+    )
     command.set_defaults(run=_simulate)
 
 
@@ -159,9 +162,18 @@ def _simulate(options):
     from wrcore.simulate import simulate
 
     out = _output(options.out) if options.out else None
-    scene = load_scene(options.scene, options.overrides)
+    scene, reason = load_scene(options.scene, options.overrides), None
+    if options.accuracy is not None:
+        from wrcore.accuracy import choose
+
+        _positive(options.accuracy, "--accuracy")
+        choice, reason = choose(scene, options.accuracy)
+        scene = load_scene(options.scene, [*choice.overrides(), *options.overrides])
+        print(f"{scene.data['name']}: {reason}")
     with _progress(scene.data["integration"]["duration"]) as advance:
         run = simulate(scene, advance)
+    if reason:
+        run.settings |= {"accuracy_m": options.accuracy, "accuracy_reason": reason}
     if out:
         from wrcore.results import write_run
 
