@@ -351,7 +351,8 @@ def _shared_legend(figure, panels, **kwargs):
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         entries.update(zip(labels, handles, strict=True))
-    figure.legend(entries.values(), entries.keys(), loc="outside upper right", ncols=len(entries), **kwargs)
+    look = {"ncols": len(entries)} | kwargs
+    figure.legend(entries.values(), entries.keys(), loc="outside upper right", **look)
 
 
 def _mark_horizon(axes, horizon, end):

@@ -68,5 +68,5 @@ def speed_against_error(tables, finest, doubts=None):
         axes.set_title(title, loc="left")
     for axes in panels[len(tables) :]:
         axes.remove()
-    _shared_legend(figure, panels[:1], fontsize=7) if len(tables) else None
+    _shared_legend(figure, panels[:1], fontsize=7, ncols=3)
     return figure
