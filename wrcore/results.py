@@ -15,6 +15,7 @@ FORMAT = "wrcore run"
 FORMAT_VERSION = 1
 
 UNIT_SUFFIXES = {
+    "_m_per_s2": "m/s^2",
     "_m_per_s": "m/s",
     "_rad_per_s": "rad/s",
     "_per_m": "1/m",
@@ -39,6 +40,9 @@ DESCRIPTIONS = {
     "vx_m_per_s": "velocity along x",
     "vy_m_per_s": "velocity along y",
     "vz_m_per_s": "velocity along z",
+    "ax_m_per_s2": "acceleration of the centre of mass along x",
+    "ay_m_per_s2": "acceleration of the centre of mass along y",
+    "az_m_per_s2": "acceleration of the centre of mass along z",
     "wx_rad_per_s": "angular velocity about x",
     "wy_rad_per_s": "angular velocity about y",
     "wz_rad_per_s": "angular velocity about z",

@@ -12,7 +12,7 @@ import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.integrate import Checkpoint, integrate
-from wrcore.dynamics.outputs import contacts_at
+from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.scene import compile_scene
@@ -86,8 +86,8 @@ def simulate(scene, progress=None, start=None):
     progress : callable, optional
         Called now and then with the simulated time reached, s.
     start : Checkpoint or ndarray, shape (size,), optional
-        Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at its
-        time bit by bit as if it had not stopped, or a state at time 0.
+        Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
+        its time bit by bit as if it had not stopped, or a state at time 0.
 
     Returns
     -------
@@ -161,13 +161,13 @@ def _channels(scene, model, trajectory):
     shape = (len(trajectory.t), len(wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches = np.full(shape, np.nan)
     bounds = np.full(shape[:3], np.nan)
-    if "contact" in wanted:
-        rate = np.empty(trajectory.states.shape[1])
-        contacts_at(trajectory.t, trajectory.states, model, workspace(model), rate, patches, bounds)
+    rates = np.full(trajectory.states.shape, np.nan)
+    if "contact" in wanted or "acceleration" in wanted:
+        evaluations_at(trajectory.t, trajectory.states, model, workspace(model), rates, patches, bounds)
     groups = {}
     for body, name in enumerate(scene.vehicle.body_names):
-        state = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        groups[name] = _body_channels(state, wanted)
+        own = slice(STATE_SIZE * body, STATE_SIZE * (body + 1))
+        groups[name] = _body_channels(trajectory.states[:, own], rates[:, own], wanted)
         if "pose" in wanted and not model.track.tangent:
             groups[name] |= _pose_on_track(model.track, trajectory.states, body, scene.vehicle.positions[body, 0])
         if "contact" in wanted and body in wheelsets:
@@ -188,7 +188,7 @@ def _pose_on_track(track, states, body, start):
     return dict(zip(("s_m", "y_m", "z_m", "roll_rad", "yaw_rad"), poses.T, strict=True))
 
 
-def _body_channels(state, wanted):
+def _body_channels(state, rate, wanted):
     channels = {}
     if "pose" in wanted:
         roll, _, yaw = angles(state[:, 3:7])
@@ -196,4 +196,6 @@ def _body_channels(state, wanted):
     if "velocity" in wanted:
         names = ("vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s")
         channels |= {name: state[:, 7 + i] for i, name in enumerate(names)}
+    if "acceleration" in wanted:
+        channels |= {f"a{axis}_m_per_s2": rate[:, 7 + i] for i, axis in enumerate("xyz")}
     return channels

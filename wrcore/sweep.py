@@ -4,6 +4,7 @@ from wrcore.scene import load_scene
 from wrcore.simulate import simulate_many
 
 DETECTIONS = ("planar", "spatial")
+CHANNELS = "output.channels=[pose, velocity, acceleration, contact]"
 
 
 def sweep_speeds(source, overrides, speeds, tracks, progress=None):
@@ -29,7 +30,9 @@ def sweep_speeds(source, overrides, speeds, tracks, progress=None):
     """
     keys = [(detection, track) for detection in DETECTIONS for track in tracks]
     scenes = [
-        load_scene(source, [*overrides, *tracks[track], f"contact.detection={detection}", f"speed={float(speed)}"])
+        load_scene(
+            source, [*overrides, CHANNELS, *tracks[track], f"contact.detection={detection}", f"speed={float(speed)}"]
+        )
         for detection, track in keys
         for speed in speeds
     ]

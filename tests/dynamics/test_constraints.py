@@ -115,7 +115,7 @@ def violation(model, t, state):
     """Largest |Phi| and |Phi'|."""
     rotations = np.array([matrix_of(part[3:7]) for part in state.reshape(-1, STATE_SIZE)] + [np.eye(3)])
     values = joint_state(model.joints)
-    evaluate_joints(model.joints, model.track, t, model.speed, state, rotations, values)
+    evaluate_joints(model.joints, t, model.speed, state, rotations, values)
     return np.abs(values.phi).max(), np.abs(values.rate).max()
 
 

@@ -79,7 +79,7 @@ def random_motion(rng):
 def evaluated(joints, t, state):
     rotations = np.array([matrix_of(part[3:7]) for part in state.reshape(-1, STATE_SIZE)] + [np.eye(3)])
     values = joint_state(joints)
-    evaluate_joints(joints, LEVEL, t, SPEED, state, rotations, values)
+    evaluate_joints(joints, t, SPEED, state, rotations, values)
     return values
 
 

@@ -91,7 +91,7 @@ def add_reactions(model, t, state, work):
     """
     joints, scratch = model.joints, work.constraints
     values, accelerations, right = scratch.joints, scratch.accelerations, scratch.multipliers
-    evaluate_joints(joints, model.track, t, model.speed, state, work.rotations, values)
+    evaluate_joints(joints, t, model.speed, state, work.rotations, values)
     invert_masses(model.bodies, joints, work.rotations, scratch)
     apply_inverse_masses(joints, scratch, work.wrenches)
     damping, stiffness = 2.0 * model.alpha, model.beta * model.beta

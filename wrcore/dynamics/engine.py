@@ -1,11 +1,11 @@
 """The compiled run: explicit pairs, and what every method needs (error norm, step control, dense output, stop).
 
 A kernel advances by a number of attempts and returns; everything it knows lies in a `Memory`, so that neither where it
-pauses nor where a run is taken up again changes a bit of the result. Steps are never cut to meet an output time or the
-end: outputs are interpolated, and the last step reaches beyond the end.
+pauses nor where a run is taken up again changes a bit of the result. Steps are never cut to meet an output time or
+the end: outputs are interpolated, and the last step reaches beyond the end.
 
-The error of a step is weighted component by component with ``atol + rtol |y|``, and with ``atol + rtol min(|y|, 1)`` for
-positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the track
+The error of a step is weighted component by component with ``atol + rtol |y|``, and with ``atol + rtol min(|y|, 1)``
+for positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the track
 need its position no less accurately than at the start. The norm is the root mean square over the components.
 """
 
@@ -32,7 +32,8 @@ may grow fivefold each."""
 
 (T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP), CLOCK_SIZE = range(7), 7
 """Places in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
-step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the run (s), and the step that the factorised matrix belongs to (s)."""
+step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the
+run (s), and the step that the factorised matrix belongs to (s)."""
 
 (STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, HAS_RATE, RETRY, AGE, SINCE_FULL), COUNTERS_SIZE = range(9), 9
 """Places in the counters; the last four belong to the control: the rate at the state is known, the last attempt was

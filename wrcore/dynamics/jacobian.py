@@ -291,7 +291,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
                 place = turn - 3 if column < 6 * n else turn
                 for j in range(4):
                     value = 0.0
-                    for l in range(4):
-                        value += jacobian.axes[body, j, l] * (slope[at + l] - rate[at + l])
+                    for k in range(4):
+                        value += jacobian.axes[body, j, k] * (slope[at + k] - rate[at + k])
                     jacobian.turning[body, j, place] = value * (2.0 if j < 3 else 1.0) / difference
     return evaluations

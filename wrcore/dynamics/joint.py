@@ -213,13 +213,12 @@ def joint_jacobian(joints, values, bodies):
 
 
 @jit(allocates=False, forceinline=True)
-def evaluate_joints(joints, track, t, speed, state, rotations, out):
+def evaluate_joints(joints, t, speed, state, rotations, out):
     """Evaluate all constraints.
 
     Parameters
     ----------
     joints : Joints
-    track : TrackModel
     t, speed : float
         Time (s), speed of the moving frame (m/s).
     state, rotations : numpy.ndarray
@@ -230,8 +229,8 @@ def evaluate_joints(joints, track, t, speed, state, rotations, out):
     mark = joints.markers
     for k in range(joints.kind.shape[0]):
         kind, i, j = joints.kind[k], joints.bodies[k, 0], joints.bodies[k, 1]
-        p, s, v = marker_motion(track, speed, t, state, rotations, i, mark[k, 0, 0], mark[k, 0, 1], mark[k, 0, 2])
-        q, z, u = marker_motion(track, speed, t, state, rotations, j, mark[k, 1, 0], mark[k, 1, 1], mark[k, 1, 2])
+        p, s, v = marker_motion(speed, t, state, rotations, i, mark[k, 0, 0], mark[k, 0, 1], mark[k, 0, 2])
+        q, z, u = marker_motion(speed, t, state, rotations, j, mark[k, 1, 0], mark[k, 1, 1], mark[k, 1, 2])
         distance, speeds = minus(p, q), minus(v, u)
         wi, wj = _angular_velocity(state, i), _angular_velocity(state, j)
         c = minus(_centripetal(wi, s), _centripetal(wj, z))

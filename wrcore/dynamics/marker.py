@@ -8,12 +8,11 @@ FRAME = -1
 
 
 @jit(allocates=False, inline="always")
-def marker_motion(track, speed, t, state, rotations, body, local_x, local_y, local_z):
+def marker_motion(speed, t, state, rotations, body, local_x, local_y, local_z):
     """Position and velocity of a marker in absolute axes.
 
     Parameters
     ----------
-    track : TrackModel
     speed, t : float
         Speed of the moving frame (m/s) and time (s); its markers are those of a tangent track.
     state, rotations : numpy.ndarray

@@ -5,8 +5,8 @@ from wrcore.dynamics.system import fill_derivatives
 
 
 @jit(allocates=False, nogil=True)
-def contacts_at(times, states, model, work, rate, patches, bounds):
-    """Contact patches of all wheels at given states.
+def evaluations_at(times, states, model, work, rates, patches, bounds):
+    """Rates and contact patches of all wheels at given states.
 
     Parameters
     ----------
@@ -15,15 +15,15 @@ def contacts_at(times, states, model, work, rate, patches, bounds):
     states : numpy.ndarray, shape (n, size)
     model : Model
     work : Workspace
-    rate : numpy.ndarray, shape (size,)
-        Scratch.
+    rates : numpy.ndarray, shape (n, size)
+        Filled.
     patches : numpy.ndarray, shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS)
         Filled where there is a patch: wheelsets in the model's order, left and right.
     bounds : numpy.ndarray, shape (n, k, 2)
         Filled: bound of planar detection's error, m.
     """
     for i in range(times.shape[0]):
-        fill_derivatives(times[i], states[i], model, work, rate)
+        fill_derivatives(times[i], states[i], model, work, rates[i])
         for k in range(work.counts.shape[0]):
             for side in range(2):
                 bounds[i, k, side] = work.bounds[k, side]

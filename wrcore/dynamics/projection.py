@@ -50,7 +50,7 @@ def project_positions(t, state, model, work, tolerance, most):
     while True:
         for b in joints.order.moving:
             rotation_matrix(state, STATE_SIZE * b, work.rotations[b])
-        evaluate_joints(joints, model.track, t, model.speed, state, work.rotations, values)
+        evaluate_joints(joints, t, model.speed, state, work.rotations, values)
         worst = 0.0
         for p in range(joints.kind.shape[0]):
             for row in range(MOST_EQUATIONS):
@@ -83,7 +83,7 @@ def project_velocities(t, state, model, work):
     joints, scratch = model.joints, work.constraints
     for b in joints.order.moving:
         rotation_matrix(state, STATE_SIZE * b, work.rotations[b])
-    evaluate_joints(joints, model.track, t, model.speed, state, work.rotations, scratch.joints)
+    evaluate_joints(joints, t, model.speed, state, work.rotations, scratch.joints)
     _respond(scratch.joints.rate, model, work)
     for b in joints.order.moving:
         at, change = STATE_SIZE * b, scratch.accelerations[b]
