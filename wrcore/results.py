@@ -22,6 +22,8 @@ UNIT_SUFFIXES = {
     "_Nm": "N m",
     "_rad": "rad",
     "_Pa": "Pa",
+    "_J": "J",
+    "_W": "W",
     "_N": "N",
     "_m": "m",
     "_s": "s",
@@ -64,6 +66,18 @@ DESCRIPTIONS = {
     "xi": "longitudinal creepage, wheel relative to rail",
     "eta": "lateral creepage, wheel relative to rail",
     "phi_per_m": "spin creepage, wheel relative to rail",
+    "kinetic_J": "kinetic energy of all bodies",
+    "gravitational_J": "gravitational energy of all bodies, from z = 0",
+    "springs_J": "energy of all springs, those in series with dampers too, from nominal position",
+    "elastic_contact_J": "2/5 of elastic normal force times penetration, all patches",
+    "input_by_frame_W": "power of the moving frame through the elements that lead to it",
+    "input_by_joints_W": "power of the joints' reactions: what they drive, and what holds them together against drift",
+    "dissipated_by_dampers_W": "power lost in dampers and friction elements",
+    "dissipated_by_creep_W": "power lost in the contact patches by creep forces and spin moments",
+    "dissipated_by_contact_damping_W": "power lost by the damping of the normal forces",
+    "stored_by_springs_W": "power that goes into the springs' energy",
+    "stored_by_gravity_W": "power that goes into the gravitational energy",
+    "stored_by_elastic_contact_W": "power against the elastic normal forces",
 }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
+from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.integrate import Checkpoint, integrate
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import workspace
@@ -47,7 +48,8 @@ class Run:
         Output times, s.
     groups : dict of str to dict of str to ndarray
         Channels by group. A body's group (``wheelset``) holds arrays of shape (n,); a contact's group
-        (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent. Names carry the unit.
+        (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
+        whole model's energies and powers. Names carry the unit.
     counters : dict
         Plain numbers: steps, rejected, rhs_evaluations, jacobians, factorisations, wall_s, compile_s and others.
     settings : dict
@@ -178,6 +180,8 @@ def _channels(scene, model, trajectory):
                 groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
                 spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
                 groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
+    if "energy" in wanted:
+        groups["energy"] = energy_channels(model, workspace(model), trajectory.t, trajectory.states)
     return groups
 
 
