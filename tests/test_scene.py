@@ -68,7 +68,7 @@ BAD_SCENES = [
     ("integration.duration", 0, "integration.duration", "above 0"),
     ("contact.creep.table", "nowhere.h5", "contact.creep.table", "existing file"),
     ("initial", [1], "initial", "mapping"),
-    ("output.channels", ["pose", "colour"], "output.channels.1", "pose, velocity, contact"),
+    ("output.channels", ["pose", "colour"], "output.channels.1", "pose, velocity, acceleration, contact"),
 ]
 
 
