@@ -96,7 +96,7 @@ RESPONSE = (
 
 @styled
 def over_speed(tables, track, quantities):
-    """Results of a sweep over speed: every vehicle, planar and spatial.
+    """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are left out.
 
     Parameters
     ----------
@@ -117,12 +117,13 @@ def over_speed(tables, track, quantities):
     for axes, (column, factor, label) in zip(np.ravel(panels), quantities, strict=True):
         for marker, (vehicle, table) in zip(VEHICLES, tables.items(), strict=False):
             for detection, line in LINES.items():
-                part = table[(table["detection"] == detection) & (table["track"] == track)]
+                done = (table["status"] == "completed") & (table["track"] == track)
+                part = table[done & (table["detection"] == detection)]
                 if part[column].notna().any():
                     style = {**line, **marker, "markevery": 2}
                     axes.plot(part["speed_m_per_s"], factor * part[column], label=f"{vehicle}, {detection}", **style)
         axes.set(ylabel=label)
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")
-    _shared_legend(figure, np.ravel(panels))
+    _shared_legend(figure, np.ravel(panels), ncols=2)
     return figure
