@@ -79,7 +79,7 @@ rule vehicle_guiding_forces:
         "Figure and table: forces of each wheel of the {wildcards.vehicle} on irregular track"
     input:
         core=CORE["vehicle_figures"],
-        run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][-1]:g}.h5",
+        run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
     output:
         report(
             "<results>/figures/vehicle_guiding_forces_{vehicle}.png",
