@@ -64,8 +64,9 @@ def compare(name, speed, duration, overrides, methods, repeat):
         if best is not None:
             _, _, rtol, run, error, seconds = best
             print(f"  {method:9s} rtol {rtol:.0e}: {run.rhs_evaluations:7d} evaluations, {run.steps:6d} steps, "
-                  f"{run.rejected:5d} rejected, {run.jacobians:5d} J, {run.factorisations:5d} LU, {1e6 * error:8.3g} um, "
-                  f"{1e3 * seconds:7.2f} ms, {1e6 * seconds / run.rhs_evaluations:.2f} us/evaluation")  # fmt: skip
+                  f"{run.rejected:5d} rejected, {run.jacobians:5d} J, {run.factorisations:5d} LU, "
+                  f"{1e6 * error:8.3g} um, {1e3 * seconds:7.2f} ms, "
+                  f"{1e6 * seconds / run.rhs_evaluations:.2f} us/evaluation")  # fmt: skip
 
 
 def main():

@@ -22,6 +22,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "load_scene": "wrcore.scene",
     "simulate": "wrcore.simulate",
+    "simulate_many": "wrcore.simulate",
     "load_run": "wrcore.results",
     "write_run": "wrcore.results",
     "named_profile": "wrcore.geometry.standards",

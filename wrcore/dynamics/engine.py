@@ -5,8 +5,8 @@ pauses nor where a run is taken up again changes a bit of the result. Steps are 
 the end: outputs are interpolated, and the last step reaches beyond the end.
 
 The error of a step is weighted component by component with ``atol + rtol |y|``, and with ``atol + rtol min(|y|, 1)``
-for positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the track
-need its position no less accurately than at the start. The norm is the root mean square over the components.
+for positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the
+track need its position no less accurately than at the start. The norm is the root mean square over the components.
 """
 
 import math
@@ -30,7 +30,7 @@ FIRST_STEP = 1e-5
 """Length of the first attempt of a run with step control, s: below every time scale of a vehicle. The steps after it
 may grow fivefold each."""
 
-(T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP), CLOCK_SIZE = range(7), 7
+T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP = range(7)
 """Places in the clock: time reached, time before the last step, length of the next attempt (s), error norm of the last
 step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the
 run (s), and the step that the factorised matrix belongs to (s)."""
@@ -253,7 +253,9 @@ def take_stock(control, dense, scale, memory, record, model, work):
                 for j in range(out.shape[0]):
                     out[j] += weight * stages[i, j]
         reached += 1
-    record.reached[0] = reached
+        record.reached[0] = reached
+        if not _on_the_rails(control.derailed_y, out, model, work):
+            return DERAILED
     if reached == times.shape[0]:
         return COMPLETED
     if not _on_the_rails(control.derailed_y, memory.state, model, work):

@@ -155,6 +155,9 @@ def integrate(
     if isinstance(start, Checkpoint):
         memory, linear = _copied(start.memory), _copied(start.linear)
         work.arc_lengths[:] = start.arc_lengths
+        if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
+            memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
+            memory.clock[engine.NEXT] = step
     else:
         memory = new_memory(start, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
         linear = new_linear(model) if method in ROSENBROCK else None

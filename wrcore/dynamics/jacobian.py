@@ -76,15 +76,20 @@ def _links(model):
     return joined, [set().union(*(joined[k] for k in linked[body])) for body in range(n)]
 
 
-def _own_states(model):
-    """Pair of bodies (FRAME left out) of each element with a state of its own."""
-    elements = model.elements
-    pairs = [set() for _ in range(elements.states)]
+def reached_bodies(model):
+    """For each body the set of bodies whose accelerations depend on its motion."""
+    return _links(model)[1]
+
+
+def own_state_bodies(model):
+    """For each force element with a state of its own the set of bodies whose accelerations it enters or follows."""
+    elements, joined = model.elements, _links(model)[0]
+    bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
         for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
             if elements.law[k, 4] >= 0:
-                pairs[elements.law[k, 4]] = {int(b) for b in ends if b != FRAME}
-    return pairs
+                bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
+    return bodies
 
 
 def _groups(reach):
@@ -123,7 +128,7 @@ def plan_sweeps(model):
     -------
     full, contact : Sweep
     """
-    n, own = len(model.bodies.mass), _own_states(model)
+    n, own = len(model.bodies.mass), own_state_bodies(model)
     joined, reached = _links(model)
 
     def column(body, direction):
@@ -138,10 +143,7 @@ def plan_sweeps(model):
         for group in _groups(rows)
         for direction in range(DIRECTIONS)
     ]
-    own_rows = [
-        {6 * n + state} | {6 * b + k for body in ends for b in reached[body] for k in range(6)}
-        for state, ends in enumerate(own)
-    ]
+    own_rows = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(own)]
     full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
     wheelsets = [int(b) for b in model.bodies.wheelsets]
     if not wheelsets:
@@ -167,33 +169,6 @@ def _apart(wheelsets, joined, reached):
         else:
             groups.append([body])
     return groups
-
-
-def elimination_order(model):
-    """Unknowns (velocities of all bodies, elements' own states) in an order of elimination that creates few entries.
-
-    Minimum degree: what has the lightest remaining neighbours goes first, and links them to one another. On a vehicle
-    that is the elements' states, then wheelsets, bogies, and the car body last.
-
-    Returns
-    -------
-    numpy.ndarray, shape (m,), int
-    """
-    n = len(model.bodies.mass)
-    reached = _links(model)[1]
-    links = {b: {k for k in range(n) if k != b and (k in reached[b] or b in reached[k])} for b in range(n)}
-    for state, ends in enumerate(_own_states(model)):
-        links[n + state] = set().union(*(reached[body] for body in ends))
-        for body in links[n + state]:
-            links[body].add(n + state)
-    order = []
-    while links:
-        first = min(links, key=lambda node: (sum(6 if k < n else 1 for k in links[node]), node))
-        order += range(6 * first, 6 * first + 6) if first < n else [5 * n + first]
-        rest = links.pop(first)
-        for node in rest:
-            links[node] = (links[node] | rest) - {node, first}
-    return np.array(order, np.int64)
 
 
 def new_jacobian(model):
@@ -291,7 +266,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
                 place = turn - 3 if column < 6 * n else turn
                 for j in range(4):
                     value = 0.0
-                    for k in range(4):
-                        value += jacobian.axes[body, j, k] * (slope[at + k] - rate[at + k])
+                    for m in range(4):
+                        value += jacobian.axes[body, j, m] * (slope[at + m] - rate[at + m])
                     jacobian.turning[body, j, place] = value * (2.0 if j < 3 else 1.0) / difference
     return evaluations

@@ -1,0 +1,139 @@
+"""The Jacobian and the linear system of the Rosenbrock methods against plain differences and numpy's solver."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.dynamics.blocks import factorise, new_system, solve_stage
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.jacobian import new_jacobian, plan_sweeps, refresh_jacobian
+from wrcore.dynamics.system import fill_derivatives, workspace
+from wrcore.scene import compile_scene, load_scene
+
+CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
+CASES = {
+    "wheelset": ("suspended_wheelset", []),
+    "wheelset in a curve": ("suspended_wheelset", [CURVE]),
+    "vehicle": ("trailer_vehicle", []),
+    "vehicle with axle boxes": ("trailer_vehicle", ["vehicle.axle_boxes=true"]),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def moving(request):
+    """Model, time, state in motion, its rate, and a function of time and state."""
+    name, overrides = CASES[request.param]
+    model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", ["speed=20", *overrides]))
+    end = integrate(model, start, [0.0, 1.5], "tsit5", 1e-6, 1e-9).end.memory
+    t, state, work = end.clock[0], end.state, workspace(model)
+
+    def function(t, state):
+        rate = np.empty_like(state)
+        fill_derivatives(t, state, model, work, rate)
+        return rate
+
+    return model, t, state, function(t, state), function
+
+
+def refreshed(moving, sweep, jacobian):
+    model, t, state, rate, _ = moving
+    refresh_jacobian(
+        sweep, jacobian, t, state, rate, np.empty_like(state), np.empty_like(state), np.empty(99), model,
+        workspace(model),
+    )  # fmt: skip
+    return jacobian
+
+
+def displaced(state, bodies, column, axes, size):
+    """State with one unknown moved by a size."""
+    out = state.copy()
+    body, k = divmod(column % (6 * bodies), 6)
+    if column >= 12 * bodies:
+        out[STATE_SIZE * bodies + column - 12 * bodies] += size
+    elif column >= 6 * bodies:
+        out[STATE_SIZE * body + 7 + k] += size
+    elif k < 3:
+        out[STATE_SIZE * body + k] += size
+    else:
+        out[STATE_SIZE * body + 3 : STATE_SIZE * body + 7] += 0.5 * size * axes[body, k - 3]
+    return out
+
+
+def test_every_entry_against_central_differences(moving):
+    """One column at a time, all rows: entries that the sweeps leave out must be zero."""
+    model, t, state, _, function = moving
+    n = len(model.bodies.mass)
+    jacobian = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model))
+    rows = np.r_[[13 * b + 7 + k for b in range(n) for k in range(6)], 13 * n : len(state)].astype(int)
+    found = np.vstack([jacobian.by_position, jacobian.by_velocity])
+    for column in range(len(found)):
+        size = 1e-7 if column < 6 * n or column >= 12 * n else 1e-6
+        ahead, behind = (function(t, displaced(state, n, column, jacobian.axes, s)) for s in (size, -size))
+        slope = (ahead - behind) / (2 * size)
+        # one-sided: a contact 0.1 mm deep gets 0.5e-4 stiffer over 1e-8 m. Rounding: heights to 5e-17 m, which a
+        # contact's stiffness over mass, 1.6e6/s^2, and the difference 1e-8 turn into 0.01.
+        tolerance = 1e-4 * np.abs(slope).max() + 0.01
+        np.testing.assert_allclose(found[column], slope[rows], rtol=0, atol=tolerance, err_msg=str(column))
+        if column < 12 * n and column % 6 >= 3:
+            body, place = column % (6 * n) // 6, column % 6 - 3 + 3 * (column >= 6 * n)
+            turn = jacobian.axes[body] @ slope[13 * body + 3 : 13 * body + 7] * [2, 2, 2, 1]
+            np.testing.assert_allclose(jacobian.turning[body, :, place], turn, atol=1e-5)
+    later, earlier = function(t + 1e-6, state), function(t - 1e-6, state)
+    np.testing.assert_allclose(jacobian.by_time, (later - earlier) / 2e-6, atol=1e-2, rtol=1e-6)
+
+
+def test_refreshing_the_contacts_refreshes_what_belongs_to_the_wheelsets(moving):
+    model, t, state, rate, function = moving
+    full, contact = plan_sweeps(model)
+    assert len(contact.starts) - 1 == (10 if model.track.tangent else 12)  # however many wheelsets there are
+    known = refreshed(moving, full, new_jacobian(model))
+    again = new_jacobian(model)
+    again.by_position[:], again.by_velocity[:] = known.by_position, known.by_velocity
+    for body in model.bodies.wheelsets:  # spoil what contact decides: lateral, vertical, roll, yaw, all velocities
+        own = slice(6 * body, 6 * body + 6)
+        for k in (1, 2, 3, 5):
+            again.by_position[6 * body + k, own] = np.nan
+        again.by_velocity[own, own] = np.nan
+    refreshed(moving, contact, again)
+    np.testing.assert_allclose(again.by_position, known.by_position, rtol=1e-12, atol=1e-3)
+    np.testing.assert_allclose(again.by_velocity, known.by_velocity, rtol=1e-12, atol=1e-3)
+
+
+def test_stages_are_solved_as_a_dense_system_would_be(moving):
+    """Unknown: displacements, velocities, own states; the matrix written out in full and solved by numpy."""
+    model, _, state, _, _ = moving
+    n, sigma = len(model.bodies.mass), 900.0
+    jacobian, system = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model)), new_system(model)
+    matrix = np.zeros((12 * n + model.elements.states,) * 2)
+    for b in range(n):
+        q, v = 6 * b, 6 * n + 6 * b
+        matrix[q : q + 3, v : v + 3] = np.eye(3)
+        matrix[q + 3 : q + 6, q + 3 : q + 6] = jacobian.turning[b, :3, :3]
+        matrix[q + 3 : q + 6, v + 3 : v + 6] = jacobian.turning[b, :3, 3:]
+    matrix[6 * n :, : 6 * n], matrix[6 * n :, 6 * n :] = jacobian.by_position.T, jacobian.by_velocity.T
+
+    def unknowns(vector):
+        bodies = vector[: 13 * n].reshape(n, 13)
+        turns = [2 * jacobian.axes[b, :3] @ bodies[b, 3:7] for b in range(n)]
+        return np.r_[np.hstack([bodies[:, :3], turns]).ravel(), bodies[:, 7:].ravel(), vector[13 * n :]]
+
+    right = np.random.default_rng(1).normal(size=len(state))
+    expected = np.linalg.solve(sigma * np.eye(len(matrix)) - matrix, unknowns(right))
+    increment = right.copy()
+    assert factorise(jacobian, system, sigma)
+    solve_stage(jacobian, system, sigma, increment)
+    np.testing.assert_allclose(unknowns(increment), expected, atol=1e-12 * np.abs(expected).max())
+    # along p, what is left is the length's own equation: sigma l = g_l + turning . (theta, w)
+    for b in range(n):
+        p, at = jacobian.axes[b, 3], 13 * b
+        turns = np.r_[2 * jacobian.axes[b, :3] @ increment[at + 3 : at + 7], increment[at + 10 : at + 13]]
+        length = (p @ right[at + 3 : at + 7] + jacobian.turning[b, 3] @ turns) / sigma
+        assert p @ increment[at + 3 : at + 7] == pytest.approx(length * (p @ p), abs=1e-14)
+
+
+def test_a_singular_system_is_reported(moving):
+    model = moving[0]
+    jacobian = new_jacobian(model)  # of zeros: with sigma = 0 nothing is left
+    assert not factorise(jacobian, new_system(model), 0.0)
+    assert factorise(jacobian, new_system(model), 1.0)
