@@ -126,9 +126,7 @@ def test_a_derailed_vehicle_is_not_on_a_limit_cycle(oscillator, suspended, monke
 
 def test_critical_table():
     """Linear and nonlinear critical speeds of both detections side by side; nothing found stays empty."""
-    linear = pd.DataFrame(
-        {"detection": ["planar", "spatial"], "critical_speed_m_per_s": [58.1, 58.0], "mode": "hunting"}
-    )
+    linear = pd.DataFrame({"variant": ["planar", "spatial"], "critical_speed_m_per_s": [58.1, 58.0], "mode": "hunting"})
     cycles = pd.DataFrame({
         "detection": "planar", "branch": "falling", "speed_m_per_s": [60.0, 52.0, 50.0, 48.0],
         "amplitude_m": [7e-3, 6e-3, 5e-3, 1e-5], "frequency_Hz": [9.0, 8.0, 7.0, np.nan],

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.analysis_stability import modes_in_full, stability_over_speed
+from wrcore.analysis_stability import critical_speeds, loci, modes_in_full
 from wrcore.figures import ACCENT, save_figure
 from wrcore.figures_stability import fig_limit_cycles, fig_modes, fig_root_locus
 from wrcore.scene import load_scene
@@ -15,7 +15,7 @@ from wrcore.scene import load_scene
 def over_speed():
     source = SCENES / "suspended_wheelset.yaml"
     scenes = {name: load_scene(source, [f"contact.detection={name}"]) for name in ("planar", "spatial")}
-    return stability_over_speed(scenes, [20.0, 50.0, 80.0])
+    return loci(scenes, [20.0, 50.0, 80.0]), critical_speeds(scenes, [20.0, 50.0, 80.0])
 
 
 def points(axes, label):
@@ -64,7 +64,7 @@ def test_modes_are_labelled_and_their_energies_written_in_per_cent():
 def test_limit_cycles_show_both_branches_in_mm(over_speed):
     rows = [
         ("planar", "falling", 60.0, 6e-3), ("planar", "falling", 50.0, 5e-3), ("planar", "rising", 50.0, 0.0),
-        ("spatial", "falling", 60.0, 6.1e-3), ("spatial", "rising", 60.0, 2e-3),
+        ("spatial", "falling", 60.0, 6.1e-3), ("spatial", "rising", 60.0, 2e-3), ("spatial", "rising", 70.0, np.nan),
     ]  # fmt: skip
     table = pd.DataFrame(rows, columns=["detection", "branch", "speed_m_per_s", "amplitude_m"])
     figure = fig_limit_cycles({"wheelset": table}, {"wheelset": over_speed[1]})
@@ -73,5 +73,6 @@ def test_limit_cycles_show_both_branches_in_mm(over_speed):
     np.testing.assert_allclose(lines["falling speed, planar"].get_xdata(), [50.0, 60.0])
     np.testing.assert_allclose(lines["falling speed, planar"].get_ydata(), [5.0, 6.0])
     assert lines["rising speed, spatial"].get_markerfacecolor() == "white"
+    assert [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())] == [70.0]
     assert axes.get_ylabel() == "amplitude of y / mm"
     assert vertical(axes) == pytest.approx(over_speed[1]["critical_speed_m_per_s"][1])

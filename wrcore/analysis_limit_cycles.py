@@ -77,9 +77,9 @@ def settle_motion(model, state, settling):
     Returns
     -------
     row : dict
-        speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest),
-        frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``, ``limit cycle``, or after
-        the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``.
+        speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN
+        if it derails), frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``,
+        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``.
     state : numpy.ndarray
         At the end.
     """
@@ -90,7 +90,7 @@ def settle_motion(model, state, settling):
         elapsed += t[-1]
         spans = 0.5 * np.ptp(lateral, axis=0)
         y = lateral[:, np.argmax(spans)]
-        amplitudes.append(float(np.max(spans)))
+        amplitudes.append(float(np.max(spans)) if on_rails else np.nan)
         status = "derailed" if not on_rails else _status(amplitudes, elapsed, settling)
     amplitude = amplitudes[-1]
     row = {
@@ -149,9 +149,9 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     while queue:
         there, straight = at_speed(model, state, queue.pop())
         tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
-        if not tried or tried[0][0]["amplitude_m"] < 0.67 * rows[-1]["amplitude_m"]:
+        if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
             tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
-        row, end = max(tried, key=lambda motion: (motion[0]["status"] != "derailed", motion[0]["amplitude_m"]))
+        row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
         if row["status"] in CYCLES:
             rows.append(row)
             carried = there, end
@@ -235,7 +235,7 @@ def critical_table(linear, cycles):
     Parameters
     ----------
     linear : dict of str to pandas.DataFrame
-        Second table of `wrcore.analysis_stability.stability_over_speed`, by vehicle.
+        Tables of `wrcore.analysis_stability.critical_speeds` by vehicle; the variants ``planar`` and ``spatial`` count.
     cycles : dict of str to pandas.DataFrame
         Tables of :func:`limit_cycles` with a column detection, by the same vehicles.
 
@@ -246,7 +246,8 @@ def critical_table(linear, cycles):
     """
     rows = []
     for vehicle, table in linear.items():
-        for row in table.to_dict("records"):
-            part = cycles[vehicle][cycles[vehicle]["detection"] == row["detection"]]
-            rows.append({"vehicle": vehicle, **row, **nonlinear_critical_speed(part)})
+        for detection in ("planar", "spatial"):
+            found = table[table["variant"] == detection].iloc[0].drop("variant").to_dict()
+            part = cycles[vehicle][cycles[vehicle]["detection"] == detection]
+            rows.append({"vehicle": vehicle, "detection": detection, **found, **nonlinear_critical_speed(part)})
     return pd.DataFrame(rows).rename(columns={"critical_speed_m_per_s": "linear_critical_speed_m_per_s"})

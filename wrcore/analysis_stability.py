@@ -180,26 +180,41 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
     }  # fmt: skip
 
 
-def stability_over_speed(scenes, speeds):
-    """Root locus and linear critical speed of one vehicle in several scenes.
+def loci(scenes, speeds):
+    """Root loci of one vehicle in several scenes.
 
     Parameters
     ----------
     scenes : dict of str to Scene
-        By detection, or by whatever else they differ in.
+        By detection.
     speeds : sequence of float
         Rising, m/s.
 
     Returns
     -------
-    locus, critical : pandas.DataFrame
-        Tables of :func:`root_locus` and rows of :func:`critical_speed`, after a column detection.
+    pandas.DataFrame
+        Tables of :func:`root_locus` after a column detection.
     """
-    loci, rows = [], []
-    for detection, scene in scenes.items():
-        model, state = straight_ahead(scene)
-        locus = root_locus(scene.vehicle, model, state, speeds)
-        locus.insert(0, "detection", detection)
-        loci.append(locus)
-        rows.append({"detection": detection, **critical_speed(scene.vehicle, model, state, speeds)})
-    return pd.concat(loci, ignore_index=True), pd.DataFrame(rows)
+    tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}
+    return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
+
+
+def critical_speeds(scenes, speeds):
+    """Linear critical speeds of one vehicle in several scenes.
+
+    Parameters
+    ----------
+    scenes : dict of str to Scene
+        By what they differ in.
+    speeds : sequence of float
+        Rising, m/s.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Rows of :func:`critical_speed` after a column variant.
+    """
+    rows = []
+    for variant, scene in scenes.items():
+        rows.append({"variant": variant, **critical_speed(scene.vehicle, *straight_ahead(scene), speeds)})
+    return pd.DataFrame(rows)

@@ -26,9 +26,9 @@ def fig_root_locus(loci, linear):
     Parameters
     ----------
     loci : dict of str to pandas.DataFrame
-        First tables of `stability_over_speed`, by title of the row of panels.
+        Tables of `loci`, by title of the row of panels.
     linear : dict of str to pandas.DataFrame
-        Second ones; the linear critical speed with spatial detection is marked.
+        Tables of `critical_speeds`; that of the variant ``spatial`` is marked.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def fig_root_locus(loci, linear):
 
 def _critical(table):
     """Linear critical speed with spatial detection, m/s; NaN where there is none."""
-    speed = table.set_index("detection").loc["spatial", "critical_speed_m_per_s"]
+    speed = table.set_index("variant").loc["spatial", "critical_speed_m_per_s"]
     return speed if np.isfinite(speed) else np.nan
 
 
@@ -111,7 +111,7 @@ def fig_limit_cycles(tables, linear):
     tables : dict of str to pandas.DataFrame
         Tables of `limit_cycles` with a column detection, by title of the panel.
     linear : dict of str to pandas.DataFrame
-        Second tables of `stability_over_speed`; the linear critical speed with spatial detection is marked.
+        Tables of `critical_speeds`; that of the variant ``spatial`` is marked.
 
     Returns
     -------
@@ -128,6 +128,9 @@ def fig_limit_cycles(tables, linear):
                 "zorder": 2 if planar else 3,
             }  # fmt: skip
             axes.plot(rows["speed_m_per_s"], MM * rows["amplitude_m"], label=f"{branch} speed, {detection}", **look)
+            derailed = rows[rows["amplitude_m"].isna()]["speed_m_per_s"]
+            cross = {"marker": "x", "color": look["color"], "linestyle": "", "transform": axes.get_xaxis_transform()}
+            axes.plot(derailed, np.full(len(derailed), 0.97), **cross)
         look = {"color": ACCENT, "linewidth": 0.9, "linestyle": "-.", "label": "linear critical speed"}
         axes.axvline(_critical(linear[title]), **look)
         axes.set(ylabel="amplitude of y / mm", ylim=(-0.2, None))

@@ -46,7 +46,8 @@ def check_config():
             scenes[f"speeds.vehicles.{vehicle} on speeds.tracks.{track}"] = (entry["scene"], entry["set"] | there)
     scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
-        scenes[f"critical_speed.vehicles.{vehicle}"] = (entry["scene"], {})
+        for name, changes in config["critical_speed"]["variants"].items():
+            scenes[f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"] = (entry["scene"], changes)
     for key, (scene, changes) in scenes.items():
         try:
             load_scene(scene, [f"{name}={value}" for name, value in changes.items()])

@@ -20,7 +20,7 @@ def cycle_speeds(wildcards):
 
 rule root_locus:
     message:
-        "{wildcards.vehicle}: modes over speed, linear critical speed"
+        "{wildcards.vehicle}: modes over speed, linear critical speeds"
     input:
         core=CORE["stability"],
         scenes=SCENES,
@@ -38,6 +38,7 @@ rule root_locus:
     params:
         speeds=CRITICAL["speeds"],
         shown=CRITICAL["shown"],
+        variants={name: changes(entry) for name, entry in CRITICAL["variants"].items()},
     script:
         "../scripts/root_locus.py"
 
@@ -77,6 +78,12 @@ rule critical_speeds:
             caption="../report/critical_speeds.rst",
             category="Stability",
             labels={"table": "critical speeds"},
+        ),
+        variants=report(
+            "<results>/tables/critical_speed_variants.csv",
+            caption="../report/critical_speed_variants.rst",
+            category="Stability",
+            labels={"table": "what the critical speed depends on"},
         ),
         locus=report(
             "<results>/figures/root_locus.png",
