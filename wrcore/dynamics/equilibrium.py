@@ -201,6 +201,7 @@ def _loads_when_lifted(model, work, state, at, k):
     """Loads (N) of the k-th wheelset's wheels at rest as a function of the lifts of its ends."""
 
     def carried(lifts):
+        """Loads, shape (2,), with the ends lifted by ``lifts`` (m)."""
         lifted = state.copy()
         _lift(lifted, at, lifts, model.contact.geometry.rail_distance)
         lifted[at + 7 : at + 13] = 0.0
