@@ -4,6 +4,7 @@ import pandas as pd
 import pytest
 
 from wrcore.accuracy import MARGIN, choose
+from wrcore.dynamics.integrate import METHODS
 from wrcore.errors import InputError
 from wrcore.scene import load_scene
 
@@ -33,6 +34,16 @@ def test_the_nearest_measured_speed_of_the_same_kind():
     assert choose(scene("suspended_wheelset", 30.0), 1e-5, FRONT)[0].method == "rodas4"  # in ratio nearer to 20 than 60
     choice, reason = choose(scene("trailer_vehicle", 80.0), 1e-5, FRONT)
     assert choice.rtol == 1e-5 and "vehicle" in reason and "20 m/s" in reason
+
+
+def test_nothing_measured_for_this_kind():
+    with pytest.raises(InputError, match="expected a suspended_wheelset or vehicle"):
+        choose(scene("wheelset", 20.0), 1e-3, FRONT)
+
+
+def test_the_measurements_of_the_package_serve_its_own_scene():
+    choice, _ = choose(scene("suspended_wheelset", 20.0), 1e-5)
+    assert choice.method in METHODS
 
 
 def test_nothing_measured_is_that_accurate():

@@ -48,6 +48,9 @@ def choose(scene, accuracy, front=None):
     front = measured_front() if front is None else front
     kind, speed = kind_of(scene), float(scene.data["speed"])
     same = front[front["kind"] == kind]
+    if not len(same):
+        measured = " or ".join(sorted(set(front["kind"])))
+        raise InputError("--accuracy", f"{accuracy:g}", f"expected a {measured}; nothing was measured for a {kind}")
     nearest = min(same["speed_m_per_s"].unique(), key=lambda v: abs(math.log(v / speed)))
     same = same[same["speed_m_per_s"] == nearest]
     enough = same[MARGIN * same["y_rms_m"] <= accuracy]
