@@ -3,6 +3,7 @@
 import copy
 import math
 import re
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -74,6 +75,12 @@ def parse_value(text):
         return text
 
 
+@cache
+def _schema(name):
+    """A schema of the package, parsed once: a sweep validates as many scenes as it has runs."""
+    return yaml.safe_load(files("wrcore").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8"))
+
+
 def validate(data, schema_name, source):
     """Check data against a schema of the package and fill in its defaults.
 
@@ -96,7 +103,7 @@ def validate(data, schema_name, source):
     InputError
         One line that names the field and what was expected.
     """
-    schema = yaml.safe_load(files("wrcore").joinpath("schemas", f"{schema_name}.yaml").read_text(encoding="utf-8"))
+    schema = _schema(schema_name)
     data = copy.deepcopy(data)
     _refuse_non_finite(data, source, "")
     errors = sorted(jsonschema.Draft202012Validator(schema).iter_errors(data), key=lambda e: (len(e.path), str(e.path)))
