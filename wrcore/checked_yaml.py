@@ -16,7 +16,7 @@ MERGE = "tag:yaml.org,2002:merge"
 """``<<: *anchor`` takes over the keys of another mapping; those written beside it win."""
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader):
     """Safe loader that refuses repeated keys and reads 1e-6 as a number."""
 
 
