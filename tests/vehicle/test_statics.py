@@ -122,7 +122,8 @@ def test_a_hinge_carries_moments_about_the_axes_it_does_not_turn_about():
 def test_links_make_a_body_turn_about_the_point_where_they_meet():
     # two links at 45 degrees whose lines meet at y = z = 0; the weight 0.2 m, a spring 0.8 m beside that point
     bodies = {"body": ((0, 0.2, 1.5), 1e3)}
-    links = [{"kind": "rigid_link", "bodies": ["body", "frame"], "at": [[0, y, 1], [0, 2 * y, 2]]} for y in (1, -1)]
+    ends = ([[0, 1, 1], [0, 2, 2]], [[0, -2, 2], [0, -3, 3]])
+    links = [{"kind": "rigid_link", "bodies": ["body", "frame"], "at": at} for at in ends]
     shares = statics_of(bodies, [spring(["body", "frame"], [0, 0.8, 1.0])], links)
     assert shares["s0"] == pytest.approx(1e4 * 0.2 / 0.8, rel=1e-9)
 
