@@ -2,7 +2,7 @@
 # make test     set up .venv, run the smoke workflow and all tests
 # make smoke    the reduced study alone: results/smoke
 # make report   the study's report anew: results/report.zip
-# make lint     ruff;   make bench   speed measurements;   make clean   remove everything generated
+# make lint     ruff, mypy;   make bench   speed measurements;   make clean   remove everything generated
 #
 # PYTHON=python3.12 chooses the interpreter for a new .venv, CORES=4 the cores for the workflow.
 
@@ -29,6 +29,7 @@ report: $(STAMP)
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 bench: $(STAMP)
 	@for script in bench/*.py; do echo "$$script"; $(BIN)/python "$$script" || exit 1; done

@@ -78,7 +78,8 @@ def parse_value(text):
 @cache
 def _schema(name):
     """A schema of the package, parsed once: a sweep validates as many scenes as it has runs."""
-    return yaml.safe_load(files("wrcore").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8"))
+    text = files("wrcore").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8")
+    return yaml.load(text, Loader=_Loader)  # reads 1.0e9 as a number
 
 
 def validate(data, schema_name, source):

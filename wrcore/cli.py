@@ -170,8 +170,7 @@ def _simulate(options):
         choice, reason = choose(scene, options.accuracy)
         scene = load_scene(options.scene, [*choice.overrides(), *options.overrides])
         print(f"{scene.data['name']}: {reason}")
-    with _progress(scene.data["integration"]["duration"]) as advance:
-        run = simulate(scene, advance)
+    run = simulate(scene)
     if reason:
         run.settings |= {"accuracy_m": options.accuracy, "accuracy_reason": reason}
     if out:
@@ -196,30 +195,6 @@ def _simulate(options):
             f"sides, {summary['table_out_of_range']} creep look-ups out of the table's range"
         )
     return 0 if run.status in ("completed", "derailed") else 1
-
-
-class _progress:
-    """Progress bar over simulated time on a terminal; silent in a log."""
-
-    def __init__(self, duration):
-        self.duration = duration
-
-    def __enter__(self):
-        from tqdm import tqdm
-
-        self.bar = tqdm(
-            total=self.duration,
-            unit="s",
-            disable=None,
-            bar_format="{l_bar}{bar}| {n:.2f}/{total:g} s, {remaining} left",
-        )
-        return None if self.bar.disable else self._advance
-
-    def _advance(self, t):
-        self.bar.update(t - self.bar.n)
-
-    def __exit__(self, *_):
-        self.bar.close()
 
 
 def _contact(options):
@@ -305,8 +280,8 @@ def _creep(options):
     out = _output(options.out)
     frame = solve_cases(read_cases(options.cases), options.model, options.table, progress=show_progress)
     _write_csv(frame, out)
-    remarks = {"outside the range of the model's data": "out_of_range", "not converged": "not_converged"}
-    remarks = [f", {frame.attrs[key]} {text}" for text, key in remarks.items() if frame.attrs.get(key)]
+    texts = {"out_of_range": "outside the range of the model's data", "not_converged": "not converged"}
+    remarks = [f", {frame.attrs[key]} {text}" for key, text in texts.items() if frame.attrs.get(key)]
     print(f"{len(frame)} cases by the {options.model} model{''.join(remarks)}: {out}")
     return 0
 

@@ -1,105 +1,26 @@
 """Runs in HDF5 files: every dataset says its unit and its meaning, every file how it came about."""
 
+from __future__ import annotations
+
 import json
 import os
+from collections.abc import Iterable
+from os import PathLike
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from wrcore import __version__
+from wrcore.channels import DESCRIPTIONS, unit_of
 from wrcore.errors import InputError
-from wrcore.simulate import Run
+from wrcore.run import Run
 
 FORMAT = "wrcore run"
 FORMAT_VERSION = 1
 
-UNIT_SUFFIXES = {
-    "_m_per_s2": "m/s^2",
-    "_m_per_s": "m/s",
-    "_rad_per_s": "rad/s",
-    "_per_m": "1/m",
-    "_Nm": "N m",
-    "_rad": "rad",
-    "_Pa": "Pa",
-    "_J": "J",
-    "_W": "W",
-    "_N": "N",
-    "_m": "m",
-    "_s": "s",
-}
-"""Unit by the end of a channel's name, longest ends first; a name without one of these is a pure number."""
 
-DESCRIPTIONS = {
-    "t": "time",
-    "x_m": "position along the track (body: centre of mass; contact: contact point), forward positive",
-    "s_m": "arc length along the track's centre line (tracks that are not tangent)",
-    "y_m": "lateral position in the track frame, left positive",
-    "z_m": "height above the plane of the rails' highest points",
-    "roll_rad": "roll about x, right-handed",
-    "pitch_rad": "pitch about y, right-handed",
-    "yaw_rad": "yaw about z, right-handed",
-    "vx_m_per_s": "velocity along x",
-    "vy_m_per_s": "velocity along y",
-    "vz_m_per_s": "velocity along z",
-    "ax_m_per_s2": "acceleration of the centre of mass along x",
-    "ay_m_per_s2": "acceleration of the centre of mass along y",
-    "az_m_per_s2": "acceleration of the centre of mass along z",
-    "wx_rad_per_s": "angular velocity about x",
-    "wy_rad_per_s": "angular velocity about y",
-    "wz_rad_per_s": "angular velocity about z",
-    "planar_error_left_m": "bound of the penetration that planar detection misses, left wheel",
-    "planar_error_right_m": "bound of the penetration that planar detection misses, right wheel",
-    "spatial_left": "1 where detection auto chose spatial for the left wheel, else 0",
-    "spatial_right": "1 where detection auto chose spatial for the right wheel, else 0",
-    "u_wheel_m": "lateral coordinate of the contact point on the wheel profile, field side positive",
-    "s_wheel_rad": "angular coordinate of the contact point on the wheel",
-    "u_rail_m": "lateral coordinate of the contact point on the rail profile, field side positive",
-    "contact_angle_rad": "angle of the contact plane to the track plane in the cross-section",
-    "penetration_m": "penetration along the contact normal, positive in contact",
-    "a_m": "semi-axis of the contact ellipse along rolling",
-    "b_m": "semi-axis of the contact ellipse across rolling",
-    "N_N": "normal force on the wheel",
-    "Fx_N": "longitudinal creep force on the wheel",
-    "Fy_N": "lateral creep force on the wheel, in the contact plane",
-    "Mz_Nm": "spin moment on the wheel about the contact normal",
-    "xi": "longitudinal creepage, wheel relative to rail",
-    "eta": "lateral creepage, wheel relative to rail",
-    "phi_per_m": "spin creepage, wheel relative to rail",
-    "kinetic_J": "kinetic energy of all bodies",
-    "gravitational_J": "gravitational energy of all bodies, from z = 0",
-    "springs_J": "energy of all springs, those in series with dampers too, from nominal position",
-    "elastic_contact_J": "2/5 of elastic normal force times penetration, all patches",
-    "input_by_frame_W": "power of the moving frame through the elements that lead to it",
-    "input_by_joints_W": "power of the joints' reactions: what they drive, and what holds them together against drift",
-    "dissipated_by_dampers_W": "power lost in dampers and friction elements",
-    "dissipated_by_creep_W": "power lost in the contact patches by creep forces and spin moments",
-    "dissipated_by_contact_damping_W": "power lost by the damping of the normal forces",
-    "stored_by_springs_W": "power that goes into the springs' energy",
-    "stored_by_gravity_W": "power that goes into the gravitational energy",
-    "stored_by_elastic_contact_W": "power against the elastic normal forces",
-}
-
-
-def unit_of(channel):
-    """Unit that a channel's name states.
-
-    Parameters
-    ----------
-    channel : str
-        Name such as ``penetration_m``.
-
-    Returns
-    -------
-    str
-        Unit, ``1`` for a pure number.
-    """
-    if channel == "t":
-        return "s"
-    return next((unit for end, unit in UNIT_SUFFIXES.items() if channel.endswith(end)), "1")
-
-
-def write_run(path, run):
+def write_run(path: str | PathLike[str], run: Run) -> None:
     """Write a run; the file appears under its name only when it is complete.
 
     The same run gives the same bytes: no date, host or path is stored.
@@ -156,7 +77,7 @@ def _write_dataset(group, name, values):
     return dataset
 
 
-def load_run(path):
+def load_run(path: str | PathLike[str]) -> Run:
     """Read a run that `write_run` wrote.
 
     Parameters
@@ -172,6 +93,15 @@ def load_run(path):
     ------
     InputError
         If the file is absent, truncated, not HDF5, or HDF5 of another kind or version.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> run = Run({"name": "still"}, "completed", "", np.array([0.0, 0.5]), {"wheelset": {"y_m": np.zeros(2)}})
+    >>> with TemporaryDirectory() as folder:
+    ...     run.save(f"{folder}/run.h5")
+    ...     load_run(f"{folder}/run.h5")["wheelset"].y_m
+    array([0., 0.])
     """
     try:
         with h5py.File(path, "r") as file:
@@ -183,7 +113,7 @@ def load_run(path):
         raise InputError(path, "", f"expected a complete run file (HDF5), got: {error}") from None
 
 
-def load_runs(paths):
+def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]:
     """Read several runs that lie as ``<case>/<name>.h5``.
 
     Parameters
@@ -200,7 +130,7 @@ def load_runs(paths):
     InputError
         As `load_run`.
     """
-    cases = {}
+    cases: dict[str, dict[str, Run]] = {}
     for path in map(Path, paths):
         cases.setdefault(path.parent.name, {})[path.stem] = load_run(path)
     return cases
@@ -216,7 +146,7 @@ def _check_format(path, file):
 
 
 def _read(file):
-    groups = {}
+    groups: dict[str, dict[str, np.ndarray]] = {}
 
     def _collect(name, item):
         if isinstance(item, h5py.Dataset) and "/" in name:

@@ -1,10 +1,16 @@
 """Scenes: a validated description becomes a compiled model and its initial state."""
 
+from __future__ import annotations
+
+import copy
 import json
 import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +42,7 @@ POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """A checked scene: its data with all defaults, and what its files hold.
 
@@ -51,7 +57,7 @@ class Scene:
     track : Track
     """
 
-    data: dict
+    data: dict[str, Any]
     source: str
     vehicle: Vehicle
     wheel: ProfileCurve
@@ -59,20 +65,34 @@ class Scene:
     track: Track
 
     @property
-    def detection(self):
+    def detection(self) -> str:
         """``planar``, ``spatial`` or ``auto``."""
         return self.data["contact"]["detection"]
 
+    def __repr__(self) -> str:
+        wheel, rail = (self.data[kind]["profile"] for kind in ("wheel", "rail"))
+        return (
+            f"Scene {self.data['name']!r}: {self.vehicle.name}, {wheel} on {rail}, {self.data['speed']:g} m/s,"
+            f" {self.detection} detection, {self.data['integration']['duration']:g} s"
+        )
 
-def load_scene(scene, overrides=()):
+
+Source = Scene | str | PathLike[str] | Mapping[str, Any]
+"""What stands for a scene: a checked one, its file, or the file's content."""
+
+
+def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
     """Read and check a scene.
 
     Parameters
     ----------
-    scene : str, Path or dict
-        Scene file, or the content of one (then paths count from the working directory).
-    overrides : sequence of str
-        ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them.
+    scene : str, Path, dict or Scene
+        Scene file, the content of one (then paths count from the working directory), or a scene to be changed.
+    overrides : sequence of str, or dict
+        ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them; or values by ``key.path``.
+    **changes
+        Further values by key: ``speed=30``, ``integration__duration=2.0`` (two underscores stand for the dot) or
+        ``initial={"y": 0.003, "yaw": 0.001}`` (what the mapping does not name stays).
 
     Returns
     -------
@@ -88,13 +108,25 @@ def load_scene(scene, overrides=()):
     >>> scene = load_scene("config/scenes/wheelset.yaml", ["speed=30", "contact.detection=planar"])
     >>> scene.data["speed"], scene.detection
     (30, 'planar')
+    >>> load_scene("config/scenes/wheelset.yaml", speed=30, contact__friction=0.4)
+    Scene 'wheelset': Manchester wheelset, S1002 on UIC60-MBench, 30 m/s, spatial detection, 10 s
     """
-    if isinstance(scene, dict):
+    if isinstance(scene, Scene):
+        source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
+    elif isinstance(scene, Mapping):
         source, folder, data = "scene", Path("."), json.loads(json.dumps(scene))
     else:
         source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
-    for override in overrides:
-        _override(data, override)
+    if isinstance(overrides, Mapping):
+        changes = {**overrides, **changes}
+    else:
+        for text in overrides:
+            key, equals, value = text.partition("=")
+            if not equals or not key.strip():
+                raise InputError("--set", text, "expected key.path=value")
+            _set(data, key.strip(), parse_value(value), "--set")
+    for key, value in _flat(changes):
+        _set(data, key, value, source)
     data = validate(data, "scene", source)
     parameters = _find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
@@ -110,16 +142,29 @@ def load_scene(scene, overrides=()):
     return Scene(data, source, vehicle, wheel, rail, track)
 
 
-def _override(data, text):
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise InputError("--set", text, "expected key.path=value")
-    *path, last = key.strip().split(".")
+def _flat(changes, prefix=""):
+    """Pairs of a key path and a plain value; mappings are entered, but for those that stand for one value."""
+    for key, value in changes.items():
+        path = prefix + key.replace("__", ".")
+        if isinstance(value, Mapping) and not path.endswith(".profile"):
+            yield from _flat(value, f"{path}.")
+        else:
+            yield path, json.loads(json.dumps(value, default=_plain))
+
+
+def _plain(value):
+    """Numbers and arrays of numpy and paths as YAML holds them."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else str(value)
+
+
+def _set(data, key, value, source):
+    """Set the value at a path of keys."""
+    *path, last = key.split(".")
     for part in path:
         data = data.setdefault(part, {})
         if not isinstance(data, dict):
-            raise InputError("--set", text, f"expected a key below a mapping, but {part!r} holds a value")
-    data[last] = parse_value(value)
+            raise InputError(source, key, f"expected a key below a mapping, but {part!r} holds a value")
+    data[last] = value
 
 
 def _find(path, folder, source, field):
@@ -174,7 +219,7 @@ def _creep(scene, progress):
     return creep_data(nu, table.kernel_data())
 
 
-def compile_scene(scene, progress=None):
+def compile_scene(scene: Scene, progress: Callable | None = None) -> tuple[Model, np.ndarray]:
     """Turn a scene into what kernels need.
 
     Parameters

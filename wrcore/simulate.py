@@ -1,22 +1,29 @@
 """From a scene to a run: compile, integrate, collect the channels."""
 
+from __future__ import annotations
+
 import math
 import time
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from types import SimpleNamespace
+from contextlib import nullcontext
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
 import wrcore
 from wrcore.contact import reduction
+from wrcore.creep.table import show_progress
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.integrate import Checkpoint, integrate
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import workspace
 from wrcore.dynamics.track import track_poses
-from wrcore.scene import compile_scene
+from wrcore.progress import counted, simulated_time
+from wrcore.run import Run
+from wrcore.scene import Scene, Source, compile_scene, load_scene
 
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
@@ -32,79 +39,57 @@ CONTACT_CHANNELS = {
 """Contact channels and their columns in the patch array."""
 
 
-@dataclass
-class Run:
-    """One simulated scene: the channels over time, how it ended and what it cost.
-
-    Parameters
-    ----------
-    scene : dict
-        The resolved scene, made of plain JSON values.
-    status : str
-        ``completed``, ``derailed``, ``stalled`` or ``failed``.
-    reason : str
-        One line on why the run ended where it did; empty for a completed one.
-    t : ndarray, shape (n,)
-        Output times, s.
-    groups : dict of str to dict of str to ndarray
-        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,); a contact's group
-        (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
-        whole model's energies and powers. Names carry the unit.
-    counters : dict
-        Plain numbers: steps, rejected, rhs_evaluations, jacobians, factorisations, wall_s, compile_s and others.
-    settings : dict
-        Flat record of the numerical choices, with the package version.
-    end : Checkpoint or None
-        Where a run of the compiled engine stopped, for one that goes on from there. Not written to files.
-
-    Examples
-    --------
-    ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N.
-    """
-
-    scene: dict
-    status: str
-    reason: str
-    t: np.ndarray
-    groups: dict[str, dict[str, np.ndarray]]
-    counters: dict = field(default_factory=dict)
-    settings: dict = field(default_factory=dict)
-    end: Checkpoint | None = None
-
-    def __getitem__(self, group):
-        """Channels of one group as attributes; KeyError names the groups that exist."""
-        if group not in self.groups:
-            raise KeyError(f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}")
-        return SimpleNamespace(**self.groups[group])
-
-
-def simulate(scene, progress=None, start=None):
+def simulate(
+    scene: Source,
+    progress: Callable[[float], object] | Literal[False] | None = None,
+    start: Checkpoint | np.ndarray | None = None,
+    **changes: Any,
+) -> Run:
     """Run a scene.
 
     Parameters
     ----------
-    scene : Scene
-        From :func:`wrcore.scene.load_scene`.
-    progress : callable, optional
-        Called now and then with the simulated time reached, s.
+    scene : Scene, path or dict
+        From :func:`wrcore.scene.load_scene`, or what that function takes.
+    progress : callable or False, optional
+        Called now and then with the simulated time reached, s. Left out: a bar where the run takes more than a second
+        and somebody watches (a terminal or a notebook, not a log); False: none.
     start : Checkpoint or ndarray, shape (size,), optional
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
         its time bit by bit as if it had not stopped, or a state at time 0.
+    **changes
+        Keys of the scene with other values, as :func:`wrcore.scene.load_scene` takes them.
 
     Returns
     -------
     Run
         Whatever happened is in ``status`` and ``reason``; what was reached is kept.
+
+    Raises
+    ------
+    InputError
+        One line that names the file, the field and what was expected.
+
+    Examples
+    --------
+    >>> run = simulate("config/scenes/suspended_wheelset.yaml", speed=30, integration__duration=0.1)
+    >>> run.status, run.keys()
+    ('completed', ['wheelset', 'wheelset/left', 'wheelset/right'])
+    >>> float(run["wheelset"].y_m[0])  # m
+    0.002
     """
+    if changes or not isinstance(scene, Scene):
+        scene = load_scene(scene, **changes)
     started = time.perf_counter()
-    model, state = compile_scene(scene)
     settings = scene.data["integration"]
     begin = start.t if isinstance(start, Checkpoint) else 0.0
     times = output_times(begin, settings["duration"], scene.data["output"]["rate"])
-    trajectory = integrate(
-        model, state if start is None else start, times, settings["method"], settings["rtol"], settings["atol"],
-        settings["step"], settings["longest_step"], DERAILED_Y, progress,
-    )  # fmt: skip
+    with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
+        model, state = compile_scene(scene, show_progress if progress is None else None)
+        trajectory = integrate(
+            model, state if start is None else start, times, settings["method"], settings["rtol"], settings["atol"],
+            settings["step"], settings["longest_step"], DERAILED_Y, advance,
+        )  # fmt: skip
     compiled = time.perf_counter() - started - trajectory.wall_s
     counters = {
         "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
@@ -118,14 +103,18 @@ def simulate(scene, progress=None, start=None):
     return Run(scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters, record, trajectory.end)
 
 
-def simulate_many(scenes, progress=None, threads=1):
+def simulate_many(
+    scenes: Sequence[Source],
+    progress: Callable[[Sequence[Source]], Iterable[Source]] | Literal[False] | None = None,
+    threads: int = 1,
+) -> list[Run]:
     """Run several scenes in one process, which imports, loads kernels and reads tables only once.
 
     Parameters
     ----------
-    scenes : sequence of Scene
-    progress : callable, optional
-        Wraps the sequence of scenes, e.g. ``tqdm.tqdm``.
+    scenes : sequence of Scene, path or dict
+    progress : callable or False, optional
+        Wraps the sequence of scenes, e.g. ``tqdm.tqdm``. Left out: a bar as for :func:`simulate`; False: none.
     threads : int
         Runs at the same time: the compiled part of a run lets other threads work. Results do not depend on it.
 
@@ -133,10 +122,19 @@ def simulate_many(scenes, progress=None, threads=1):
     -------
     list of Run
         As :func:`simulate` gives for each scene alone.
+
+    Examples
+    --------
+    >>> scenes = [load_scene("config/scenes/wheelset.yaml", speed=v, integration__duration=0.05) for v in (20, 30)]
+    >>> [run.scene["speed"] for run in simulate_many(scenes, threads=2)]
+    [20, 30]
     """
+    scenes = list(scenes)
+    quietly = partial(simulate, progress=False)
+    bar = counted if progress is None else progress or iter
     with ThreadPoolExecutor(threads) as pool:
-        runs = pool.map(simulate, scenes) if threads > 1 else map(simulate, scenes)
-        return [run for _, run in zip(scenes if progress is None else progress(scenes), runs, strict=True)]
+        runs = pool.map(quietly, scenes) if threads > 1 else map(quietly, scenes)
+        return [run for _, run in zip(bar(scenes), runs, strict=True)]
 
 
 def output_times(begin, duration, rate):
@@ -150,7 +148,7 @@ def output_times(begin, duration, rate):
 
 def _flat(settings, prefix=""):
     """Nested settings as one level, keys joined by dots."""
-    flat = {}
+    flat: dict[str, Any] = {}
     for key, value in settings.items():
         flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
     return flat
@@ -193,7 +191,7 @@ def _pose_on_track(track, states, body, start):
 
 
 def _body_channels(state, rate, wanted):
-    channels = {}
+    channels: dict[str, np.ndarray] = {}
     if "pose" in wanted:
         roll, _, yaw = angles(state[:, 3:7])
         channels |= {"x_m": state[:, 0], "y_m": state[:, 1], "z_m": state[:, 2], "roll_rad": roll, "yaw_rad": yaw}

@@ -1,0 +1,113 @@
+"""A quick look at one run: any of its channels over time, with units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wrcore.analysis import SIDES
+from wrcore.analysis_vehicle import wheel_forces, wheelsets_of
+from wrcore.channels import UNIT_SUFFIXES, unit_of
+from wrcore.errors import InputError
+from wrcore.figures import styled
+
+if TYPE_CHECKING:
+    from wrcore.run import Run
+
+PRINTED = {
+    "m": (1e3, "mm"), "rad": (1e3, "mrad"), "N": (1e-3, "kN"), "N m": (1.0, "N m"), "J": (1e-3, "kJ"),
+    "W": (1e-3, "kW"), "Pa": (1e-6, "MPa"), "1": (1.0, ""),
+}  # fmt: skip
+"""Factor to the printed unit, and that unit; other units are printed as they are."""
+
+LARGE = ("x_m", "s_m", "z_m")
+"""Channels in m that are printed in m."""
+
+WIDTH, HEIGHT = 7.2, 1.7
+LINE_STYLES: tuple[dict[str, Any], ...] = (
+    {"color": "0.1"}, {"color": "#0072B2", "linestyle": (0, (4, 2))}, {"color": "#E69F00"},
+    {"color": "0.55", "linestyle": ":"},
+)  # fmt: skip
+
+
+@styled
+def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
+    """Draw channels of a run over time, one panel each.
+
+    Parameters
+    ----------
+    run : Run
+    channels : sequence of str
+        ``"<group>.<channel>"``, such as ``"wheelset/left.N_N"``. Empty: lateral position and yaw of all wheelsets, and
+        vertical and lateral force of each wheel where the run has contacts.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        For a channel that the run does not have.
+    """
+    panels = [(channel.rpartition(".")[2], {channel: _values(run, channel)}) for channel in channels] or _overview(run)
+    figure = Figure(figsize=(WIDTH, 0.7 + HEIGHT * len(panels)), layout="constrained")
+    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (quantity, lines) in zip(rows, panels, strict=True):
+        _draw(axes, run, quantity, lines)
+    rows[-1].set_xlabel("time / s")
+    figure.suptitle(f"{run.scene.get('name', 'run')}: {run.status}", x=0.01, ha="left")
+    return figure
+
+
+def _values(run: Run, channel: str) -> np.ndarray:
+    group, _, name = channel.rpartition(".")
+    if name not in run.groups.get(group, {}):
+        known = ", ".join(f"{group}.{name}" for group, names in run.groups.items() for name in names)
+        raise InputError("plot", channel, f"expected a channel of the run: {known}")
+    return run.groups[group][name]
+
+
+def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Panels (quantity, lines by label) that say most about a run with the channels that it has."""
+    panels = []
+    names = wheelsets_of(run) or [name for name, group in run.groups.items() if "y_m" in group]
+    for quantity in ("y_m", "yaw_rad"):
+        lines = {name: run.groups[name][quantity] for name in names if quantity in run.groups[name]}
+        if lines:
+            panels.append((quantity, lines))
+    wheels = {(name, side): wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
+    for at, quantity in enumerate(("Q_N", "Y_N")):
+        if wheels:
+            panels.append((quantity, {f"{name} {side}": forces[at] for (name, side), forces in wheels.items()}))
+    if not panels:
+        first = next(((group, name) for group, names in run.groups.items() for name in names), None)
+        if first is None:
+            raise InputError("plot", "", "expected a run with output channels")
+        panels.append((first[1], {".".join(first): run.groups[first[0]][first[1]]}))
+    return panels
+
+
+def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> None:
+    unit = unit_of(quantity)
+    factor, printed = (1.0, "m") if quantity in LARGE else PRINTED.get(unit, (1.0, unit))
+    for at, (label, values) in enumerate(lines.items()):
+        style = dict(LINE_STYLES[at % len(LINE_STYLES)])
+        if values.ndim > 1:  # a patch may last for a single output
+            style |= {"marker": ".", "markersize": 3}
+        for patch, column in enumerate(np.reshape(values, (len(run.t), -1)).T):
+            if patch == 0 or not np.isnan(column).all():
+                axes.plot(run.t, factor * column, label=label.replace("_", " ") if patch == 0 else None, **style)
+    symbol = quantity
+    if unit != "1":
+        symbol = quantity.removesuffix(next(end for end in UNIT_SUFFIXES if quantity.endswith(end)))
+    symbol = symbol.replace("_", " ")
+    axes.set(ylabel=f"{symbol} / {printed}" if printed else symbol, xmargin=0)
+    if len(lines) > 1:
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    else:
+        axes.set_title(next(iter(lines)).removesuffix(f".{quantity}").replace("_", " "), loc="left")

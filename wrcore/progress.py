@@ -1,0 +1,73 @@
+"""Progress of long work: a bar in a terminal or a notebook, nothing in a log."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from wrcore._jit import cache_root, source_digest
+
+DELAY = 1.0
+"""Work that is done within this time shows no bar, s."""
+
+
+def somebody_watches() -> bool:
+    """Whether a person sees what is printed now: a terminal or a notebook, and not ``WRCORE_PROGRESS=0``."""
+    if os.environ.get("WRCORE_PROGRESS") == "0":
+        return False
+    return sys.stderr.isatty() or _in_notebook()
+
+
+def _in_notebook() -> bool:
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
+@contextmanager
+def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[float], None] | None]:
+    """A bar over simulated time.
+
+    Parameters
+    ----------
+    duration : float
+        s.
+    begin : float
+        Time at which the run begins, s.
+
+    Yields
+    ------
+    callable or None
+        To be called with the time reached, s; None where nobody watches.
+
+    Examples
+    --------
+    >>> with simulated_time(10.0) as advance:
+    ...     if advance:
+    ...         advance(5.0)
+    """
+    if not somebody_watches():
+        yield None
+        return
+    if not any((cache_root() / "kernels" / source_digest()).rglob("*advance_*.nbi")):
+        print("compiling for the first run of this version: about a minute, once", file=sys.stderr)
+    form = "{l_bar}{bar}| {n:.2f}/{total:g} s, {remaining} left"
+    with _tqdm()(total=duration, unit="s", delay=DELAY, bar_format=form, leave=False) as bar:
+        yield lambda t: bar.update(t - begin - bar.n) and None
+
+
+def counted(items, total: int | None = None, unit: str = "run"):
+    """Wrap an iterable in a bar, where somebody watches."""
+    if not somebody_watches():
+        return items
+    return _tqdm()(items, total=total, unit=unit, delay=DELAY)
+
+
+def _tqdm():
+    """The bar of the place: widgets in a notebook that has them, else text."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a notebook without widgets gets the text bar, which needs no remark
+        from tqdm.auto import tqdm
+    return tqdm

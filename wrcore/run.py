@@ -1,0 +1,213 @@
+"""A run: channels by group, how it ended and what it cost, for a person to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wrcore.channels import DESCRIPTIONS, unit_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from wrcore.dynamics.integrate import Checkpoint
+
+
+class Channels(Mapping[str, np.ndarray]):
+    """Channels of one group, as attributes and as items; ``dir`` and completion list them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> wheelset = Channels("wheelset", {"y_m": np.zeros(3)})
+    >>> wheelset.y_m is wheelset["y_m"], list(wheelset)
+    (True, ['y_m'])
+    """
+
+    def __init__(self, group: str, channels: Mapping[str, np.ndarray]) -> None:
+        self._group, self._channels = group, channels
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._channels:
+            raise KeyError(f"no channel {name!r} in {self._group!r}; it has {', '.join(self._channels)}")
+        return self._channels[name]
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):  # what copying and pickling ask for before there are any channels
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self._channels])
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._channels)
+
+    def __repr__(self) -> str:
+        width = max(map(len, self._channels), default=0)
+        rows = [
+            f"  {name:{width}}  {unit_of(name):7} {np.shape(values)}  {DESCRIPTIONS.get(name, '')}".rstrip()
+            for name, values in self._channels.items()
+        ]
+        return "\n".join([f"{self._group}:", *rows])
+
+
+@dataclass(repr=False)
+class Run:
+    """One simulated scene: the channels over time, how it ended and what it cost.
+
+    Parameters
+    ----------
+    scene : dict
+        The resolved scene, made of plain JSON values.
+    status : str
+        ``completed``, ``derailed``, ``stalled`` or ``failed``.
+    reason : str
+        One line on why the run ended where it did; empty for a completed one.
+    t : ndarray, shape (n,)
+        Output times, s.
+    groups : dict of str to dict of str to ndarray
+        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,); a contact's group
+        (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
+        whole model's energies and powers. Names carry the unit.
+    counters : dict
+        Plain numbers: steps, rejected, rhs_evaluations, jacobians, factorisations, wall_s, compile_s and others.
+    settings : dict
+        Flat record of the numerical choices, with the package version.
+    end : Checkpoint or None
+        Where a run of the compiled engine stopped, for one that goes on from there. Not written to files.
+
+    Examples
+    --------
+    ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N.
+
+    >>> import numpy as np
+    >>> run = Run({"name": "still"}, "completed", "", np.array([0.0, 0.5]), {"wheelset": {"y_m": np.zeros(2)}})
+    >>> run
+    Run 'still': completed, 0.5 s, 2 output times; groups: wheelset
+    >>> run["wheelset"].y_m.max()
+    np.float64(0.0)
+    >>> run.to_pandas()["wheelset.y_m"].tolist()
+    [0.0, 0.0]
+    """
+
+    scene: dict[str, Any]
+    status: str
+    reason: str
+    t: np.ndarray
+    groups: dict[str, dict[str, np.ndarray]]
+    counters: dict[str, Any] = field(default_factory=dict)
+    settings: dict[str, Any] = field(default_factory=dict)
+    end: Checkpoint | None = None
+
+    def __getitem__(self, group: str) -> Channels:
+        """Channels of one group as attributes; KeyError names the groups that exist."""
+        if group not in self.groups:
+            raise KeyError(f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}")
+        return Channels(group, self.groups[group])
+
+    def __contains__(self, group: object) -> bool:
+        return group in self.groups
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.groups)
+
+    def __len__(self) -> int:
+        return len(self.groups)
+
+    def keys(self) -> list[str]:
+        """Names of the groups."""
+        return list(self.groups)
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.keys()
+
+    def __repr__(self) -> str:
+        reached = f"{self.t[-1] - self.t[0]:g} s, {len(self.t)} output times" if len(self.t) else "nothing simulated"
+        cost = f" in {self.counters['wall_s']:.2g} s" if "wall_s" in self.counters else ""
+        ended = f"{self.status} ({self.reason})" if self.reason else self.status
+        return f"Run {self.scene.get('name', '')!r}: {ended}, {reached}{cost}; groups: {', '.join(self.groups)}"
+
+    def to_pandas(self, tidy: bool = False) -> pd.DataFrame:
+        """All channels as one table.
+
+        Parameters
+        ----------
+        tidy : bool
+            False: a row per output time (index ``t_s``), a column per channel, named ``wheelset.y_m``, and
+            ``wheelset/left.N_N.0`` for patch 0 of a wheel. True: a row per value with columns ``t_s``, ``group``,
+            ``channel``, ``patch`` (0 but for contacts), ``value`` and ``unit``, without those that are absent.
+
+        Returns
+        -------
+        pandas.DataFrame
+            SI units, as the names say. Patches that never occur in the run are left out.
+        """
+        import pandas as pd
+
+        columns = dict(self._columns())
+        wide = {".".join(map(str, (group, name, *patch))): values for (group, name, *patch), values in columns.items()}
+        if not tidy:
+            return pd.DataFrame(wide, index=pd.Index(self.t, name="t_s"))
+        parts = [
+            pd.DataFrame({
+                "t_s": self.t, "group": group, "channel": name, "patch": patch[0] if patch else 0, "value": values,
+                "unit": unit_of(name),
+            })
+            for (group, name, *patch), values in columns.items()
+        ]  # fmt: skip
+        return pd.concat(parts, ignore_index=True).dropna(subset="value", ignore_index=True)
+
+    def _columns(self) -> Iterator[tuple[tuple[Any, ...], np.ndarray]]:
+        """Channels one by one, those of contacts patch by patch."""
+        for group, channels in self.groups.items():
+            for name, values in channels.items():
+                if values.ndim == 1:
+                    yield (group, name), values
+                else:
+                    for patch, column in enumerate(values.T):
+                        if patch == 0 or not np.isnan(column).all():
+                            yield (group, name, patch), column
+
+    def plot(self, *channels: str) -> Figure:
+        """Draw the run over time.
+
+        Parameters
+        ----------
+        *channels : str
+            Such as ``"wheelset.yaw_rad"`` or ``"wheelset/left.N_N"``, a panel each. Without any: lateral position and
+            yaw of the wheelsets and, if the run has contacts, the vertical and the lateral force of each wheel.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Shown by a notebook; ``figure.savefig("run.png")`` writes it.
+
+        Raises
+        ------
+        InputError
+            For a channel that the run does not have.
+        """
+        from wrcore.figures_run import plot_run
+
+        return plot_run(self, channels)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the run to a file (HDF5), for :func:`wrcore.results.load_run`."""
+        from wrcore.results import write_run
+
+        write_run(path, self)
