@@ -6,7 +6,7 @@ import copy
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -34,6 +34,7 @@ from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track, rotation
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
+from wrcore.vehicle.train import repeated_equilibrium, train_of
 
 LARGEST_REST = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
@@ -130,6 +131,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     data = validate(data, "scene", source)
     parameters = _find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
+    vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
     wheel = _profile(data, "wheel", folder, source, 0.0)
     rail = _profile(data, "rail", folder, source, _ratio(data["rail"]["inclination"], source, "rail.inclination"))
     if "table" in data["contact"]["creep"]:
@@ -219,7 +221,9 @@ def _creep(scene, progress):
     return creep_data(nu, table.kernel_data())
 
 
-def compile_scene(scene: Scene, progress: Callable | None = None) -> tuple[Model, np.ndarray]:
+def compile_scene(
+    scene: Scene, progress: Callable | None = None, shared: dict[Any, Any] | None = None
+) -> tuple[Model, np.ndarray]:
     """Turn a scene into what kernels need.
 
     Parameters
@@ -227,6 +231,9 @@ def compile_scene(scene: Scene, progress: Callable | None = None) -> tuple[Model
     scene : Scene
     progress : callable, optional
         Wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``.
+    shared : dict, optional
+        Keeps what does not change from one scene to the next (contact geometry, creep table, static equilibrium); hand
+        the same one over for each scene of a series. It knows vehicles, profiles and tracks by their identity.
 
     Returns
     -------
@@ -234,14 +241,18 @@ def compile_scene(scene: Scene, progress: Callable | None = None) -> tuple[Model
     state : numpy.ndarray, shape (13 n,)
         Initial state: wheelsets at rest on the rails vertically and in roll, rolling forward without slip.
     """
+    shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
     model = Model(
         vehicle.bodies,
         ContactModel(
-            contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance),
-            hertz_table(), LAWS[contact["creep"]["model"]], _creep(scene, progress),
+            _once(shared, "geometry", _parts(scene), lambda: contact_geometry(
+                scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
+            )),
+            hertz_table(), LAWS[contact["creep"]["model"]],
+            _once(shared, "creep", (_text(contact["creep"]), material["poisson_ratio"]), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]), REDUCTIONS[contact["patch"]],
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
@@ -251,118 +262,36 @@ def compile_scene(scene: Scene, progress: Callable | None = None) -> tuple[Model
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
-    return model, initial_state(scene, model)
+    decisive = {**contact, "friction": None, "creep": None, "detection_tolerance": None}
+    key = (_parts(scene), _text(decisive), _text(integration["baumgarte"]))
+    standing = _once(shared, "equilibrium", key, lambda: static_equilibrium(scene, model))
+    return model, initial_state(scene, model, standing)
 
 
-def static_equilibrium(scene, model):
-    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-
-    Returns
-    -------
-    Equilibrium
-        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
-
-    Raises
-    ------
-    InputError
-        If there is none near the nominal position.
-    """
-    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
-    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
-    level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity), contact=contact)
-    state = np.zeros(state_size(model))
-    for body, position in enumerate(vehicle.positions):
-        at = STATE_SIZE * body
-        state[at : at + 8] = *position, 1.0, 0.0, 0.0, 0.0, model.speed
-        if body in wheelsets:
-            load = vehicle.nominal_wheel_load(body)
-            if load <= 0.0:
-                raise InputError(
-                    scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
-                )
-            state[at + 2] = _settled(scene, model, 0.0, 0.0, load)[1]
-    equilibrium = solve_equilibrium(level, state)
-    if not equilibrium.residual < LARGEST_REST or np.any(equilibrium.wheel_loads <= 0.0):
-        raise InputError(
-            scene.source, "vehicle", "expected a vehicle that rests on its wheels near its nominal position, got"
-            f" accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel load of"
-            f" {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
-        )  # fmt: skip
-    for body in wheelsets:
-        part = equilibrium.state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        roll, _, yaw = angles(part[3:7])
-        part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
-    return equilibrium
+def _once(shared, name, key, make):
+    """The part of a name that was made for a key before, or is made now."""
+    if (name, key) not in shared:
+        shared[name, key] = make()
+    return shared[name, key]
 
 
-def _rolling(scene, model, y, z, roll, yaw):
-    """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
-    detection = "planar" if scene.detection == "planar" else "spatial"
-    patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
-    radius = np.mean([z - patch.z_m for patch in patches])
-    return rotation(roll, yaw)[:, 1] * model.speed / radius
+def _parts(scene):
+    """What a scene is made of, by identity."""
+    return tuple(_Same(part) for part in (scene.vehicle, scene.wheel, scene.rail, scene.track))
 
 
-def _settled(scene, model, y, yaw, load):
-    """Roll and height of a wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
-    contact = model.contact
-    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
-    roll, z = settle(
-        contact.geometry, contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
-        scene.vehicle.rolling_radius,
-    )  # fmt: skip
-    if not math.isfinite(z):
-        raise InputError(
-            scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
-            f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
-        )  # fmt: skip
-    return roll, z
+@dataclass(frozen=True, eq=False)
+class _Same:
+    """A key that is equal for the same object only, and keeps it alive."""
+
+    part: object
+
+    def __eq__(self, other):
+        return self.part is other.part
+
+    def __hash__(self):
+        return id(self.part)
 
 
-def initial_state(scene, model):
-    """State at the start: static equilibrium, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
-
-    Wheelsets keep their static loads: height and roll are those at which each wheel carries half of its wheelset's.
-    They stand on the rails where these are out of line, too, and axle boxes stay on their axles.
-    """
-    vehicle, data = scene.vehicle, scene.data
-    equilibrium = static_equilibrium(scene, model)
-    y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
-    state = equilibrium.state.copy()
-    for k, body in enumerate(vehicle.bodies.wheelsets):
-        if y or yaw:
-            part, load = state[STATE_SIZE * body : STATE_SIZE * (body + 1)], float(np.mean(equilibrium.wheel_loads[k]))
-            roll, z = _settled(scene, model, y, yaw, load)
-            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
-            part[10:13] = _rolling(scene, model, y, z, roll, yaw)
-    stand_on_rails(model, state, equilibrium.wheel_loads)
-    parts = {name: state[STATE_SIZE * b : STATE_SIZE * (b + 1)] for b, name in enumerate(vehicle.body_names)}
-    places = dict(zip(parts, vehicle.positions, strict=True))
-    for name, part in parts.items():
-        described = vehicle.data["bodies"][name]
-        if described["kind"] == "axle_box":
-            axle = parts[described["wheelset"]]
-            part[:3] = axle[:3] + matrix_of(axle[3:7]) @ (places[name] - places[described["wheelset"]])
-            part[3:7] = axle[3:7]
-        elif described["kind"] == "body":
-            part[1] += y
-    if not model.track.tangent:
-        for part, (s, _, _) in zip(parts.values(), vehicle.positions, strict=True):
-            part[:] = _on_path(model.track.path, s, part)
-    return state
-
-
-def _on_path(path, s, part):
-    """State of one body at arc length s of the path, from its state at the same place of a tangent track along x."""
-    frame = np.empty((3, 3))
-    station = track_frame(path, s, frame)
-    turn = frame @ np.array(frame_turn(station)) * part[7]  # the frame's own turn along the path
-    arm = frame @ np.array([part[0] - s, part[1], part[2]])
-    position = np.array([station.x, station.y, station.z]) + arm
-    velocity = frame @ part[7:10] + np.cross(turn, arm)
-    return np.concatenate([position, euler_of(frame @ matrix_of(part[3:7])), velocity, frame @ part[10:13] + turn])
+def _text(value):
+    return json.dumps(value, sort_keys=True)

@@ -47,6 +47,8 @@ class Vehicle:
     joints : Joints
     data : dict
         The file's content with defaults, for provenance.
+    unit : Vehicle or None
+        The vehicle that a train repeats.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Vehicle:
     elements: Elements
     joints: Joints
     data: dict
+    unit: "Vehicle | None" = None
 
     @property
     def wheelset_names(self):
@@ -110,6 +113,11 @@ def build_vehicle(data, source, axle_boxes=True):
         check_element(item, source)
     if not axle_boxes:
         data = {**data, "bodies": _lumped(data["bodies"])}
+    return compile_vehicle(data, source)
+
+
+def compile_vehicle(data, source):
+    """Bodies, elements and joints of a checked description."""
     layout = _layout(data, source)
     parts = [data["bodies"][name] for name in layout.names]
     wheelsets = np.flatnonzero(layout.spins)

@@ -1,0 +1,106 @@
+"""Trains: one vehicle several times, one behind the other."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.errors import InputError
+from wrcore.vehicle.description import compile_vehicle
+from wrcore.vehicle.layout import FRAME_NAME
+
+
+def train_of(vehicle, count, spacing, source):
+    """Several equal vehicles, not coupled to one another; what acts between one and the moving frame does so for each.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    count : int
+    spacing : float or None
+        Distance from one vehicle to the next one behind it, m.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Vehicle
+        The vehicle itself for one; else the names of bodies, elements and joints begin with ``vehicle_1_`` (the leading
+        one), ``vehicle_2_``, and so on.
+
+    Raises
+    ------
+    InputError
+        Without a spacing, or for one in which vehicles overlap.
+    """
+    if count == 1:
+        return vehicle
+    if spacing is None:
+        raise InputError(source, "vehicle.spacing", f"expected a distance in m, as vehicle.count is {count}")
+    length = float(np.ptp(vehicle.positions[:, 0]))
+    if spacing <= length:
+        expected = f"expected more than the {length:g} m between the outermost bodies of a vehicle, got {spacing:g}"
+        raise InputError(source, "vehicle.spacing", expected)
+    return replace(compile_vehicle(repeated(vehicle.data, count, spacing), vehicle.source_file), unit=vehicle)
+
+
+def repeated(data, count, spacing):
+    """The content of a vehicle file for a train.
+
+    Parameters
+    ----------
+    data : dict
+        Content of a vehicle file, checked and with defaults.
+    count : int
+    spacing : float
+        m.
+
+    Returns
+    -------
+    dict
+    """
+    train = {**data, "bodies": {}, "elements": [], "joints": []}
+    for k in range(count):
+        prefix, shift = f"vehicle_{k + 1}_", -k * spacing
+        for name, part in data["bodies"].items():
+            moved = {**part, "position": _moved(part["position"], shift)}
+            if "wheelset" in part:
+                moved["wheelset"] = prefix + part["wheelset"]
+            train["bodies"][prefix + name] = moved
+        for group in ("elements", "joints"):
+            for item in data[group]:
+                ends = [end if end == FRAME_NAME else prefix + end for end in item["bodies"]]
+                moved = {**item, "name": prefix + item["name"], "bodies": ends}
+                if "at" in item:
+                    moved["at"] = _moved(item["at"], shift)
+                train[group].append(moved)
+    return train
+
+
+def repeated_equilibrium(equilibrium, train):
+    """Static equilibrium of a train from that of one of its vehicles.
+
+    Parameters
+    ----------
+    equilibrium : Equilibrium
+        Of ``train.unit``.
+    train : Vehicle
+
+    Returns
+    -------
+    Equilibrium
+    """
+    bodies = len(train.unit.body_names)
+    count = len(train.body_names) // bodies
+    end = STATE_SIZE * bodies
+    state = np.concatenate([np.tile(equilibrium.state[:end], count), np.tile(equilibrium.state[end:], count)])
+    shifts = np.repeat(train.positions[::bodies, 0] - train.positions[0, 0], bodies)
+    state[0 : count * end : STATE_SIZE] += shifts
+    return replace(equilibrium, state=state, wheel_loads=np.tile(equilibrium.wheel_loads, (count, 1)))
+
+
+def _moved(at, shift):
+    """A point, or a list of points, moved along the track."""
+    if isinstance(at[0], list):
+        return [_moved(point, shift) for point in at]
+    return [at[0] + shift, *at[1:]]
