@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -15,29 +14,24 @@ from typing import Any
 import numpy as np
 
 from wrcore.checked_yaml import parse_value, read_yaml, validate
-from wrcore.contact.detection import DETECTIONS, detect
+from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.geometry import contact_geometry
-from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.normal import hertz_table
 from wrcore.contact.reduction import REDUCTIONS
-from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table, load_table
-from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
-from wrcore.dynamics.equilibrium import FRICTIONLESS, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Model, state_size
+from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
-from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track, build_track, rotation
+from wrcore.geometry.track import Track, build_track
+from wrcore.initial import initial_state, rest
+from wrcore.initial import static_equilibrium as static_equilibrium
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
-from wrcore.vehicle.train import repeated_equilibrium, train_of
-
-LARGEST_REST = 1e-6 * GRAVITY
-"""A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
+from wrcore.vehicle.train import train_of
 
 POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
@@ -252,7 +246,7 @@ def compile_scene(
                 scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
             )),
             hertz_table(), LAWS[contact["creep"]["model"]],
-            _once(shared, "creep", (_text(contact["creep"]), material["poisson_ratio"]), lambda: _creep(scene, progress)),
+            _once(shared, "creep", _text([contact["creep"], material]), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]), REDUCTIONS[contact["patch"]],
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
@@ -262,10 +256,9 @@ def compile_scene(
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
-    decisive = {**contact, "friction": None, "creep": None, "detection_tolerance": None}
-    key = (_parts(scene), _text(decisive), _text(integration["baumgarte"]))
-    standing = _once(shared, "equilibrium", key, lambda: static_equilibrium(scene, model))
-    return model, initial_state(scene, model, standing)
+    key = (_parts(scene), _text({**contact, "friction": None, "creep": None}), _text(integration["baumgarte"]))
+    at_rest = _once(shared, "rest", key, lambda: rest(scene, model))
+    return model, initial_state(scene, model, at_rest)
 
 
 def _once(shared, name, key, make):

@@ -73,7 +73,7 @@ def sources(*rooms):
     return files
 
 
-SCENE = ("vehicle", "schemas", "checked_yaml", "scene")
+SCENE = ("vehicle", "schemas", "checked_yaml", "initial", "scene")
 CORE = {
     "creep": sources("creep"),
     "creep_study": sources("creep", "analysis_creep"),

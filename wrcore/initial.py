@@ -1,0 +1,183 @@
+"""Where a vehicle begins: in static equilibrium on the rails, moved as the scene says, rolling without slip."""
+
+import dataclasses
+import math
+
+import numpy as np
+
+from wrcore.contact.detection import detect
+from wrcore.contact.normal import contact_modulus
+from wrcore.contact.statics import settle
+from wrcore.creep.laws import LAWS
+from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
+from wrcore.dynamics.equilibrium import FRICTIONLESS, solve_equilibrium, stand_on_rails
+from wrcore.dynamics.system import state_size
+from wrcore.dynamics.track import TrackModel
+from wrcore.errors import InputError
+from wrcore.geometry.path import frame_turn, track_frame
+from wrcore.geometry.track import rotation
+from wrcore.vehicle.description import GRAVITY
+from wrcore.vehicle.train import repeated_equilibrium
+
+LARGEST_REST = 1e-6 * GRAVITY
+"""A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
+
+REST_SPEED = 20.0
+"""Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
+
+
+def rest(scene, model):
+    """Where the bodies of a scene's vehicle stand in static equilibrium; speed and friction do not matter for it.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+
+    Returns
+    -------
+    Equilibrium
+        Velocities are those of a common motion ahead, without rotation.
+
+    Raises
+    ------
+    InputError
+        If there is none near the nominal position.
+    """
+    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
+    unit = vehicle.unit
+    if unit is not None:
+        alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
+        return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    track = TrackModel(True, model.track.path, model.track.irregularity)
+    level = model._replace(track=track, contact=contact, speed=REST_SPEED)
+    state = np.zeros(state_size(model))
+    for body, position in enumerate(vehicle.positions):
+        at = STATE_SIZE * body
+        state[at : at + 8] = *position, 1.0, 0.0, 0.0, 0.0, REST_SPEED
+        if body in wheelsets:
+            load = vehicle.nominal_wheel_load(body)
+            if load <= 0.0:
+                raise InputError(
+                    scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
+                )
+            state[at + 2] = _settled(scene, model, 0.0, 0.0, load)[1]
+    equilibrium = solve_equilibrium(level, state)
+    if not equilibrium.residual < LARGEST_REST or np.any(equilibrium.wheel_loads <= 0.0):
+        raise InputError(
+            scene.source, "vehicle", "expected a vehicle that rests on its wheels near its nominal position, got"
+            f" accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel load of"
+            f" {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
+        )  # fmt: skip
+    return equilibrium
+
+
+def static_equilibrium(scene, model, at_rest=None):
+    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+    at_rest : Equilibrium, optional
+        Of the same vehicle, from :func:`rest`.
+
+    Returns
+    -------
+    Equilibrium
+        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
+
+    Raises
+    ------
+    InputError
+        If there is none near the nominal position.
+    """
+    at_rest = at_rest or rest(scene, model)
+    state = at_rest.state.copy()
+    for body in range(len(model.bodies.mass)):
+        state[STATE_SIZE * body + 7] = model.speed
+    for body in scene.vehicle.bodies.wheelsets:
+        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        roll, _, yaw = angles(part[3:7])
+        part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
+    return dataclasses.replace(at_rest, state=state)
+
+
+def _rolling(scene, model, y, z, roll, yaw):
+    """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
+    detection = "planar" if scene.detection == "planar" else "spatial"
+    patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
+    radius = np.mean([z - patch.z_m for patch in patches])
+    return rotation(roll, yaw)[:, 1] * model.speed / radius
+
+
+def _settled(scene, model, y, yaw, load):
+    """Roll and height of a wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
+    contact = model.contact
+    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
+    roll, z = settle(
+        contact.geometry, contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
+        scene.vehicle.rolling_radius,
+    )  # fmt: skip
+    if not math.isfinite(z):
+        raise InputError(
+            scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
+            f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
+        )  # fmt: skip
+    return roll, z
+
+
+def initial_state(scene, model, at_rest=None):
+    """State at the start: static equilibrium, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
+
+    Wheelsets keep their static loads: height and roll are those at which each wheel carries half of its wheelset's.
+    They stand on the rails where these are out of line, too, and axle boxes stay on their axles.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+    at_rest : Equilibrium, optional
+        Of the same vehicle, from :func:`rest`.
+
+    Returns
+    -------
+    numpy.ndarray, shape (13 n + states,)
+    """
+    vehicle, data = scene.vehicle, scene.data
+    equilibrium = static_equilibrium(scene, model, at_rest)
+    y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
+    state = equilibrium.state.copy()
+    for k, body in enumerate(vehicle.bodies.wheelsets):
+        if y or yaw:
+            part, load = state[STATE_SIZE * body : STATE_SIZE * (body + 1)], float(np.mean(equilibrium.wheel_loads[k]))
+            roll, z = _settled(scene, model, y, yaw, load)
+            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
+            part[10:13] = _rolling(scene, model, y, z, roll, yaw)
+    stand_on_rails(model, state, equilibrium.wheel_loads)
+    parts = {name: state[STATE_SIZE * b : STATE_SIZE * (b + 1)] for b, name in enumerate(vehicle.body_names)}
+    places = dict(zip(parts, vehicle.positions, strict=True))
+    for name, part in parts.items():
+        described = vehicle.data["bodies"][name]
+        if described["kind"] == "axle_box":
+            axle = parts[described["wheelset"]]
+            part[:3] = axle[:3] + matrix_of(axle[3:7]) @ (places[name] - places[described["wheelset"]])
+            part[3:7] = axle[3:7]
+        elif described["kind"] == "body":
+            part[1] += y
+    if not model.track.tangent:
+        for part, (s, _, _) in zip(parts.values(), vehicle.positions, strict=True):
+            part[:] = _on_path(model.track.path, s, part)
+    return state
+
+
+def _on_path(path, s, part):
+    """State of one body at arc length s of the path, from its state at the same place of a tangent track along x."""
+    frame = np.empty((3, 3))
+    station = track_frame(path, s, frame)
+    turn = frame @ np.array(frame_turn(station)) * part[7]  # the frame's own turn along the path
+    arm = frame @ np.array([part[0] - s, part[1], part[2]])
+    position = np.array([station.x, station.y, station.z]) + arm
+    velocity = frame @ part[7:10] + np.cross(turn, arm)
+    return np.concatenate([position, euler_of(frame @ matrix_of(part[3:7])), velocity, frame @ part[10:13] + turn])
