@@ -16,6 +16,10 @@ MERGE = "tag:yaml.org,2002:merge"
 """``<<: *anchor`` takes over the keys of another mapping; those written beside it win."""
 
 
+MOST_VALUES, DEEPEST = 200_000, 50
+"""A document with more values, or nested deeper, is none that a person wrote."""
+
+
 class _Loader(yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader):
     """Safe loader that refuses repeated keys and reads 1e-6 as a number."""
 
@@ -58,7 +62,7 @@ def read_yaml(path):
         raise InputError(path, "", f"expected a readable file: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "expected a UTF-8 text file") from None
-    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as error:
+    except Exception as error:  # besides its own errors, PyYAML lets through whatever its constructors stumble over
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1}" if mark else ""
         raise InputError(path, where, f"expected YAML: {getattr(error, 'problem', None) or error}") from None
@@ -71,8 +75,27 @@ def parse_value(text):
     """One value as written on a command line (``--set key=value``), by YAML's rules."""
     try:
         return yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError:
+    except Exception:  # as in read_yaml
         return text
+
+
+def parse_ratio(value):
+    """A number, or a ratio of two such as '1/40'.
+
+    Parameters
+    ----------
+    value : str, int or float
+
+    Returns
+    -------
+    float
+        NaN where the value is no such thing.
+    """
+    numerator, slash, denominator = str(value).partition("/")
+    try:
+        return float(numerator) / (float(denominator) if slash else 1.0)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return math.nan
 
 
 @cache
@@ -105,8 +128,7 @@ def validate(data, schema_name, source):
         One line that names the field and what was expected.
     """
     schema = _schema(schema_name)
-    data = copy.deepcopy(data)
-    _refuse_non_finite(data, source, "")
+    data = plain_tree(data, source)
     errors = sorted(jsonschema.Draft202012Validator(schema).iter_errors(data), key=lambda e: (len(e.path), str(e.path)))
     if errors:
         field, expected = _explain(errors[0], schema)
@@ -115,12 +137,64 @@ def validate(data, schema_name, source):
     return data
 
 
-def _refuse_non_finite(value, source, field):
-    if isinstance(value, float) and not math.isfinite(value):
-        raise InputError(source, field, f"expected a finite number, got {value}")
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, item in items:
-        _refuse_non_finite(item, source, f"{field}.{key}".lstrip("."))
+def plain_tree(data, source):
+    """A copy of nested data that holds nothing but what JSON knows.
+
+    Parameters
+    ----------
+    data : dict
+        As YAML or a caller gives it.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        For keys that are no text, dates, bytes, sets, numbers that are not finite or too large, text that is no
+        Unicode, data that contain themselves, and data that aliases blow up beyond `MOST_VALUES`.
+    """
+    left = MOST_VALUES
+
+    def copied(value, path, above):
+        nonlocal left
+        left -= 1
+        if isinstance(value, dict | list | tuple):
+            if left < 0 or id(value) in above or len(above) > DEEPEST:
+                expected = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and none inside itself"
+                raise InputError(source, ".".join(path[:3]), expected)
+            above = {*above, id(value)}
+        if isinstance(value, list | tuple):
+            return [copied(item, (*path, str(k)), above) for k, item in enumerate(value)]
+        if isinstance(value, dict):
+            for key in value:
+                if not isinstance(key, str):
+                    raise InputError(source, ".".join(path), f"expected keys that are text, got {_short(key)}")
+                copied(key, path, above)
+            return {key: copied(item, (*path, key), above) for key, item in value.items()}
+        fault = _fault(value)
+        if fault:
+            raise InputError(source, ".".join(path), fault)
+        return value
+
+    return copied(data, (), frozenset())
+
+
+def _fault(value):
+    """What is wrong with a single value; empty if JSON knows it."""
+    if isinstance(value, bool) or value is None:
+        return ""
+    if isinstance(value, int):
+        return "" if abs(value) < 2**63 else "expected a number of at most 18 digits, got a longer one"
+    if isinstance(value, float):
+        return "" if math.isfinite(value) else f"expected a finite number, got {value}"
+    if isinstance(value, str):
+        bad = [c for c in value if c == "\0" or "\ud800" <= c <= "\udfff"]
+        return f"expected text, got the character {bad[0]!a}" if bad else ""
+    return f"expected text, a number, a list or a mapping, got {_short(value)}"
 
 
 def _explain(error, schema):

@@ -8,7 +8,6 @@ import argparse
 import json
 import os
 import sys
-from fractions import Fraction
 from pathlib import Path
 
 from wrcore import __version__
@@ -38,6 +37,9 @@ def main(arguments=None):
         return options.run(options)
     except InputError as error:
         print(f"wrcore: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:  # a disk that fills up, a file that goes away
+        print(f"wrcore: {InputError(error.filename or '', '', error.strerror or error)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("wrcore: interrupted", file=sys.stderr)
@@ -139,11 +141,14 @@ def _positive(value, option):
 
 def _output(path):
     """Refuse an output path that cannot be written before any work starts."""
-    folder = Path(path).resolve().parent
-    if not folder.is_dir():
-        raise InputError("--out", str(path), "expected a file in an existing folder")
-    if not os.access(folder, os.W_OK):
-        raise InputError("--out", str(path), "expected a folder that can be written to")
+    if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or os.path.isdir(path):
+        raise InputError("--out", path, "expected a file in an existing folder")
+    part = f"{path}.part{os.getpid()}"  # permissions do not tell whether a disk is full or a name is too long
+    try:
+        open(part, "xb").close()
+        os.unlink(part)
+    except OSError as error:
+        raise InputError("--out", path, f"expected a file that can be written: {error.strerror}") from None
     return Path(path)
 
 
@@ -260,17 +265,19 @@ def _profile(options, spec, kind):
     """A profile of `conicity`; ``--unit`` applies to files, not to names."""
     from wrcore.geometry.standards import named_profile
 
-    if options.unit and Path(spec).is_file() and Path(spec).suffix.lower() not in (".prw", ".prr"):
+    if options.unit and os.path.isfile(spec) and Path(spec).suffix.lower() not in (".prw", ".prr"):
         spec = {"points": spec, "unit": options.unit}
     return named_profile(spec, kind, _ratio(options.inclination))
 
 
 def _ratio(text):
     """A ratio such as 1/40."""
-    try:
-        return float(Fraction(text))
-    except (ValueError, ZeroDivisionError):
-        raise InputError("wrcore", "--inclination", f"expected a ratio such as 1/40, got {text!r}") from None
+    from wrcore.checked_yaml import parse_ratio
+
+    ratio = parse_ratio(text)
+    if not abs(ratio) <= 0.2:
+        raise InputError("wrcore", "--inclination", f"expected a ratio such as 1/40, within 1/5, got {text!r}")
+    return ratio
 
 
 def _creep(options):

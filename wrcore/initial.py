@@ -26,6 +26,7 @@ REST_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
 
 
+@np.errstate(all="ignore")  # what overflows is no equilibrium
 def rest(scene, model):
     """Where the bodies of a scene's vehicle stand in static equilibrium; speed and friction do not matter for it.
 
@@ -63,12 +64,15 @@ def rest(scene, model):
                     scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 )
             state[at + 2] = _settled(scene, model, 0.0, 0.0, load)[1]
-    equilibrium = solve_equilibrium(level, state)
-    if not equilibrium.residual < LARGEST_REST or np.any(equilibrium.wheel_loads <= 0.0):
+    expected = "expected a vehicle that rests on its wheels near its nominal position, got"
+    try:
+        equilibrium = solve_equilibrium(level, state)
+    except np.linalg.LinAlgError as error:
+        raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
+    if not (equilibrium.residual < LARGEST_REST and np.all(equilibrium.wheel_loads > 0.0)):
         raise InputError(
-            scene.source, "vehicle", "expected a vehicle that rests on its wheels near its nominal position, got"
-            f" accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel load of"
-            f" {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
+            scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
+            f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
         )  # fmt: skip
     return equilibrium
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import copy
 import json
+import math
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wrcore.checked_yaml import parse_value, read_yaml, validate
+from wrcore.checked_yaml import parse_ratio, parse_value, plain_tree, read_yaml, validate
 from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import hertz_table
@@ -109,7 +110,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     if isinstance(scene, Scene):
         source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
     elif isinstance(scene, Mapping):
-        source, folder, data = "scene", Path("."), json.loads(json.dumps(scene))
+        source, folder, data = "scene", Path("."), plain_tree(dict(scene), "scene")
     else:
         source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
     if isinstance(overrides, Mapping):
@@ -166,17 +167,16 @@ def _set(data, key, value, source):
 def _find(path, folder, source, field):
     """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
     for base in (folder, folder.parent, Path()):
-        if (base / path).is_file():
+        if os.path.isfile(base / path):  # Path.is_file raises where a name is too long or a folder is closed
             return base / path
     raise InputError(source, field, f"expected an existing file, got {path!r}")
 
 
 def _ratio(value, source, field):
     """Inclination as a ratio: a number or a fraction such as '1/40'."""
-    try:
-        ratio = float(Fraction(value)) if isinstance(value, str) else float(value)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}") from None
+    ratio = parse_ratio(value)
+    if math.isnan(ratio):
+        raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}")
     if abs(ratio) > 0.2:
         raise InputError(source, field, f"expected a ratio within 1/5, got {value!r}")
     return ratio

@@ -235,6 +235,8 @@ def _joints(joints, layout, source):
             if len(at) != (2 if item["kind"] == "rigid_link" else 1):
                 raise InputError(source, f"{field}.at", "expected two points for a rigid link, one for other joints")
             length = float(np.linalg.norm(at[0] - at[-1]))
+            if item["kind"] == "rigid_link" and length < 1e-3:
+                raise InputError(source, f"{field}.at", "expected two points at least 1 mm apart")
             markers = [layout.marker(point, body, field) for point, body in zip(at[[0, -1]], bodies, strict=True)]
         axis = "xyz".index(item.get("axis", "x"))
         items.append(Joint(item["name"], item["kind"], tuple(bodies), np.array(markers), axis, length))

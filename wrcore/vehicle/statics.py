@@ -24,6 +24,7 @@ SPRINGS = ("spring_damper", "shear_spring")
 """Kinds that take a preload by themselves."""
 
 
+@np.errstate(all="ignore")  # numbers that overflow carry nothing
 def preloads(items, layout, joints, gravity):
     """Vertical preloads of the springs that state none, such that the vehicle rests in nominal position.
 
@@ -66,7 +67,7 @@ def preloads(items, layout, joints, gravity):
     left = _solve(free, constraints, weight, fixed)[1]
     for body, name in enumerate(layout.names):
         part = slice(6 * body, 6 * body + 6)
-        if np.max(np.abs(left[part])) > UNCARRIED * -weight[6 * body + 2]:
+        if not np.max(np.abs(left[part])) <= UNCARRIED * -weight[6 * body + 2]:
             expected = "expected springs or joints that carry the body in nominal position; a force or moment of"
             got = f"{np.max(np.abs(left[part])):.4g} N or N m is left of its weight"
             raise InputError(layout.source, f"bodies.{name}", f"{expected} {got}")
@@ -83,7 +84,10 @@ def _solve(stiffness, constraints, load, fixed):
     right = np.concatenate([load[columns], np.zeros(len(rows))])
     if not columns.size:
         return np.zeros(n), np.zeros(n)
-    solved = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    try:
+        solved = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    except np.linalg.LinAlgError:
+        solved = np.full(len(right), np.nan)
     displacement, left = np.zeros(n), np.zeros(n)
     displacement[columns] = solved[: len(columns)]
     left[columns] = (right - matrix @ solved)[: len(columns)]
