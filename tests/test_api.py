@@ -15,7 +15,7 @@ from synthetic import hunting_run
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
 
-DOCUMENTED = ("channels", "progress", "results", "run", "scene", "simulate")
+DOCUMENTED = ("channels", "progress", "results", "run", "scene", "simulate", "sweep_batch", "sweep_plan")
 """Modules with runnable examples; each must have some."""
 
 

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from wrcore.scene import load_scene as load_scene
     from wrcore.simulate import simulate as simulate
     from wrcore.simulate import simulate_many as simulate_many
+    from wrcore.sweep_batch import run_sweep as run_sweep
+    from wrcore.sweep_plan import load_sweep as load_sweep
 
 __version__ = "0.1.0"
 
@@ -47,7 +49,9 @@ _PUBLIC = {
     "load_run": "wrcore.results",
     "load_runs": "wrcore.results",
     "load_scene": "wrcore.scene",
+    "load_sweep": "wrcore.sweep_plan",
     "named_profile": "wrcore.geometry.standards",
+    "run_sweep": "wrcore.sweep_batch",
     "simulate": "wrcore.simulate",
     "simulate_many": "wrcore.simulate",
     "write_run": "wrcore.results",

@@ -1,4 +1,4 @@
-"""Command line: ``wrcore simulate | contact | conicity | creep | table | profiles``.
+"""Command line: ``wrcore simulate | sweep | contact | conicity | creep | table | profiles``.
 
 Exit status 0 only when the result was produced; 2 for bad input, with one line that names the file, the field and
 what was expected.
@@ -51,6 +51,7 @@ def _parser():
     parser.add_argument("--version", action="version", version=f"wrcore {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
+    _add_sweep(commands)
     _add_contact(commands)
     _add_conicity(commands)
     _add_creep(commands)
@@ -70,6 +71,16 @@ def _add_simulate(commands):
         "--accuracy", type=float, metavar="m", help="choose the fastest model and integrator with this error of y (rms)"
     )
     command.set_defaults(run=_simulate)
+
+
+def _add_sweep(commands):
+    command = commands.add_parser("sweep", help="run a scene many times with other values of its keys")
+    command.add_argument("sweep", metavar="SWEEP.yaml")
+    command.add_argument("--out", required=True, metavar="table.csv|table.h5", help="a row per run")
+    command.add_argument("--threads", type=int, default=1, metavar="n", help="runs at the same time")
+    command.add_argument("--batch", metavar="i/n", help="only the i-th of n equal parts, from 1")
+    command.add_argument("--gather", nargs="+", metavar="part.csv", help="run nothing: put parts together")
+    command.set_defaults(run=_sweep)
 
 
 def _add_contact(commands):
@@ -200,6 +211,34 @@ def _simulate(options):
             f"sides, {summary['table_out_of_range']} creep look-ups out of the table's range"
         )
     return 0 if run.status in ("completed", "derailed") else 1
+
+
+def _sweep(options):
+    from wrcore.sweep_batch import gather, load_table, run_rows, sweep_to_file, write_table
+    from wrcore.sweep_plan import load_sweep
+
+    out = _output(options.out)
+    if not 1 <= options.threads <= 1000:
+        raise InputError("wrcore sweep", "--threads", f"expected 1 to 1000, got {options.threads}")
+    sweep = load_sweep(options.sweep)
+    if options.gather:
+        gather(options.gather, out)
+    elif options.batch:
+        write_table(out, run_rows(sweep, sweep.rows(*_batch(options.batch, len(sweep.runs))), options.threads))
+    else:
+        sweep_to_file(sweep, out, options.threads)
+    table = load_table(out)
+    ends = ", ".join(f"{count} {status}" for status, count in table["status"].value_counts().items())
+    print(f"{sweep.data['name']}: {len(table)} of {len(sweep.runs)} runs, {ends}: {out}")
+    return 0
+
+
+def _batch(text, runs):
+    """Number (from 0) and count of a batch such as 1/4."""
+    number, _, count = text.partition("/")
+    if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count) <= runs):
+        raise InputError("wrcore sweep", "--batch", f"expected i/n with 1 <= i <= n <= {runs} runs, got {text!r}")
+    return int(number) - 1, int(count)
 
 
 def _contact(options):

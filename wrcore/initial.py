@@ -77,15 +77,13 @@ def rest(scene, model):
     return equilibrium
 
 
-def static_equilibrium(scene, model, at_rest=None):
+def static_equilibrium(scene, model):
     """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
 
     Parameters
     ----------
     scene : Scene
     model : Model
-    at_rest : Equilibrium, optional
-        Of the same vehicle, from :func:`rest`.
 
     Returns
     -------
@@ -97,15 +95,24 @@ def static_equilibrium(scene, model, at_rest=None):
     InputError
         If there is none near the nominal position.
     """
-    at_rest = at_rest or rest(scene, model)
-    state = at_rest.state.copy()
-    for body in range(len(model.bodies.mass)):
-        state[STATE_SIZE * body + 7] = model.speed
+    at_rest = rest(scene, model)
+    state = _moving_ahead(model, at_rest)
     for body in scene.vehicle.bodies.wheelsets:
-        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        roll, _, yaw = angles(part[3:7])
-        part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
+        _roll_as_it_stands(scene, model, state[STATE_SIZE * body : STATE_SIZE * (body + 1)])
     return dataclasses.replace(at_rest, state=state)
+
+
+def _moving_ahead(model, at_rest):
+    """State of the bodies at rest with the speed of the moving frame."""
+    state = at_rest.state.copy()
+    state[7 : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] = model.speed
+    return state
+
+
+def _roll_as_it_stands(scene, model, part):
+    """Let a wheelset roll without slip in the pose that its part of the state holds."""
+    roll, _, yaw = angles(part[3:7])
+    part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
 
 
 def _rolling(scene, model, y, z, roll, yaw):
@@ -150,16 +157,19 @@ def initial_state(scene, model, at_rest=None):
     numpy.ndarray, shape (13 n + states,)
     """
     vehicle, data = scene.vehicle, scene.data
-    equilibrium = static_equilibrium(scene, model, at_rest)
+    at_rest = at_rest or rest(scene, model)
     y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
-    state = equilibrium.state.copy()
+    state = _moving_ahead(model, at_rest)
     for k, body in enumerate(vehicle.bodies.wheelsets):
+        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         if y or yaw:
-            part, load = state[STATE_SIZE * body : STATE_SIZE * (body + 1)], float(np.mean(equilibrium.wheel_loads[k]))
-            roll, z = _settled(scene, model, y, yaw, load)
+            roll, z = _settled(scene, model, y, yaw, float(np.mean(at_rest.wheel_loads[k])))
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             part[10:13] = _rolling(scene, model, y, z, roll, yaw)
-    stand_on_rails(model, state, equilibrium.wheel_loads)
+        else:
+            _roll_as_it_stands(scene, model, part)
+    if not model.track.tangent:
+        stand_on_rails(model, state, at_rest.wheel_loads)
     parts = {name: state[STATE_SIZE * b : STATE_SIZE * (b + 1)] for b, name in enumerate(vehicle.body_names)}
     places = dict(zip(parts, vehicle.positions, strict=True))
     for name, part in parts.items():

@@ -246,7 +246,7 @@ def compile_scene(
                 scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
             )),
             hertz_table(), LAWS[contact["creep"]["model"]],
-            _once(shared, "creep", _text([contact["creep"], material]), lambda: _creep(scene, progress)),
+            _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]), REDUCTIONS[contact["patch"]],
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
@@ -256,8 +256,11 @@ def compile_scene(
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
-    key = (_parts(scene), _text({**contact, "friction": None, "creep": None}), _text(integration["baumgarte"]))
-    at_rest = _once(shared, "rest", key, lambda: rest(scene, model))
+    decisive = (
+        _parts(scene), scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
+        *damping.values(), *integration["baumgarte"].values(),
+    )  # fmt: skip
+    at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
     return model, initial_state(scene, model, at_rest)
 
 
@@ -284,7 +287,3 @@ class _Same:
 
     def __hash__(self):
         return id(self.part)
-
-
-def _text(value):
-    return json.dumps(value, sort_keys=True)

@@ -17,9 +17,9 @@ from wrcore.contact import reduction
 from wrcore.creep.table import show_progress
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.energy import energy_channels
-from wrcore.dynamics.integrate import Checkpoint, integrate
+from wrcore.dynamics.integrate import Checkpoint, Trajectory, integrate
 from wrcore.dynamics.outputs import evaluations_at
-from wrcore.dynamics.system import workspace
+from wrcore.dynamics.system import Model, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.progress import counted, simulated_time
 from wrcore.run import Run
@@ -158,12 +158,10 @@ def _channels(scene, model, trajectory):
     """Output channels by group; contact forces are evaluated again at the output times."""
     wanted = scene.data["output"]["channels"]
     wheelsets = model.bodies.wheelsets
-    shape = (len(trajectory.t), len(wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
-    patches = np.full(shape, np.nan)
-    bounds = np.full(shape[:3], np.nan)
-    rates = np.full(trajectory.states.shape, np.nan)
     if "contact" in wanted or "acceleration" in wanted:
-        evaluations_at(trajectory.t, trajectory.states, model, workspace(model), rates, patches, bounds)
+        patches, bounds, rates = evaluated(model, trajectory)
+    else:
+        rates = np.full(trajectory.states.shape, np.nan)
     groups = {}
     for body, name in enumerate(scene.vehicle.body_names):
         own = slice(STATE_SIZE * body, STATE_SIZE * (body + 1))
@@ -181,6 +179,30 @@ def _channels(scene, model, trajectory):
     if "energy" in wanted:
         groups["energy"] = energy_channels(model, workspace(model), trajectory.t, trajectory.states)
     return groups
+
+
+def evaluated(model: Model, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate the equations of motion again at a run's output times.
+
+    Parameters
+    ----------
+    model : Model
+    trajectory : Trajectory
+
+    Returns
+    -------
+    patches : ndarray, shape (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS)
+        NaN where a patch is absent; left and right.
+    bounds : ndarray, shape (n, wheelsets, 2)
+        Bound of planar detection's error (detection ``auto`` only), m.
+    rates : ndarray, shape (n, size)
+        Derivatives of the states.
+    """
+    shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
+    patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
+    rates = np.full(trajectory.states.shape, np.nan)
+    evaluations_at(trajectory.t, trajectory.states, model, workspace(model), rates, patches, bounds)
+    return patches, bounds, rates
 
 
 def _pose_on_track(track, states, body, start):

@@ -1,0 +1,205 @@
+"""Sweeps: each row is the run that `simulate` gives, whatever is shared; batches and interruptions change nothing."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+import wrcore as wr
+from tests.conftest import ROOT, SCENES
+from wrcore import sweep_batch
+from wrcore.analysis import amplitude, hunting_frequency
+from wrcore.analysis_vehicle import wear_number, wheel_forces
+from wrcore.cli import main
+from wrcore.errors import InputError
+from wrcore.sweep_measures import MEASURES
+
+SMOKE = ROOT / "config" / "sweeps" / "smoke.yaml"
+
+
+@pytest.fixture(scope="module")
+def smoke():
+    return wr.run_sweep(SMOKE)
+
+
+def small(**changes):
+    data = {
+        "name": "small",
+        "scene": str(SCENES / "suspended_wheelset.yaml"),
+        "set": {"integration.duration": 0.05},
+        "sampling": {"kind": "latin_hypercube", "runs": 6, "seed": 3},
+        "keys": {"speed": {"from": 20, "to": 40}, "initial.y": {"from": -0.003, "to": 0.003}},
+        "measures": ["y_max_m", "steps"],
+        "batch": 2,
+    }
+    return data | changes
+
+
+@pytest.mark.parametrize("row", [0, 7, 18, 23])
+def test_measures_of_a_row_are_those_of_the_run_alone(smoke, row):
+    sweep = wr.load_sweep(SMOKE)
+    values = sweep.runs.loc[row].to_dict()
+    run = wr.simulate(sweep.scene, overrides=values)
+    late = run.t >= 0.05
+    last = run.t >= 0.2 - 0.1 - 1e-9
+    y = run["wheelset"].y_m
+    got = smoke.loc[row]
+    assert got["y_rms_m"] == pytest.approx(np.sqrt(np.mean(y[late] ** 2)), rel=1e-14)
+    assert got["y_max_m"] == np.abs(y[late]).max() and got["amplitude_m"] == amplitude(y[last])
+    assert got["yaw_max_rad"] == pytest.approx(np.abs(run["wheelset"].yaw_rad[late]).max(), rel=1e-12)
+    np.testing.assert_equal(got["frequency_Hz"], hunting_frequency(run.t[late], y[late]))
+    wheels = [[force[late] for force in wheel_forces(run, "wheelset", side)] for side in ("left", "right")]
+    assert got["Q_max_N"] == pytest.approx(max(q.max() for q, _ in wheels), rel=1e-12)
+    assert got["Q_min_N"] == pytest.approx(min(q.min() for q, _ in wheels), rel=1e-12)
+    assert got["Y_max_N"] == pytest.approx(max(np.abs(lateral).max() for _, lateral in wheels), rel=1e-12)
+    assert got["Y_over_Q_max"] == pytest.approx(max(np.abs(lateral / q).max() for q, lateral in wheels), rel=1e-12)
+    wear = max(wear_number(run, "wheelset", side)[late].mean() for side in ("left", "right"))
+    assert got["wear_number_mean_N"] == pytest.approx(wear, rel=1e-12)
+    for counter in ("steps", "rejected", "rhs_evaluations", "table_out_of_range", "simulated_s"):
+        assert got[counter] == run.counters[counter]
+    assert (got["status"], got["method"]) == (run.status, run.settings["method_used"])
+
+
+def test_a_grid_has_every_combination_once(smoke):
+    keys = ["speed", "contact.detection", "rail.inclination", "contact.friction"]
+    assert len(smoke) == 3 * 2 * 2 * 2 == len(smoke[keys].drop_duplicates())
+    assert sorted(smoke["speed"].unique()) == [20.0, 40.0, 60.0]
+    np.testing.assert_allclose(sorted(smoke["contact.friction"].unique()), [0.1, 0.4])
+    assert smoke["run"].tolist() == list(range(24)) and set(wr.load_sweep(SMOKE).data["measures"]) <= set(smoke)
+    assert set(MEASURES) - set(smoke) == {"jacobians", "factorisations", "smallest_step_s", "wall_s"}
+
+
+def test_a_latin_hypercube_has_one_run_in_each_part_of_each_range():
+    keys = {
+        "speed": {"from": 20, "to": 40}, "integration.rtol": {"from": 1e-6, "to": 1e-3, "scale": "log"},
+        "contact.detection": {"values": ["planar", "spatial"]},
+    }  # fmt: skip
+    sampling = {"kind": "latin_hypercube", "runs": 40, "seed": 5}
+    runs = wr.load_sweep(small(keys=keys, sampling=sampling)).runs
+    assert sorted(((runs["speed"] - 20) / 20 * 40).astype(int)) == list(range(40))
+    assert sorted(((np.log10(runs["integration.rtol"]) + 6) / 3 * 40).astype(int)) == list(range(40))
+    assert runs["contact.detection"].value_counts().to_dict() == {"planar": 20, "spatial": 20}
+    assert wr.load_sweep(small(keys=keys, sampling=sampling)).runs.equals(runs)
+    other = wr.load_sweep(small(keys=keys, sampling=sampling | {"seed": 6})).runs
+    assert not other["speed"].equals(runs["speed"])
+
+
+def test_threads_and_batches_change_nothing():
+    whole = wr.run_sweep(small())
+    pd.testing.assert_frame_equal(wr.run_sweep(small(), threads=3), whole)
+    sweep = wr.load_sweep(small())
+    parts = [sweep_batch.run_rows(sweep, sweep.rows(batch, 4)) for batch in range(4)]
+    pd.testing.assert_frame_equal(pd.concat(parts, ignore_index=True), whole)
+
+
+def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path, monkeypatch):
+    sweep, out = wr.load_sweep(small()), tmp_path / "table.csv"
+    calls = []
+
+    def third_fails(*args, original=sweep_batch.run_rows):
+        calls.append(args[1].index.tolist())
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return original(*args)
+
+    monkeypatch.setattr(sweep_batch, "run_rows", third_fails)
+    with pytest.raises(KeyboardInterrupt):
+        sweep_batch.sweep_to_file(sweep, out)
+    assert not out.exists()
+    sweep_batch.sweep_to_file(sweep, out)
+    assert calls == [[0, 1], [2, 3], [4, 5], [4, 5]]
+    monkeypatch.undo()
+    pd.testing.assert_frame_equal(sweep_batch.load_table(out), wr.run_sweep(small()))
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_another_scene_is_another_digest():
+    assert wr.load_sweep(small()).digest() == wr.load_sweep(small()).digest()
+    digests = {wr.load_sweep(small(**c)).digest() for c in ({}, {"set": {"speed": 21}}, {"measures": ["steps"]})}
+    assert len(digests) == 3
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5"])
+def test_tables_come_back_as_they_were(tmp_path, smoke, ending):
+    sweep_batch.write_table(tmp_path / f"t.{ending}", smoke)
+    pd.testing.assert_frame_equal(sweep_batch.load_table(tmp_path / f"t.{ending}"), smoke, check_dtype=False)
+
+
+def test_command_runs_a_whole_sweep_and_parts_of_it(tmp_path, capsys):
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(small()))
+    base = ["sweep", str(tmp_path / "small.yaml"), "--out"]
+    assert main([*base, str(tmp_path / "whole.csv"), "--threads", "2"]) == 0
+    assert "small: 6 of 6 runs, 6 completed" in capsys.readouterr().out
+    parts = [str(tmp_path / f"part{i}.csv") for i in (1, 2)]
+    for i, part in enumerate(parts, 1):
+        assert main([*base, part, "--batch", f"{i}/2"]) == 0
+    assert main([*base, str(tmp_path / "gathered.csv"), "--gather", *reversed(parts)]) == 0
+    assert (tmp_path / "gathered.csv").read_text() == (tmp_path / "whole.csv").read_text()
+    assert main([*base, str(tmp_path / "x.csv"), "--batch", "3/2"]) == 2
+    assert "--batch: expected i/n with 1 <= i <= n <= 6 runs, got '3/2'" in capsys.readouterr().err
+
+
+def test_a_run_that_derails_is_a_row_and_not_an_end():
+    keys = {"initial.yaw": {"values": [0.0, 0.09]}, "speed": {"values": [10]}}
+    changes = {"contact.friction": 0.9, "integration.duration": 0.6}
+    table = wr.run_sweep(
+        small(scene=str(SCENES / "wheelset.yaml"), set=changes, sampling={"kind": "grid"}, keys=keys,
+              measures=["y_max_m", "simulated_s", "amplitude_m", "Q_max_N"])
+    )  # fmt: skip
+    assert table["status"].tolist() == ["completed", "derailed"]
+    assert table["simulated_s"][1] < 0.6 and table.notna().all(axis=None)
+    run = wr.simulate(SCENES / "wheelset.yaml", speed=10, initial={"yaw": 0.09}, **changes)
+    assert table["y_max_m"][1] == np.abs(run["wheelset"].y_m).max() and table["simulated_s"][1] == run.t[-1]
+
+
+def test_curved_and_irregular_track_is_measured_along_the_track():
+    path = [{"tangent": 20}, {"transition": 30}, {"curve": 100, "radius": 500, "cant": 0.1}]
+    changes = {"integration.duration": 0.3, "contact.creep.model": "she"}
+    keys = {"track.irregularity.spectrum.seed": {"values": [1, 2]}, "speed": {"values": [30]}}
+    spectrum = {"level": "low", "seed": 0, "length": 200, "begin": 5.0}
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", {**changes, "track.path": path}).data
+    scene["track"]["irregularity"] = {"spectrum": spectrum}
+    run = wr.simulate(SCENES / "suspended_wheelset.yaml", overrides={**changes, "speed": 30, "track": scene["track"],
+                      "track.irregularity.spectrum.seed": 2})  # fmt: skip
+    setting = {**changes, "track": scene["track"]}
+    table = wr.run_sweep(small(set=setting, keys=keys, sampling={"kind": "grid"}, measures=["y_rms_m", "yaw_max_rad"]))
+    y, yaw = run["wheelset"].y_m, run["wheelset"].yaw_rad
+    assert table["y_rms_m"][1] == pytest.approx(np.sqrt(np.mean(y**2)), rel=1e-14)
+    assert table["y_rms_m"][1] != table["y_rms_m"][0] and table["yaw_max_rad"][1] == np.abs(yaw).max()
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"keys": {"sped": {"values": [1]}}}, "keys.sped: .*sped: unknown key"),
+        ({"keys": {"speed": {"from": 10, "to": 200}}}, "keys.speed: .*a speed in m/s, above 0 and at most 150"),
+        ({"keys": {"speed": {"from": 30, "to": 20}}}, "keys.speed: expected from < to"),
+        ({"keys": {"speed": {"from": 30}}}, "keys.speed: expected values, or from and to"),
+        ({"keys": {"speed": {"from": 30, "to": 40, "values": [3]}}}, "expected either values or from and to"),
+        ({"keys": {"speed": {"from": 20, "to": 30}}, "sampling": {"kind": "grid"}}, "keys.speed.steps"),
+        ({"keys": {"integration.method": {"values": ["scipy_bdf"]}}}, "keys.integration.method: expected one of auto"),
+        (
+            {"keys": {"vehicle.count": {"from": 1, "to": 4}}, "set": {"vehicle.spacing": 3.0}},
+            "keys.vehicle.count: .*a number of equal vehicles, 1 to 1000, got 2.2426",
+        ),
+        ({"keys": {}}, "keys: expected a mapping from scene keys"),
+        ({"sampling": {"kind": "latin_hypercube"}}, "sampling.runs"),
+        ({"sampling": {"kind": "random"}}, "sampling.kind: expected 'grid'"),
+        ({"measures": ["y_max"]}, "measures: expected some of y_rms_m, .* got 'y_max'"),
+        ({"scene": "absent.yaml"}, "scene: expected an existing file, got 'absent.yaml'"),
+        ({"batch": 1, "sampling": {"kind": "latin_hypercube", "runs": 600}}, "batch: expected at least 2 runs"),
+        ({"speed": 3}, "speed: unknown key"),
+    ],
+)
+def test_wrong_sweeps_are_refused_with_one_line(changes, expected):
+    with pytest.raises(InputError, match=expected) as caught:
+        wr.load_sweep(small(**changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_table_of_another_kind_is_refused(tmp_path):
+    with pytest.raises(InputError, match="expected a sweep's table"):
+        sweep_batch.load_table(tmp_path / "absent.csv")
+    wr.write_run(tmp_path / "run.h5", wr.simulate(SCENES / "wheelset.yaml", integration__duration=0.01))
+    with pytest.raises(InputError, match="expected 'wrcore sweep'"):
+        sweep_batch.load_table(tmp_path / "run.h5")

@@ -1,0 +1,294 @@
+"""Running a sweep: many runs in one process, a number per measure from each, one tidy table in the end.
+
+What all runs of a batch have in common is made once: imports, kernels, profiles, contact geometry, creep table, static
+equilibrium. A run then costs its integration and a few tenths of a millisecond.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+import pandas as pd
+
+from wrcore.channels import unit_of
+from wrcore.dynamics.integrate import Trajectory, integrate
+from wrcore.errors import InputError
+from wrcore.progress import counted
+from wrcore.scene import Scene, compile_scene, load_scene
+from wrcore.simulate import DERAILED_Y, output_times
+from wrcore.sweep_measures import COUNTERS, FORCES, MOTION, Motions, lateral_and_yaw, wheel_forces, wheelset_motion
+from wrcore.sweep_plan import Sweep, load_sweep, of_parts
+
+CHUNK = 200
+"""Runs whose motions are held at a time."""
+
+
+UNITS = {
+    "frequency_Hz": "Hz", "speed": "m/s", "initial.y": "m", "initial.yaw": "rad", "track.gauge": "m",
+    "contact.detection_tolerance": "m", "contact.normal.damping.v0": "m/s", "contact.creep.least_speed": "m/s",
+    "contact.material.shear_modulus": "Pa", "integration.duration": "s", "integration.step": "s",
+    "integration.longest_step": "s", "integration.baumgarte.alpha": "1/s", "integration.baumgarte.beta": "1/s",
+    "output.rate": "1/s",
+}  # fmt: skip
+"""Units of columns whose names do not state them."""
+
+
+class _Task(NamedTuple):
+    run: int
+    scene: Scene
+    values: dict[str, Any]
+    shared: dict[Any, Any]
+
+
+class _Outcome(NamedTuple):
+    run: int
+    tangent: bool
+    times: np.ndarray
+    trajectory: Trajectory
+    motion: np.ndarray
+    forces: np.ndarray | None
+
+
+def run_sweep(
+    source: str | PathLike[str] | dict[str, Any] | Sweep,
+    threads: int = 1,
+    progress: Callable[[Iterable], Iterable] | None = None,
+) -> pd.DataFrame:
+    """Run a whole sweep in this process.
+
+    Parameters
+    ----------
+    source : str, Path, dict or Sweep
+        As :func:`wrcore.sweep_plan.load_sweep` takes it.
+    threads : int
+        Runs at the same time; the table does not depend on it.
+    progress : callable, optional
+        Wraps the runs, e.g. ``tqdm.tqdm``. Left out: a bar where somebody watches.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per run: ``run``, the keys, ``status``, ``method`` and the measures (names carry the unit, SI).
+
+    Raises
+    ------
+    InputError
+
+    Examples
+    --------
+    >>> table = run_sweep({
+    ...     "name": "decay", "scene": "config/scenes/suspended_wheelset.yaml", "set": {"integration.duration": 0.1},
+    ...     "sampling": {"kind": "grid"}, "keys": {"speed": {"values": [20, 30]}}, "measures": ["y_max_m"],
+    ... })
+    >>> table
+       run  speed     status    method  y_max_m
+    0    0     20  completed  ros34pw2    0.002
+    1    1     30  completed     tsit5    0.002
+    """
+    sweep = source if isinstance(source, Sweep) else load_sweep(source)
+    return run_rows(sweep, sweep.runs, threads, progress)
+
+
+def run_rows(
+    sweep: Sweep, rows: pd.DataFrame, threads: int = 1, progress: Callable[[Iterable], Iterable] | None = None
+) -> pd.DataFrame:
+    """Run some rows of a sweep's table; arguments and result as for :func:`run_sweep`."""
+    with_forces = bool(set(sweep.data["measures"]) & set(FORCES))
+
+    def work(task):
+        return _run(task, with_forces)
+
+    tasks, bar = _tasks(sweep, rows), progress or (lambda items: counted(items, total=len(rows)))
+    tables: list[pd.DataFrame] = []
+    chunk: list[_Outcome] = []
+    with ThreadPoolExecutor(threads) as pool:
+        for outcome in bar(pool.map(work, tasks) if threads > 1 else map(work, tasks)):
+            if chunk and (len(chunk) == CHUNK or not _alike(chunk[0], outcome)):
+                tables.append(_measured(sweep, chunk))
+                chunk = []
+            chunk.append(outcome)
+    table = pd.concat([*tables, _measured(sweep, chunk)]).sort_index()
+    return pd.concat([rows, table], axis=1).reset_index()
+
+
+def _tasks(sweep: Sweep, rows: pd.DataFrame) -> list[_Task]:
+    """One task per run; runs that are made of the same parts share them."""
+    parts = [key for key in rows.columns if of_parts(key)]
+    others = [key for key in rows.columns if not of_parts(key)]
+    groups: dict[str, tuple[Scene, dict[Any, Any]]] = {}
+    tasks = []
+    for run, values in zip(rows.index, rows.to_dict("records"), strict=True):
+        made_of = {key: values[key] for key in parts}
+        text = json.dumps(made_of, sort_keys=True)
+        if text not in groups:
+            groups[text] = load_scene(sweep.scene, made_of) if made_of else sweep.scene, {}
+        scene, shared = groups[text]
+        tasks.append(_Task(int(run), scene, {key: values[key] for key in others}, shared))
+    return tasks
+
+
+def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
+    """A scene with other values of keys that need nothing read anew; they have been checked before."""
+    data = dict(scene.data)
+    for key, value in values.items():
+        *path, last = key.split(".")
+        inner = data
+        for part in path:
+            inner[part] = inner = dict(inner[part])
+        inner[last] = value
+    return dataclasses.replace(scene, data=data)
+
+
+def _run(task: _Task, with_forces: bool) -> _Outcome:
+    scene = _changed(task.scene, task.values)
+    model, state = compile_scene(scene, shared=task.shared)
+    settings = scene.data["integration"]
+    times = _times(settings["duration"], scene.data["output"]["rate"])
+    trajectory = integrate(
+        model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
+        settings["longest_step"], DERAILED_Y,
+    )  # fmt: skip
+    starts = scene.vehicle.positions[model.bodies.wheelsets, 0]
+    motion = wheelset_motion(model, starts, trajectory.states)
+    forces = wheel_forces(model, trajectory) if with_forces else None
+    trajectory = dataclasses.replace(trajectory, states=trajectory.states[:0], end=None)  # measured: no longer needed
+    return _Outcome(task.run, bool(model.track.tangent), times, trajectory, motion, forces)
+
+
+@lru_cache
+def _times(duration: float, rate: float) -> np.ndarray:
+    return output_times(0.0, duration, rate)
+
+
+def _alike(one: _Outcome, other: _Outcome) -> bool:
+    """Whether the motions of two runs fit into one array."""
+    same_kind = one.tangent == other.tangent and one.motion.shape[1] == other.motion.shape[1]
+    return same_kind and (one.times is other.times or np.array_equal(one.times, other.times))
+
+
+def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
+    """Measures of runs with the same output times, a row per run."""
+    times = outcomes[0].times
+    table: dict[str, Any] = {
+        "status": [outcome.trajectory.status for outcome in outcomes],
+        "method": [outcome.trajectory.method for outcome in outcomes],
+    }
+    late = times >= sweep.data["begin"]
+    motion = _stacked([outcome.motion for outcome in outcomes], len(times))[:, late]
+    y, yaw = lateral_and_yaw(motion, outcomes[0].tangent)
+    forces = None
+    if outcomes[0].forces is not None:
+        forces = _stacked([outcome.forces for outcome in outcomes], len(times))[:, late]
+    motions = Motions(times[late], y, yaw, forces, sweep.data["window"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # all NaN: a run that ended before ``begin`` has no measure
+        for name in sweep.data["measures"]:
+            if name in COUNTERS:
+                table[name] = [COUNTERS[name](outcome.trajectory) for outcome in outcomes]
+            else:
+                table[name] = (MOTION | FORCES)[name](motions)
+    return pd.DataFrame(table, index=pd.Index([outcome.run for outcome in outcomes], name="run"))
+
+
+def _stacked(parts: list, length: int) -> np.ndarray:
+    """Runs on top of one another, filled up with NaN where they ended early."""
+    if all(len(part) == length for part in parts):
+        return np.stack(parts)
+    out = np.full((len(parts), length, *parts[0].shape[1:]), np.nan)
+    for row, part in zip(out, parts, strict=True):
+        row[: len(part)] = part
+    return out
+
+
+def sweep_to_file(
+    sweep: Sweep,
+    path: str | PathLike[str],
+    threads: int = 1,
+    progress: Callable[[Iterable], Iterable] | None = None,
+) -> None:
+    """Run a sweep batch by batch and write its table; batches of an earlier, interrupted call are kept.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    path : path-like
+        Table, CSV or ``.h5``. Finished batches wait beside it in a folder whose name tells what they depend on.
+    threads, progress
+        As for :func:`run_sweep`.
+    """
+    path = Path(path)
+    folder = path.with_name(f".{path.name}.{sweep.digest()}")
+    parts = [folder / f"{batch:04d}.csv" for batch in range(sweep.batches)]
+    for batch, part in enumerate(parts):
+        if not part.exists():
+            write_table(part, run_rows(sweep, sweep.rows(batch), threads, progress))
+    gather(parts, path)
+    shutil.rmtree(folder)
+
+
+def gather(parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
+    """One table from those of all batches, in the order of the runs."""
+    table = pd.concat([load_table(part) for part in parts], ignore_index=True)
+    write_table(path, table.sort_values("run", ignore_index=True))
+
+
+def write_table(path: str | PathLike[str], table: pd.DataFrame) -> None:
+    """Write a sweep's table: CSV, or HDF5 with a dataset and its unit per column where the name ends in ``.h5``.
+
+    The file appears under its name only when it is complete.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        if path.suffix == ".h5":
+            _write_hdf5(part, table)
+        else:
+            table.to_csv(part, index=False)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write_hdf5(path: Path, table: pd.DataFrame) -> None:
+    with h5py.File(path, "w", track_order=True) as file:
+        file.attrs["format"] = "wrcore sweep"
+        for name in table.columns:
+            values = table[name].to_numpy()
+            if values.dtype.kind not in "biuf":
+                values = np.array([str(value) for value in values], dtype=h5py.string_dtype())
+            dataset = file.create_dataset(name, data=values)
+            dataset.attrs["units"] = UNITS.get(name) or unit_of(name)
+
+
+def load_table(path: str | PathLike[str]) -> pd.DataFrame:
+    """Read a sweep's table, CSV or HDF5.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it is of another kind.
+    """
+    path = Path(path)
+    try:
+        if path.suffix != ".h5":
+            return pd.read_csv(path)
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != "wrcore sweep":
+                raise InputError(path, "attribute format", "expected 'wrcore sweep'")
+            columns = {name: item.asstr()[()] if item.dtype.kind == "O" else item[()] for name, item in file.items()}
+    except (OSError, pd.errors.ParserError, UnicodeDecodeError) as error:
+        raise InputError(path, "", f"expected a sweep's table (CSV or HDF5), got: {error}") from None
+    return pd.DataFrame(columns)

@@ -1,0 +1,168 @@
+"""What a sweep keeps of each run: one number per measure, over all wheelsets and wheels the worst one.
+
+============================  ========================================================================================
+``y_rms_m``, ``y_max_m``      root mean square and largest lateral distance of a wheelset from the track's centre
+``amplitude_m``               half the peak-to-peak value of the lateral motion over the last ``window``: of a limit
+                              cycle, where the run has come to one
+``yaw_max_rad``               largest yaw of a wheelset
+``frequency_Hz``              of the leading wheelset's lateral motion, from its zero crossings; NaN below three
+``Q_min_N``, ``Q_max_N``      least and largest vertical force of a wheel
+``Y_max_N``                   largest lateral force of a wheel on its rail, by amount
+``Y_over_Q_max``              their largest quotient, by amount, where the wheel carries more than 1 kN
+``wear_number_mean_N``        mean of T gamma = |Fx xi| + |Fy eta|, summed over a wheel's patches
+``simulated_s``               time reached
+``steps``, ``rejected``       accepted and rejected steps; likewise ``rhs_evaluations``, ``jacobians``,
+                              ``factorisations``, ``table_out_of_range`` and ``smallest_step_s``
+``wall_s``                    time spent in the integration (differs from run to run of the same sweep)
+============================  ========================================================================================
+
+Measures of the motion are taken at the output times (``output.rate``) from ``begin`` on. Each run also has its
+``status`` and the integration ``method``. Those of forces evaluate all contacts again at the output times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wrcore.analysis import hunting_frequency
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE, angles
+from wrcore.dynamics.integrate import Trajectory
+from wrcore.dynamics.system import Model
+from wrcore.dynamics.track import track_poses
+from wrcore.simulate import evaluated
+
+LEAST_Q = 1e3
+"""Wheels that carry less have no quotient Y/Q, N."""
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Several runs at the same output times; NaN where a run did not come to."""
+
+    t: np.ndarray
+    """(n,), s."""
+    y: np.ndarray
+    """(runs, n, wheelsets), m."""
+    yaw: np.ndarray
+    """(runs, n, wheelsets), rad."""
+    forces: np.ndarray | None
+    """(runs, n, wheelsets, 2, 3): Q, Y (N) and T gamma (N) of each wheel; None where no measure needs them."""
+    window: float
+    """Length of the last part of a run, s."""
+
+
+def _worst(values: np.ndarray) -> np.ndarray:
+    return np.nanmax(values.reshape(len(values), -1), axis=1)
+
+
+def _last_part(m: Motions) -> np.ndarray:
+    reached = np.where(np.isnan(m.y[:, :, 0]), -np.inf, m.t).max(axis=1)
+    late = m.t >= reached[:, None] - m.window * (1.0 + 1e-12)
+    return np.where(late[:, :, None], m.y, np.nan)
+
+
+def _amplitude(m: Motions) -> np.ndarray:
+    late = _last_part(m)
+    return 0.5 * _worst(np.nanmax(late, axis=1) - np.nanmin(late, axis=1))
+
+
+def _frequency(m: Motions) -> np.ndarray:
+    reached = [~np.isnan(row) for row in m.y[:, :, 0]]
+    return np.array([hunting_frequency(m.t[r], y[r]) for r, y in zip(reached, m.y[:, :, 0], strict=True)])
+
+
+def _quotient(m: Motions) -> np.ndarray:
+    assert m.forces is not None
+    vertical, lateral = m.forces[..., 0], m.forces[..., 1]
+    ratios = np.abs(np.divide(lateral, vertical, out=np.zeros_like(vertical), where=vertical > LEAST_Q))
+    return _worst(ratios)
+
+
+MOTION: dict[str, Callable[[Motions], np.ndarray]] = {
+    "y_rms_m": lambda m: _worst(np.sqrt(np.nanmean(m.y**2, axis=1))),
+    "y_max_m": lambda m: _worst(np.abs(m.y)),
+    "amplitude_m": _amplitude,
+    "yaw_max_rad": lambda m: _worst(np.abs(m.yaw)),
+    "frequency_Hz": _frequency,
+}
+"""Measures of the motion, shape (runs,)."""
+
+FORCES: dict[str, Callable[[Any], np.ndarray]] = {
+    "Q_min_N": lambda m: -_worst(-m.forces[..., 0]),
+    "Q_max_N": lambda m: _worst(m.forces[..., 0]),
+    "Y_max_N": lambda m: _worst(np.abs(m.forces[..., 1])),
+    "Y_over_Q_max": _quotient,
+    "wear_number_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 2], axis=1)),
+}
+"""Measures of the wheels' forces, shape (runs,)."""
+
+COUNTERS: dict[str, Callable[[Trajectory], Any]] = {
+    "simulated_s": lambda run: float(run.t[-1]) if len(run.t) else 0.0,
+    "steps": lambda run: run.steps,
+    "rejected": lambda run: run.rejected,
+    "rhs_evaluations": lambda run: run.rhs_evaluations,
+    "jacobians": lambda run: run.jacobians,
+    "factorisations": lambda run: run.factorisations,
+    "table_out_of_range": lambda run: run.out_of_range,
+    "smallest_step_s": lambda run: run.smallest_step,
+    "wall_s": lambda run: run.wall_s,
+}
+"""Measures of the cost."""
+
+MEASURES = (*MOTION, *FORCES, *COUNTERS)
+"""Names of all measures."""
+
+
+def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Lateral position and Euler parameters of the wheelsets, or their pose on a curved or irregular track.
+
+    Parameters
+    ----------
+    model : Model
+    starts : numpy.ndarray, shape (wheelsets,)
+        Arc lengths at the start, m.
+    states : numpy.ndarray, shape (n, size)
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, wheelsets, 5)
+        On tangent track y (m) and four Euler parameters; else arc length (m), y, z (m), roll and yaw (rad).
+    """
+    wheelsets = model.bodies.wheelsets
+    out = np.empty((len(states), len(wheelsets), 5))
+    for k, body in enumerate(wheelsets):
+        at = STATE_SIZE * body
+        if model.track.tangent:
+            out[:, k, 0] = states[:, at + 1]
+            out[:, k, 1:] = states[:, at + 3 : at + 7]
+        else:
+            poses = np.empty((len(states), 5))
+            track_poses(model.track, states, at, starts[k], poses)
+            out[:, k] = poses
+    return out
+
+
+def lateral_and_yaw(motion: np.ndarray, tangent: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral position (m) and yaw (rad) from what :func:`wheelset_motion` gave, over any leading axes."""
+    if not tangent:
+        return motion[..., 1], motion[..., 4]
+    yaw = angles(motion[..., 1:].reshape(-1, 4))[2]
+    return motion[..., 0], np.reshape(yaw, motion.shape[:-1])
+
+
+def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:
+    """Q, Y and T gamma of each wheel of a run, N, shape (n, wheelsets, 2, 3)."""
+    patches, _, _ = evaluated(model, trajectory)
+    angle, normal, lateral = (patches[..., k] for k in (reduction.ANGLE, reduction.NORMAL, reduction.FY))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    out = np.empty((*patches.shape[:3], 3))
+    out[..., 0] = np.nansum(normal * cosine + lateral * sine, axis=-1)
+    out[..., 1] = np.nansum(lateral * cosine - normal * sine, axis=-1)
+    slips = patches[..., reduction.FX] * patches[..., reduction.XI], lateral * patches[..., reduction.ETA]
+    out[..., 2] = np.nansum(np.abs(slips[0]) + np.abs(slips[1]), axis=-1)
+    return out
