@@ -17,6 +17,7 @@ include: "workflow/rules/creep.smk"
 include: "workflow/rules/contact.smk"
 include: "workflow/rules/benchmarks.smk"
 include: "workflow/rules/critical_speed.smk"
+include: "workflow/rules/sweep.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 

@@ -203,3 +203,16 @@ def test_a_table_of_another_kind_is_refused(tmp_path):
     wr.write_run(tmp_path / "run.h5", wr.simulate(SCENES / "wheelset.yaml", integration__duration=0.01))
     with pytest.raises(InputError, match="expected 'wrcore sweep'"):
         sweep_batch.load_table(tmp_path / "run.h5")
+
+
+def test_figure_of_a_sweep_has_a_panel_with_units_per_key(smoke):
+    from wrcore.figures_sweep import sweep_scatter
+
+    keys = ["speed", "contact.detection", "rail.inclination", "contact.friction"]
+    figure = sweep_scatter(smoke, keys, "amplitude_m")
+    labels = [axes.get_xlabel() for axes in figure.axes[:4]]
+    assert labels == ["speed / m/s", "detection", "inclination", "friction"]
+    assert figure.axes[0].get_ylabel() == "amplitude / mm"
+    shown = figure.axes[0].collections[0].get_offsets()
+    np.testing.assert_allclose(shown[:, 1], 1e3 * smoke["amplitude_m"])
+    np.testing.assert_allclose(shown[:, 0], smoke["speed"])

@@ -143,6 +143,12 @@ def test_benchmark_of_the_study_meets_its_bar(smoke):
     assert len(pd.read_csv(smoke / "tables" / "ivp_values.csv")) == 17
 
 
+def test_sweep_of_the_study_has_all_its_runs(smoke):
+    table = pd.read_csv(smoke / "tables" / "sweeps" / "smoke.csv")
+    assert table["run"].tolist() == list(range(24)) and set(table["status"]) == {"completed"}
+    assert (smoke / "figures" / "sweep_smoke.svg").is_file()
+
+
 def test_notebook_was_executed_and_holds_fig4(smoke):
     cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
     outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]

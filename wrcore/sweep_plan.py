@@ -6,7 +6,7 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -71,13 +71,17 @@ class Sweep:
         return f"Sweep {self.data['name']!r}: {len(self.runs)} runs over {keys}; {self.batches} batches"
 
 
-def load_sweep(source: str | PathLike[str] | Mapping[str, Any]) -> Sweep:
+def load_sweep(
+    source: str | PathLike[str] | Mapping[str, Any], overrides: Iterable[str] | Mapping[str, Any] = ()
+) -> Sweep:
     """Read and check a sweep.
 
     Parameters
     ----------
     source : str, Path or dict
         Sweep file (schema ``wrcore/schemas/sweep.yaml``) or its content; then paths count from the working directory.
+    overrides : sequence of str, or dict
+        Further changes to the scene that hold for all runs, as :func:`wrcore.scene.load_scene` takes them.
 
     Returns
     -------
@@ -104,7 +108,7 @@ def load_sweep(source: str | PathLike[str] | Mapping[str, Any]) -> Sweep:
     for measure in data["measures"]:
         if measure not in MEASURES:
             raise InputError(name, "measures", f"expected some of {', '.join(MEASURES)}, got {measure!r}")
-    scene = load_scene(_scene_file(data["scene"], folder, name), data["set"])
+    scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     _check_values(scene, data["keys"], values, name)
     runs = _grid(values) if data["sampling"]["kind"] == "grid" else _hypercube(values, data["sampling"], name)

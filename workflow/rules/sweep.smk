@@ -1,0 +1,83 @@
+# Sweeps: a few long jobs of many short runs each, and one table. Which batches there are, the sweep's file says.
+from wrcore.sweep_plan import load_sweep
+
+SWEEPS = {}
+for file in config["sweeps"]:
+    try:
+        SWEEPS[Path(file).stem] = load_sweep(file)
+    except InputError as error:
+        raise WorkflowError(f"configuration: sweeps: {error}")
+CORE["sweep"] = CORE["simulation"] + sources("analysis", "analysis_vehicle", "sweep_plan", "sweep_measures", "sweep_batch")
+CORE["sweep_figures"] = sources("sweep_batch", "figures", "figures_run", "figures_sweep")
+
+
+wildcard_constraints:
+    sweep="|".join(SWEEPS) or "none",
+    batch=r"\d+",
+
+
+def sweep_file(wildcards):
+    return SWEEPS[wildcards.sweep].source
+
+
+def sweep_keys(wildcards):
+    return list(SWEEPS[wildcards.sweep].runs.columns)
+
+
+def sweep_shown(wildcards):
+    measures = SWEEPS[wildcards.sweep].data["measures"]
+    return "amplitude_m" if "amplitude_m" in measures else measures[0]
+
+
+def sweep_batches(wildcards):
+    count = SWEEPS[wildcards.sweep].batches
+    return expand(rules.sweep_batch.output, sweep=wildcards.sweep, batch=range(count))
+
+
+rule sweep_batch:
+    message:
+        "Sweep {wildcards.sweep}: batch {wildcards.batch}"
+    input:
+        core=CORE["sweep"],
+        scenes=SCENES,
+        sweep=sweep_file,
+    output:
+        "<results>/sweeps/{sweep}/{batch}.csv",
+    log:
+        "<logs>/sweep_batch/{sweep}_{batch}.log",
+    benchmark:
+        "<benchmarks>/sweep_batch/{sweep}_{batch}.tsv"
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    script:
+        "../scripts/sweep_batch.py"
+
+
+rule sweep_table:
+    message:
+        "Sweep {wildcards.sweep}: table and figure"
+    input:
+        core=CORE["sweep_figures"],
+        batches=sweep_batches,
+    output:
+        table="<results>/tables/sweeps/{sweep}.csv",
+        figure=report(
+            "<results>/figures/sweep_{sweep}.png",
+            caption="../report/sweep.rst",
+            category="Sweeps",
+            labels={"figure": "{sweep}"},
+        ),
+        svg="<results>/figures/sweep_{sweep}.svg",
+    log:
+        "<logs>/sweep_table/{sweep}.log",
+    params:
+        varied=sweep_keys,
+        shown=sweep_shown,
+    script:
+        "../scripts/sweep_table.py"
+
+
+rule sweeps:
+    input:
+        expand(rules.sweep_table.output, sweep=SWEEPS),

@@ -1,0 +1,80 @@
+"""Figures of sweeps: a measure of every run over each key that was varied."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wrcore.channels import unit_of
+from wrcore.figures import _shared_legend, styled
+from wrcore.figures_run import PRINTED
+from wrcore.sweep_batch import UNITS
+
+ENDS = {
+    "completed": {"color": "#0072B2", "marker": "o", "s": 3, "linewidths": 0, "alpha": 0.5},
+    "derailed": {"color": "#CC3311", "marker": "x", "s": 14, "linewidths": 0.8},
+    "failed": {"color": "0.1", "marker": "+", "s": 20, "linewidths": 0.8},
+}
+"""How a run that ended so is drawn."""
+
+MOST_COLUMNS = 3
+
+
+@styled
+def sweep_scatter(table: pd.DataFrame, keys: list[str], measure: str) -> Figure:
+    """One measure of all runs of a sweep over each key, a panel per key.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From :func:`wrcore.sweep_batch.run_sweep`.
+    keys : list of str
+        Columns that were varied; words stand side by side.
+    measure : str
+        Column to show.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    columns = min(MOST_COLUMNS, len(keys))
+    rows = -(-len(keys) // columns)
+    figure = Figure(figsize=(0.8 + 2.4 * columns, 0.6 + 2.3 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    values, label = _printed(measure, table[measure])
+    for axes, key in zip(panels.flat, keys, strict=False):
+        _over(axes, table, key, values)
+    for axes in list(panels.flat)[len(keys) :]:
+        axes.set_axis_off()
+    for axes in panels[:, 0]:
+        axes.set_ylabel(label)
+    _shared_legend(figure, panels.flat)
+    return figure
+
+
+def _over(axes: Axes, table: pd.DataFrame, key: str, values: np.ndarray) -> None:
+    numeric = pd.api.types.is_numeric_dtype(table[key]) and not pd.api.types.is_bool_dtype(table[key])
+    if numeric:
+        places, label = _printed(key, table[key])
+    else:
+        codes, names = pd.factorize(table[key].astype(str))
+        spread = (np.arange(len(table)) % 29 - 14) / 50  # side by side, for what would lie on one line
+        places, label = codes + spread, key.rpartition(".")[2]
+        axes.set_xticks(range(len(names)), names)
+    for end, style in ENDS.items():
+        here = (table["status"] == end).to_numpy()
+        if here.any():
+            axes.scatter(places[here], values[here], label=end, rasterized=True, **style)
+    axes.set(xlabel=label.replace("_", " "))
+
+
+def _printed(column: str, values: pd.Series) -> tuple[np.ndarray, str]:
+    """Values in the unit that is printed, and the label."""
+    unit = UNITS.get(column) or unit_of(column)
+    name = column.removeprefix("contact.").removeprefix("integration.").replace(".", " ")
+    for end in ("_m", "_rad", "_N"):
+        name = name.removesuffix(end)
+    factor, printed = PRINTED.get(unit, (1.0, unit))
+    return factor * values.to_numpy(float), f"{name.replace('_', ' ')} / {printed}" if printed else name
