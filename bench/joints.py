@@ -12,28 +12,28 @@ from wrcore._jit import jit
 from wrcore.dynamics.body import euler_parameters
 from wrcore.dynamics.joint import Joint, build_joints
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Bodies, fill_derivatives, workspace
+from wrcore.dynamics.system import Bodies, Equations, derivatives_at
 from wrcore.scene import compile_scene, load_scene
 
 ROUNDS = 41
 
 
-@jit
-def repeat(states, model, work, rate, count):
+@jit(allocates=False)
+def repeat(states, equations, model, work, rate, count):
     """Right-hand sides of several states in turn."""
     for k in range(count):
-        fill_derivatives(0.0, states[k % states.shape[0]], model, work, rate)
+        derivatives_at(equations, 0.0, states[k % states.shape[0]], model, work, rate)
 
 
 def nanoseconds(model, states):
     """Median time of one right-hand side."""
-    work, rate = workspace(model), np.empty(states.shape[1])
-    repeat(states, model, work, rate, 1)
+    arguments, rate = Equations(model).arguments, np.empty(states.shape[1])
+    repeat(states, *arguments, rate, 1)
     count = max(50, 20_000 // len(model.bodies.mass))
     seconds = []
     for _ in range(ROUNDS):
         start = time.process_time()
-        repeat(states, model, work, rate, count)
+        repeat(states, *arguments, rate, count)
         seconds.append((time.process_time() - start) / count)
     return 1e9 * np.median(seconds)
 

@@ -11,9 +11,14 @@ import time
 from pathlib import Path
 
 import numba
+from numba.core import types
+from numba.extending import intrinsic
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
+
+FUSED = {"contract"}
+"""Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once."""
 
 KERNEL_ROOMS = ("geometry", "contact", "creep", "dynamics")
 _KEEP_SECONDS = 14 * 86400
@@ -34,10 +39,11 @@ def cache_root():
 
 
 def source_digest():
-    """Digest (16 hex digits) of the sources of this file and of the rooms that hold kernels."""
+    """Digest (16 hex digits) of the sources of this file, of ``_lanes.py`` and of the rooms that hold kernels."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
-    for path in [Path(__file__), *sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py"))]:
+    shared = [Path(__file__), Path(__file__).with_name("_lanes.py")]
+    for path in [*shared, *sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py"))]:
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
@@ -66,6 +72,9 @@ _FOLDER = _prepare_cache_folder()
 def jit(function=None, *, allocates=True, **options):
     """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
 
+    What is not asked for is switched off: numba would hand fast math and inlining on from the first caller that has a
+    kernel compiled, so that its code depended on who came first.
+
     Parameters
     ----------
     function : callable
@@ -77,7 +86,13 @@ def jit(function=None, *, allocates=True, **options):
     """
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
-    settings = {"cache": _FOLDER is not None, "error_model": "numpy", **options}
+    settings = {
+        "cache": _FOLDER is not None,
+        "error_model": "numpy",
+        "fastmath": False,
+        "forceinline": False,
+        **options,
+    }
     if not allocates:
         settings["_nrt"] = False
     before = numba.config.CACHE_DIR
@@ -86,3 +101,15 @@ def jit(function=None, *, allocates=True, **options):
         return numba.njit(function, **settings)
     finally:
         numba.config.CACHE_DIR = before
+
+
+@intrinsic
+def rarely_called(_):
+    """In a kernel's first line: keep it out of its callers, whose common path should not carry its registers along."""
+
+    def generate(context, builder, __, ___):
+        for attribute in ("noinline", "cold"):
+            builder.function.attributes.add(attribute)
+        return context.get_dummy_value()
+
+    return types.void(), generate

@@ -19,7 +19,7 @@ from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.integrate import Checkpoint, Trajectory, integrate
 from wrcore.dynamics.outputs import evaluations_at
-from wrcore.dynamics.system import Model, workspace
+from wrcore.dynamics.system import Equations, Model, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.progress import counted, simulated_time
 from wrcore.run import Run
@@ -201,7 +201,7 @@ def evaluated(model: Model, trajectory: Trajectory) -> tuple[np.ndarray, np.ndar
     shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
     rates = np.full(trajectory.states.shape, np.nan)
-    evaluations_at(trajectory.t, trajectory.states, model, workspace(model), rates, patches, bounds)
+    evaluations_at(trajectory.t, trajectory.states, *Equations(model).arguments, rates, patches, bounds)
     return patches, bounds, rates
 
 

@@ -7,7 +7,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipe, ellipk
 
-from wrcore.contact.normal import contact_modulus, damping_factor, hertz_ellipse, hertz_shape, hertz_table
+from wrcore.contact.normal import (
+    contact_modulus,
+    damping_factor,
+    hertz_ellipse,
+    hertz_shape,
+    hertz_shape_at,
+    hertz_table,
+    inverse_cube_root,
+)
 
 # Classical coefficients m, n, r over cos(theta) = (B - A)/(A + B), three decimals (Hertz).
 MNR = [
@@ -96,3 +104,16 @@ def test_restitution_of_a_fast_impact(c_e):
     leaves.terminal, leaves.direction = True, -1
     run = solve_ivp(motion, (0, 1), [0.0, impact], events=leaves, rtol=1e-10, atol=1e-12, max_step=1e-5)
     assert -run.y[1, -1] / impact == pytest.approx(math.sqrt(c_e), abs=2e-3)
+
+
+def test_inverse_cube_root_is_exact_to_rounding():
+    for x in [1.0, 0.9999999, *np.linspace(0.2, 1.0, 401), 0.1999999, 0.05, 1e-6]:
+        assert inverse_cube_root(x) == pytest.approx(x ** (-1 / 3), rel=5e-16)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.7, 37.0, 1e4])
+def test_tabulated_log_of_the_axis_ratio(ratio):
+    # 1e-9: what the tables' interpolation leaves
+    for A, B in ((1.0, ratio), (ratio, 1.0)):
+        _, a, b, log_axis_ratio = hertz_shape_at(hertz_table(), A, B)
+        assert log_axis_ratio == pytest.approx(math.log(a / b), abs=1e-9)

@@ -11,7 +11,7 @@ from wrcore.checked_yaml import read_yaml
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.equilibrium import wheel_loads
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, right_hand_side, workspace
 from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
@@ -141,7 +141,7 @@ def test_the_start_stands_on_rails_that_are_out_of_line(tmp_path, path):
         "vehicle.axle_boxes=true",
     ])  # fmt: skip
     model, state = compile_scene(scene)
-    loads = wheel_loads(model._replace(contact=model.contact._replace(friction=1e-9, law=2)), workspace(model), state)
+    loads = wheel_loads(Equations(model._replace(contact=model.contact._replace(friction=1e-9, law=2))), state)
     np.testing.assert_allclose(loads, 54546, rtol=3e-3)  # rolling at 20 m/s, yawed by 3 mrad: approach speeds, damping
     names = scene.vehicle.body_names
     for k in range(1, 5):

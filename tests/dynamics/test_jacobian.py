@@ -8,7 +8,7 @@ from wrcore.dynamics.blocks import factorise, new_system, solve_stage
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.jacobian import new_jacobian, plan_sweeps, refresh_jacobian
-from wrcore.dynamics.system import fill_derivatives, workspace
+from wrcore.dynamics.system import Equations
 from wrcore.scene import compile_scene, load_scene
 
 CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
@@ -26,21 +26,15 @@ def moving(request):
     name, overrides = CASES[request.param]
     model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", ["speed=20", *overrides]))
     end = integrate(model, start, [0.0, 1.5], "tsit5", 1e-6, 1e-9).end.memory
-    t, state, work = end.clock[0], end.state, workspace(model)
-
-    def function(t, state):
-        rate = np.empty_like(state)
-        fill_derivatives(t, state, model, work, rate)
-        return rate
-
-    return model, t, state, function(t, state), function
+    t, state, equations = end.clock[0], end.state, Equations(model)
+    return model, t, state, equations(t, state), equations
 
 
 def refreshed(moving, sweep, jacobian):
-    model, t, state, rate, _ = moving
+    _, t, state, rate, equations = moving
     refresh_jacobian(
-        sweep, jacobian, t, state, rate, np.empty_like(state), np.empty_like(state), np.empty(99), model,
-        workspace(model),
+        sweep, jacobian, t, state, rate, np.empty_like(state), np.empty_like(state), np.empty(99),
+        *equations.arguments,
     )  # fmt: skip
     return jacobian
 

@@ -14,11 +14,10 @@ from wrcore.analysis_stability import at_speed, steady_motion
 from wrcore.contact import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import evaluate
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.linear import linearise, moved_states, steady_running
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import Model, state_size, workspace
+from wrcore.dynamics.system import Equations, Model, state_size
 from wrcore.scene import compile_scene, load_scene
 from wrcore.vehicle.description import build_vehicle
 
@@ -225,11 +224,11 @@ def test_hunting_of_a_conical_wheelset_equals_the_textbook(stiffening, patch, to
     model = model._replace(contact=model.contact._replace(shear_modulus=8.2e10 * stiffening))
     higher = 6e-5 * (stiffening > 1.0) * (np.arange(STATE_SIZE) == 2)  # the stiff contact takes less penetration
     state = steady_running(model, state + higher, 50).state
-    work = workspace(model)
-    evaluate(0.0, state[None, :], model, work, np.empty((1, 13)))
+    equations = Equations(model)
+    equations(0.0, state)
     for speed in (5.0, 20.0, 40.0, 60.0, 80.0):
         found = np.linalg.eigvals(steady_motion(model, state, speed).matrix)
-        exact = np.linalg.eigvals(hunting_matrix(model, work.patches[0, 0, 0], state[2], speed))
+        exact = np.linalg.eigvals(hunting_matrix(model, equations.work.patches[0, 0, 0], state[2], speed))
         hunting = exact[np.argmax(exact.real)]
         nearest = found[np.argmin(np.abs(found - complex(hunting.real, abs(hunting.imag))))]
         assert nearest.real == pytest.approx(hunting.real, rel=tolerance)

@@ -7,7 +7,7 @@ from tests.conftest import SCENES
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import damping_factor, hertz_ellipse
 from wrcore.creep.laws import LAWS, creep_force
-from wrcore.dynamics.wheel import wheel_wrench
+from wrcore.dynamics.wheel import MOTION_COLUMNS, wheel_wrenches
 from wrcore.geometry.track import rotation
 from wrcore.scene import compile_scene, load_scene
 
@@ -24,11 +24,10 @@ def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
     v, w = np.array([20.0, 0.03, -0.01]), np.array([0.02, 43.6, 0.05])
     axle = rotation(roll, yaw)[:, 1]
     z = next(z for z in np.arange(0.4625, 0.4590, -2e-5) if _loaded(model, side, y, z, axle))
-    rows = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
-    *wrench, count, _, _ = wheel_wrench(model, side, y, z, *axle, *v, *w, 0.0, 0.0, rows)
-    assert count >= 1
+    wrench, rows, _ = one_wheel(model, [side, y, z, *axle, *v, *w, 0.0, 0.0])
+    assert len(rows) >= 1
     force, moment = np.zeros(3), np.zeros(3)
-    for row in rows[:count]:
+    for row in rows:
         angle, delta = row[columns.ANGLE], row[columns.PENETRATION]
         t1, t2, n = np.array([[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]])
         arm = row[[columns.X, columns.Y, columns.Z]] - [0.0, y, z]
@@ -55,6 +54,47 @@ def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
     np.testing.assert_allclose(wrench[3:], moment, rtol=1e-9, atol=1e-9 * np.abs(moment).max())
 
 
+def one_wheel(model, motion):
+    """Wrench, patches and bound of a wheel whose neighbour is far above its rail."""
+    motions = np.array([[motion, motion]])
+    motions[0, 1, 2] += 1.0
+    patches = np.zeros((1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    counts, bounds, wrenches = np.zeros((1, 2), int), np.zeros((1, 2)), np.zeros((1, 2, 6))
+    wheel_wrenches(model, motions, patches, counts, bounds, wrenches)
+    assert counts[0, 1] == 0 and not wrenches[0, 1].any()
+    return wrenches[0, 0], patches[0, 0, : counts[0, 0]], bounds[0, 0]
+
+
 def _loaded(model, side, y, z, axle):
-    rows = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
-    return wheel_wrench(model, side, y, z, *axle, 20.0, 0, 0, 0, 43.6, 0, 0.0, 0.0, rows)[2] > 4e4
+    return one_wheel(model, [side, y, z, *axle, 20.0, 0, 0, 0, 43.6, 0, 0.0, 0.0])[0][2] > 4e4
+
+
+@pytest.mark.parametrize("detection", ["spatial", "planar", "auto"])
+@pytest.mark.parametrize(("patch", "creep"), [("moment", "table"), ("maximum", "she")])
+def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
+    overrides = [f"contact.detection={detection}", f"contact.patch={patch}", f"contact.creep.model={creep}"]
+    model = compile_scene(load_scene(SCENES / "wheelset.yaml", overrides))[0].contact
+    rng = np.random.default_rng(0)
+    motions = np.empty((40, MOTION_COLUMNS))
+    for m in motions:
+        axle = rotation(1e-3 * rng.normal(), 5e-3 * rng.normal())[:, 1]
+        position = [rng.choice([-1.0, 1.0]), rng.uniform(-0.008, 0.008), 0.46 + rng.uniform(-1e-3, 5e-4)]
+        m[:] = (
+            *position,
+            *axle,
+            20.0,
+            *rng.normal(size=2) * 0.05,
+            *(rng.normal(size=3) * 0.1 + [0, 43.6, 0]),
+            1e-3,
+            1e-4,
+        )
+    motions = motions.reshape(20, 2, MOTION_COLUMNS)
+    patches = np.zeros((20, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    counts, bounds, wrenches = np.zeros((20, 2), int), np.zeros((20, 2)), np.zeros((20, 2, 6))
+    assert wheel_wrenches(model, motions, patches, counts, bounds, wrenches) == 0
+    for place in np.ndindex(20, 2):
+        wrench, rows, bound = one_wheel(model, motions[place])
+        assert (len(rows), bound) == (counts[place], bounds[place])
+        np.testing.assert_allclose(wrenches[place], wrench, rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(patches[place][: len(rows)], rows, rtol=1e-12, atol=1e-12)
+    assert 0 < (counts > 0).sum() < 40

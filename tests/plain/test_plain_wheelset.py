@@ -11,7 +11,7 @@ from wrcore.creep.table import ensure_table
 from wrcore.dynamics.body import euler_of, matrix_of
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.reference import integrate_function
-from wrcore.dynamics.system import derivatives, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
 from wrcore.plain.contact import cut_strips, find_patches
@@ -66,7 +66,7 @@ def differences(model, plain, states):
     """Differences of kinematic rates, of force over wheel load, of moment over wheel load and tape circle, (n, 3)."""
     work, found = workspace(model), []
     for state in states:
-        difference = derivatives(0.15, state, model, work) - plain.rates(0.15, state)
+        difference = Equations(model, work)(0.15, state) - plain.rates(0.15, state)
         force = model.bodies.mass[0] * difference[7:10] / LOAD
         moment = model.bodies.inertia[0] * difference[10:13] / (LOAD * LEVER)
         found.append([np.abs(part).max() for part in (difference[:7], force, moment)])

@@ -7,7 +7,7 @@ from tests.conftest import SCENES
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.equilibrium import solve_equilibrium
-from wrcore.dynamics.system import derivatives, workspace
+from wrcore.dynamics.system import Equations
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.scene import compile_scene, load_scene, static_equilibrium
@@ -23,7 +23,7 @@ def test_vehicles_of_a_train_accelerate_as_alone(boxes):
     train, starts = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", [*overrides, *COUPLED]))
     n = len(alone.bodies.mass)
     assert len(train.bodies.mass) == 3 * n
-    one, all_three = (derivatives(0.0, s, m, workspace(m)) for m, s in ((alone, start), (train, starts)))
+    one, all_three = (Equations(m)(0.0, s) for m, s in ((alone, start), (train, starts)))
     for k in range(3):
         own = slice(STATE_SIZE * n * k, STATE_SIZE * n * (k + 1))
         shifted = starts[own].copy()

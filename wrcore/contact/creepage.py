@@ -1,12 +1,10 @@
 """From rigid-body motion to creepages at a patch."""
 
-import math
-
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 
 
-@jit(allocates=False)
-def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, angle, speed):
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed):
     """Creepages and approach speed of a patch on a tangent track.
 
     The contact frame is (1) forward, (2) lateral in the tangent plane, (3) normal from rail into wheel:
@@ -18,8 +16,8 @@ def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, angle, speed):
         Velocity of the wheelset's centre (m/s) and its angular velocity (rad/s) in the track frame.
     px, py, pz : float
         Contact point relative to the wheelset's centre, m.
-    angle : float
-        Contact angle, rad.
+    cosine, sine : float
+        Of the contact angle.
     speed : float
         Rolling speed V, m/s, > 0.
 
@@ -30,11 +28,11 @@ def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, angle, speed):
     approach_speed : float
         Rate of penetration, m/s.
     """
-    cosine, sine = math.cos(angle), math.sin(angle)
+    slowness = 1.0 / speed
     ux = vx + wy * pz - wz * py
     uy = vy + wz * px - wx * pz
     uz = vz + wx * py - wy * px
-    xi = ux / speed
-    eta = (uy * cosine + uz * sine) / speed
-    phi = (wz * cosine - wy * sine) / speed
+    xi = ux * slowness
+    eta = (uy * cosine + uz * sine) * slowness
+    phi = (wz * cosine - wy * sine) * slowness
     return xi, eta, phi, uy * sine - uz * cosine

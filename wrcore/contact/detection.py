@@ -17,16 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore._jit import jit
-from wrcore.contact.geometry import (
-    RAIL_COSINE,
-    RAIL_RESERVE,
-    SCAN_STEP,
-    WHEEL_RESERVE,
-)
+from wrcore._jit import FUSED, jit, rarely_called
+from wrcore.contact.geometry import RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, WHEEL_RESERVE, YAW_LIMIT
 from wrcore.contact.reduction import (
     CURVATURE_Y,
     MAX_PATCHES,
+    MAXIMUM,
     MOMENT,
     PATCH_COLUMNS,
     PENETRATION,
@@ -39,17 +35,22 @@ from wrcore.contact.reduction import (
     patch_from_moments,
 )
 from wrcore.contact.scan import (
-    CHUNK,
-    any_close,
+    MOST_STRIPS,
+    blocks_near_misses,
+    cells_ahead,
+    deepest_strip,
     fine_sums,
+    first_zone,
     leaves_cells,
+    make_window,
+    near_blocks,
     planar_bound,
     rail_cell,
     scan,
     strip_gap,
-    window,
+    strip_place,
 )
-from wrcore.contact.strip import gap_at, make_pose
+from wrcore.contact.strip import gap_at, make_pose, strip_point
 from wrcore.errors import InputError
 
 DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
@@ -67,7 +68,7 @@ _WIDE = 10
 those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepest, depth, m0, m1, m2, nodes, patches,
                  count):  # fmt: skip
     """Reduce one overlap and store its patch; when all rows are taken the shallowest patch gives way to a deeper one.
@@ -89,7 +90,9 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
             middle = first
             m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP, m2 * SCAN_STEP
         else:
-            m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, outside, beyond)
+            middle = 0.5 * (outside + beyond)
+            ahead = cells_ahead(geometry, middle, strip_point(geometry, pose, middle)[0])
+            m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, ahead, outside, beyond)
             if fine_nodes < _WIDE:
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
@@ -100,18 +103,20 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
     return count + found if row == count else count
 
 
-@jit(allocates=False)
-def _search(geometry, pose, reduction, node, reach, offset, first_close, last_close, patches):
+@jit(allocates=False, fastmath=FUSED)
+def _search(geometry, pose, grid, reduction, first_close, last_close, patches, count):
     """All overlaps strip by strip, with a closer look wherever the reserve allows one between two nodes without.
 
-    Only strips from ``first_close`` to ``last_close`` and their neighbours can take part.
+    Only strips from ``first_close`` to ``last_close`` and their neighbours can take part. Patches are added to the
+    ``count`` there are; returns their new number.
     """
-    scan_wheel, scan_rail = geometry.scan_wheel, geometry.scan_rail
-    cells = scan_rail.shape[1]
+    rarely_called()
+    wheel, rail = geometry.scan_wheel, geometry.scan_rail
+    cells = rail.shape[1]
     exact = leaves_cells(pose)
-    begin = geometry.scan_wheel_start + node * SCAN_STEP
+    begin = geometry.scan_wheel_start + grid.node * SCAN_STEP
     wheel_end = geometry.wheel_start + (geometry.wheel.shape[0] - 1) * geometry.wheel_step
-    count = nodes = 0
+    nodes = 0
     inside = False
     outside = first = last = deepest = begin
     depth = m0 = m1 = m2 = 0.0
@@ -119,27 +124,21 @@ def _search(geometry, pose, reduction, node, reach, offset, first_close, last_cl
     k = max(first_close - 1, 0)
     end = min(last_close + 2, cells)
     while k < end:
-        # a chunk without a close strip in it or next to it is passed over
-        if k % CHUNK == 0 and not (inside or exact) and 4 <= k < cells - CHUNK - 4:
-            if any_close(pose, scan_wheel, scan_rail, node, reach, offset, k - 4) == 0:
-                k += CHUNK
-                two_back, one_back, one_back_at, before = 1.0, 1.0, begin + (k - 1) * SCAN_STEP, 1.0
-                continue
-        at = begin + k * SCAN_STEP
-        if at < geometry.wheel_start or at > wheel_end:
+        here = begin + k * SCAN_STEP
+        if here < geometry.wheel_start or here > wheel_end:
             coarse = 1.0
         elif exact:
-            coarse = gap_at(geometry, pose, at)[0]
+            coarse = gap_at(geometry, pose, here)[0]
         else:
-            coarse = strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k)
-        cell = rail_cell(geometry, pose, at) if exact else k
-        reserve = scan_wheel[WHEEL_RESERVE, node + k] + scan_rail[RAIL_RESERVE, cell]
+            coarse = strip_gap(grid, wheel, rail, k)
+        cell = rail_cell(geometry, pose, here) if exact else k
+        reserve = wheel[WHEEL_RESERVE, grid.node + k] + rail[RAIL_RESERVE, cell]
         if abs(coarse) < reserve and not exact:  # the node may have left its rail cell: its sign is not safe
-            coarse = gap_at(geometry, pose, at)[0]
-        cosine = scan_rail[RAIL_COSINE, cell]
+            coarse = gap_at(geometry, pose, here)[0]
+        cosine = rail[RAIL_COSINE, cell]
         parts = _PARTS if 0.0 <= min(coarse, before) < reserve else 1
         for part in range(1, parts + 1):
-            u, gap = at, coarse
+            u, gap = here, coarse
             if part < parts:
                 u -= (parts - part) * (SCAN_STEP / _PARTS)
                 gap = gap_at(geometry, pose, u)[0]
@@ -178,7 +177,7 @@ def _search(geometry, pose, reduction, node, reach, offset, first_close, last_cl
     return count
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def planar_error_bound(geometry, side, y, z, ex, ey, ez):
     """Bound of the normal penetration that planar detection misses for one wheel, from yaw and contact angle.
 
@@ -193,14 +192,67 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
         Metres; 0 where no strip comes near the rail.
     """
     pose = make_pose(side, y, z, ex, ey, ez, False)
-    node, reach, offset = window(geometry, pose)
-    if node < 0 or node + geometry.scan_rail.shape[1] > geometry.scan_wheel.shape[1]:
+    window = make_window(geometry, pose)
+    grid, wheel, rail = window.grid, geometry.scan_wheel, geometry.scan_rail
+    cells = rail.shape[1]
+    if grid.node < 0 or grid.node + cells > wheel.shape[1]:
         return 0.0
+    yaw_square, bound = ex * ex, 0.0
+    if yaw_square > YAW_LIMIT * YAW_LIMIT or leaves_cells(pose):
+        bound = planar_bound(grid, yaw_square, wheel, rail, 0, cells)
+    else:
+        near = blocks_near_misses(geometry, window, yaw_square)
+        while near > 0:
+            begin, end, near = first_zone(near, geometry.block)
+            bound = max(bound, planar_bound(grid, yaw_square, wheel, rail, begin, end))
     # the law is of first order in yaw; the next order is psi^2 (1 + R'^2) of it: below 2 % up to 50 mrad on the flange
-    return 1.05 * planar_bound(pose, geometry.scan_wheel, geometry.scan_rail, node, reach, offset)
+    return 1.05 * bound
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patch):
+    """Patch of the only overlap of a zone that begins at strip ``begin``: 1, 0 without penetration, -1 if too narrow.
+
+    ``overlap`` and the sums m0, m1, m2: see `scan`.
+    """
+    wheel, start = geometry.scan_wheel, geometry.scan_wheel_start + (grid.node + begin) * SCAN_STEP
+    if reduction == MAXIMUM:
+        strip = deepest_strip(grid, wheel, geometry.scan_rail, begin + overlap.first, begin + overlap.last)
+        return int(patch_at_maximum(geometry, pose, start + (strip - begin) * SCAN_STEP, patch))
+    if overlap.count >= _WIDE:
+        m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3
+    else:
+        middle = (overlap.first + overlap.last) // 2
+        ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_place(grid, wheel, begin + middle)[0]
+        ahead = cells_ahead(geometry, start + middle * SCAN_STEP, ur)
+        outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
+        m0, m1, m2, start, nodes = fine_sums(geometry, pose, ahead, outside, beyond)
+        if nodes < _WIDE:
+            return -1
+    return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patch))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
+    """Patches of the strips from ``begin`` to before ``end``, added to ``count`` others; returns their new number."""
+    grid = window.grid
+    if end - begin > MOST_STRIPS:
+        return _search(geometry, pose, grid, reduction, begin, end - 1, patches, count)
+    m0, m1, m2, overlap, close = scan(window, geometry.scan_wheel, geometry.scan_rail, begin, end)
+    if close.count == 0:
+        return count
+    # one overlap, and next to its ends no more close strips than its own flanks make
+    one_overlap = overlap.count > 0 and overlap.last - overlap.first + 1 == overlap.count
+    one_overlap = one_overlap and close.last - close.first + 1 == close.count
+    one_overlap = one_overlap and overlap.first - close.first <= _FLANK and close.last - overlap.last <= _FLANK
+    if one_overlap and count < MAX_PATCHES:
+        found = _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patches[count])
+        if found >= 0:
+            return count + found
+    return _search(geometry, pose, grid, reduction, begin + close.first, begin + close.last, patches, count)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     """All contact patches of one wheel.
 
@@ -231,24 +283,18 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     Two overlaps separated by less than the scan's step of 0.6 mm count as one: patches so close carry load as one.
     """
     pose = make_pose(side, y, z, ex, ey, ez, spatial)
-    node, reach, offset = window(geometry, pose)
-    if node < 0 or node + geometry.scan_rail.shape[1] > geometry.scan_wheel.shape[1]:
+    window = make_window(geometry, pose)
+    node, cells = window.grid.node, geometry.scan_rail.shape[1]
+    if node < 0 or node + cells > geometry.scan_wheel.shape[1]:
         return 0
     if leaves_cells(pose):
-        return _search(geometry, pose, reduction, node, reach, offset, 0, geometry.scan_rail.shape[1], patches)
-    m0, m1, m2, overlapping, first, last, close, first_close, last_close = scan(
-        pose, geometry.scan_wheel, geometry.scan_rail, node, reach, offset
-    )
-    if close == 0:
-        return 0
-    # one overlap, and next to its ends no more close strips than its own flanks make
-    one_overlap = last - first + 1 == overlapping and last_close - first_close + 1 == close
-    one_overlap = one_overlap and first - first_close <= _FLANK and last_close - last <= _FLANK
-    if reduction == MOMENT and overlapping >= _WIDE and one_overlap:
-        start = geometry.scan_wheel_start + node * SCAN_STEP
-        m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3
-        return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patches[0]))
-    return _search(geometry, pose, reduction, node, reach, offset, first_close, last_close, patches)
+        return _search(geometry, pose, window.grid, reduction, 0, cells, patches, 0)
+    count = 0
+    near = near_blocks(geometry, window)
+    while near > 0:
+        begin, end, near = first_zone(near, geometry.block)
+        count = _search_zone(geometry, pose, window, reduction, begin, end, patches, count)
+    return count
 
 
 @dataclass(frozen=True)

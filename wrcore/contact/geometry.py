@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from wrcore.errors import InputError
 
@@ -12,15 +13,39 @@ SCAN_STEP = 0.6e-3
 
 # Columns of the profile arrays.
 VALUE, SLOPE, CURVATURE = range(3)
-# Rows of the scan arrays.
-RADIUS, RADIUS_SLOPE, WHEEL_RESERVE = range(3)
+# Rows of the strip arrays (scan and fine); with along = tilt R' a strip's radius has the shares
+# R along = tilt ALONG and R sqrt(1 - along^2) = R - tilt^2 (DOWN_2 + tilt^2 (DOWN_4 + tilt^2 DOWN_6)) to along^8/26.
+RADIUS, ALONG, DOWN_2, DOWN_4, DOWN_6 = range(5)
+# Further rows of the scan arrays.
+WHEEL_RESERVE, RADIUS_SLOPE, WHEEL_COSINE = range(5, 8)
 RAIL_RESERVE, RAIL_COSINE = 4, 5
+
+LANES = 8
+"""Strips are taken in multiples of this: whole vector registers."""
+
+_MOST_BLOCKS = 56
+"""Blocks that are told apart: of the 64 bits of a word, in whole registers, one left over."""
 
 _MARGIN = 4
 _SAFETY = 1.5
 """Covers what roll and yaw add to a profile's second derivative."""
 RESERVE_TO_SECOND = 8.0 / (_SAFETY * SCAN_STEP**2)
 """Bound of a second derivative (1/m) from a reserve (m)."""
+
+STRAY = 0.6 * SCAN_STEP
+"""Distance by which the scan's nodes may leave their rail cell, m; the second reserve covers what that costs."""
+ROLL_STRAY, YAW_STRAY = 0.03, 1.5
+"""What roll and yaw^2 move a strip sideways, m: by its radius' difference to the tape circle (0.03 m at the flange tip)
+and by R R' psi^2 (R R' = 1.5 m on a flange of 70 degrees)."""
+
+PARTS = 4
+"""Parts of a scan cell that bounds of gaps are told apart for."""
+
+CALM = 0.15
+"""Share of STRAY up to which tighter bounds hold."""
+
+YAW_LIMIT = 0.02
+"""Yaw (rad) up to which `_zone_misses` holds."""
 
 
 class ContactGeometry(NamedTuple):
@@ -31,15 +56,23 @@ class ContactGeometry(NamedTuple):
     rail: np.ndarray
     """(m, 3): ordinate f, f', f'' for Hertz."""
     scan_wheel: np.ndarray
-    """(3, nodes): R, R' and the reserve at the scan nodes; padding has R = 0."""
+    """(8, nodes): strip rows, the reserve, R' and the cosine of the wheel's inclination at the scan nodes; padding has
+    R = 0."""
     scan_rail: np.ndarray
     """(6, cells): the rail in each scan cell as a cubic of the distance from the cell's start (4 coefficients), the
     reserve, and the cosine of its inclination; padding lies 1 m below the track. The reserves of a wheel node and its
     rail cell together bound how much deeper than the nodes the gap between them can go (M h^2/8)."""
+    zone_gaps: np.ndarray
+    """(shifts 2 PARTS, blocks): see `_zone_gaps`; of each shift the calm poses first."""
+    zone_misses: np.ndarray
+    """(shifts, blocks): see `_zone_misses`."""
+    block: int
+    """Strips per block: LANES, or a multiple of it where the rail is very wide."""
     fine_wheel: np.ndarray
-    """(2, n): R and R' at the profile's own nodes."""
+    """(5, n + LANES): strip rows at the profile's own nodes, and padding."""
     fine_rail: np.ndarray
-    """(4, m - 1): the rail between its own nodes, as in ``scan_rail``; no cells where the two spacings differ."""
+    """(4, m - 1 + LANES): the rail between its own nodes, as in ``scan_rail``, and padding; padding alone where the two
+    spacings differ."""
     wheel_start: float
     wheel_step: float
     rail_start: float
@@ -78,11 +111,15 @@ def contact_geometry(wheel, rail, track, rolling_radius, half_distance):
     """
     if wheel.kind != "wheel" or rail.kind != "rail":
         raise InputError(wheel.name, "kind", f"expected a wheel and a rail, got {wheel.kind} and {rail.kind}")
-    scan_rail, scan_rail_start = _rail_scan(rail)
+    scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
     return ContactGeometry(
         np.column_stack([-wheel.f, -wheel.df, -wheel.d2f]), np.column_stack([rail.f, rail.df, rail.d2f]),
-        scan_wheel, scan_rail, np.stack([rolling_radius - wheel.f, -wheel.df]), _fine_rail(wheel, rail),
+        scan_wheel, scan_rail,
+        np.concatenate([_zone_gaps(scan_wheel, scan_rail, block, rolling_radius, s) for s in (CALM * STRAY, STRAY)], 1)
+        .reshape(-1, _whole(scan_rail.shape[1] // block)),
+        _zone_misses(scan_wheel, scan_rail, block), block,
+        _padded(_strip_rows(rolling_radius - wheel.f, -wheel.df)), _padded(_fine_rail(wheel, rail)),
         float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
         float(rolling_radius), float(half_distance), float(track.rail_distance(rail)),
@@ -103,11 +140,67 @@ def _wheel_scan(wheel, rolling_radius, window):
     """Scan nodes of the wheel, padded by one window of rail cells on either side, and where they start."""
     count = int((wheel.u[-1] - wheel.u[0]) / SCAN_STEP + 1e-9) + 1
     u = wheel.u[0] + SCAN_STEP * np.arange(count)
-    nodes = np.zeros((3, count + 2 * window))
-    middle = slice(window, window + count)
-    nodes[RADIUS, middle], nodes[RADIUS_SLOPE, middle] = rolling_radius - wheel(u), -wheel(u, 1)
-    nodes[WHEEL_RESERVE, middle] = _reserve(wheel, u)
+    nodes = np.zeros((8, count + 2 * window))
+    middle, slope = slice(window, window + count), -wheel(u, 1)
+    nodes[:5, middle] = _strip_rows(rolling_radius - wheel(u), slope)
+    nodes[WHEEL_RESERVE, middle], nodes[RADIUS_SLOPE, middle] = _reserve(wheel, u), slope
+    nodes[WHEEL_COSINE, middle] = 1.0 / np.sqrt(1.0 + slope**2)
     return nodes, float(u[0] - window * SCAN_STEP)
+
+
+def _whole(count):
+    """The next multiple of LANES."""
+    return LANES * math.ceil(count / LANES)
+
+
+def _strip_rows(radius, slope):
+    """Rows RADIUS to DOWN_6 from R and R'."""
+    square = slope**2
+    return np.stack([radius, radius * slope, radius * square / 2, radius * square**2 / 8, radius * square**3 / 16])
+
+
+def _padded(rows):
+    return np.pad(rows, ((0, 0), (0, LANES)))
+
+
+def _zone_gaps(wheel, rail, block, rolling_radius, limit):
+    """Lower bounds of gaps, so that the scan can leave out what is far from contact.
+
+    Entry (shift, part, block): at height 0 and roll 0 no strip of the block, a run of rail cells, comes closer than
+    this to being close (see `scan`), if the first wheel node is ``shift`` and the strips stand in the part
+    ``part`` of PARTS of their cells. Roll and yaw that stray by no more than ``limit`` move a strip by up to ``stray``
+    from there, and only upwards but for ``sag``.
+    """
+    cells = rail.shape[1]
+    radius, along = wheel[RADIUS], np.abs(wheel[ALONG])
+    tilt_square, roll = limit / YAW_STRAY, limit / ROLL_STRAY
+    # lateral: roll times the radius' difference, yaw by R R' psi^2, and the axle's foreshortening along the profile
+    stray = (np.abs(radius - rolling_radius) + tilt_square * wheel[DOWN_2]) * roll + tilt_square * along
+    stray += 0.51 * SCAN_STEP * np.arange(wheel.shape[1]) * max(tilt_square, roll * roll)
+    stray = sliding_window_view(1.01 * stray, cells)
+    sag = along * 0.25 * tilt_square * roll  # R R' tilt^2 ez: at most where half the limit is used up by either
+    reserves = 1.0 + (limit / STRAY) ** 2
+    height = sliding_window_view(-radius - sag - reserves * wheel[WHEEL_RESERVE], cells) - reserves * rail[RAIL_RESERVE]
+    c0, c1, c2, c3 = rail[:4]
+    gaps = np.full((len(height), PARTS, _whole(cells // block)), 1.0)
+    for part in range(PARTS):
+        low, high = part / PARTS * SCAN_STEP - stray, (part + 1) / PARTS * SCAN_STEP + stray
+        # highest point of a cubic over an interval: its ends, and how far it can rise above their chord
+        top = np.maximum(*(c0 + d * (c1 + d * (c2 + d * c3)) for d in (low, high)))
+        bend = np.maximum(*(np.abs(2.0 * c2 + 6.0 * c3 * d) for d in (low, high)))
+        gap = height - top - 0.125 * bend * (high - low) ** 2
+        gaps[:, part, : cells // block] = gap.reshape(len(gap), -1, block).min(axis=2)
+    return gaps
+
+
+def _zone_misses(wheel, rail, block):
+    """Largest penetration, over yaw^2 up to YAW_LIMIT, that planar detection can miss in each block (shift, block)."""
+    cells = rail.shape[1]
+    missed = YAW_LIMIT**2 * 0.5 * RESERVE_TO_SECOND * rail[RAIL_RESERVE] * sliding_window_view(wheel[ALONG] ** 2, cells)
+    missed += sliding_window_view(wheel[DOWN_2], cells)
+    misses = np.zeros((len(missed), _whole(cells // block)))
+    misses[:, : cells // block] = missed.reshape(len(missed), -1, block).max(axis=2)
+    return misses
 
 
 def _fine_rail(wheel, rail):
@@ -126,14 +219,15 @@ def _cubics(f, df, step):
 
 
 def _rail_scan(rail):
-    """Scan cells of the rail, padded to whole vectors of eight, and where they start."""
+    """Scan cells of the rail, padded to whole blocks, where they start, and the size of a block."""
     count = int((rail.u[-1] - rail.u[0]) / SCAN_STEP + 1e-9)
     u = rail.u[0] + SCAN_STEP * np.arange(count + 1)
     f, df = rail(u), rail(u, 1)
-    cells = np.zeros((6, 8 * math.ceil((count + 2 * _MARGIN) / 8)))
+    block = LANES * math.ceil((count + 2 * _MARGIN) / (LANES * _MOST_BLOCKS))
+    cells = np.zeros((6, block * math.ceil((count + 2 * _MARGIN) / block)))
     cells[0], cells[RAIL_COSINE] = -1.0, 1.0
     middle = slice(_MARGIN, _MARGIN + count)
     cells[:4, middle] = _cubics(f, df, SCAN_STEP)
     cells[RAIL_RESERVE, middle] = _reserve(rail, u[:-1] + 0.5 * SCAN_STEP)
     cells[RAIL_COSINE, middle] = 1.0 / np.sqrt(1.0 + (0.5 * (df[:-1] + df[1:])) ** 2)
-    return cells, float(u[0] - _MARGIN * SCAN_STEP)
+    return cells, float(u[0] - _MARGIN * SCAN_STEP), block

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.strip import (
     cubic_at,
@@ -21,6 +21,7 @@ from wrcore.contact.strip import (
     gap_and_slope,
     gap_at,
     on_rail,
+    radius_direction,
     slope_difference,
     strip_point,
     wheel_slope,
@@ -39,7 +40,8 @@ interpenetrate more at the sides, the curvature at one point says nothing about 
 # Columns of the patch array: geometry first, then what the forces add (wrcore.dynamics.wheel).
 U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y = range(10)
 SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
-PATCH_COLUMNS = 19
+COSINE, SINE = 19, 20  # of the contact angle
+PATCH_COLUMNS = 21
 
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
@@ -56,7 +58,7 @@ _EDGE_TOLERANCE = 4e-7
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def deepest_point(geometry, pose, u, tolerance):
     """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
 
@@ -81,7 +83,7 @@ def deepest_point(geometry, pose, u, tolerance):
     return new if abs(new - u) < 2.9 * SCAN_STEP else u
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _edge_by_newton(geometry, pose, u, low, high):
     """Zero of the gap from a good guess by a few Newton steps; NaN if that does not settle in (low, high)."""
     for _ in range(6):
@@ -95,7 +97,7 @@ def _edge_by_newton(geometry, pose, u, low, high):
     return np.nan
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _edge_by_bracket(geometry, pose, outside, inside):
     """Zero of the gap between a point outside and one inside an overlap (Illinois steps)."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
@@ -122,7 +124,7 @@ def _edge_by_bracket(geometry, pose, outside, inside):
     return 0.5 * (outside + inside)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     """Both ends of a narrow overlap: from the parabola at its deepest point where that leads there, else by bracketing.
 
@@ -142,7 +144,7 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     return start, end
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def overlap_moments(geometry, pose, first, last):
     """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature, M1 and M2 about the interval's middle."""
     middle, half = 0.5 * (first + last), 0.5 * (last - first)
@@ -157,27 +159,50 @@ def overlap_moments(geometry, pose, first, last):
     return half * m0, half * m1, half * m2
 
 
-@jit(allocates=False, forceinline=True)
-def fill_patch(pose, u, along, radius, ur, rail_z, slope, penetration, patch):
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
 
     ``rail_z`` is the rail's height at ``ur``, ``slope`` the contact plane's over the rail's lateral coordinate, ``u``,
     ``along`` and ``radius`` the wheel's strip.
     """
-    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-    down = math.sqrt(max(1.0 - along * along, 0.0))
-    dy = down * pose.y_down + along * pose.y_along
+    secant = math.sqrt(1.0 + slope * slope)
+    cosine = 1.0 / secant
+    dy, _ = radius_direction(pose, along)
     patch[U_WHEEL] = u
-    patch[S_WHEEL] = -math.asin((along * pose.q * pose.ey - pose.ex * dy) / math.sqrt(1.0 - pose.ez * pose.ez))
+    patch[S_WHEEL] = -_arc_sine((along * pose.q * pose.ey - pose.ex * dy) / math.sqrt(1.0 - pose.ez * pose.ez))
     patch[U_RAIL] = ur
-    patch[ANGLE] = pose.side * math.atan(slope)
+    patch[ANGLE] = pose.side * _arc_tangent(slope)
+    patch[COSINE], patch[SINE] = cosine, pose.side * slope * cosine
     patch[PENETRATION] = penetration
-    patch[X] = radius * along * pose.q
-    patch[Z] = rail_z - penetration * (1.0 / cosine - 0.5 * cosine)
-    patch[Y] = -0.5 * penetration * pose.side * slope * cosine
+    patch[X] = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+    patch[Z] = rail_z - penetration * (secant - 0.5 * cosine)
+    patch[Y] = pose.side * (ur + geometry.rail_distance - 0.5 * penetration * slope * cosine)
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _arc_tangent(x):
+    """atan x; its series where seven terms give it to rounding."""
+    s = x * x
+    if s > 0.01:
+        return math.atan(x)
+    s2 = s * s
+    high = 1.0 / 9.0 - s * (1.0 / 11.0) + s2 * (1.0 / 13.0 - s * (1.0 / 15.0))
+    return x - x * s * (1.0 / 3.0 - s * (1.0 / 5.0) + s2 * (1.0 / 7.0 - s * high))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _arc_sine(x):
+    """asin x; its series where eight terms give it to rounding."""
+    s = x * x
+    if s > 0.01:
+        return math.asin(x)
+    s2 = s * s
+    high = 35.0 / 1152.0 + s * (63.0 / 2816.0) + s2 * (231.0 / 13312.0 + s * (143.0 / 10240.0))
+    return x + x * s * (1.0 / 6.0 + s * (3.0 / 40.0) + s2 * (15.0 / 336.0 + s * high))
+
+
+@jit(allocates=False, fastmath=FUSED)
 def patch_at_maximum(geometry, pose, u, patch):
     """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
     u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE)
@@ -208,20 +233,20 @@ def patch_at_maximum(geometry, pose, u, patch):
         hyy = around * square + across * (1.0 - square) + rail_across
     mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
     spread = math.copysign(math.sqrt(half * half + hxy * hxy), half)
-    fill_patch(pose, u, along, radius, ur, f, df, penetration, patch)
-    _place(geometry, pose, patch)
+    _fill_patch(geometry, pose, u, along, radius, ur, f, df, penetration, patch)
     patch[CURVATURE_X] = 0.5 * max(mean + spread, CURVATURE_FLOOR)
     patch[CURVATURE_Y] = 0.5 * max(mean - spread, CURVATURE_FLOOR)
     return True
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
     if not m0 > 0.0:
         return False
-    centre = m1 / m0
-    spread = 7.0 * (m2 / m0 - centre * centre)
+    inverse = 1.0 / m0
+    centre = m1 * inverse
+    spread = 7.0 * (m2 * inverse - centre * centre)
     if not spread > 0.0:
         return False
     width = math.sqrt(spread)
@@ -231,15 +256,7 @@ def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
     slope_both = 0.5 * (wheel_slope(pose, slope, along) + df)
     cosine = 1.0 / math.sqrt(1.0 + slope_both * slope_both)
-    fill_patch(pose, u, along, radius, ur, f, slope_both, depth * cosine, patch)
-    _place(geometry, pose, patch)
+    _fill_patch(geometry, pose, u, along, radius, ur, f, slope_both, depth * cosine, patch)
     patch[CURVATURE_X] = 0.5 / (radius * math.sqrt(1.0 + slope * slope))
     patch[CURVATURE_Y] = depth / spread * cosine * cosine * cosine
     return True
-
-
-@jit(allocates=False, forceinline=True)
-def _place(geometry, pose, patch):
-    """Turn the columns X and Y from local parts into track coordinates (X from the wheelset's cross-section)."""
-    patch[X] += (geometry.half_distance + patch[U_WHEEL]) * pose.ex
-    patch[Y] += pose.side * (patch[U_RAIL] + geometry.rail_distance)

@@ -1,106 +1,278 @@
-"""The scan: gaps of all strips of a wheel that can lie over its rail, in vector registers.
+"""The scan: gaps of the strips of a wheel that can come close to its rail, eight at a time.
 
-Scan nodes of the wheel and cells of the rail have the same spacing, so that the k-th strip lies over the k-th cell and
-all loads are contiguous. What roll and yaw take away from that stays a fraction of a cell, or the search is told so.
+Wheel nodes and rail cells have the same spacing, so that the k-th strip lies over the k-th cell and all loads are
+contiguous. What roll and yaw take away from that stays a fraction of a cell, or the search is told so.
+
+Blocks of strips that cannot come close to contact are known from a table of lower bounds (`geometry.zone_gaps`); the
+others form zones, and only these are scanned.
 """
 
 import math
+from typing import NamedTuple
 
-from wrcore._jit import FAST, jit
-from wrcore.contact.geometry import RADIUS, RADIUS_SLOPE, RAIL_RESERVE, RESERVE_TO_SECOND, SCAN_STEP, WHEEL_RESERVE
+import numpy as np
+
+from wrcore._jit import FUSED, jit
+from wrcore._lanes import (
+    below,
+    count_bits,
+    greatest,
+    highest_bit,
+    lane,
+    lanes8,
+    load8,
+    lowest_bit,
+    ramp8,
+    total,
+    where_below,
+)
+from wrcore.contact.geometry import (
+    ALONG,
+    CALM,
+    DOWN_2,
+    DOWN_4,
+    DOWN_6,
+    LANES,
+    PARTS,
+    RADIUS,
+    RAIL_COSINE,
+    RAIL_RESERVE,
+    RESERVE_TO_SECOND,
+    ROLL_STRAY,
+    SCAN_STEP,
+    STRAY,
+    WHEEL_COSINE,
+    WHEEL_RESERVE,
+    YAW_STRAY,
+)
 from wrcore.contact.strip import strip_point
 
-CHUNK = 8
-"""Strips that are passed over together where none of them is close."""
-
-_CELL_SHARE = 0.6
-"""Share of a rail cell by which the scan's nodes may leave it; the second reserve covers what that costs."""
+MOST_STRIPS = 128
+"""Strips that one call of `scan` can tell apart: the bits of two words."""
 
 
-@jit(allocates=False, forceinline=True)
+class Grid(NamedTuple):
+    """How the strips of a wheel (its strip rows, see `geometry`) lie over rail cells of the same spacing (its cubics).
+
+    The k-th strip, with its radius' shares ``down`` and ``along``, lies
+    d = lateral + k lateral_rate + down y_down + along y_along from the start of its cell, and at the height
+    height + k height_rate + down z_down + along z_along.
+    """
+
+    node: int
+    cell: int
+    """Those of the strip 0."""
+    lateral: float
+    lateral_rate: float
+    height: float
+    height_rate: float
+    y_down: float
+    y_along: float
+    z_down: float
+    z_along: float
+    tilt_square: float
+
+
+class Window(NamedTuple):
+    """The wheel nodes over the rail."""
+
+    grid: Grid
+    zone_row: int
+    """Row of ``zone_gaps`` for calm poses: by node, and part of a cell that the strips stand in."""
+    reserves: float
+    """Gaps below so many reserves are close: the first one bounds what lies between two nodes, the rest, up to another
+    one, what leaving the rail cell costs (in proportion to the square of the distance)."""
+
+
+class Strips(NamedTuple):
+    """Which strips of a zone are below some limit, counted from its first one."""
+
+    count: int
+    first: int
+    last: int
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def stray(pose):
+    """How far roll and yaw may move the scan's nodes away from their rail cells, m."""
+    return ROLL_STRAY * abs(pose.ez) + YAW_STRAY * pose.tilt * pose.tilt
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def leaves_cells(pose):
     """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly.
 
-    Roll moves a strip sideways by its radius' difference to the tape circle (0.03 m at the flange tip), yaw by
-    R R' psi^2 (R R' = 1.5 m on a flange of 70 degrees). Small angles on real runs stay far below the limit: 12 mrad of
-    roll or 15 mrad of yaw alone.
+    Small angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone.
     """
-    return 0.03 * abs(pose.ez) + 1.5 * pose.tilt * pose.tilt > _CELL_SHARE * SCAN_STEP
+    return stray(pose) > STRAY
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def rail_cell(geometry, pose, u):
     """Rail cell that really lies below the strip at u."""
     ur = strip_point(geometry, pose, u)[0]
     return min(max(int((ur - geometry.scan_rail_start) / SCAN_STEP), 0), geometry.scan_rail.shape[1] - 1)
 
 
-@jit(allocates=False, forceinline=True)
-def window(geometry, pose):
-    """First wheel node over the rail, its distance along the axle, and the track coordinate of the first rail cell."""
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _grid(pose, node, cell, reach, offset, step):
+    """Strips ``step`` apart, the first one at ``reach`` along the axle over a cell that starts at ``offset``."""
+    side_y = pose.side * pose.ey
+    return Grid(
+        node, cell, reach * side_y - offset, step * (side_y - 1.0), pose.z + reach * pose.ez,
+        step * pose.ez, pose.side * pose.y_down, pose.side * pose.y_along * pose.tilt, pose.z_down,
+        pose.z_along * pose.tilt, pose.tilt * pose.tilt,
+    )  # fmt: skip
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def make_window(geometry, pose):
+    """The scan's strips, one for each rail cell; ``grid.node`` may lie outside the nodes there are."""
     offset = geometry.rail_distance + geometry.scan_rail_start - pose.side * pose.y
-    shift = (geometry.half_distance + geometry.scan_wheel_start) * pose.side * pose.ey
-    shift += geometry.rolling_radius * pose.side * pose.y_down
-    node = int(math.floor((offset - shift) / SCAN_STEP)) + 1
-    return node, geometry.half_distance + geometry.scan_wheel_start + node * SCAN_STEP, offset
+    start = geometry.half_distance + geometry.scan_wheel_start
+    position = offset - pose.side * (start * pose.ey + geometry.rolling_radius * pose.y_down)
+    position *= 1.0 / SCAN_STEP
+    node = int(math.floor(position)) + 1
+    part = min(int((node - position) * PARTS), PARTS - 1)
+    share = stray(pose) * (1.0 / STRAY)
+    grid = _grid(pose, node, 0, start + node * SCAN_STEP, offset, SCAN_STEP)
+    return Window(grid, 2 * PARTS * node + part, 1.0 + share * share)
 
 
-@jit(allocates=False, fastmath=FAST)
-def scan(pose, scan_wheel, scan_rail, node, reach, offset):
-    """Sums over all strips that can lie over the rail: what a single wide overlap needs.
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def near_blocks(geometry, window):
+    """Blocks with a strip that can be close, a bit for each."""
+    calm = window.reserves < 1.0 + CALM * CALM
+    return _near_blocks(geometry, window.grid, window.zone_row if calm else window.zone_row + PARTS, 0.0)
 
-    The rail cell of the k-th strip is k: wheel nodes and rail cells have the same spacing. What roll and yaw take away
-    from it (``d`` outside its cell) stays a fraction of a cell where overlaps are wide. All loads are contiguous and
-    there is no branch, so that the loop runs in vector registers.
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def blocks_near_misses(geometry, window, yaw_square):
+    """Blocks with a strip that can take part in `planar_bound`, a bit for each."""
+    return _near_blocks(geometry, window.grid, window.zone_row + PARTS, yaw_square)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _near_blocks(geometry, grid, row, yaw_square):
+    rise = geometry.block * grid.height_rate
+    low = grid.height + 0.5 * (rise - abs(rise)) + ramp8() * rise
+    near = np.uint64(0)
+    for first in range(0, geometry.zone_gaps.shape[1], LANES):
+        block, limit = np.uint64(first), lanes8(0.0)
+        if yaw_square > 0.0:
+            limit = yaw_square * load8(geometry.zone_misses, np.uint64(grid.node), block)
+        gaps = load8(geometry.zone_gaps, np.uint64(row), block)
+        near |= below(gaps + (low + float(first) * rise), limit) << block
+    return near
+
+
+@jit(allocates=False, forceinline=True)
+def first_zone(near, block):
+    """First run of near blocks: its first strip, the strip after its last one, and the bits beyond."""
+    first = lowest_bit(near)
+    end = first + lowest_bit(~(near >> np.uint64(first)))
+    return first * block, end * block, near & (~np.uint64(0) << np.uint64(end))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def strip_place(grid, wheel, k):
+    """Distance of the k-th strip from the start of its rail cell, and its height."""
+    square, node = grid.tilt_square, np.uint64(grid.node + k)
+    down = square * (wheel[DOWN_4, node] + square * wheel[DOWN_6, node])
+    down = wheel[RADIUS, node] - square * (wheel[DOWN_2, node] + down)
+    along = wheel[ALONG, node]
+    d = grid.lateral + k * grid.lateral_rate + down * grid.y_down + along * grid.y_along
+    return d, grid.height + k * grid.height_rate + down * grid.z_down + along * grid.z_along
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def strip_gap(grid, wheel, rail, k):
+    """Gap of the k-th strip."""
+    d, height = strip_place(grid, wheel, k)
+    cell = np.uint64(grid.cell + k)
+    return height - (rail[0, cell] + d * (rail[1, cell] + d * (rail[2, cell] + d * rail[3, cell])))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _gaps(grid, wheel, rail, k):
+    """Gaps of eight strips from the k-th on, as `strip_gap`."""
+    square, node = grid.tilt_square, np.uint64(grid.node + k)
+    down = square * (load8(wheel, DOWN_4, node) + square * load8(wheel, DOWN_6, node))
+    down = load8(wheel, RADIUS, node) - square * (load8(wheel, DOWN_2, node) + down)
+    along, index = load8(wheel, ALONG, node), float(k) + ramp8()
+    d = grid.lateral + index * grid.lateral_rate + down * grid.y_down + along * grid.y_along
+    height = grid.height + index * grid.height_rate + down * grid.z_down + along * grid.z_along
+    return height - _rail_heights(rail, grid.cell + k, d)
+
+
+@jit(allocates=False, forceinline=True)
+def _rail_heights(rail, first, d):
+    cell = np.uint64(first)
+    slope = load8(rail, 1, cell) + d * (load8(rail, 2, cell) + d * load8(rail, 3, cell))
+    return load8(rail, 0, cell) + d * slope
+
+
+@jit(allocates=False, forceinline=True)
+def _strips(low, high):
+    """From a bit for each strip, the first 64 of them in ``low``."""
+    first = lowest_bit(low) if low > 0 else 64 + lowest_bit(high)
+    last = 64 + highest_bit(high) if high > 0 else highest_bit(low)
+    return Strips(count_bits(low) + count_bits(high), first, last)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def scan(window, wheel, rail, begin, end):
+    """Sums over the strips from ``begin`` to before ``end``, at most `MOST_STRIPS`: what a single overlap needs.
 
     Returns
     -------
     m0, m1, m2 : float
-        Sums of g^2, g^2 k, g^2 k^2 over strips with negative gap g.
-    overlapping, first, last : int
-        Number of those strips, the first and the last of them.
-    close, first_close, last_close : int
-        The same for strips with a gap below twice their reserve (the second one covers what leaving the cell costs).
+        Sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, i counted from ``begin``.
+    overlap, close : Strips
+        Strips with a negative gap, and with one below ``window.reserves`` times their reserve.
     """
-    cells = scan_rail.shape[1]
-    radii, slopes = scan_wheel[RADIUS, node : node + cells], scan_wheel[RADIUS_SLOPE, node : node + cells]
-    reserves, rail_reserves = scan_wheel[WHEEL_RESERVE, node : node + cells], scan_rail[RAIL_RESERVE]
-    c0, c1, c2, c3 = scan_rail[0], scan_rail[1], scan_rail[2], scan_rail[3]
-    side_y = pose.side * pose.ey
-    y_down, y_along = pose.side * pose.y_down, pose.side * pose.y_along
-    m0 = m1 = m2 = 0.0
-    overlapping = close = 0
-    first = first_close = cells
-    last = last_close = -1
-    for k in range(cells):
-        radius, along = radii[k], slopes[k] * pose.tilt
-        square = along * along
-        down = 1.0 - square * (0.5 + square * (0.125 + square * 0.0625))  # sqrt(1 - along^2) to along^8/26
-        position = k * SCAN_STEP
-        axial = reach + position
-        d = axial * side_y + radius * (down * y_down + along * y_along) - offset - position
-        rail = c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k]))
-        gap = pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
-        index = float(k)
-        negative = min(gap, 0.0)
-        square = negative * negative
-        m0 += square
-        m1 += square * index
-        m2 += square * index * index
-        below = gap < 0.0
-        overlapping += below
-        first = min(first, k if below else cells)
-        last = max(last, k if below else -1)
-        below = gap < 2.0 * (reserves[k] + rail_reserves[k])
-        close += below
-        first_close = min(first_close, k if below else cells)
-        last_close = max(last_close, k if below else -1)
-    return m0, m1, m2, overlapping, first, last, close, first_close, last_close
+    grid, zero = window.grid, lanes8(0.0)
+    m0, m1, m2 = zero, zero, zero
+    overlap_low = overlap_high = close_low = close_high = np.uint64(0)
+    for i in range(0, end - begin, LANES):
+        index, gap = float(i) + ramp8(), _gaps(grid, wheel, rail, begin + i)
+        negative = where_below(gap, zero, gap, zero)
+        weight = negative * negative
+        first_moment = weight * index
+        m0, m1, m2 = m0 + weight, m1 + first_moment, m2 + first_moment * index
+        cell = np.uint64(begin + i)
+        reserve = load8(wheel, WHEEL_RESERVE, np.uint64(grid.node) + cell) + load8(rail, RAIL_RESERVE, cell)
+        overlap, close, shift = below(gap, zero), below(gap, window.reserves * reserve), np.uint64(i & 63)
+        if i < 64:
+            overlap_low, close_low = overlap_low | overlap << shift, close_low | close << shift
+        else:
+            overlap_high, close_high = overlap_high | overlap << shift, close_high | close << shift
+    return total(m0), total(m1), total(m2), _strips(overlap_low, overlap_high), _strips(close_low, close_high)
 
 
-@jit(allocates=False, fastmath=FAST)
-def fine_sums(geometry, pose, first, last):
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def deepest_strip(grid, wheel, rail, first, last):
+    """The strip that overlaps most along the rail's normal, if the only overlap reaches from ``first`` to ``last``."""
+    best, chosen = lanes8(0.0), lanes8(0.0)
+    for k in range(first // LANES * LANES, last + 1, LANES):
+        depth = -1.0 * _gaps(grid, wheel, rail, k) * load8(rail, RAIL_COSINE, np.uint64(k))
+        chosen = where_below(best, depth, float(k) + ramp8(), chosen)
+        best = where_below(best, depth, depth, best)
+    shallower = below(best, lanes8(greatest(best)))
+    return int(lane(chosen, lowest_bit(~shallower)))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def cells_ahead(geometry, u, ur):
+    """Number by which fine rail cells are ahead of the fine wheel nodes over them, at wheel u over rail ur."""
+    return int(math.floor((ur - geometry.rail_start - u + geometry.wheel_start) / geometry.wheel_step))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def fine_sums(geometry, pose, ahead, first, last):
     """Moments of g^2 over the strips at the wheel profile's own nodes from ``first`` to ``last``.
+
+    ``ahead``: see `cells_ahead`, for the middle of the overlap.
 
     Returns
     -------
@@ -108,94 +280,48 @@ def fine_sums(geometry, pose, first, last):
         Integrals of g^2, g^2 e, g^2 e^2 over the overlap, e from the position ``origin``.
     origin : float
         m.
-    nodes : float
+    nodes : int
         Number of nodes in overlap; 0 where the nodes of wheel and rail do not go together.
     """
-    step = geometry.wheel_step
-    begin = max(int((first - geometry.wheel_start) / step), 0)
-    end = min(int((last - geometry.wheel_start) / step) + 2, geometry.fine_wheel.shape[1])
-    middle = (begin + end) // 2
-    ur = strip_point(geometry, pose, geometry.wheel_start + middle * step)[0]
-    ahead = int(math.floor((ur - geometry.rail_start) / step)) - middle  # cell less node
-    begin, end = max(begin, -ahead), min(end, geometry.fine_rail.shape[1] - ahead)
-    origin = geometry.wheel_start + begin * step
-    count, cell = end - begin, begin + ahead
-    if count <= 0:
-        return 0.0, 0.0, 0.0, origin, 0.0
-    radii, slopes = geometry.fine_wheel[0, begin : begin + count], geometry.fine_wheel[1, begin : begin + count]
-    c0, c1 = geometry.fine_rail[0, cell : cell + count], geometry.fine_rail[1, cell : cell + count]
-    c2, c3 = geometry.fine_rail[2, cell : cell + count], geometry.fine_rail[3, cell : cell + count]
-    reach = geometry.half_distance + origin
+    wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
+    density = 1.0 / step
+    begin = max(max(int((first - geometry.wheel_start) * density), 0), -ahead)
+    end = min(int((last - geometry.wheel_start) * density) + 2, wheel.shape[1] - LANES)
+    end = min(end, rail.shape[1] - LANES - ahead)
+    origin, cell = geometry.wheel_start + begin * step, begin + ahead
     offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
-    side_y = pose.side * pose.ey
-    y_down, y_along = pose.side * pose.y_down, pose.side * pose.y_along
-    m0 = m1 = m2 = nodes = 0.0
-    for k in range(count):
-        radius, along = radii[k], slopes[k] * pose.tilt
-        square = along * along
-        down = 1.0 - square * (0.5 + square * (0.125 + square * 0.0625))
-        position = k * step
-        axial = reach + position
-        d = axial * side_y + radius * (down * y_down + along * y_along) - offset - position
-        rail = c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k]))
-        gap = pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
-        negative = min(gap, 0.0)
-        square = negative * negative
-        m0 += square
-        m1 += square * position
-        m2 += square * position * position
-        nodes += 1.0 if gap < 0.0 else 0.0
-    return m0 * step, m1 * step, m2 * step, origin, nodes
+    grid = _grid(pose, begin, cell, geometry.half_distance + origin, offset, step)
+    zero, size = lanes8(0.0), lanes8(float(end - begin))
+    m0, m1, m2 = zero, zero, zero
+    nodes = 0
+    for k in range(0, end - begin, LANES):
+        index, gap = float(k) + ramp8(), _gaps(grid, wheel, rail, k)
+        negative = where_below(index, size, where_below(gap, zero, gap, zero), zero)
+        weight = negative * negative
+        first_moment = weight * index
+        m0, m1, m2 = m0 + weight, m1 + first_moment, m2 + first_moment * index
+        nodes += count_bits(below(negative, zero))
+    return total(m0) * step, total(m1) * step**2, total(m2) * step**3, origin, nodes
 
 
-@jit(allocates=False, forceinline=True)
-def strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k):
-    """Gap of the k-th strip, as in `scan`."""
-    radius, along = scan_wheel[RADIUS, node + k], scan_wheel[RADIUS_SLOPE, node + k] * pose.tilt
-    square = along * along
-    down = 1.0 - square * (0.5 + square * (0.125 + square * 0.0625))
-    axial = reach + k * SCAN_STEP
-    lateral = axial * pose.ey + radius * (down * pose.y_down + along * pose.y_along)
-    d = pose.side * lateral - offset - k * SCAN_STEP
-    rail = scan_rail[0, k] + d * (scan_rail[1, k] + d * (scan_rail[2, k] + d * scan_rail[3, k]))
-    return pose.z + axial * pose.ez + radius * (down * pose.z_down + along * pose.z_along) - rail
-
-
-@jit(allocates=False, forceinline=True, fastmath=FAST)
-def any_close(pose, scan_wheel, scan_rail, node, reach, offset, first):
-    """Number of strips with a gap below twice their reserve among the ``CHUNK + 8`` strips from ``first`` on."""
-    count = 0
-    for i in range(CHUNK + 8):
-        k = first + i
-        gap = strip_gap(pose, scan_wheel, scan_rail, node, reach, offset, k)
-        count += gap < 2.0 * (scan_wheel[WHEEL_RESERVE, node + k] + scan_rail[RAIL_RESERVE, k])
-    return count
-
-
-@jit(allocates=False, fastmath=FAST)
-def planar_bound(pose, scan_wheel, scan_rail, node, reach, offset):
-    """Largest normal penetration (m) that planar detection misses where it could matter.
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def planar_bound(grid, yaw_square, wheel, rail, begin, end):
+    """Largest normal penetration (m) that planar detection misses where it could matter, at some strips.
 
     At a strip with slope R' the extreme point lies R R' psi^2 further out, over a rail of the same slope and of second
     derivative f'': missed is the height R (psi R')^2/2 + |f''| (R R' psi^2)^2/2. The first term, along the normal, is
     the first-order law r psi^2 tan^2(delta) cos(delta)/2; the second one counts on the flange. It matters where the
     planar gap is below that height (or its reserve).
     """
-    cells = scan_rail.shape[1]
-    radii, slopes = scan_wheel[RADIUS, node : node + cells], scan_wheel[RADIUS_SLOPE, node : node + cells]
-    reserves, rail_reserves = scan_wheel[WHEEL_RESERVE, node : node + cells], scan_rail[RAIL_RESERVE]
-    c0, c1, c2, c3 = scan_rail[0], scan_rail[1], scan_rail[2], scan_rail[3]
-    yaw_square = pose.ex * pose.ex
-    bound = 0.0
-    for k in range(cells):
-        position = k * SCAN_STEP
-        axial = reach + position
-        d = pose.side * (axial * pose.ey + radii[k] * pose.y_down) - offset - position
-        gap = pose.z + axial * pose.ez + radii[k] * pose.z_down - (c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k])))
-        steep = slopes[k] * slopes[k]
-        shift = radii[k] * yaw_square * slopes[k]
-        missed = 0.5 * radii[k] * yaw_square * steep + rail_reserves[k] * RESERVE_TO_SECOND * 0.5 * shift * shift
-        along_normal = missed / math.sqrt(1.0 + steep)
-        close = gap < missed + 2.0 * (reserves[k] + rail_reserves[k])
-        bound = max(bound, along_normal if close else 0.0)
-    return bound
+    largest = lanes8(0.0)
+    for k in range(begin, end, LANES):
+        node = np.uint64(grid.node + k)
+        index, radius = float(k) + ramp8(), load8(wheel, RADIUS, node)
+        d = grid.lateral + index * grid.lateral_rate + radius * grid.y_down
+        gap = grid.height + index * grid.height_rate + radius * grid.z_down - _rail_heights(rail, k, d)
+        shift, reserve = yaw_square * load8(wheel, ALONG, node), load8(rail, RAIL_RESERVE, np.uint64(k))
+        missed = yaw_square * load8(wheel, DOWN_2, node) + (0.5 * RESERVE_TO_SECOND) * reserve * shift * shift
+        limit = missed + 2.0 * (load8(wheel, WHEEL_RESERVE, node) + reserve)
+        counted = where_below(gap, limit, missed * load8(wheel, WHEEL_COSINE, node), lanes8(0.0))
+        largest = where_below(largest, counted, counted, largest)
+    return greatest(largest)

@@ -14,7 +14,9 @@ A :class:`Pose` holds what all strips of one wheel share, so that a strip costs 
 import math
 from typing import NamedTuple
 
-from wrcore._jit import jit
+import numpy as np
+
+from wrcore._jit import FUSED, jit
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
 
 
@@ -41,30 +43,33 @@ class Pose(NamedTuple):
     z_along: float
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def make_pose(side, y, z, ex, ey, ez, spatial):
     """Pose of a wheel from the wheelset's centre and the wheel's outward axle direction."""
     q = math.sqrt(1.0 - ex * ex)
-    tilt = ex / q if spatial else 0.0
-    return Pose(side, y, z, ex, ey, ez, q, tilt, side * ez / q, -ex * ey / q, -side * ey / q, -ex * ez / q)
+    r = 1.0 / q
+    tilt = ex * r if spatial else 0.0
+    return Pose(side, y, z, ex, ey, ez, q, tilt, side * ez * r, -ex * ey * r, -side * ey * r, -ex * ez * r)
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def cubic_at(nodes, start, step, u):
     """Value, slope and second derivative of the cubic Hermite interpolant; end cells are continued outwards."""
-    position = (u - start) / step
-    i = min(max(int(position), 0), nodes.shape[0] - 2)
-    t = position - i
-    y0, y1 = nodes[i, VALUE], nodes[i + 1, VALUE]
-    d0, d1 = nodes[i, SLOPE] * step, nodes[i + 1, SLOPE] * step
+    inverse = 1.0 / step
+    position = (u - start) * inverse
+    cell = min(max(int(position), 0), nodes.shape[0] - 2)
+    t = position - cell
+    low, high = np.uint64(cell), np.uint64(cell + 1)  # unsigned: numba leaves out the treatment of negative indices
+    y0, y1 = nodes[low, VALUE], nodes[high, VALUE]
+    d0, d1 = nodes[low, SLOPE] * step, nodes[high, SLOPE] * step
     c2 = 3.0 * (y1 - y0) - 2.0 * d0 - d1
     c3 = d0 + d1 - 2.0 * (y1 - y0)
     value = y0 + t * (d0 + t * (c2 + t * c3))
-    slope = (d0 + t * (2.0 * c2 + 3.0 * t * c3)) / step
-    return value, slope, (2.0 * c2 + 6.0 * t * c3) / (step * step)
+    slope = (d0 + t * (2.0 * c2 + 3.0 * t * c3)) * inverse
+    return value, slope, (2.0 * c2 + 6.0 * t * c3) * (inverse * inverse)
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def curvature_at(nodes, start, step, u):
     """Second derivative for Hertz: its window mean, interpolated linearly."""
     position = (u - start) / step
@@ -73,7 +78,7 @@ def curvature_at(nodes, start, step, u):
     return nodes[i, CURVATURE] * (1.0 - t) + nodes[i + 1, CURVATURE] * t
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_point(geometry, pose, u):
     """Extreme point of the strip at wheel coordinate u.
 
@@ -89,20 +94,26 @@ def strip_point(geometry, pose, u):
     extra, slope, second = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
     radius = geometry.rolling_radius + extra
     along = slope * pose.tilt
-    down = math.sqrt(max(1.0 - along * along, 0.0))
+    dy, dz = radius_direction(pose, along)
     reach = geometry.half_distance + u
-    y = pose.y + reach * pose.ey + radius * (down * pose.y_down + along * pose.y_along)
-    z = pose.z + reach * pose.ez + radius * (down * pose.z_down + along * pose.z_along)
+    y, z = pose.y + reach * pose.ey + radius * dy, pose.z + reach * pose.ez + radius * dz
     return pose.side * y - geometry.rail_distance, z, radius, slope, second, along
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def radius_direction(pose, along):
+    """Components y and z of the direction d of a strip's radius."""
+    down = math.sqrt(max(1.0 - along * along, 0.0))
+    return down * pose.y_down + along * pose.y_along, down * pose.z_down + along * pose.z_along
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def on_rail(geometry, ur):
     """Whether a rail coordinate lies inside the rail's profile."""
     return geometry.rail_start <= ur <= geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def gap_at(geometry, pose, u):
     """Vertical gap of the strip at u: negative in overlap, 1 m where there is no rail below; and the rail's slope."""
     ur, z, _, _, _, _ = strip_point(geometry, pose, u)
@@ -112,7 +123,7 @@ def gap_at(geometry, pose, u):
     return z - f, slope
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def wheel_slope(pose, slope, along):
     """Slope of the wheel in the cross-section over the rail's lateral coordinate.
 
@@ -120,14 +131,12 @@ def wheel_slope(pose, slope, along):
     Planar: the generator's tangent, projected.
     """
     if pose.tilt != 0.0:
-        down = math.sqrt(max(1.0 - along * along, 0.0))
-        ny = down * pose.y_down + along * pose.y_along - slope * pose.ey
-        nz = down * pose.z_down + along * pose.z_along - slope * pose.ez
-        return -pose.side * ny / nz
+        dy, dz = radius_direction(pose, along)
+        return -pose.side * (dy - slope * pose.ey) / (dz - slope * pose.ez)
     return pose.side * (pose.ez + slope * pose.z_down) / (pose.ey + slope * pose.y_down)
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def gap_and_slope(geometry, pose, u):
     """Vertical gap of the strip at u and its slope over u (but for the small turn by roll and yaw)."""
     ur, z, _, slope, _, along = strip_point(geometry, pose, u)
@@ -135,7 +144,7 @@ def gap_and_slope(geometry, pose, u):
     return z - f, wheel_slope(pose, slope, along) - rail_slope
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def slope_difference(geometry, pose, u):
     """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate.
 

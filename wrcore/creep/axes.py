@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
+from wrcore._lanes import lane, load4
 from wrcore.creep.kalker import KalkerData, coefficients_at
-from wrcore.creep.lanes import scaled_sum, three_rows
 
 LEVER = 0.25
 SPIN_FLOOR = 0.8
@@ -35,7 +35,6 @@ _PEAK_LOW = -PEAK / np.hypot(PEAK, PEAK_WIDTH)
 _PEAK_HIGH = (1 - PEAK) / np.hypot(1 - PEAK, PEAK_WIDTH)
 _STRETCH = 1 / (1 + PEAK_WIDTH * (_PEAK_HIGH - _PEAK_LOW))
 _LARGE = 1e12
-_FUSED = {"contract"}
 _HALF_PI = 0.5 * np.pi
 _PER_TURN = 0.5 / np.pi
 
@@ -79,7 +78,7 @@ class CreepTableData(NamedTuple):
     coefficients: np.ndarray
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _atan(z):
     """atan for 0 <= z <= 1 within 1e-8; exact at 1, so that `_atan2` has no step (nor a kink: slope 1/2 there)."""
     s = z * z
@@ -90,7 +89,7 @@ def _atan(z):
     return z + z * s * p
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _atan2(y, x):
     """Angle of (x, y) in -pi..pi within 1e-7; 0 at the origin."""
     ax, ay = abs(x), abs(y)
@@ -101,7 +100,7 @@ def _atan2(y, x):
     return -angle if y < 0 else angle
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scales(g, c11, c22, c23):
     """Factors of ux', uy', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
     root = np.sqrt(g)
@@ -112,14 +111,14 @@ def scales(g, c11, c22, c23):
     return sx, c22 * (1 / 3), lever * sx, np.sqrt((c23 * (1 / 1.5)) ** 2 + SPIN_FLOOR**2), rate
 
 
-@jit(forceinline=True, fastmath=_FUSED)
+@jit(forceinline=True, fastmath=FUSED)
 def _bend(far, whole):
     """What the stretched axis adds to t = far/whole; as a fraction, so that the root need not wait for the division."""
     d, width = far - PEAK * whole, PEAK_WIDTH * whole
     return PEAK_WIDTH * (d / np.sqrt(d * d + width * width) - _PEAK_LOW)
 
 
-@jit(forceinline=True, fastmath=_FUSED)
+@jit(forceinline=True, fastmath=FUSED)
 def _stretch(t):
     """Position along t, 0 to 1: up to twice as many nodes around PEAK, where spin saturates with a sharp bend."""
     return (t + _bend(t, 1.0)) * _STRETCH
@@ -154,7 +153,7 @@ def creepages_at(g, t, alpha, beta, kalker):
     return direction * (t / ((1 - t) * rate * length))[..., None]
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _taps(position, last):
     """Nearest node and the three quadratic B-spline weights at a position in node spacings, clamped to 0..last."""
     position = min(position, float(last)) if position > 0 else 0.0
@@ -163,23 +162,27 @@ def _taps(position, last):
     return node, (0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f))
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True)
+def _line(c, start, wb):
+    """Sum over three neighbours in beta, of all four outputs."""
+    return wb[0] * load4(c, start) + wb[1] * load4(c, start + np.uint64(4)) + wb[2] * load4(c, start + np.uint64(8))
+
+
+@jit(allocates=False, forceinline=True)
 def _plane(c, start, row, wa, wb):
-    """Sum over three neighbours each in alpha (stride ``row``) and beta (stride 4)."""
-    one = three_rows(c, start, *wb)
-    two = three_rows(c, start + row, *wb)
-    return scaled_sum(wa[0], one, wa[1], two, wa[2], three_rows(c, start + row + row, *wb))
+    """The same over three lines along alpha (stride ``row``)."""
+    one, two, three = _line(c, start, wb), _line(c, start + row, wb), _line(c, start + row + row, wb)
+    return wa[0] * one + wa[1] * two + wa[2] * three
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True)
 def _solid(c, start, row, layer, wt, wa, wb):
     """The same over three planes along t (stride ``layer``)."""
-    one = _plane(c, start, row, wa, wb)
-    two = _plane(c, start + layer, row, wa, wb)
-    return scaled_sum(wt[0], one, wt[1], two, wt[2], _plane(c, start + layer + layer, row, wa, wb))
+    one, two = _plane(c, start, row, wa, wb), _plane(c, start + layer, row, wa, wb)
+    return wt[0] * one + wt[1] * two + wt[2] * _plane(c, start + layer + layer, row, wa, wb)
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def table_lookup(table, g, psi, ux, uy, phi):
     """Creep force from the table.
 
@@ -201,7 +204,7 @@ def table_lookup(table, g, psi, ux, uy, phi):
     return table_lookup_at(table, np.log(g), g, psi, ux, uy, phi)
 
 
-@jit(allocates=False, forceinline=True, fastmath=_FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
     """`table_lookup` where ln(a/b) is known."""
     axes, c = table.axes, table.coefficients
@@ -247,22 +250,20 @@ def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
     start = np.uint64(k) * layer + np.uint64(m) * row + np.uint64(4 * n)
     if axes.n_psi == 1:
         start += np.uint64(i) * patch
-        one = _solid(c, start, row, layer, wt, wa, wb)
-        two = _solid(c, start + patch, row, layer, wt, wa, wb)
-        total = scaled_sum(wg[0], one, wg[1], two, wg[2], _solid(c, start + patch + patch, row, layer, wt, wa, wb))
+        one, two = _solid(c, start, row, layer, wt, wa, wb), _solid(c, start + patch, row, layer, wt, wa, wb)
+        force = wg[0] * one + wg[1] * two + wg[2] * _solid(c, start + patch + patch, row, layer, wt, wa, wb)
     else:
         j, wp = _taps(abs(psi) * ((axes.n_psi - 1) / axes.psi_max), axes.n_psi - 1)
         plane = np.uint64(axes.n_psi + 2) * patch
         start += np.uint64(i) * plane + np.uint64(j) * patch
-        total = (0.0, 0.0, 0.0, 0.0)
+        force = 0.0 * load4(c, start)
         for u in range(3):
-            one = _solid(c, start, row, layer, wt, wa, wb)
-            two = _solid(c, start + patch, row, layer, wt, wa, wb)
+            one, two = _solid(c, start, row, layer, wt, wa, wb), _solid(c, start + patch, row, layer, wt, wa, wb)
             three = _solid(c, start + patch + patch, row, layer, wt, wa, wb)
-            total = scaled_sum(1.0, total, wg[u], scaled_sum(wp[0], one, wp[1], two, wp[2], three), 0.0, total)
+            force = force + wg[u] * (wp[0] * one + wp[1] * two + wp[2] * three)
             start += plane
     linear = stick * stick
-    fx = t * total[0] - linear * c11 * ux
-    fy = t * total[1] - linear * (c22 * uy + c23 * phi)
-    mz = t * total[2] + linear * (c23 * uy - c33 * phi)
+    fx = t * lane(force, 0) - linear * c11 * ux
+    fy = t * lane(force, 1) - linear * (c22 * uy + c23 * phi)
+    mz = t * lane(force, 2) + linear * (c23 * uy - c33 * phi)
     return flip * flip_x * fx, flip * flip_y * fy, flip * flip_y * mz, outside

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline, krogh_interpolate
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
 
 COEFFICIENTS_FILE = "kalker_coefficients.csv"
@@ -131,7 +131,7 @@ def kalker_data(nu):
     return KalkerData(float(nu), float(log_g[0]), float(log_g[1] - log_g[0]), cubic)
 
 
-@jit(allocates=False, forceinline=True, fastmath={"contract"})
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def coefficients_at(log_g, data):
     """C11, C22, C23, C33 at ln(a/b); outside the stored range the value at its end."""
     cells = data.cubic.shape[0]

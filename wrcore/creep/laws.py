@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit, rarely_called
 from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup_at
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
@@ -59,7 +59,7 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
     return CreepData(table, FastsimData(int(grid), int(grid), int(elliptic)))
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def linear(kalker, g, ux, uy, phi):
     """Kalker's linear theory: fx = -C11 ux', fy = -C22 uy' - C23 phi', mz = C23 uy' - C33 phi'; no bound.
 
@@ -76,7 +76,7 @@ def linear(kalker, g, ux, uy, phi):
     return -c11 * ux, -c22 * uy - c23 * phi, c23 * uy - c33 * phi
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def she(kalker, g, ux, uy, phi):
     """Shen, Hedrick and Elkins: the linear force, reduced to u - u^2/3 + u^3/27 (1 for u >= 3), direction kept.
 
@@ -92,7 +92,7 @@ def she(kalker, g, ux, uy, phi):
     return factor * fx, factor * fy, factor * mz
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def polach(kalker, g, ux, uy, phi):
     """Polach: one saturation curve for the force, a separate one for the part that spin makes; no moment (mz = 0).
 
@@ -123,9 +123,10 @@ def polach(kalker, g, ux, uy, phi):
     return -force * ux / total, (-force * uy + 0.5625 * a * k * spin * phi) / total, 0.0
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _other_law(law, data, log_g, g, psi, ux, uy, phi):
     """All laws but the table."""
+    rarely_called()
     kalker = data.table.kalker
     end = kalker.start + kalker.cubic.shape[0] * kalker.spacing
     outside = int(not kalker.start <= log_g <= end)
@@ -140,7 +141,7 @@ def _other_law(law, data, log_g, g, psi, ux, uy, phi):
     return fx, fy, mz, outside
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def creep_force_at(law, data, log_g, g, psi, ux, uy, phi):
     """`creep_force` where ln(a/b) is known."""
     if law == _TABLE:
@@ -148,7 +149,7 @@ def creep_force_at(law, data, log_g, g, psi, ux, uy, phi):
     return _other_law(law, data, log_g, g, psi, ux, uy, phi)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def creep_force(law, data, g, psi, ux, uy, phi):
     """Creep force by the law with number ``law`` (see `LAWS`).
 
@@ -171,7 +172,7 @@ def creep_force(law, data, g, psi, ux, uy, phi):
     return creep_force_at(law, data, np.log(g), g, psi, ux, uy, phi)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def creep_forces(law, data, g, psi, creepages, forces):
     """One law over many cases.
 

@@ -36,7 +36,7 @@ from wrcore.dynamics.suspension import (
     characteristic,
     pack_elements,
 )
-from wrcore.dynamics.system import fill_derivatives, state_size
+from wrcore.dynamics.system import Equations, derivatives_at
 from wrcore.dynamics.track import moving_frame
 from wrcore.dynamics.wheel import normal_contact
 
@@ -164,16 +164,21 @@ def element_energies(elements, track, t, speed, state, rotations, turns):
     return stored, rate, lost, driven
 
 
-@jit
-def _powers(times, states, model, work, rate):
-    """Power of all wrenches of a model at each state, W, shape (n,); gyroscopic moments have none."""
-    powers = np.zeros(times.shape[0])
-    work.arc_lengths[:] = np.nan  # the last pass ended elsewhere
+@jit(allocates=False)
+def _fill_powers(times, states, equations, model, work, rate, powers):
     for i in range(times.shape[0]):
-        fill_derivatives(times[i], states[i], model, work, rate)
+        derivatives_at(equations, times[i], states[i], model, work, rate)
+        powers[i] = 0.0
         for b in range(work.wrenches.shape[0]):
-            at = STATE_SIZE * b + 7
-            powers[i] += np.sum(work.wrenches[b] * states[i, at : at + 6])
+            for k in range(6):
+                powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + 7 + k]
+
+
+def _powers(times, states, model, work):
+    """Power of all wrenches of a model at each state, W, shape (n,); gyroscopic moments have none."""
+    powers = np.empty(len(times))
+    work.arc_lengths[:] = np.nan  # the last pass ended elsewhere
+    _fill_powers(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), powers)
     return powers
 
 
@@ -204,12 +209,16 @@ def _elastic_contact_energy(contact, work):
 
 
 @jit
-def _energies(times, states, model, work, rate):
-    """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8)."""
-    rows = np.empty((times.shape[0], 8))
+def _energies(times, states, evaluation, model, work):
+    """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8).
+
+    ``evaluation``: the arguments of the model's `Equations` with this workspace.
+    """
+    rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
+    equations, model_handle, work_handle = evaluation
     work.arc_lengths[:] = np.nan
     for i in range(times.shape[0]):
-        fill_derivatives(times[i], states[i], model, work, rate)
+        derivatives_at(equations, times[i], states[i], model_handle, work_handle, rate)
         kinetic, height, rise = _kinetic_and_gravitational(model, work.rotations, states[i])
         stored, stretching, damped, driven = element_energies(
             model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns
@@ -238,14 +247,15 @@ def energy_channels(model, work, times, states):
         Channels by name, with their unit: energies in J (gravitational from z = 0, springs from nominal position),
         powers in W.
     """
-    times, rate, outside = np.asarray(times, float), np.empty(state_size(model)), int(work.counters[1])
+    times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
     touching = model._replace(elements=pack_elements(), joints=model.joints._replace(equations=0), gravity=0.0)
     smooth = touching._replace(contact=model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"]))
     undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
     whole, contact, normal, hertz = (
-        _powers(times, states, variant, work, rate) for variant in (model, touching, smooth, undamped)
+        _powers(times, states, variant, work) for variant in (model, touching, smooth, undamped)
     )
-    kinetic, height, stored, pressed, stretching, rise, damped, driven = _energies(times, states, model, work, rate).T
+    rows = _energies(times, states, Equations(model, work).arguments, model, work)
+    kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
     work.counters[1] = outside
     elastic = -0.5 * (1.0 + model.contact.damping) * hertz
     joints = whole + rise - contact - (driven - stretching - damped)

@@ -16,7 +16,7 @@ import numpy as np
 
 from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.system import fill_derivatives
+from wrcore.dynamics.system import derivatives_at
 from wrcore.geometry.path import arc_length_of, track_frame
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
@@ -207,7 +207,7 @@ def _on_the_rails(limit, state, model, work):
         at = STATE_SIZE * model.bodies.wheelsets[k]
         x, y, z = state[at], state[at + 1], state[at + 2]
         if not model.track.tangent:
-            frame = work.frames[0]
+            frame = work.frame
             s = arc_length_of(model.track.path, x, y, z, work.arc_lengths[k])
             station = track_frame(model.track.path, s, frame)
             y = (x - station.x) * frame[0, 1] + (y - station.y) * frame[1, 1] + (z - station.z) * frame[2, 1]
@@ -266,7 +266,7 @@ def take_stock(control, dense, scale, memory, record, model, work):
 
 
 @jit(allocates=False, nogil=True)
-def advance_explicit(tableau, control, memory, scratch, record, budget, model, work):
+def advance_explicit(tableau, control, memory, scratch, record, budget, equations, model, work):
     """Advance a run by an explicit pair.
 
     Parameters
@@ -278,6 +278,8 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, model, w
     record : Record
     budget : int
         Attempts before the kernel returns.
+    equations : Kernel
+        The right-hand side.
     model : Model
     work : Workspace
 
@@ -305,7 +307,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, model, w
                 if weight != 0.0:
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
-            fill_derivatives(clock[T] + tableau.nodes[i] * step, trial, model, work, stage)
+            derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, stage)
             counters[EVALUATIONS] += 1
             if i == 0:
                 copy_into(memory.rate, stage)

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact import reduction
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import fill_derivatives, state_size, workspace
+from wrcore.dynamics.system import Equations
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path
 
@@ -45,13 +44,6 @@ class Equilibrium:
     state: np.ndarray
     wheel_loads: np.ndarray
     residual: float
-
-
-@jit
-def evaluate(t, states, model, work, rates):
-    """Right-hand sides of several states, row by row."""
-    for i in range(states.shape[0]):
-        fill_derivatives(t, states[i], model, work, rates[i])
 
 
 def displaced(state, model, displacement):
@@ -121,16 +113,14 @@ def solve_equilibrium(model, state, iterations=50):
     Equilibrium
         Check ``residual``: it is large where Newton's method found no equilibrium.
     """
-    work = workspace(model)
     model = model._replace(beta=model.beta or 1.0)  # without feedback a joint's violation would not show
+    equations = Equations(model)
     unknown = _unknowns(model)
     size = int(unknown.sum())
-    rates = np.empty((2 * size + 1, state_size(model)))
     residual = np.inf
     for _ in range(iterations):
         rows = [displaced(state, model, h * row) for h in (STEP, -STEP) for row in np.eye(len(unknown))[unknown]]
-        evaluate(0.0, np.array([*rows, state]), model, work, rates)
-        values = _accelerations(rates, model)[:, unknown]
+        values = _accelerations(equations.at(0.0, np.array([*rows, state])), model)[:, unknown]
         residual = float(np.max(np.abs(values[-1])))
         if residual < RESIDUAL:
             break
@@ -139,31 +129,30 @@ def solve_equilibrium(model, state, iterations=50):
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
         step = np.zeros(len(unknown))
         step[unknown] = np.linalg.lstsq(weights[:, None] * slopes, -weights * values[-1], rcond=1e-11)[0]
-        better = _improved(state, step, model, work, residual)
+        better = _improved(state, step, model, equations, residual)
         if better is None:
             break
         state = better
-    return Equilibrium(state, wheel_loads(model, work, state), residual)
+    return Equilibrium(state, wheel_loads(equations, state), residual)
 
 
-def _improved(state, step, model, work, residual):
+def _improved(state, step, model, equations, residual):
     """The state after the longest of the step, its half, its quarter, ... that comes closer to equilibrium, or None."""
-    rates = np.empty((1, len(state)))
     for halvings in range(12):
         new = displaced(state, model, step * 0.5**halvings)
-        evaluate(0.0, new[None, :], model, work, rates)
+        rates = equations.at(0.0, new[None, :])
         if np.max(np.abs(_accelerations(rates, model)[:, _unknowns(model)])) < residual:
             return new
     return None
 
 
-def wheel_loads(model, work, state):
+def wheel_loads(equations, state):
     """Vertical force of the rails on each wheel, N, shape (k, 2)."""
-    evaluate(0.0, state[None, :], model, work, np.empty((1, len(state))))
-    rows = work.patches
+    equations(0.0, state)
+    rows = equations.work.patches
     cosine, sine = np.cos(rows[..., reduction.ANGLE]), np.sin(rows[..., reduction.ANGLE])
     vertical = rows[..., reduction.NORMAL] * cosine + rows[..., reduction.FY] * sine
-    return np.where(np.arange(rows.shape[2]) < work.counts[..., None], vertical, 0.0).sum(axis=2)
+    return np.where(np.arange(rows.shape[2]) < equations.work.counts[..., None], vertical, 0.0).sum(axis=2)
 
 
 def stand_on_rails(model, state, loads):
@@ -181,13 +170,13 @@ def stand_on_rails(model, state, loads):
     contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
     joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
     bare = model._replace(elements=pack_elements(), joints=joints, track=track, contact=contact)
-    work, base, deviations = workspace(model), contact.geometry.rail_distance, np.zeros((3, 4))
+    equations, base, deviations = Equations(bare), contact.geometry.rail_distance, np.zeros((3, 4))
     for k, body in enumerate(model.bodies.wheelsets):
         at, load = STATE_SIZE * body, np.mean(loads[k])
         irregularity_at(track.irregularity, state[at], deviations)
         if deviations[0].any():
             state[at + 1] += 0.5 * (deviations[0, 0] + deviations[0, 2])
-            carried = _loads_when_lifted(bare, work, state, at, k)
+            carried = _loads_when_lifted(equations, state, at, k, base)
             _lift(state, at, _lifts_for(carried, load, deviations[0, 1::2].copy()), base)
 
 
@@ -197,15 +186,15 @@ def _lift(state, at, lifts, base):
     state[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0]))
 
 
-def _loads_when_lifted(model, work, state, at, k):
+def _loads_when_lifted(equations, state, at, k, base):
     """Loads (N) of the k-th wheelset's wheels at rest as a function of the lifts of its ends."""
 
     def carried(lifts):
         """Loads, shape (2,), with the ends lifted by ``lifts`` (m)."""
         lifted = state.copy()
-        _lift(lifted, at, lifts, model.contact.geometry.rail_distance)
+        _lift(lifted, at, lifts, base)
         lifted[at + 7 : at + 13] = 0.0
-        return wheel_loads(model, work, lifted)[k]
+        return wheel_loads(equations, lifted)[k]
 
     return carried
 

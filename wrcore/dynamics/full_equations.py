@@ -6,7 +6,7 @@ import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.joint import build_joints, joint_jacobian
-from wrcore.dynamics.system import derivatives, workspace
+from wrcore.dynamics.system import Equations
 
 
 class FullEquations(NamedTuple):
@@ -47,9 +47,9 @@ def full_equations(model, state, t=0.0):
     >>> residual = full.jacobian @ full.accelerations.ravel() - full.right
     """
     n, m = len(model.bodies.mass), model.joints.equations
-    work = workspace(model)
-    derivatives(t, state, model, work)
-    values, rotations = work.constraints.joints, work.rotations
+    equations = Equations(model)
+    equations(t, state)
+    values, rotations = equations.work.constraints.joints, equations.work.rotations
     mass = np.zeros((6 * n, 6 * n))
     for b in range(n):
         A, at = rotations[b], 6 * b
@@ -57,7 +57,7 @@ def full_equations(model, state, t=0.0):
         mass[at + 3 : at + 6, at + 3 : at + 6] = A @ np.diag(model.bodies.inertia[b]) @ A.T
     D = joint_jacobian(model.joints, values, n).reshape(m, 6 * n)
     unjointed = model._replace(joints=build_joints([], model.bodies.spins))
-    forces = mass @ _accelerations(derivatives(t, state, unjointed, workspace(unjointed)), n)
+    forces = mass @ _accelerations(Equations(unjointed)(t, state), n)
     used = np.arange(values.phi.shape[1]) < model.joints.size[:, None]
     right = (values.gamma - 2.0 * model.alpha * values.rate - model.beta**2 * values.phi)[used]
     matrix = np.block([[mass, D.T], [D, np.zeros((m, m))]])

@@ -21,7 +21,7 @@ from wrcore.dynamics import engine
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.engine import Control, Memory, Record, advance_explicit, new_memory, new_scratch
 from wrcore.dynamics.rosenbrock import Linear, advance_rosenbrock, new_linear
-from wrcore.dynamics.system import workspace
+from wrcore.dynamics.system import Equations
 from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.dynamics.track import track_poses
 
@@ -151,7 +151,8 @@ def integrate(
 
         return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress)
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
-    work = workspace(model)
+    equations = Equations(model)
+    work = equations.work
     if isinstance(start, Checkpoint):
         memory, linear = _copied(start.memory), _copied(start.linear)
         work.arc_lengths[:] = start.arc_lengths
@@ -167,8 +168,8 @@ def integrate(
 
     def advance(attempts):
         if linear is None:
-            return advance_explicit(tableau, control, memory, scratch, record, attempts, model, work)
-        return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, model, work)
+            return advance_explicit(tableau, control, memory, scratch, record, attempts, *equations.arguments)
+        return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, *equations.arguments)
 
     outcome = advance(0)  # compiles, or loads the kernel from the cache
     before, started = memory.counters.copy(), time.perf_counter()

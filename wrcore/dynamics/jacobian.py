@@ -18,7 +18,7 @@ from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.engine import copy_into
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import fill_derivatives, state_size
+from wrcore.dynamics.system import derivatives_at, state_size
 
 DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 """Differences: m, rad, m/s and rad/s."""
@@ -213,7 +213,7 @@ def _perturb(trial, column, axes):
 
 
 @jit(allocates=False)
-def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences, model, work):
+def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences, equations, model, work):
     """Refresh the columns of a sweep.
 
     Parameters
@@ -228,6 +228,8 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
         Scratch.
     differences : numpy.ndarray, shape (p,)
         Scratch, at least as many as the largest number of columns perturbed together.
+    equations : Kernel
+        The right-hand side.
     model : Model
     work : Workspace
 
@@ -245,7 +247,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
         first, last = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         for k in range(first, last):
             differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes)
-        fill_derivatives(t + MOMENT if in_time else t, trial, model, work, slope)
+        derivatives_at(equations, t + MOMENT if in_time else t, trial, model, work, slope)
         if in_time:
             for j in range(state.shape[0]):
                 jacobian.by_time[j] = (slope[j] - rate[j]) / MOMENT

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import RESIDUAL, evaluate
+from wrcore.dynamics.equilibrium import RESIDUAL
 from wrcore.dynamics.joint import joint_jacobian
-from wrcore.dynamics.system import workspace
+from wrcore.dynamics.system import Equations
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""
@@ -80,17 +80,15 @@ def linearise(model, state):
     Central differences in all independent coordinates; all right-hand sides in one compiled call.
     """
     size = 6 * len(model.bodies.mass)
-    work = workspace(model)
-    evaluate(0.0, state[None, :], model, work, np.empty((1, len(state))))  # leaves the joints' Jacobian
-    places, speeds = _independent_motions(model, state, work)
+    equations = Equations(model)
+    equations(0.0, state)  # leaves the joints' Jacobian
+    places, speeds = _independent_motions(model, state, equations.work)
     basis = block_diag(places, speeds, np.eye(model.elements.states))
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
     states = moved_states(model, state, np.vstack([moves, -moves, np.zeros((1, len(basis)))]))
-    rates = np.empty_like(states)
-    evaluate(0.0, states, model, work, rates)
-    changes = _accelerations(model, states, rates)
+    changes = _accelerations(model, states, equations.at(0.0, states))
     slopes = (changes[: len(moves)] - changes[len(moves) : -1]).T / (2.0 * steps)
     kinematic = np.zeros((places.shape[1], len(moves)))
     kinematic[:, places.shape[1] : places.shape[1] + speeds.shape[1]] = places.T @ speeds

@@ -1,11 +1,11 @@
 """What an evaluation of the equations of motion leaves besides the rates, at many states."""
 
 from wrcore._jit import jit
-from wrcore.dynamics.system import fill_derivatives
+from wrcore.dynamics.system import derivatives_at
 
 
 @jit(allocates=False, nogil=True)
-def evaluations_at(times, states, model, work, rates, patches, bounds):
+def evaluations_at(times, states, equations, model, work, rates, patches, bounds):
     """Rates and contact patches of all wheels at given states.
 
     Parameters
@@ -13,6 +13,8 @@ def evaluations_at(times, states, model, work, rates, patches, bounds):
     times : numpy.ndarray, shape (n,)
         s.
     states : numpy.ndarray, shape (n, size)
+    equations : Kernel
+        The right-hand side.
     model : Model
     work : Workspace
     rates : numpy.ndarray, shape (n, size)
@@ -23,7 +25,7 @@ def evaluations_at(times, states, model, work, rates, patches, bounds):
         Filled: bound of planar detection's error, m.
     """
     for i in range(times.shape[0]):
-        fill_derivatives(times[i], states[i], model, work, rates[i])
+        derivatives_at(equations, times[i], states[i], model, work, rates[i])
         for k in range(work.counts.shape[0]):
             for side in range(2):
                 bounds[i, k, side] = work.bounds[k, side]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import integrate as scipy_integrate
 
 from wrcore.dynamics.integrate import Trajectory, derailment
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 
 SOLVERS = {
@@ -28,11 +28,10 @@ def integrate_by_reference(model, state, times, method, rtol, atol, longest_step
     InputError
         ``cvode`` without scikit-sundae.
     """
-    work = workspace(model)
-    function = right_hand_side(model, work)
+    function = Equations(model)
 
     def stop(t, state):
-        return derailment(model, t, state, work.arc_lengths, derailed_y)
+        return derailment(model, t, state, function.work.arc_lengths, derailed_y)
 
     bounded = stop if np.isfinite(derailed_y) else None
     return integrate_function(function, state, times, method, rtol, atol, longest_step, bounded, progress)

@@ -31,7 +31,7 @@ from wrcore.dynamics.engine import (
     take_stock,
 )
 from wrcore.dynamics.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian
-from wrcore.dynamics.system import fill_derivatives
+from wrcore.dynamics.system import derivatives_at
 
 CONTACT_REFRESHES = 20
 """Refreshes of the contacts' part of the Jacobian between two of the whole."""
@@ -65,7 +65,7 @@ def new_linear(model):
 
 
 @jit(allocates=False)
-def _renew(tableau, memory, scratch, linear, model, work):
+def _renew(tableau, memory, scratch, linear, equations, model, work):
     """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
 
     After a rejected step a Jacobian from an earlier state is refreshed first.
@@ -79,7 +79,7 @@ def _renew(tableau, memory, scratch, linear, model, work):
             counters[SINCE_FULL] = 0
         counters[EVALUATIONS] += refresh_jacobian(
             sweep, linear.jacobian, clock[T], memory.state, memory.rate, scratch.trial, scratch.slope,
-            linear.differences, model, work,
+            linear.differences, equations, model, work,
         )  # fmt: skip
         counters[JACOBIANS] += 1
         counters[SINCE_FULL] += 1
@@ -93,7 +93,7 @@ def _renew(tableau, memory, scratch, linear, model, work):
 
 
 @jit(allocates=False, nogil=True)
-def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget, model, work):
+def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget, equations, model, work):
     """Advance a run by a Rosenbrock method.
 
     Parameters
@@ -106,6 +106,8 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
     record : Record
     budget : int
         Attempts before the kernel returns.
+    equations : Kernel
+        The right-hand side.
     model : Model
     work : Workspace
 
@@ -132,13 +134,13 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
             if i > 0 or not counters[HAS_RATE]:
-                fill_derivatives(clock[T] + tableau.nodes[i] * step, trial, model, work, slope)
+                derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, slope)
                 counters[EVALUATIONS] += 1
             if i == 0:
                 if not counters[HAS_RATE]:
                     copy_into(memory.rate, slope)
                     counters[HAS_RATE] = 1
-                regular = _renew(tableau, memory, scratch, linear, model, work)
+                regular = _renew(tableau, memory, scratch, linear, equations, model, work)
                 copy_into(slope, memory.rate)
             increment, drift = stages[i], step * tableau.drift[i]
             for k in range(n):

@@ -11,16 +11,16 @@ without joints does not run any of this.
 from typing import NamedTuple
 
 import numpy as np
-from numba.typed import List
 
 from wrcore._jit import jit
+from wrcore._references import Handle, Kernel, call_at
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import Elements, element_forces
-from wrcore.dynamics.track import TrackModel, add_rail_wrenches
-from wrcore.dynamics.wheel import ContactModel, wheel_wrench
+from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
+from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
 
 
 class Bodies(NamedTuple):
@@ -68,12 +68,21 @@ class Workspace(NamedTuple):
     """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
     counts: np.ndarray
     """(k, 2) int: patches in contact."""
+    motions: np.ndarray
+    """(k, 2, MOTION_COLUMNS): motion of each wheel in its rail's frame."""
+    rail_wrenches: np.ndarray
+    """(k, 2, 6): force and moment of the rails on each wheelset."""
+    rails: np.ndarray
+    """(k, 2, 3, 3): axes of the rails' frames, unless the track is tangent."""
+    shifts: np.ndarray
+    """(k, 2, 2): where rails are off their nominal places, m, unless the track is tangent."""
     bounds: np.ndarray
     """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
     counters: np.ndarray
     """(2,) int: evaluations, creep look-ups out of range."""
     constraints: ConstraintWork
-    frames: np.ndarray
+    frame: np.ndarray
+    """(3, 3): axes of the track's frame."""
     irregularity: np.ndarray
 
 
@@ -97,8 +106,9 @@ def workspace(model):
     return Workspace(
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
-        np.zeros((k, 2), np.int64), np.full((k, 2), np.nan), np.zeros(2, np.int64),
-        constraint_workspace(model.joints), np.zeros((2, 3, 3)), np.zeros((3, 4)),
+        np.zeros((k, 2), np.int64), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)), np.zeros((k, 2, 3, 3)),
+        np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(2, np.int64),
+        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
     )  # fmt: skip
 
 
@@ -117,7 +127,39 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[5] -= wx * hy - wy * hx
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False)
+def _add_rail_wrenches(model, state, work):
+    """Add the wrenches of the rails to those of the wheelsets."""
+    wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
+    for k in range(wheelsets.shape[0]):
+        b = wheelsets[k]
+        at, axle = STATE_SIZE * b, work.rotations[b]
+        if not tangent:
+            work.arc_lengths[k] = rail_motions(
+                model.track, model.contact.geometry.rail_distance, state, at, axle, work.arc_lengths[k], work.frame,
+                work.irregularity, work.rails[k], work.shifts[k], work.motions[k],
+            )  # fmt: skip
+            continue
+        for wheel in range(2):
+            row = work.motions[k, wheel]
+            row[0], row[1], row[2] = 1.0 - 2.0 * wheel, state[at + 1], state[at + 2]
+            for i in range(3):
+                row[3 + i] = axle[i, 1]
+            for i in range(6):
+                row[6 + i] = state[at + 7 + i]
+            row[12] = row[13] = 0.0
+    work.counters[1] += wheel_wrenches(
+        model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches
+    )
+    for k in range(wheelsets.shape[0]):
+        if not tangent:
+            turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
+        wrench = work.wrenches[wheelsets[k]]
+        for i in range(6):
+            wrench[i] += work.rail_wrenches[k, 0, i] + work.rail_wrenches[k, 1, i]
+
+
+@jit(allocates=False)
 def fill_derivatives(t, state, model, work, rate):
     """Right-hand side of the equations of motion.
 
@@ -148,33 +190,8 @@ def fill_derivatives(t, state, model, work, rate):
         turn[0], turn[1], turn[2] = wx - spin * matrix[0, 1], wy - spin * matrix[1, 1], wz - spin * matrix[2, 1]
         wrench[:] = 0.0
         wrench[2] = -model.gravity * bodies.mass[b]
-    for k in range(bodies.wheelsets.shape[0]):
-        b = bodies.wheelsets[k]
-        at = STATE_SIZE * b
-        axle = work.rotations[b]
-        wrench = work.wrenches[b]
-        if not model.track.tangent:
-            s, outside = add_rail_wrenches(
-                model.contact, model.track, state, at, axle, work.arc_lengths[k], work.frames, work.irregularity,
-                work.patches[k], work.counts[k], work.bounds[k], wrench,
-            )  # fmt: skip
-            work.arc_lengths[k] = s
-            work.counters[1] += outside
-            continue
-        for wheel in range(2):
-            fx, fy, fz, mx, my, mz, count, outside, bound = wheel_wrench(
-                model.contact, 1.0 - 2.0 * wheel, state[at + 1], state[at + 2], axle[0, 1], axle[1, 1], axle[2, 1],
-                state[at + 7], state[at + 8], state[at + 9], state[at + 10], state[at + 11], state[at + 12],
-                0.0, 0.0, work.patches[k, wheel],
-            )  # fmt: skip
-            work.counts[k, wheel], work.bounds[k, wheel] = count, bound
-            work.counters[1] += outside
-            wrench[0] += fx
-            wrench[1] += fy
-            wrench[2] += fz
-            wrench[3] += mx
-            wrench[4] += my
-            wrench[5] += mz
+    if bodies.wheelsets.shape[0] > 0:
+        _add_rail_wrenches(model, state, work)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
@@ -189,25 +206,54 @@ def fill_derivatives(t, state, model, work, rate):
         apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + 10 : at + 13])
 
 
-@jit
-def derivatives(t, state, model, work):
-    """Right-hand side in a new array; arguments as for :func:`fill_derivatives`."""
-    rate = np.empty_like(state)
-    fill_derivatives(t, state, model, work, rate)
-    return rate
+@jit(allocates=False, forceinline=True)
+def derivatives_at(equations, t, state, model, work, rate):
+    """Right-hand side by its address; all else as for :func:`fill_derivatives`."""
+    call_at(equations, t, state, model, work, rate)
 
 
-@jit
-def _derivatives_of_boxed(t, state, box):
-    model, work = box[0]
-    return derivatives(t, state, model, work)
+@jit(allocates=False, nogil=True)
+def fill_many(equations, t, states, model, work, rates):
+    """Right-hand sides of several states (n, size), row by row."""
+    for i in range(states.shape[0]):
+        derivatives_at(equations, t, states[i], model, work, rates[i])
+
+
+class Equations:
+    """A model's equations of motion with their scratch arrays, for kernels and as ``function(t, state)``.
+
+    Parameters
+    ----------
+    model : Model
+    work : Workspace, optional
+
+    Attributes
+    ----------
+    work : Workspace
+    arguments : tuple
+        ``(equations, model, work)`` as kernels take them: the right-hand side and handles.
+    """
+
+    def __init__(self, model, work=None):
+        self.work = workspace(model) if work is None else work
+        model, work = Handle(model), Handle(self.work)
+        state = np.empty(0)
+        self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
+
+    def __call__(self, t, state):
+        """Rate of a state, shape (size,), at a time (s)."""
+        return self.at(t, state[None, :])[0]
+
+    def at(self, t, states):
+        """Rates of several states, shape (n, size), at one time (s)."""
+        states, rates = np.ascontiguousarray(states, float), np.empty(states.shape)
+        equations, model, work = self.arguments
+        fill_many(equations, t, states, model, work, rates)
+        return rates
 
 
 def right_hand_side(model, work):
     """The equations of motion as ``function(t, state)`` for a solver that is written in Python.
-
-    A model holds some sixty arrays; handing them across the border between Python and compiled code at each call
-    costs more than the equations themselves. A compiled list crosses it as one pointer.
 
     Parameters
     ----------
@@ -216,8 +262,6 @@ def right_hand_side(model, work):
 
     Returns
     -------
-    callable
+    Equations
     """
-    box = List()
-    box.append((model, work))
-    return lambda t, state: _derivatives_of_boxed(t, state, box)
+    return Equations(model, work)

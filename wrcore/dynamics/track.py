@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore._jit import jit
+from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.wheel import wheel_wrench
 from wrcore.geometry.irregularity import IrregularityData, irregularity_at
 from wrcore.geometry.path import PathData, arc_length_of, frame_turn, rail_direction, track_frame
 
@@ -66,13 +66,14 @@ def _rail_frame(frame, lateral, vertical, out):
 
 
 @jit(allocates=False)
-def add_rail_wrenches(contact, track, state, at, axle, guess, frames, values, patches, counts, bounds, wrench):
-    """Add the wrench of both rails on one wheelset to ``wrench`` (6,), in absolute axes.
+def rail_motions(track, rail_distance, state, at, axle, guess, frame, values, rails, shifts, motions):
+    """A wheelset's motion in the frames of its two rails.
 
     Parameters
     ----------
-    contact : ContactModel
     track : TrackModel
+    rail_distance : float
+        Rail profile origin from the track's centre line, m.
     state : numpy.ndarray
     at : int
         Start of the wheelset's state.
@@ -80,59 +81,63 @@ def add_rail_wrenches(contact, track, state, at, axle, guess, frames, values, pa
         Its rotation matrix.
     guess : float
         Arc length from which its own is sought, m.
-    frames, values : numpy.ndarray, shapes (2, 3, 3) and (3, 4)
+    frame, values : numpy.ndarray, shapes (3, 3) and (3, 4)
         Scratch.
-    patches, counts, bounds : numpy.ndarray
-        Filled per side; positions in the track's frame at the wheelset's arc length.
+    rails, shifts : numpy.ndarray, shapes (2, 3, 3) and (2, 2)
+        Filled: axes of the left and the right rail's frame, and where it is off its nominal place, left and up (m).
+    motions : numpy.ndarray, shape (2, MOTION_COLUMNS)
+        Filled, see `wrcore.dynamics.wheel.wheel_wrenches`.
 
     Returns
     -------
-    s : float
+    float
         Arc length of the wheelset, m; NaN if there is none.
-    outside : int
-        Creep look-ups out of range.
     """
-    frame, rail = frames[0], frames[1]
     s = arc_length_of(track.path, state[at], state[at + 1], state[at + 2], guess)
     station = track_frame(track.path, s, frame)
     irregularity_at(track.irregularity, s, values)
     _, bend_vertical, bend = frame_turn(station)
     dx, dy, dz = state[at] - station.x, state[at + 1] - station.y, state[at + 2] - station.z
     _, y, z = _turn_into(frame, dx, dy, dz)
-    outside = 0
     for wheel in range(2):
-        side = 1.0 - 2.0 * wheel
+        side, rail, row = 1.0 - 2.0 * wheel, rails[wheel], motions[wheel]
         shift = side * 0.5 * station.widening + values[0, 2 * wheel]
         lift = values[0, 2 * wheel + 1]
-        place = side * contact.geometry.rail_distance
+        place = side * rail_distance
         slope_y = side * 0.5 * station.widening_rate + values[1, 2 * wheel]
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
         _rail_frame(frame, lateral, vertical, rail)
         # the wheelset's centre from the rail's origin, turned into the rail's frame
         gx, gy, gz = _turn_back(frame, 0.0, y - place - shift, z - lift)
-        _, ry, rz = _turn_into(rail, gx, gy, gz)
-        ex, ey, ez = _turn_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
-        vx, vy, vz = _turn_into(rail, state[at + 7], state[at + 8], state[at + 9])
-        wx, wy, wz = _turn_into(rail, state[at + 10], state[at + 11], state[at + 12])
-        curvature_y = bend + values[2, 2 * wheel]
-        curvature_z = -bend_vertical + values[2, 2 * wheel + 1]
-        fx, fy, fz, mx, my, mz, count, missed, bound = wheel_wrench(
-            contact, side, ry + place, rz, ex, ey, ez, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, patches[wheel]
-        )
-        counts[wheel], bounds[wheel] = count, bound
-        outside += missed
-        for k in range(count):
-            patches[wheel, k, 4] += shift
-            patches[wheel, k, 5] += lift
-        gx, gy, gz = _turn_back(rail, fx, fy, fz)
-        wrench[0] += gx
-        wrench[1] += gy
-        wrench[2] += gz
-        gx, gy, gz = _turn_back(rail, mx, my, mz)
-        wrench[3] += gx
-        wrench[4] += gy
-        wrench[5] += gz
-    return s, outside
+        _, ry, row[2] = _turn_into(rail, gx, gy, gz)
+        row[0], row[1] = side, ry + place
+        row[3], row[4], row[5] = _turn_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
+        row[6], row[7], row[8] = _turn_into(rail, state[at + 7], state[at + 8], state[at + 9])
+        row[9], row[10], row[11] = _turn_into(rail, state[at + 10], state[at + 11], state[at + 12])
+        row[12], row[13] = bend + values[2, 2 * wheel], -bend_vertical + values[2, 2 * wheel + 1]
+        shifts[wheel, 0], shifts[wheel, 1] = shift, lift
+    return s
+
+
+@jit(allocates=False)
+def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
+    """Turn what was found in the frames of two rails into absolute axes, and patches to where they are in the track's.
+
+    Parameters
+    ----------
+    rails, shifts : numpy.ndarray, shapes (2, 3, 3) and (2, 2)
+        From `rail_motions`.
+    wrenches : numpy.ndarray, shape (2, 6)
+    patches : numpy.ndarray, shape (2, MAX_PATCHES, PATCH_COLUMNS)
+    counts : numpy.ndarray, shape (2,)
+    """
+    for wheel in range(2):
+        rail, wrench = rails[wheel], wrenches[wheel]
+        wrench[0], wrench[1], wrench[2] = _turn_back(rail, wrench[0], wrench[1], wrench[2])
+        wrench[3], wrench[4], wrench[5] = _turn_back(rail, wrench[3], wrench[4], wrench[5])
+        for k in range(counts[wheel]):
+            patches[wheel, k, Y] += shifts[wheel, 0]
+            patches[wheel, k, Z] += shifts[wheel, 1]
 
 
 @jit(allocates=False)

@@ -3,13 +3,13 @@
 import math
 from typing import NamedTuple
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
-from wrcore.contact.normal import HertzTable, damping_factor, hertz_ellipse
+from wrcore.contact.normal import HertzTable, damping_factor, hertz_shape_at, inverse_cube_root
 from wrcore.contact.reduction import (
-    ANGLE,
+    COSINE,
     CURVATURE_X,
     CURVATURE_Y,
     ETA,
@@ -21,12 +21,15 @@ from wrcore.contact.reduction import (
     PHI,
     SEMI_A,
     SEMI_B,
+    SINE,
     XI,
     X,
     Y,
     Z,
 )
-from wrcore.creep.laws import CreepData, creep_force
+from wrcore.creep.laws import CreepData, creep_force_at
+
+MOTION_COLUMNS = 14
 
 
 class ContactModel(NamedTuple):
@@ -56,80 +59,107 @@ class ContactModel(NamedTuple):
     """Rolling speed is not taken smaller than this in creepages, m/s."""
 
 
-@jit(allocates=False)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
+    """`normal_contact`, and a/b and its logarithm."""
+    stiffness, a, b, log_axis_ratio = hertz_shape_at(model.hertz, curvature_x, curvature_y)
+    factor = damping_factor(approach_speed, model.damping, model.damping_speed)
+    root = math.sqrt(penetration)
+    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
+    force = factor * modulus * stiffness * penetration * root
+    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
+    inverse = inverse_cube_root(factor)
+    root *= factor * inverse * inverse
+    return force, a * root, b * root, a / b, log_axis_ratio
+
+
+@jit(allocates=False, fastmath=FUSED)
 def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """Normal force (N) by Eq. (7) and the semi-axes (m) of the Hertz ellipse that carries it."""
-    stiffness, a_factor, b_factor = hertz_ellipse(model.hertz, curvature_x, curvature_y)
-    factor = damping_factor(approach_speed, model.damping, model.damping_speed)
-    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
-    force = factor * modulus * stiffness * penetration * math.sqrt(penetration)
-    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
-    root = math.sqrt(penetration) * factor ** (1.0 / 3.0)
-    return force, a_factor * root, b_factor * root
+    force, a, b, _, _ = _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
+    return force, a, b
 
 
-@jit(allocates=False)
-def wheel_wrench(model, side, y, z, ex, ey, ez, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, rows):
-    """Force and moment of one rail on a wheelset, and the wheel's patches, in a frame in which the rail runs along x.
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _find(model, side, y, z, ex, ey, ez, rows):
+    """Patches of a wheel by the model's detection: their number, and AUTO's bound of planar detection's error."""
+    bound, spatial = 0.0, model.detection == SPATIAL
+    if model.detection == AUTO:
+        bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
+        spatial = bound > model.detection_tolerance
+    ex, ey, ez = side * ex, side * ey, side * ez
+    return find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, model.reduction, rows), bound
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, row):
+    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left."""
+    px, py, pz = row[X], row[Y] - y, row[Z] - z
+    cosine, sine = row[COSINE], row[SINE]
+    speed = max(abs(vx), model.least_speed)
+    xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed)
+    row[CURVATURE_X] += 0.5 * (curvature_y * sine - curvature_z * cosine)  # rail bending away from the wheel
+    normal, a, b, axis_ratio, log_axis_ratio = _normal_contact(
+        model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach
+    )
+    limit = model.friction * normal
+    square = a * b
+    c = math.sqrt(square)
+    scale = model.shear_modulus * square / limit
+    f1, f2, m3, missed = creep_force_at(
+        model.law, model.creep, log_axis_ratio, axis_ratio, 0.0, xi * scale, eta * scale, phi * scale * c
+    )
+    f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
+    gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
+    row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
+    row[FX], row[FY], row[MZ] = f1, f2, m3
+    row[XI], row[ETA], row[PHI] = xi, eta, phi
+    mx, my, mz = py * gz - pz * gy, pz * f1 - px * gz - m3 * sine, px * gy - py * f1 + m3 * cosine
+    return f1, gy, gz, mx, my, mz, missed
+
+
+@jit(allocates=False, fastmath=FUSED)
+def wheel_wrenches(model, motions, patches, counts, bounds, wrenches):
+    """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
+
+    One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
+    chains of neighbours overlap.
 
     Parameters
     ----------
     model : ContactModel
-    side : float
-        +1 left, -1 right.
-    y, z : float
-        Wheelset centre, m.
-    ex, ey, ez : float
-        Axle direction, pointing left.
-    vx, vy, vz, wx, wy, wz : float
-        Velocity of the centre (m/s) and angular velocity (rad/s).
-    curvature_y, curvature_z : float
-        Curvature of the rail's line towards y and z, 1/m (0 on a tangent track).
-    rows : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
-        Filled: the wheel's patches; rows beyond the count keep old content.
+    motions : numpy.ndarray, shape (k, 2, MOTION_COLUMNS)
+        Of left and right wheels: side (+1 left, -1 right); y and z of the wheelset's centre (m); axle direction,
+        pointing left (3); velocity of the centre (m/s, 3) and angular velocity (rad/s, 3); curvature of the rail's line
+        towards y and towards z (1/m; 0 on a tangent track).
+    patches : numpy.ndarray, shape (k, 2, MAX_PATCHES, PATCH_COLUMNS)
+        Filled: the wheels' patches; rows beyond their counts keep old content.
+    counts, bounds : numpy.ndarray, shape (k, 2)
+        Filled: number of patches; AUTO's bound of planar detection's error (m).
+    wrenches : numpy.ndarray, shape (k, 2, 6)
+        Filled: force (N) and moment about the wheelset's centre (N m).
 
     Returns
     -------
-    fx, fy, fz, mx, my, mz : float
-        Force (N) and moment about the wheelset's centre (N m).
-    count : int
-        Number of patches.
-    outside : int
+    int
         Number of creep look-ups outside the range of the creep law's table.
-    bound : float
-        AUTO only: bound of planar detection's error, m.
     """
-    fx = fy = fz = mx = my = mz = 0.0
-    outside, bound = 0, 0.0
-    spatial = model.detection == SPATIAL
-    if model.detection == AUTO:
-        bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
-        spatial = bound > model.detection_tolerance
-    count = find_patches(model.geometry, side, y, z, side * ex, side * ey, side * ez, spatial, model.reduction, rows)
-    speed = max(abs(vx), model.least_speed)
-    modulus = model.shear_modulus
-    for k in range(count):
-        row = rows[k]
-        px, py, pz = row[X], row[Y] - y, row[Z] - z
-        xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, row[ANGLE], speed)
-        cosine, sine = math.cos(row[ANGLE]), math.sin(row[ANGLE])
-        row[CURVATURE_X] += 0.5 * (curvature_y * sine - curvature_z * cosine)  # rail bending away from the wheel
-        normal, a, b = normal_contact(model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach)
-        limit = model.friction * normal
-        square = a * b
-        c = math.sqrt(square)
-        scale = modulus * square / limit
-        f1, f2, m3, missed = creep_force(model.law, model.creep, a / b, 0.0, xi * scale, eta * scale, phi * scale * c)
-        outside += missed
-        f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
-        gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
-        fx += f1
-        fy += gy
-        fz += gz
-        mx += py * gz - pz * gy
-        my += pz * f1 - px * gz - m3 * sine
-        mz += px * gy - py * f1 + m3 * cosine
-        row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
-        row[FX], row[FY], row[MZ] = f1, f2, m3
-        row[XI], row[ETA], row[PHI] = xi, eta, phi
-    return fx, fy, fz, mx, my, mz, count, outside, bound
+    for i in range(motions.shape[0]):
+        for wheel in range(2):
+            m = motions[i, wheel]
+            count, bound = _find(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+            counts[i, wheel], bounds[i, wheel] = count, bound
+    outside = 0
+    for i in range(motions.shape[0]):
+        for wheel in range(2):
+            m, w = motions[i, wheel], wrenches[i, wheel]
+            fx = fy = fz = mx = my = mz = 0.0
+            for k in range(counts[i, wheel]):
+                gx, gy, gz, nx, ny, nz, missed = _patch_wrench(
+                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], patches[i, wheel, k]
+                )
+                fx, fy, fz = fx + gx, fy + gy, fz + gz
+                mx, my, mz = mx + nx, my + ny, mz + nz
+                outside += missed
+            w[0], w[1], w[2], w[3], w[4], w[5] = fx, fy, fz, mx, my, mz
+    return outside

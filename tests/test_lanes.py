@@ -1,0 +1,73 @@
+"""Vector registers in kernels against numpy."""
+
+import numpy as np
+import pytest
+
+from wrcore._jit import FUSED, jit
+from wrcore._lanes import (
+    below,
+    count_bits,
+    greatest,
+    highest_bit,
+    lane,
+    lanes8,
+    load4,
+    load8,
+    lowest_bit,
+    ramp8,
+    total,
+    where_below,
+)
+
+
+@jit(fastmath=FUSED)
+def polynomial(rows, start, factor):
+    """Sum over eight columns of (row 0 - factor) (row 1 + k) factor + row 0, and its third term."""
+    one, two = load8(rows, 0, np.uint64(start)), load8(rows, 1, np.uint64(start))
+    result = (one - factor) * (two + ramp8()) * factor + one
+    return total(result), lane(result, 2)
+
+
+@jit
+def compared(rows, limit):
+    """Bits, greatest and chosen numbers of eight columns below a limit."""
+    one, two = load8(rows, 0, np.uint64(0)), load8(rows, 1, np.uint64(0))
+    bits = below(one, lanes8(limit))
+    chosen = where_below(one, lanes8(limit), one, two)
+    return bits, count_bits(bits), lowest_bit(bits), highest_bit(bits), greatest(one), total(chosen)
+
+
+@jit
+def four(values, start):
+    """Sum and last of four neighbours."""
+    lanes = load4(values, np.uint64(start))
+    return total(lanes), lane(lanes, 3)
+
+
+def test_arithmetic_is_that_of_numbers():
+    rows = np.random.default_rng(0).normal(size=(2, 21))
+    for start in (0, 1, 13):
+        one, two = rows[:, start : start + 8]
+        expected = (one - 0.3) * (two + np.arange(8)) * 0.3 + one
+        assert polynomial(rows, start, 0.3) == pytest.approx((expected.sum(), expected[2]), rel=1e-14)
+
+
+@pytest.mark.parametrize("limit", [-9.0, -0.5, 0.0, 0.7, 9.0])
+def test_comparisons(limit):
+    rows = np.random.default_rng(1).normal(size=(2, 8))
+    is_below = rows[0] < limit
+    places = np.flatnonzero(is_below)
+    ends = (places[0], places[-1]) if len(places) else (64, -1)
+    expected = (is_below @ 2 ** np.arange(8), len(places), *ends, rows[0].max(), np.where(is_below, *rows).sum())
+    assert compared(rows, limit) == pytest.approx(expected, rel=1e-14)
+
+
+def test_not_a_number_is_not_below():
+    rows = np.zeros((2, 8))
+    rows[0, 3] = np.nan
+    assert compared(rows, 1.0)[:2] == (0b11110111, 7)
+
+
+def test_single_precision_is_widened():
+    values = np.arange(20, dtype=np.float32) / 3
+    assert four(values, 5) == (values[5:9].astype(float).sum(), float(values[8]))

@@ -1,0 +1,207 @@
+"""Vector registers in kernels: four or eight float64 side by side, for loops that the compiler does not vectorise well.
+
+A kernel writes ``x = load8(a, row, i)`` and calculates with + - * as with numbers; a number beside lanes counts for all
+of them. Products and sums are fused (`FUSED` of `wrcore._jit`). Processors without such wide registers take several.
+No bounds are checked.
+"""
+
+import operator
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, models, register_model
+
+_DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(32)
+_FUSED, _SUM = ("contract",), ("contract", "reassoc")
+
+
+class Lanes(types.Type):
+    """Type of several float64 in one register."""
+
+    def __init__(self, count):
+        self.count = count
+        super().__init__(name=f"Lanes({count})")
+
+    @property
+    def vector(self):
+        """The LLVM type."""
+        return ir.VectorType(_DOUBLE, self.count)
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager, lanes):
+        super().__init__(manager, lanes, lanes.vector)
+
+
+FOUR, EIGHT = Lanes(4), Lanes(8)
+
+
+def _spread(builder, number, lanes):
+    """The same number in all lanes."""
+    undefined = ir.Constant(lanes.vector, ir.Undefined)
+    first = builder.insert_element(undefined, number, _INDEX(0))
+    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(_INDEX, lanes.count), None))
+
+
+def _call(builder, name, result, arguments, **options):
+    function_type = ir.FunctionType(result, [a.type for a in arguments])
+    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), arguments, **options)
+
+
+def _define(function, instruction):
+    """Let an operator work on lanes and on lanes with a number."""
+    pairs = [(a, b) for lanes in (FOUR, EIGHT)
+             for a, b in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes))]  # fmt: skip
+
+    @infer_global(function)
+    class Typing(ConcreteTemplate):
+        cases = [signature(a if isinstance(a, Lanes) else b, a, b) for a, b in pairs]
+
+    def generate(_, builder, call, arguments):
+        both = [a if isinstance(kind, Lanes) else _spread(builder, a, call.return_type)
+                for a, kind in zip(arguments, call.args, strict=True)]  # fmt: skip
+        return getattr(builder, instruction)(*both, flags=_FUSED)
+
+    for pair in pairs:
+        lower_builtin(function, *pair)(generate)
+    return Typing
+
+
+for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _define(_function, _instruction)
+
+
+def _load(builder, array, offset, kind, lanes):
+    place = builder.bitcast(builder.gep(array.data, [offset]), ir.VectorType(kind, lanes.count).as_pointer())
+    return builder.load(place, align=4 if kind == ir.FloatType() else 8)
+
+
+@intrinsic
+def load8(_, rows, row, start):
+    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64; ``start`` unsigned."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        length = cgutils.unpack_tuple(builder, array.shape, 2)[1]
+        offset = builder.add(builder.mul(arguments[1], length), arguments[2])
+        return _load(builder, array, offset, _DOUBLE, EIGHT)
+
+    return EIGHT(rows, row, start), generate
+
+
+@intrinsic
+def load4(_, values, start):
+    """``values[start : start + 4]`` of a contiguous array of float32; ``start`` unsigned."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        return builder.fpext(_load(builder, array, arguments[1], ir.FloatType(), FOUR), FOUR.vector)
+
+    return FOUR(values, start), generate
+
+
+@intrinsic
+def lanes8(_, number):
+    """A number in all of eight lanes."""
+
+    def generate(__, builder, ___, arguments):
+        return _spread(builder, arguments[0], EIGHT)
+
+    return EIGHT(types.float64), generate
+
+
+@intrinsic
+def ramp8(_):
+    """0, 1, ... 7."""
+
+    def generate(*__):
+        return ir.Constant(EIGHT.vector, [float(k) for k in range(8)])
+
+    return EIGHT(), generate
+
+
+@intrinsic
+def lane(_, lanes, k):
+    """Number in lane ``k``."""
+
+    def generate(__, builder, ___, arguments):
+        return builder.extract_element(*arguments)
+
+    return types.float64(lanes, k), generate
+
+
+@intrinsic
+def total(_, lanes):
+    """Sum of all lanes."""
+
+    def generate(__, builder, call, arguments):
+        name = f"llvm.vector.reduce.fadd.v{call.args[0].count}f64"
+        return _call(builder, name, _DOUBLE, [_DOUBLE(0.0), arguments[0]], fastmath=_SUM)
+
+    return types.float64(lanes), generate
+
+
+@intrinsic
+def greatest(_, lanes):
+    """The greatest lane."""
+
+    def generate(__, builder, call, arguments):
+        name = f"llvm.vector.reduce.fmax.v{call.args[0].count}f64"
+        return _call(builder, name, _DOUBLE, arguments, fastmath=("nnan",))
+
+    return types.float64(lanes), generate
+
+
+@intrinsic
+def below(_, lanes, limit):
+    """Bits of the lanes that are less than ``limit`` (lanes, too): bit k for lane k."""
+
+    def generate(__, builder, call, arguments):
+        less = builder.fcmp_ordered("<", *arguments)
+        return builder.zext(builder.bitcast(less, ir.IntType(call.args[0].count)), ir.IntType(64))
+
+    return types.uint64(lanes, limit), generate
+
+
+@intrinsic
+def where_below(_, lanes, limit, value, other):
+    """``value`` where ``lanes`` are less than ``limit``, else ``other``; all lanes."""
+
+    def generate(__, builder, ___, arguments):
+        return builder.select(builder.fcmp_ordered("<", arguments[0], arguments[1]), arguments[2], arguments[3])
+
+    return lanes(lanes, limit, value, other), generate
+
+
+@intrinsic
+def count_bits(_, bits):
+    """Number of bits that are set in an unsigned integer."""
+
+    def generate(__, builder, ___, arguments):
+        return _call(builder, "llvm.ctpop.i64", ir.IntType(64), arguments)
+
+    return types.int64(types.uint64), generate
+
+
+@intrinsic
+def lowest_bit(_, bits):
+    """Place of the lowest bit that is set; 64 if none is."""
+
+    def generate(__, builder, ___, arguments):
+        return _call(builder, "llvm.cttz.i64", ir.IntType(64), [arguments[0], ir.IntType(1)(0)])
+
+    return types.int64(types.uint64), generate
+
+
+@intrinsic
+def highest_bit(_, bits):
+    """Place of the highest bit that is set; -1 if none is."""
+
+    def generate(__, builder, ___, arguments):
+        zeros = _call(builder, "llvm.ctlz.i64", ir.IntType(64), [arguments[0], ir.IntType(1)(0)])
+        return builder.sub(ir.IntType(64)(63), zeros)
+
+    return types.int64(types.uint64), generate

@@ -1,0 +1,188 @@
+"""Models in kernels behind a pointer, and kernels behind an address.
+
+A model holds some sixty arrays. Handed over by value they are 400 words at every call, and a kernel that calls another
+one is compiled together with it. A `Handle` keeps a model in memory instead: in kernels ``model.contact.friction`` then
+reads what it names, and calls pass one address. A `Kernel` called by its address (`call_at`) is compiled once, however
+many others call it.
+"""
+
+import numpy as np
+from llvmlite import ir
+from numba import typeof
+from numba.core import cgutils, types
+from numba.core.errors import TypingError
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import NativeValue, intrinsic, models, register_model, unbox
+
+from wrcore._jit import jit
+
+_INDEX = ir.IntType(32)
+
+
+class Reference(types.Type):
+    """Type of the address of a value in memory; fields of a named tuple are read through it."""
+
+    def __init__(self, target):
+        self.target = target
+        super().__init__(f"Reference({target})")
+
+
+@register_model(Reference)
+class _ReferenceModel(models.PrimitiveModel):
+    def __init__(self, manager, reference):
+        super().__init__(manager, reference, manager.lookup(reference.target).get_value_type().as_pointer())
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    key = Reference
+
+    def generic_resolve(self, reference, name):
+        """Named tuples in a named tuple are references again, all else is read."""
+        if name not in reference.target.fields:
+            return None
+        field = reference.target.types[reference.target.fields.index(name)]
+        return Reference(field) if isinstance(field, types.BaseNamedTuple) else field
+
+
+def _read(builder, place):
+    """Value at a place, number by number: what is not used is not read. No kernel changes it."""
+    kind = place.type.pointee
+    if not isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
+        number = builder.load(place)
+        number.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return number
+    value = ir.Constant(kind, ir.Undefined)
+    for k in range(len(kind.elements) if isinstance(kind, ir.LiteralStructType) else kind.count):
+        value = builder.insert_value(value, _read(builder, builder.gep(place, [_INDEX(0), _INDEX(k)])), k)
+    return value
+
+
+@lower_getattr_generic(Reference)
+def _get_field(context, builder, reference, pointer, name):
+    k = reference.target.fields.index(name)
+    place = builder.gep(pointer, [_INDEX(0), _INDEX(k)])
+    field = reference.target.types[k]
+    if isinstance(field, types.BaseNamedTuple):
+        return place
+    if context.enable_nrt and isinstance(field, types.Array):  # the handle keeps it alive, nobody counts references
+        raise TypingError("arrays of a Handle can only be read in kernels compiled with allocates=False")
+    return _read(builder, place)
+
+
+@intrinsic
+def _size_of(_, value):
+    def generate(context, builder, call, __):
+        return ir.Constant(ir.IntType(64), context.get_abi_sizeof(context.get_value_type(call.args[0])))
+
+    return types.int64(value), generate
+
+
+@intrinsic
+def _store(_, value, memory):
+    def generate(context, builder, call, arguments):
+        data = context.make_array(call.args[1])(context, builder, arguments[1]).data
+        builder.store(arguments[0], builder.bitcast(data, arguments[0].type.as_pointer()))
+        return context.get_dummy_value()
+
+    return types.void(value, memory), generate
+
+
+@jit
+def _size(value):
+    return _size_of(value)
+
+
+@jit
+def _write(value, memory):
+    _store(value, memory)
+
+
+class Handle:
+    """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing.
+
+    Parameters
+    ----------
+    value : NamedTuple
+        Its arrays live as long as the handle.
+    """
+
+    def __init__(self, value):
+        self.value = value
+        self._numba_type_ = Reference(typeof(value))
+        self._memory = np.zeros(_sizes(value, self._numba_type_), np.uint8)
+        _write(value, self._memory)
+        self.address = self._memory.ctypes.data
+
+
+_KNOWN_SIZES = {}
+
+
+def _sizes(value, kind):
+    """Bytes of a value; the same for all of a type."""
+    if kind not in _KNOWN_SIZES:
+        _KNOWN_SIZES[kind] = _size(value)
+    return _KNOWN_SIZES[kind]
+
+
+class KernelType(types.Type):
+    """Type of the address of a compiled kernel that returns nothing."""
+
+    def __init__(self, arguments):
+        self.arguments = arguments
+        super().__init__(f"Kernel({', '.join(map(str, arguments))})")
+
+
+@register_model(KernelType)
+class _KernelModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.IntType(8).as_pointer())
+
+
+class Kernel:
+    """A kernel that returns nothing, compiled (or loaded) for some arguments, to be called by its address.
+
+    Parameters
+    ----------
+    function : numba dispatcher
+    *examples
+        Arguments; only their types matter.
+    """
+
+    def __init__(self, function, *examples):
+        signature = tuple(typeof(example) for example in examples)
+        function.compile(signature)
+        compiled = function.overloads[signature]
+        self._numba_type_ = KernelType(signature)
+        self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+@unbox(Reference)
+@unbox(KernelType)
+def _unbox_address(kind, holder, c):
+    number = c.pyapi.object_getattr_string(holder, "address")
+    address = c.pyapi.number_as_ssize_t(number)
+    c.pyapi.decref(number)
+    pointer = c.builder.inttoptr(address, c.context.get_value_type(kind))
+    return NativeValue(pointer, is_error=c.pyapi.c_api_error())
+
+
+@intrinsic
+def call_at(_, kernel, *arguments):
+    """Call a `Kernel` with arguments of just the types that it was compiled for."""
+    if tuple(arguments) != kernel.arguments:
+        raise TypingError(f"a kernel compiled for {kernel.arguments} is called with {tuple(arguments)}")
+
+    def generate(context, builder, call, values):
+        kinds = tuple(call.args[1])
+        handed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
+        function = context.call_conv.get_function_type(types.none, kinds).as_pointer()
+        status, _ = context.call_conv.call_function(
+            builder, builder.bitcast(values[0], function), types.none, kinds, handed
+        )
+        with cgutils.if_unlikely(builder, status.is_error):
+            context.call_conv.return_status_propagate(builder, status)
+        return context.get_dummy_value()
+
+    return types.void(kernel, types.StarArgTuple(arguments)), generate
