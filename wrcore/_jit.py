@@ -39,10 +39,10 @@ def cache_root():
 
 
 def source_digest():
-    """Digest (16 hex digits) of the sources of this file, of ``_lanes.py`` and of the rooms that hold kernels."""
+    """Digest (16 hex digits) of the sources that kernels are made of."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
-    shared = [Path(__file__), Path(__file__).with_name("_lanes.py")]
+    shared = [Path(__file__).with_name(name) for name in ("_jit.py", "_lanes.py", "_references.py")]
     for path in [*shared, *sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py"))]:
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())

@@ -9,9 +9,11 @@ many others call it.
 import numpy as np
 from llvmlite import ir
 from numba import typeof
+from numba._dispatcher import compute_fingerprint
 from numba.core import cgutils, types
 from numba.core.errors import TypingError
 from numba.core.imputils import lower_getattr_generic
+from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, unbox
 
@@ -72,14 +74,6 @@ def _get_field(context, builder, reference, pointer, name):
 
 
 @intrinsic
-def _size_of(_, value):
-    def generate(context, builder, call, __):
-        return ir.Constant(ir.IntType(64), context.get_abi_sizeof(context.get_value_type(call.args[0])))
-
-    return types.int64(value), generate
-
-
-@intrinsic
 def _store(_, value, memory):
     def generate(context, builder, call, arguments):
         data = context.make_array(call.args[1])(context, builder, arguments[1]).data
@@ -87,11 +81,6 @@ def _store(_, value, memory):
         return context.get_dummy_value()
 
     return types.void(value, memory), generate
-
-
-@jit
-def _size(value):
-    return _size_of(value)
 
 
 @jit
@@ -110,20 +99,22 @@ class Handle:
 
     def __init__(self, value):
         self.value = value
-        self._numba_type_ = Reference(typeof(value))
-        self._memory = np.zeros(_sizes(value, self._numba_type_), np.uint8)
+        self._numba_type_, size = _layout(value)
+        self._memory = np.zeros(size, np.uint8)
         _write(value, self._memory)
         self.address = self._memory.ctypes.data
 
 
-_KNOWN_SIZES = {}
+_LAYOUTS = {}
 
 
-def _sizes(value, kind):
-    """Bytes of a value; the same for all of a type."""
-    if kind not in _KNOWN_SIZES:
-        _KNOWN_SIZES[kind] = _size(value)
-    return _KNOWN_SIZES[kind]
+def _layout(value):
+    """Type of a handle and the bytes that its value takes: found once for all values of a type."""
+    key = compute_fingerprint(value)
+    if key not in _LAYOUTS:
+        kind, context = typeof(value), cpu_target.target_context
+        _LAYOUTS[key] = Reference(kind), context.get_abi_sizeof(context.get_value_type(kind))
+    return _LAYOUTS[key]
 
 
 class KernelType(types.Type):
@@ -152,7 +143,8 @@ class Kernel:
 
     def __init__(self, function, *examples):
         signature = tuple(typeof(example) for example in examples)
-        function.compile(signature)
+        if signature not in function.overloads:
+            function.compile(signature)
         compiled = function.overloads[signature]
         self._numba_type_ = KernelType(signature)
         self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
