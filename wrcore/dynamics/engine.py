@@ -35,9 +35,11 @@ T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP = range(7)
 step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the
 run (s), and the step that the factorised matrix belongs to (s)."""
 
-(STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, HAS_RATE, RETRY, AGE, SINCE_FULL), COUNTERS_SIZE = range(9), 9
-"""Places in the counters; the last four belong to the control: the rate at the state is known, the last attempt was
-rejected, steps since the Jacobian was refreshed (-1: there is none), contact refreshes since the last full one."""
+(STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, HAS_RATE, RETRY, AGE, SINCE_FULL, TOUCHING) = range(10)
+COUNTERS_SIZE = 10
+"""Places in the counters; the last five belong to the control: the rate at the state is known, the last attempt was
+rejected, steps since the Jacobian was refreshed (-1: there is none), contact refreshes since the last full one, patches
+at the state."""
 
 
 class Control(NamedTuple):
@@ -77,6 +79,8 @@ class Scratch(NamedTuple):
     """(n,)."""
     caps: np.ndarray
     """(n,): largest size that counts in a component's error weight."""
+    defect: np.ndarray
+    """(n,)."""
 
 
 class Record(NamedTuple):
@@ -119,7 +123,7 @@ def new_scratch(size, bodies):
     caps = np.ones(size)
     for b in range(bodies):
         caps[STATE_SIZE * b + VELOCITY : STATE_SIZE * (b + 1)] = np.inf
-    return Scratch(np.zeros(size), np.zeros(size), caps)
+    return Scratch(np.zeros(size), np.zeros(size), caps, np.zeros(size))
 
 
 @jit(allocates=False, inline="always")

@@ -23,6 +23,7 @@ from wrcore.dynamics.engine import (
     RETRY,
     RUNNING,
     SINCE_FULL,
+    TOUCHING,
     T,
     accept,
     copy_into,
@@ -92,6 +93,35 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
     return True
 
 
+@jit(allocates=False)
+def _touching(work):
+    """Patches in the last evaluation."""
+    total = 0
+    for k in range(work.counts.shape[0]):
+        total += work.counts[k, 0] + work.counts[k, 1]
+    return total
+
+
+@jit(allocates=False)
+def _touchdown_error(tableau, control, memory, scratch, linear):
+    """Error by the rate at the end of an attempt (``scratch.slope``) against the step's own dense output there.
+
+    Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
+    embedded method compares is blind to it at any tolerance, and the impact would give energy. The system damps what
+    is stiff.
+    """
+    step, stages, defect = memory.clock[NEXT], memory.stages, scratch.defect
+    copy_into(defect, scratch.slope)
+    for i in range(stages.shape[0]):
+        weight = 0.0
+        for k in range(tableau.dense.shape[1]):
+            weight += (k + 1) * tableau.dense[i, k]
+        for k in range(defect.shape[0]):
+            defect[k] -= weight / step * stages[i, k]
+    solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), defect)
+    return error_size(control, scratch.caps, memory.state, scratch.trial, defect)
+
+
 @jit(allocates=False, nogil=True)
 def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget, equations, model, work):
     """Advance a run by a Rosenbrock method.
@@ -139,7 +169,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
             if i == 0:
                 if not counters[HAS_RATE]:
                     copy_into(memory.rate, slope)
-                    counters[HAS_RATE] = 1
+                    counters[HAS_RATE], counters[TOUCHING] = 1, _touching(work)
                 regular = _renew(tableau, memory, scratch, linear, equations, model, work)
                 copy_into(slope, memory.rate)
             increment, drift = stages[i], step * tableau.drift[i]
@@ -157,9 +187,18 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                 trial[k] += tableau.weights[i] * stages[i, k]
                 slope[k] += tableau.error[i] * stages[i, k]
         error = error_size(control, scratch.caps, state, trial, slope) if regular else np.nan
+        looked_ahead, touching = error <= 1.0, 0
+        if looked_ahead:  # the next step's first rate
+            derivatives_at(equations, clock[T] + step, trial, model, work, slope)
+            counters[EVALUATIONS] += 1
+            touching = _touching(work)
+            if touching > counters[TOUCHING]:
+                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear))
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
-            counters[HAS_RATE] = 0
             counters[AGE] += 1
+            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, touching
+            if looked_ahead:
+                copy_into(memory.rate, slope)
         elif control.fixed_step > 0.0:
             return NOT_FINITE

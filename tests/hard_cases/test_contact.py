@@ -1,0 +1,42 @@
+"""Jumps of the contact point, loss of contact and impacts."""
+
+import numpy as np
+import pytest
+
+from wrcore.analysis_hard_contact import crests, drops, impacts, pose_sweeps, restitution, slow_push
+
+
+def test_fast_impacts_keep_the_root_of_the_damping_factor():
+    # int v/c_d dv: far above v0 the approach stores v^2/2, the separation v^2/(2 c_e)
+    assert restitution(100.0, 0.8, 0.05) == pytest.approx(np.sqrt(0.8), rel=1e-4)
+    assert restitution(1e-5, 0.8, 0.05) == pytest.approx(1.0, abs=1e-4)
+    assert restitution(0.3, 1.0, 0.05) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_impacts_follow_the_damping_law(vehicles, assert_passed):
+    found, curve = impacts(vehicles, "free wheelset", [0.01, 0.5], ["spatial"], ["ros34pw2", "tsit5"])
+    assert_passed(found)
+    assert len(curve) == 4
+
+
+def test_an_impact_between_the_stages_of_a_step_is_not_missed(vehicles, assert_passed):
+    # with the embedded estimate alone the wheelset comes back 2000 times as high as it fell from
+    found, _ = drops(vehicles, "free wheelset", 1e-3, 1.0, ["planar"], ["ros34pw2"], [1e-4, 1e-6])
+    assert_passed(found)
+
+
+def test_wheels_leave_the_rail_where_the_crest_is_steep_and_nowhere_else(vehicles, assert_passed):
+    some = {name: vehicles[name] for name in ("suspended wheelset", "trailer vehicle")}
+    assert_passed(crests(some, 30.0, 3.0, 0.8, ["spatial"], ["tsit5"]))
+
+
+def test_sweeps_of_poses_have_no_memory(vehicles, assert_passed):
+    pair = {"wheel": "S1002", "rail": "UIC60-MBench", "inclination": 0.025, "gauge": 1.435, "rolling_radius": 0.46,
+            "half_distance": 0.75}  # fmt: skip
+    found, _ = pose_sweeps({"pair": pair}, 54546.0, 2e-6, 1e-3, 5e-4, 8e-3)
+    assert_passed(found)
+
+
+def test_a_slow_push_has_no_hysteresis(vehicles, assert_passed):
+    found, _ = slow_push(vehicles, "suspended wheelset", 60e3, [16.0, 32.0], ["spatial"], ["tsit5"])
+    assert_passed(found)

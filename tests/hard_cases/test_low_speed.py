@@ -1,0 +1,28 @@
+"""Low speed: no blow-up, no step collapse."""
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import table
+from wrcore.analysis_hard_low_speed import braking, ladder, regularisation, slow_path
+
+
+def test_wheelsets_run_at_any_speed(vehicles, assert_passed):
+    assert_passed(ladder(vehicles, [1.0, 0.01, 0.001], {"ros34pw2": 0.0, "tsit5": 1.0}, 0.2))
+
+
+def test_the_path_does_not_depend_on_a_low_speed(vehicles, assert_passed):
+    assert_passed(slow_path(vehicles, "suspended wheelset", [5.0, 0.1, 0.01], 1.0, 58.0))
+
+
+def test_regularisation_does_not_touch_higher_speeds(vehicles, assert_passed):
+    found, curve = regularisation(vehicles, "suspended wheelset", 0.01, [1e-4, 1e-3, 1e-1], 0.02)
+    assert_passed(found)
+    assert curve[1]["y_off_m"] < 1e-9 < 1e-5 < curve[2]["y_off_m"]
+
+
+def test_braking_ends_at_rest_without_step_collapse(vehicles, assert_passed):
+    # with differences of 1e-7 m/s in the Jacobian the last one takes 1e7 steps
+    found, _ = braking(vehicles, 1.0, 0.5, 1.0, [1e-3, 1e-4])
+    assert_passed(found)
+    assert table(found)["steps"].max() < 20_000
+    assert np.all(table(found)["status"] == "completed")

@@ -1,0 +1,290 @@
+"""Hard cases: what each one must keep is stated first, then it is run, and a table says what came of it.
+
+A case runs one vehicle with one detection and one integrator and is judged by invariants. Each is a number with a limit
+that follows from mechanics, from the law in use or from the integrator's tolerance; its source is part of the table.
+The families of cases are the modules ``analysis_hard_<family>``.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.outputs import evaluations_at
+from wrcore.dynamics.system import Equations
+from wrcore.errors import InputError
+from wrcore.scene import compile_scene, load_scene
+from wrcore.simulate import DERAILED_Y, output_times
+
+COLUMNS = (
+    "family", "case", "condition", "vehicle", "detection", "integrator", "outcome", "status", "reason", "simulated_s",
+    "steps", "rejected", "smallest_step_s", "wall_s", "out_of_range", "invariant", "value", "unit", "relation", "limit",
+    "source", "passed", "known_limit",
+)  # fmt: skip
+"""Columns of the table."""
+
+NORM_LIMIT = 1e-6
+"""Largest departure of a Euler parameters' norm from 1 that a run may show: at the scenes' relative tolerance of 1e-4 a
+rotation is then still exact to a hundredth of it."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One invariant of a case.
+
+    Attributes
+    ----------
+    invariant : str
+    value : float
+    limit : float
+        Largest value that passes; the smallest one if ``least``.
+    unit : str
+    source : str
+        Where the limit comes from.
+    least : bool
+    known_limit : str
+        Why the models in use cannot pass, where that is known.
+    """
+
+    invariant: str
+    value: float
+    limit: float
+    unit: str
+    source: str
+    least: bool = False
+    known_limit: str = ""
+
+    @property
+    def passed(self):
+        """False for a value that is no number."""
+        return bool(self.value >= self.limit if self.least else self.value <= self.limit)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A vehicle, ready to run.
+
+    Attributes
+    ----------
+    scene : Scene
+    model : Model
+        Its arrays may be changed between parts of a run.
+    state : numpy.ndarray
+        Start.
+    label : dict
+        Columns vehicle, detection and integrator of the table.
+    """
+
+    scene: object
+    model: object
+    state: np.ndarray
+    label: dict
+
+    @property
+    def control(self):
+        """Keyword arguments for `integrate`."""
+        chosen = self.scene.data["integration"]
+        names = ("method", "rtol", "atol", "step", "longest_step")
+        return {name: chosen[name] for name in names} | {"derailed_y": DERAILED_Y}
+
+
+def prepare(vehicles, name, changes=(), **parts):
+    """A vehicle of the study in some scene.
+
+    Parameters
+    ----------
+    vehicles : dict of str to dict
+        ``scene`` and ``set`` (changes to it) by name of the vehicle.
+    name : str
+    changes : dict
+        Further changes to the scene.
+    **parts
+        Attributes of the scene to be replaced, such as ``wheel`` or ``track``.
+
+    Returns
+    -------
+    Setting
+    """
+    entry = vehicles[name]
+    chosen = {**entry.get("set", {}), **dict(changes)}
+    scene = load_scene(entry["scene"], [f"{key}={value}" for key, value in chosen.items()])
+    scene = replace(scene, **parts) if parts else scene
+    model, state = compile_scene(scene)
+    label = {"vehicle": name, "detection": scene.detection, "integrator": scene.data["integration"]["method"]}
+    return Setting(scene, model, state, label)
+
+
+def with_forces(setting, body, markers):
+    """The same with constant forces on one body, which are zero until they are set.
+
+    Parameters
+    ----------
+    setting : Setting
+    body : int
+    markers : array_like, shape (n, 3)
+        Where they act, relative to the body's centre, m.
+
+    Returns
+    -------
+    setting : Setting
+    forces : numpy.ndarray, shape (n, 3)
+        View of the model's forces in the axes of the moving frame, N.
+    """
+    elements, markers = setting.model.elements, np.atleast_2d(np.asarray(markers, float))
+    rows = np.zeros((len(markers), elements.springs.shape[1]))
+    rows[:, :3] = markers
+    first = len(elements.springs)
+    elements = elements._replace(
+        pairs=np.vstack([elements.pairs, [[body, FRAME]]]), ahead=np.append(elements.ahead, setting.state[0] * 0.0),
+        turning=np.concatenate([elements.turning, np.zeros((1, 2, 3))]),
+        springs=np.vstack([elements.springs, rows]),
+        first_spring=np.append(elements.first_spring, first + len(markers)),
+        first_directed=np.append(elements.first_directed, elements.first_directed[-1]),
+    )  # fmt: skip
+    return replace(setting, model=setting.model._replace(elements=elements)), elements.springs[first:, 12:15]
+
+
+def run(setting, duration, rate=200.0, begin=0.0, **control):
+    """Integrate a setting; keyword arguments change those of `Setting.control`."""
+    times = output_times(begin, duration, rate)
+    return integrate(setting.model, setting.state, times, **{**setting.control, **control})
+
+
+def run_in_parts(setting, duration, rate, part, change, **control):
+    """Integrate part by part, with something in the model changed before each.
+
+    Parameters
+    ----------
+    setting : Setting
+    duration, rate : float
+        s and 1/s.
+    part : float
+        Length of a part, s.
+    change : callable
+        Takes the time at which a part begins and the state there; may change the model's arrays, and ends the run by
+        returning True.
+
+    Returns
+    -------
+    Trajectory
+        Of all parts together.
+    """
+    done, at, state = [], 0.0, setting.state
+    for index in range(math.ceil(duration / part - 1e-9)):
+        if change(at, state):
+            break
+        done.append(run(replace(setting, state=state), part, rate, at, **control))
+        if done[-1].status != "completed":
+            break
+        at, state = (index + 1) * part, done[-1].states[-1]
+    return joined(done)
+
+
+def joined(parts):
+    """One trajectory of several that follow each other."""
+    counted = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "out_of_range", "wall_s")
+    starts = [1 if index else 0 for index in range(len(parts))]
+    return replace(
+        parts[-1],
+        t=np.concatenate([part.t[start:] for part, start in zip(parts, starts, strict=True)]),
+        states=np.concatenate([part.states[start:] for part, start in zip(parts, starts, strict=True)]),
+        smallest_step=float(np.nanmin([part.smallest_step for part in parts])),
+        **{name: sum(getattr(part, name) for part in parts) for name in counted},
+    )
+
+
+def contacts(model, times, states):
+    """Patches of all wheels along a trajectory, shape (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), NaN if absent."""
+    shape = (len(times), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
+    patches, bounds, rates = np.full(shape, np.nan), np.full(shape[:3], np.nan), np.empty(states.shape)
+    states = np.ascontiguousarray(states)
+    evaluations_at(times, states, *Equations(model).arguments, rates, patches, bounds)
+    return patches
+
+
+def wheel_forces(patches):
+    """Vertical (downwards) and lateral (to the left) force of each wheel on its rail, N, shape (n, wheelsets, 2)."""
+    normal, lateral, angle = (patches[..., k] for k in (reduction.NORMAL, reduction.FY, reduction.ANGLE))
+    vertical = np.nansum(normal * np.cos(angle) + lateral * np.sin(angle), axis=-1)
+    return vertical, -np.nansum(lateral * np.cos(angle) - normal * np.sin(angle), axis=-1)
+
+
+def sound(setting, trajectory):
+    """Checks that hold for every run: numbers, unit Euler parameters, no tension."""
+    states = trajectory.states[:, : STATE_SIZE * len(setting.model.bodies.mass)]
+    parameters = states.reshape(len(states), -1, STATE_SIZE)[:, :, 3:7]
+    patches = contacts(setting.model, trajectory.t, trajectory.states)
+    least = np.nanmin(patches[..., reduction.NORMAL], initial=np.inf)
+    broken = float(np.sum(~np.isfinite(trajectory.states)) + (least < 0.0) * 1.0)
+    norm = float(np.max(np.abs(np.linalg.norm(parameters, axis=2) - 1.0)))
+    return [
+        Check("states that are no numbers, wheels under tension", broken, 0.0, "1", "Eq. (7) never pulls"),
+        Check("Euler parameters' norm less 1", norm, NORM_LIMIT, "1", "a hundredth of rtol = 1e-4"),
+    ]
+
+
+def rows(family, case, condition, setting, trajectory, checks, expected="completed"):
+    """Rows of the table for one run: one per check.
+
+    Parameters
+    ----------
+    family, case, condition : str
+    setting : Setting
+    trajectory : Trajectory
+    checks : sequence of Check
+    expected : str
+        Status that counts as survived.
+
+    Returns
+    -------
+    list of dict
+    """
+    used = trajectory.method
+    label = setting.label | {"integrator": used if setting.control["step"] == 0.0 else f"{used}, fixed step"}
+    outcome = "survived" if trajectory.status in ("completed", expected) else "failed"
+    cost = {
+        "outcome": outcome, "status": trajectory.status, "reason": trajectory.reason,
+        "simulated_s": float(trajectory.t[-1] - trajectory.t[0]) if len(trajectory.t) else 0.0,
+        "steps": trajectory.steps, "rejected": trajectory.rejected, "smallest_step_s": trajectory.smallest_step,
+        "wall_s": trajectory.wall_s, "out_of_range": trajectory.out_of_range,
+    }  # fmt: skip
+    finished = Check("ends as expected", float(trajectory.status != expected), 0.0, "1", f"expected: {expected}")
+    return [_row(family, case, condition, label | cost, check) for check in (finished, *checks)]
+
+
+def computed(family, case, condition, label, checks, wall=np.nan):
+    """Rows for a case that runs no vehicle in time, such as a sweep of poses."""
+    cost = {"outcome": "survived", "status": "completed", "reason": "", "wall_s": wall}
+    return [_row(family, case, condition, label | cost, check) for check in checks]
+
+
+def refused(family, case, condition, label, attempt):
+    """Row for a case that must be refused; ``attempt`` is called and has to raise InputError."""
+    try:
+        attempt()
+        cost = {"outcome": "failed", "status": "accepted", "reason": "expected a refusal"}
+    except InputError as error:
+        cost = {"outcome": "refused", "status": "refused", "reason": str(error)}
+    check = Check("lines of the refusal", float(len(cost["reason"].splitlines())), 1.0, "1", "one line that names why")
+    kept = _row(family, case, condition, label | cost, check)
+    return [kept | {"passed": kept["passed"] and cost["outcome"] == "refused"}]
+
+
+def _row(family, case, condition, known, check):
+    verdict = {
+        "invariant": check.invariant, "value": check.value, "unit": check.unit,
+        "relation": ">=" if check.least else "<=", "limit": check.limit, "source": check.source,
+        "passed": check.passed, "known_limit": "" if check.passed else check.known_limit,
+    }  # fmt: skip
+    row = {"family": family, "case": case, "condition": condition, **known, **verdict}
+    return {name: row.get(name, np.nan) for name in COLUMNS}
+
+
+def table(rows_of_cases):
+    """The table of the study from the rows of all cases."""
+    return pd.DataFrame(rows_of_cases, columns=COLUMNS)

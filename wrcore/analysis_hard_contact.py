@@ -1,0 +1,349 @@
+"""Hard cases of the normal contact: jumps of the contact point, loss of contact, impacts."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pandas as pd
+from scipy.integrate import quad, simpson
+from scipy.optimize import brentq
+
+from wrcore.analysis_contact import lateral_sweep, pair_geometry, study_pair, sweep_jumps
+from wrcore.analysis_hard_cases import (
+    Check,
+    computed,
+    contacts,
+    prepare,
+    rows,
+    run,
+    run_in_parts,
+    sound,
+    wheel_forces,
+    with_forces,
+)
+from wrcore.contact import reduction
+from wrcore.contact.normal import damping_factor
+from wrcore.contact.poses import solve_poses
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.geometry.irregularity import irregularity_data
+from wrcore.vehicle.description import GRAVITY
+
+SMOOTH = 2.0
+"""A step of the force larger than so many times the steepest smooth change is a jump."""
+
+RATE_SHARE = 0.6
+"""Part of the lag of a slow push that may be left at half its rate: all of what is no hysteresis halves."""
+
+RESTITUTION_ERROR = 0.01
+"""Of the restitution at the scenes' relative tolerance of 1e-4."""
+
+GAP = 2e-4
+"""Gap from which a wheelset is dropped onto the rails, m."""
+
+PLANAR_LOOP = "planar detection has two equilibria of a yawed wheelset where the contact jumps to the flange's root"
+
+CRESTS = {"flat": 0.25, "steep": 2.0}
+"""Largest V^2 kappa over load by unsprung mass on a crest. A quarter of it never unloads a wheel: the curvature sets in
+suddenly at both ends, which doubles its effect at most, and changes by twice its size between. Above 1 wheels leave."""
+
+IMPULSE_ERROR = 0.01
+"""Of the load's impulse: sampled forces of impacts are integrated to no better than this."""
+
+CREST_RATE = 2e4
+"""Outputs per second of runs over a crest."""
+
+
+def restitution(speed, c_e, v0):
+    """Speed after over speed before an impact by Eq. (7), without weight.
+
+    With m v v' = -c_d(v') f(d) and any elastic force f that depends on the penetration alone, int v/c_d(v) dv over the
+    approach equals int v/c_d(-v) dv over the separation. For speeds far above v0 that is sqrt(c_e).
+
+    Parameters
+    ----------
+    speed : float
+        Of the approach, m/s.
+    c_e, v0 : float
+        Of the damping factor.
+
+    Returns
+    -------
+    float
+    """
+
+    def stored(end, sign):
+        return quad(lambda v: v / damping_factor(sign * v, c_e, v0), 0.0, end, points=[min(v0, end)])[0]
+
+    given = stored(speed, 1.0)
+    return brentq(lambda ratio: stored(ratio * speed, -1.0) - given, 1e-3, 1.0 + 1e-9)
+
+
+def impacts(vehicles, name, speeds, detections, methods):
+    """A wheelset that hits the rails without weight: its restitution against that of the damping law.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a free wheelset.
+    speeds : sequence of float
+        Vertical, m/s.
+    detections, methods : sequence of str
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        detection, integrator, speed_m_per_s, restitution, expected.
+    """
+    found, curve = [], []
+    for detection, method, speed in product(detections, methods, speeds):
+        changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.0}
+        setting = prepare(vehicles, name, changes)
+        damping, state = setting.scene.data["contact"]["normal"]["damping"], setting.state.copy()
+        state[2] += GAP
+        state[9] = -speed
+        setting = replace(setting, state=state, model=setting.model._replace(gravity=0.0))
+        duration = 3.0 * GAP / speed + 0.02
+        trajectory = run(setting, duration, 1000.0 / duration)
+        after, expected = trajectory.states[-1, 9] / speed, restitution(speed, damping["c_e"], damping["v0"])
+        label = {"detection": detection, "integrator": method, "speed_m_per_s": speed}
+        curve.append(label | {"restitution": after, "expected": expected})
+        checks = [
+            *sound(setting, trajectory),
+            Check("restitution off the law's", abs(after - expected), RESTITUTION_ERROR, "1",
+                  "int v/c_d dv equal for approach and separation; 100 rtol"),
+            Check("restitution", after, 1.0, "1", "energy never grows"),
+        ]  # fmt: skip
+        found += rows("lift-off", "impact", f"{speed:g} m/s", setting, trajectory, checks)
+    return found, curve
+
+
+def drops(vehicles, name, height, duration, detections, methods, tolerances):
+    """A wheelset that falls onto the rails, bounces and comes to rest: it never gets higher than before.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a free wheelset.
+    height, duration : float
+        m and s.
+    detections, methods : sequence of str
+    tolerances : sequence of float
+        Relative ones; the absolute one is a thousandth of it.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        detection, integrator, rtol, t_s, lift_m (above the static height).
+    """
+    found, curve = [], []
+    for detection, method, rtol in product(detections, methods, tolerances):
+        changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.0}
+        changes |= {"integration.rtol": rtol, "integration.atol": 1e-3 * rtol}
+        setting = prepare(vehicles, name, changes)
+        rest, state = setting.state[2], setting.state.copy()
+        state[2] += height
+        setting = replace(setting, state=state)
+        trajectory = run(setting, duration, 2000.0)
+        lift, speed = trajectory.states[:, 2] - rest, trajectory.states[:, 9]
+        energy = GRAVITY * lift + 0.5 * speed**2
+        flying = ~np.isfinite(contacts(setting.model, trajectory.t, trajectory.states)[..., reduction.NORMAL])
+        flying = np.all(flying, axis=(1, 2, 3))
+        growth = np.max(np.diff(energy[flying]), initial=0.0) / energy[0]
+        late = np.max(np.abs(lift[trajectory.t > 0.8 * duration]))
+        allowed = np.sqrt(STATE_SIZE) * rtol * (rest + 1e-3) / height
+        checks = [
+            *sound(setting, trajectory),
+            Check("flights", np.count_nonzero(np.diff(flying.astype(int)) == -1), 2, "1",
+                  "a drop at restitution 0.9 bounces several times", least=True),
+            Check("growth of energy from flight to flight, of m g h", float(growth), float(allowed), "1",
+                  "0 within the tolerance of the height, sqrt(13) (rtol z + atol)/h"),
+            Check("lift over the last fifth", float(late), 0.01 * height, "m", "it comes to rest: 1 % of the drop"),
+        ]  # fmt: skip
+        condition = f"{1e3 * height:g} mm, rtol {rtol:g}"
+        found += rows("lift-off", "drop", condition, setting, trajectory, checks)
+        label = {"detection": detection, "integrator": method, "rtol": rtol}
+        curve += [label | {"t_s": t, "lift_m": z} for t, z in zip(trajectory.t[::4], lift[::4], strict=True)]
+    return found, curve
+
+
+def crest(length, curvature, begin):
+    """Irregularity of both rails, a hump (1 - cos) of the given length whose top has the given curvature (1/m)."""
+    s = np.arange(0.0, length + 1e-9, 0.02)
+    height = curvature * length**2 / (2.0 * np.pi) ** 2 * (1.0 - np.cos(2.0 * np.pi * s / length))
+    zero = np.zeros_like(s)
+    return irregularity_data(begin, 0.02, np.column_stack([zero, height, zero, height]))
+
+
+def crests(vehicles, speed, length, duration, detections, methods):
+    """Vehicles that run over a hump: wheels take off where V^2 kappa exceeds what presses them down, and come back.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    speed, length, duration : float
+        m/s, m and s.
+    detections, methods : sequence of str
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name, detection, method, kind in product(vehicles, detections, methods, CRESTS):
+        changes = {"speed": speed, "contact.detection": detection, "integration.method": method, "initial.y": 0.0}
+        setting, share = prepare(vehicles, name, changes), CRESTS[kind]
+        front = int(setting.model.bodies.wheelsets[0])
+        load = np.sum(wheel_forces(contacts(setting.model, np.zeros(1), setting.state[None, :]))[0][0, 0])
+        curvature = share * float(load) / setting.model.bodies.mass[front] / speed**2
+        bump = crest(length, curvature, setting.scene.vehicle.positions[front, 0] + 3.0)
+        track = setting.model.track._replace(tangent=False, irregularity=bump)
+        setting = replace(setting, model=setting.model._replace(track=track))
+        trajectory = run(setting, duration, CREST_RATE)
+        condition = f"V^2 kappa = {share:g} load/mass, {speed:g} m/s"
+        checks = [*sound(setting, trajectory), *_crest_checks(setting, trajectory, share)]
+        found += rows("lift-off", f"{kind} crest", condition, setting, trajectory, checks)
+    return found
+
+
+def _crest_checks(setting, trajectory, share):
+    """Lift-off where it must be and nowhere else, return, and impulse of the rails against momentum of all bodies."""
+    patches, bodies = contacts(setting.model, trajectory.t, trajectory.states), setting.model.bodies
+    vertical = np.sum(wheel_forces(patches)[0], axis=(1, 2))
+    masses = np.repeat(bodies.mass[None, :], 2, axis=0)
+    rise = trajectory.states[[0, -1], 9 : STATE_SIZE * len(bodies.mass) : STATE_SIZE]
+    gained = float(np.diff(np.sum(masses * rise, axis=1))[0])
+    load = vertical[0] * trajectory.t[-1]  # in equilibrium at the start: the weight, and what preloads add
+    given = float(simpson(vertical, x=trajectory.t))
+    front = np.all(~np.isfinite(patches[:, 0, ..., reduction.NORMAL]), axis=2)
+    away = float(np.mean(np.all(front, axis=1)))
+    checks = [Check("impulse of the rails less load and momentum, of the load's", abs(given - load - gained) / load,
+                    IMPULSE_ERROR, "1", "Newton's law for all bodies")]  # fmt: skip
+    if share < 1.0:
+        return [*checks, Check("share of time off the rails", away, 0.0, "1", "a quarter of the load's acceleration")]
+    landings = float(np.min(np.count_nonzero(np.diff(front.astype(int), axis=0) == -1, axis=0)))
+    return [
+        *checks,
+        Check("share of time off the rails", away, 1e-3, "1", "V^2 kappa above load by mass", least=True),
+        Check("landings", landings, 1, "1", "each wheel comes back", least=True),
+    ]
+
+
+# ------------------------------------------------------------------------------------------- jumps of the contact point
+
+
+def pose_sweeps(pairs, load, step, reach, far_step, far):
+    """Static sweeps of loaded pairs: how far the force steps, and whether the way back is the way there.
+
+    Parameters
+    ----------
+    pairs : dict of str to dict
+        Settings of :func:`wrcore.analysis_contact.study_pair` by name.
+    load : float
+        N per wheel.
+    step, reach : float
+        Of the sweep at constant height, m.
+    far_step, far : float
+        Of the sweep at constant load, to and fro, m.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        pair, detection, reduction, y_m, u_wheel_m (left wheel's most loaded patch), force_N (lateral, both wheels).
+    """
+    found, curve = [], []
+    for pair, settings in pairs.items():
+        geometry = pair_geometry(study_pair(settings))
+        for detection in ("planar", "spatial"):
+            label = {"vehicle": "wheelset", "detection": detection, "integrator": "statics"}
+            jumps = sweep_jumps(lateral_sweep(geometry, reach, step, load, detection), [reach])
+            for row in jumps.itertuples():
+                checks = [Check(
+                    "largest over steepest smooth step of the force", row.ratio, SMOOTH, "1", "a continuous force",
+                    known_limit="the point of greatest penetration jumps" if row.reduction == "maximum" else "",
+                )]  # fmt: skip
+                condition = f"+-{1e3 * reach:g} mm at constant height, {row.reduction}"
+                found += computed("contact jumps", pair, condition, label, checks)
+            there, back = (_at_load(geometry, detection, load, y) for y in _there_and_back(far, far_step))
+            off = float(np.max(np.abs(there.force_N - back.force_N[::-1].to_numpy())))
+            checks = [
+                Check("force on the way back less that on the way there", off, 0.0, "N", "no memory in the contact"),
+                Check("positions without equilibrium", float(there.force_N.isna().sum()), 0.0, "1", "it is loaded"),
+            ]
+            condition = f"0 to {1e3 * far:g} mm and back at constant load"
+            found += computed("contact jumps", pair, condition, label, checks)
+            curve += there.assign(pair=pair, detection=detection).to_dict("records")
+    return found, curve
+
+
+def _there_and_back(far, step):
+    there = step * np.arange(round(far / step) + 1)
+    return there, there[::-1]
+
+
+def _at_load(geometry, detection, load, y):
+    """Lateral force and the left wheel's most loaded patch of a wheelset under load at lateral positions."""
+    poses = pd.DataFrame({"pose_id": np.arange(len(y)), "y_m": y, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan})
+    patches = solve_poses(poses, geometry, load, detection, "moment")
+    lateral = (-patches.N_N * np.sin(patches.contact_angle_rad)).groupby(patches.pose_id).sum()
+    left = patches[patches.side == "left"].sort_values("N_N").groupby("pose_id").last()
+    table = pd.DataFrame({"y_m": y}).assign(force_N=lateral, u_wheel_m=left.u_wheel_m)
+    return table
+
+
+def slow_push(vehicles, name, largest, durations, detections, methods):
+    """A wheelset pushed over its contact jumps and back at two rates: what is left of the loop at no rate at all.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+    largest : float
+        Force to the left, N.
+    durations : (float, float)
+        Of push and return together, s; the second one slower.
+    detections, methods : sequence of str
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        detection, integrator, duration_s, force_N, y_m.
+    """
+    found, curve = [], []
+    for detection, method in product(detections, methods):
+        widths = []
+        for duration in durations:
+            changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.0}
+            setting, trajectory, force = _push_and_return(prepare(vehicles, name, changes), largest, duration)
+            y = trajectory.states[:, STATE_SIZE * int(setting.model.bodies.wheelsets[0]) + 1]
+            widths.append(np.sqrt(np.mean((y - y[::-1]) ** 2)) if len(y) == len(force) else np.nan)
+            label = {"detection": detection, "integrator": method, "duration_s": duration}
+            curve += [label | {"force_N": f, "y_m": at} for f, at in zip(force, y, strict=False)]
+        loop = Check(
+            "loop in y (rms) at half the rate, of that at the full one", widths[1] / widths[0], RATE_SHARE, "1",
+            "what depends on the rate alone halves with it", known_limit=PLANAR_LOOP if detection == "planar" else "",
+        )  # fmt: skip
+        condition = f"0 to {1e-3 * largest:g} kN and back"
+        found += rows("contact jumps", "slow push", condition, setting, trajectory, [*sound(setting, trajectory), loop])
+    return found, curve
+
+
+def _push_and_return(setting, largest, duration, parts=400):
+    """The first wheelset under a force that rises and falls in small steps, and that force at the output times."""
+    setting, force = with_forces(setting, int(setting.model.bodies.wheelsets[0]), np.zeros(3))
+    part = duration / parts
+
+    def change(t, _):
+        force[0, 1] = largest * (1.0 - abs(2.0 * (t + 0.5 * part) / duration - 1.0))
+
+    trajectory = run_in_parts(setting, duration, 1.0 / part, part, change)
+    return setting, trajectory, largest * (1.0 - np.abs(np.linspace(-1.0, 1.0, parts + 1)))

@@ -1,0 +1,216 @@
+"""Hard cases on the flange: a wheelset is pushed sideways until it climbs and derails; Nadal's limit."""
+
+import math
+from itertools import product
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import (
+    Check,
+    contacts,
+    prepare,
+    rows,
+    run_in_parts,
+    sound,
+    wheel_forces,
+    with_forces,
+)
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.simulate import DERAILED_Y
+
+RATE = 500.0
+"""Outputs per second: 20 mm of track at 10 m/s."""
+
+PART = 0.02
+"""Time for which a force is kept constant, s."""
+
+AXLE_BOX = 1.0
+"""Lateral distance of the forces from the wheelset's centre, m. They act in the plane of the rails: forces at the axle
+would lift the other wheel at Y/Q = 0.75/0.46 at the latest, below Nadal's limit of low friction."""
+
+SLIDING_MEAN = 2.0
+"""Distance over which Y/Q is averaged, m (EN 14363)."""
+
+ON_THE_TIP = 0.04
+"""From this distance off the centre on the flange's tip stands on the rail, m."""
+
+NADAL_FLOOR = 0.97
+"""Least part of Nadal's limit at which a wheel may climb: the mean over 2 m lags behind the rising force."""
+
+PLANAR_LIMIT = "planar detection misses the flange contact ahead of the axle's cross-section: the wheel climbs late"
+
+NADAL_CEILING = 1.15
+"""Largest part of it at a large angle of attack: longitudinal slip of the flange takes part of the friction."""
+
+
+def nadal_limit(friction, angle):
+    """Nadal's limit of Y/Q: (tan g - mu)/(1 + mu tan g) for the steepest contact angle g (rad)."""
+    return (math.tan(angle) - friction) / (1.0 + friction * math.tan(angle))
+
+
+def flange_angle(scene):
+    """Steepest contact angle of a scene's wheel profile on the flange, rad."""
+    wheel = scene.wheel
+    flank = (wheel.u > wheel.u[np.argmin(wheel.f)]) & (wheel.u < 0.0)  # from the flange's tip to the tape circle
+    return float(math.atan(np.max(np.abs(wheel.df[flank]))))
+
+
+def pushed(setting, body, turn, rate, largest, settle):
+    """A wheelset is turned towards a rail and pushed onto it by a rising force until it derails.
+
+    Parameters
+    ----------
+    setting : Setting
+    body : int
+        A wheelset.
+    turn : float
+        Force ahead on its right and backwards on its left end, which turns it to the left, N; reached at half the time
+        to settle.
+    rate, largest : float
+        Of the force to the left, N/s and N.
+    settle : float
+        Time before that force begins, s.
+
+    Returns
+    -------
+    setting : Setting
+    trajectory : Trajectory
+    """
+    low = -setting.scene.vehicle.rolling_radius
+    setting, force = with_forces(setting, body, [[0.0, AXLE_BOX, low], [0.0, -AXLE_BOX, low]])
+
+    def change(t, _):
+        force[:, 0] = np.array([-turn, turn]) * min(1.0, 2.0 * t / settle)
+        force[:, 1] = 0.5 * min(largest, rate * max(0.0, t - settle))
+
+    return setting, run_in_parts(setting, settle + largest / rate, RATE, PART, change)
+
+
+def flange_history(setting, trajectory, body):
+    """What the left wheel of a pushed wheelset does over time.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray, shape (n,)
+        t_s, y_m, yaw_rad, Y_over_Q (sliding mean over 2 m; NaN where the wheel is as good as unloaded), patches,
+        contact_angle_rad (steepest).
+    """
+    k = int(np.flatnonzero(setting.model.bodies.wheelsets == body)[0])
+    patches = contacts(setting.model, trajectory.t, trajectory.states)[:, k, 0]
+    vertical, lateral = wheel_forces(patches)
+    width = max(1, round(SLIDING_MEAN / setting.model.speed * RATE))
+    kernel = np.ones(width) / width
+    count = np.convolve(np.ones(len(vertical)), kernel, "same")
+    mean_q, mean_y = (np.convolve(force, kernel, "same") / count for force in (vertical, lateral))
+    loaded = mean_q > 0.1 * mean_q[0]
+    ratio = np.divide(mean_y, mean_q, out=np.full(len(mean_q), np.nan), where=loaded)
+    part = trajectory.states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+    e0, e1, e2, e3 = part[:, 3:7].T
+    yaw = np.arctan2(2.0 * (e0 * e3 - e1 * e2), 1.0 - 2.0 * (e1**2 + e3**2))
+    return {
+        "t_s": trajectory.t, "y_m": part[:, 1], "yaw_rad": yaw, "Y_over_Q": ratio,
+        "patches": np.sum(np.isfinite(patches[..., reduction.NORMAL]), axis=1),
+        "contact_angle_rad": np.nanmax(np.abs(patches[..., reduction.ANGLE]), axis=1, initial=0.0),
+    }  # fmt: skip
+
+
+def climbing(history):
+    """Largest Y/Q (mean over 2 m) before a wheelset has climbed: up to 8 mm off the centre, where the flange ends."""
+    on_flange = history["y_m"] < 0.008
+    last = np.flatnonzero(on_flange)[-1] + 1
+    return float(np.nanmax(history["Y_over_Q"][:last], initial=0.0))
+
+
+def _recognised(setting, trajectory):
+    """Checks of a derailment: where the run ended."""
+    places = trajectory.states[:, 1 : STATE_SIZE * len(setting.model.bodies.mass) : STATE_SIZE]
+    places = np.abs(places[:, setting.model.bodies.wheelsets])
+    return [
+        Check("farthest wheelset but for the last state", float(np.max(places[:-1])), DERAILED_Y, "m", "DERAILED_Y"),
+        Check(
+            "farthest wheelset in the last state", float(np.max(places[-1])), ON_THE_TIP, "m", "tip on the rail", True
+        ),
+    ]
+
+
+def derailments(vehicles, speeds, detections, methods, pushes):
+    """Vehicles whose first wheelset is pushed over the rail at several speeds.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    speeds : sequence of float
+        m/s.
+    detections, methods : sequence of str
+    pushes : dict of str to dict
+        Largest force and its rate by vehicle: ``largest`` (N), ``rate`` (N/s).
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name, speed, detection, method in product(pushes, speeds, detections, methods):
+        changes = {"speed": speed, "contact.detection": detection, "integration.method": method, "initial.y": 0.0}
+        setting = prepare(vehicles, name, changes)
+        body = int(setting.model.bodies.wheelsets[0])
+        limit = NADAL_FLOOR * nadal_limit(setting.model.contact.friction, flange_angle(setting.scene))
+        setting, trajectory = pushed(setting, body, 0.0, settle=0.2, **pushes[name])
+        ratio = climbing(flange_history(setting, trajectory, body))
+        checks = [
+            *sound(setting, trajectory),
+            *_recognised(setting, trajectory),
+            Check("Y/Q before it climbs", ratio, limit, "1", "0.97 of Nadal's limit", least=True),
+        ]
+        condition = f"{speed:g} m/s"
+        found += rows("flange", "pushed until it derails", condition, setting, trajectory, checks, "derailed")
+    return found
+
+
+def nadal(vehicles, name, speed, frictions, detections, turn, push):
+    """Y/Q at which a wheelset with a large angle of attack climbs under a slowly rising force, over friction.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+    speed : float
+        m/s.
+    frictions : sequence of float
+    detections : sequence of str
+    turn : float
+        As for :func:`pushed`, N.
+    push : dict
+        ``largest`` (N), ``rate`` (N/s).
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        detection, friction, Y_over_Q, nadal, yaw_rad (when it climbs).
+    """
+    found, curve = [], []
+    for detection, friction in product(detections, frictions):
+        changes = {"speed": speed, "contact.detection": detection, "contact.friction": friction, "initial.y": 0.0}
+        setting = prepare(vehicles, name, changes)
+        limit = nadal_limit(friction, flange_angle(setting.scene))
+        setting, trajectory = pushed(setting, 0, turn, settle=1.0, **push)
+        history = flange_history(setting, trajectory, 0)
+        ratio, two = climbing(history), int(np.max(history["patches"]))
+        yaw = float(history["yaw_rad"][np.flatnonzero(history["y_m"] < 0.008)[-1]])
+        label = {"detection": detection, "friction": friction}
+        curve.append(label | {"Y_over_Q": ratio, "nadal": limit, "yaw_rad": yaw})
+        checks = [
+            *sound(setting, trajectory),
+            *_recognised(setting, trajectory),
+            Check("patches at once", two, 2, "1", "tread and flange carry together before it climbs", least=True),
+            Check("Y/Q before it climbs", ratio, NADAL_FLOOR * limit, "1", "0.97 of Nadal's limit", least=True),
+            Check("Y/Q before it climbs", ratio, NADAL_CEILING * limit, "1", "1.15 of Nadal's limit",
+                  known_limit=PLANAR_LIMIT if detection == "planar" else ""),
+        ]  # fmt: skip
+        found += rows("flange", "Nadal's limit", f"friction {friction:g}", setting, trajectory, checks, "derailed")
+    return found, curve

@@ -1,0 +1,235 @@
+"""Hard cases at low speed: creepages grow like 1/V, and with them the stiffness of the equations of motion."""
+
+from itertools import product
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import (
+    Check,
+    contacts,
+    prepare,
+    rows,
+    run,
+    run_in_parts,
+    sound,
+    with_forces,
+)
+from wrcore.analysis_stability import straight_ahead
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE, matrix_of
+from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.marker import FRAME
+
+DETECTIONS = ("planar", "spatial")
+
+STEPS_PER_TIME_SCALE = 10.0
+"""No method needs shorter steps than such a part of the fastest time scale of the linearised motion."""
+
+ROLLING_ERROR = 1e-3
+"""Slip's share of the speed lost in braking: the force that turns the wheels needs creepages well below it."""
+
+
+def fastest_time_scale(setting):
+    """1/|lambda| of the fastest small motion about steady running, s."""
+    motion = steady_running(*straight_ahead(setting.scene))
+    return 1.0 / float(np.max(np.abs(np.linalg.eigvals(motion.matrix))))
+
+
+def ladder(vehicles, speeds, methods, duration):
+    """Vehicles released off the centre at ever lower speeds: no blow-up, no step collapse.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    speeds : sequence of float
+        m/s.
+    methods : dict of str to float
+        Lowest speed (m/s) at which an integrator is run, by its name.
+    duration : float
+        s.
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name, detection, speed, method in product(vehicles, DETECTIONS, speeds, methods):
+        if speed < methods[method]:
+            continue
+        changes = {"speed": speed, "contact.detection": detection, "integration.method": method}
+        setting = prepare(vehicles, name, changes)
+        trajectory = run(setting, duration)
+        step, scale = trajectory.smallest_step, fastest_time_scale(setting)
+        source = "a tenth of the linearised motion's fastest time scale"
+        checks = [
+            *sound(setting, trajectory),
+            Check("smallest step", step, scale / STEPS_PER_TIME_SCALE, "s", source, least=True),
+        ]
+        found += rows("low speed", "released", f"{speed:g} m/s", setting, trajectory, checks)
+    return found
+
+
+def slow_path(vehicles, name, speeds, distance, critical_speed):
+    """One suspended wheelset over the same distance at several speeds: without inertia its path is that of the slowest.
+
+    Springs and rolling depend on the distance alone. Inertia forces grow like V^2 and reach the size of the others at
+    the critical speed.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+    speeds : sequence of float
+        Falling, m/s.
+    distance : float
+        m.
+    critical_speed : float
+        m/s.
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for detection in DETECTIONS:
+        settings = [prepare(vehicles, name, {"speed": speed, "contact.detection": detection}) for speed in speeds]
+        runs = [run(s, distance / v, rate=50.0 * v / distance) for s, v in zip(settings, speeds, strict=True)]
+        slowest = runs[-1].states[:, 1]
+        for speed, setting, trajectory in zip(speeds, settings, runs, strict=True):
+            y = trajectory.states[:, 1]
+            gap = np.max(np.abs(y - slowest)) / abs(y[0]) if len(y) == len(slowest) else np.nan
+            limit = (speed / critical_speed) ** 2 + setting.control["rtol"]
+            checks = [
+                *sound(setting, trajectory),
+                Check("path off that at the lowest speed, of y(0)", gap, limit, "1", "(V/V_critical)^2 + rtol"),
+            ]
+            found += rows("low speed", "same path at all speeds", f"{speed:g} m/s", setting, trajectory, checks)
+    return found
+
+
+def regularisation(vehicles, name, speed, least_speeds, distance):
+    """Influence of the smallest speed that creepages are divided by, at a speed above or below it.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+    speed : float
+        m/s.
+    least_speeds : sequence of float
+        ``contact.creep.least_speed``, m/s; the first one is compared with.
+    distance : float
+        m.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        vehicle, speed_m_per_s, least_speed_m_per_s, y_off_m (largest departure from the first run).
+    """
+    found, curve, reference = [], [], None
+    for least in least_speeds:
+        setting = prepare(vehicles, name, {"speed": speed, "contact.creep.least_speed": least})
+        trajectory = run(setting, distance / speed, rate=50.0 * speed / distance)
+        reference = trajectory if reference is None else reference
+        off = float(np.max(np.abs(trajectory.states[:, 1] - reference.states[:, 1])))
+        curve.append({"vehicle": name, "speed_m_per_s": speed, "least_speed_m_per_s": least, "y_off_m": off})
+        below = least < speed
+        limit = setting.control["rtol"] * abs(setting.state[1]) if below else np.inf
+        source = "creepages are the same: rtol y(0)" if below else "measured, not limited"
+        influence = Check("y off that with the smallest least_speed", off, limit, "m", source)
+        condition = f"{speed:g} m/s, least_speed {least:g} m/s"
+        found += rows("low speed", "regularisation", condition, setting, trajectory,
+                      [*sound(setting, trajectory), influence])  # fmt: skip
+    return found, curve
+
+
+def _let_go(setting):
+    """Take away what couples a vehicle to the moving frame along the track, and forbid nothing else."""
+    elements = setting.model.elements
+    for pair in np.flatnonzero(elements.pairs[:, 1] == FRAME):
+        own = slice(elements.first_spring[pair], elements.first_spring[pair + 1])
+        elements.springs[own, [6]] = elements.springs[own, [9]] = 0.0
+
+
+def rolling_momentum(setting, states):
+    """Momentum along the track and, over the rolling radius, of the wheelsets' spin, kg m/s, shape (n,)."""
+    bodies, total = setting.model.bodies, 0.0
+    for body, mass in enumerate(bodies.mass):
+        part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        total = total + mass * part[:, 7]
+        if bodies.spins[body]:
+            axles = np.array([matrix_of(row[3:7])[:, 1] for row in part])
+            spin = np.sum(axles * part[:, 10:13], axis=1)
+            total = total + bodies.inertia[body, 1] * spin / setting.scene.vehicle.rolling_radius
+    return total
+
+
+def largest_drag(setting):
+    """Bound of what spin creep takes from rolling: sum of mu N c sin(contact angle)/r over all wheels, N."""
+    patches = contacts(setting.model, np.zeros(1), setting.state[None, :])
+    size = np.sqrt(patches[..., reduction.SEMI_A] * patches[..., reduction.SEMI_B])
+    moment = patches[..., reduction.NORMAL] * size * np.abs(np.sin(patches[..., reduction.ANGLE]))
+    return float(setting.model.contact.friction * np.nansum(moment) / setting.scene.vehicle.rolling_radius)
+
+
+def braking(vehicles, speed, deceleration, rest, least_speeds):
+    """Vehicles that a constant force slows down to standstill, where it ends; then they must stay.
+
+    The frame runs at constant speed, so the vehicle is let go from it along the track and drawn back at its heaviest
+    body. Wheels that roll lose momentum at the rate of the force, their spin included: m v + J omega/r = P0 - F t.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    speed, deceleration : float
+        m/s and m/s^2.
+    rest : float
+        Time at standstill, s.
+    least_speeds : sequence of float
+        ``contact.creep.least_speed``, m/s.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curves : list of dict
+        vehicle, detection, least_speed_m_per_s, t_s, v_m_per_s.
+    """
+    found, curves = [], []
+    for name, detection, least in product(vehicles, DETECTIONS, least_speeds):
+        changes = {"speed": speed, "contact.detection": detection, "contact.creep.least_speed": least}
+        setting = prepare(vehicles, name, {**changes, "initial.y": 0.001})
+        body = int(np.argmax(setting.model.bodies.mass))
+        setting, force = with_forces(setting, body, np.zeros(3))
+        _let_go(setting)
+        start, stop = rolling_momentum(setting, setting.state[None, :])[0], speed / deceleration
+        force[0, 0] = -start / stop
+        trajectory = _stopped(setting, force, stop, rest)
+        momentum = rolling_momentum(setting, trajectory.states)
+        error = np.max(np.abs(momentum - start * np.clip(1.0 - trajectory.t / stop, 0.0, None))) / start
+        rolling = Check(
+            "momentum off P0 - F t, then 0, of P0", float(error), ROLLING_ERROR + largest_drag(setting) * stop / start,
+            "1", "rolling without slip; spin moments below mu N c turn against it",
+        )  # fmt: skip
+        condition = f"{speed:g} m/s to 0 at {deceleration:g} m/s^2, least_speed {least:g} m/s"
+        checks = [*sound(setting, trajectory), rolling]
+        found += rows("low speed", "braking to standstill", condition, setting, trajectory, checks)
+        label = {"vehicle": name, "detection": detection, "least_speed_m_per_s": least}
+        speeds = trajectory.states[:, STATE_SIZE * body + 7]
+        curves += [label | {"t_s": t, "v_m_per_s": v} for t, v in zip(trajectory.t, speeds, strict=True)]
+    return found, curves
+
+
+def _stopped(setting, force, stop, rest):
+    """Trajectory under a force that ends at a time (s)."""
+
+    def change(t, _):
+        force[:] *= t < stop - 1e-9
+
+    return run_in_parts(setting, stop + rest, 100.0, stop, change)
