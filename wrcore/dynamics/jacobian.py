@@ -23,6 +23,10 @@ from wrcore.dynamics.system import derivatives_at, state_size
 DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 """Differences: m, rad, m/s and rad/s."""
 
+FINE_BELOW = 1e-3
+"""Where creepages are divided by a least speed below this (m/s), differences of velocities shrink in proportion:
+friction saturates at creepages of some 1e-3, and a difference must not come near that."""
+
 MOMENT = 1e-6
 """Difference of time, s."""
 
@@ -192,14 +196,14 @@ def _take_axes(state, axes):
 
 
 @jit(allocates=False)
-def _perturb(trial, column, axes):
-    """Perturb one unknown and return by how much."""
+def _perturb(trial, column, axes, fine):
+    """Perturb one unknown and return by how much; differences of velocities are multiplied by ``fine``."""
     n = axes.shape[0]
     if column >= 12 * n:
         at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
     elif column >= 6 * n:
         k = (column - 6 * n) % 6
-        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + 7 + k, SPEED if k < 3 else SPIN
+        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + 7 + k, fine * (SPEED if k < 3 else SPIN)
     else:
         k = column % 6
         at, difference = STATE_SIZE * (column // 6) + k, DISPLACEMENT
@@ -240,13 +244,14 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     """
     n = jacobian.axes.shape[0]
     _take_axes(state, jacobian.axes)
+    fine = min(1.0, model.contact.least_speed / FINE_BELOW)
     evaluations = sweep.starts.shape[0] - 1 + (1 if sweep.with_time else 0)
     for i in range(evaluations):
         copy_into(trial, state)
         in_time = i == sweep.starts.shape[0] - 1
         first, last = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         for k in range(first, last):
-            differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes)
+            differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes, fine)
         derivatives_at(equations, t + MOMENT if in_time else t, trial, model, work, slope)
         if in_time:
             for j in range(state.shape[0]):
