@@ -76,6 +76,34 @@ def test_columns_in_every_accepted_form(tmp_path, header, unit, scale, separator
     assert deviation(read_profile(spec | ({"unit": unit} if unit else {}), "wheel")) < 0.2e-6
 
 
+def test_files_of_profile_meters_have_a_head_and_directions_of_their_own(tmp_path):
+    head = "ProgramName=Some meter\nDate=2020-01-01\nXYPOINT_COUNT=1151\n\n"
+    rows = "".join(
+        f"{-1e3 * (u - 0.07):.9f} {-1e3 * (f + 0.46):.9f} 0.1 0.0\n" for u, f in zip(U, wheel()(U), strict=True)
+    )
+    path = write(tmp_path, "meter.txt", head + rows)
+    spec = {"points": path, "unit": "mm", "mirrored": True, "downwards": True, "shift": [0.07, -0.46]}
+    assert deviation(read_profile(spec, "wheel")) < 0.2e-6
+    with pytest.raises(InputError, match="inside a wheel profile"):  # far from u = 0: the origin is missing
+        read_profile(spec | {"shift": [0.4, 0.0]}, "wheel")
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"mirrored": 1}, "mirrored: expected true or false, got 1"),
+        ({"downwards": "yes"}, "downwards: expected true or false"),
+        ({"shift": 0.1}, "shift: expected two distances in m, within 1"),
+        ({"shift": [70, 0]}, "shift: expected two distances in m, within 1"),
+        ({"shift": [float("nan"), 0]}, "shift: expected two distances in m"),
+        ({"points": "wheel.prw", "mirrored": True}, "a SIMPACK file states them itself"),
+    ],
+)
+def test_wrong_directions_are_refused(change, expected):
+    with pytest.raises(InputError, match=expected):
+        read_profile({"points": "wheel.txt", "unit": "mm"} | change, "wheel")
+
+
 def test_a_path_alone_and_a_name_are_the_same_entrance(tmp_path):
     path = write(tmp_path, "wheel.csv", "u_mm,f_mm\n" + columns(U, wheel()(U)))
     a, b = named_profile(str(path), "wheel"), named_profile({"points": str(path)}, "wheel")

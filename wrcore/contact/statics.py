@@ -66,6 +66,19 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, redu
     return count, force
 
 
+FIRST_STEP = 1e-5
+"""First step of the search for two heights around the one sought, m; each next one is four times as long."""
+
+CLOSE = 1e-12
+"""Relative error of F^(2/3) that ends the search for a height: what the rounding of a height leaves."""
+
+ROLL_SLOPE = -1.5
+"""First guess of the change with roll of the left wheel's own height less the right wheel's, m: the rails' distance."""
+
+LARGEST_TURN = 0.02
+"""A step in roll beyond this is not trusted, rad."""
+
+
 @jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
     """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding.
@@ -88,13 +101,68 @@ def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduct
     return low
 
 
-@jit
+@jit(allocates=False)
+def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, guess, patches):
+    """As `height_at_load`, from a guess: regula falsi (Illinois) on F^(2/3), almost linear in z. NaN if it is lost."""
+    goal = load ** (2.0 / 3.0)
+    z, step, last = guess, FIRST_STEP, 0
+    low = high = np.nan
+    excess_low = excess_high = 0.0
+    for _ in range(60):
+        force = wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1]
+        excess = force ** (2.0 / 3.0) - goal
+        if abs(excess) <= CLOSE * goal:
+            return z
+        pressed = excess > 0.0
+        if pressed:
+            low, excess_low = z, excess
+            excess_high *= 0.5 if last > 0 else 1.0
+        else:
+            high, excess_high = z, excess
+            excess_low *= 0.5 if last < 0 else 1.0
+        if np.isnan(low) or np.isnan(high):
+            z += step if pressed else -step
+            step *= 4.0
+            continue
+        last = 1 if pressed else -1
+        z = low + (high - low) * excess_low / (excess_low - excess_high)
+        if not low < z < high:
+            break
+    return np.nan
+
+
+@jit(allocates=False)
+def _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
+    """As `settle`, by secants: fifty times as fast where forces are continuous. NaN where they jump or it is lost."""
+    roll = before = difference = 0.0
+    slope, left, right = ROLL_SLOPE, nominal, nominal
+    for k in range(12):
+        left = _height_near(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, left, patches)
+        right = _height_near(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, right, patches)
+        if k > 0 and roll != before:
+            slope = (left - right - difference) / (roll - before)
+        difference, before = left - right, roll
+        step = difference / slope
+        if abs(step) < 1e-13:
+            return roll, 0.5 * (left + right)
+        if not abs(step) < LARGEST_TURN:
+            break
+        roll -= step
+        left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
+    return np.nan, np.nan
+
+
+@jit(nogil=True)
 def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
     """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none.
 
-    The left wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe.
+    The left wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe;
+    it runs where secants do not get there.
     """
     patches = np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    roll, z = _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
+    if not np.isnan(z):
+        return roll, z
     low, high = -ROLL_RANGE, ROLL_RANGE
     left = right = 0.0
     for _ in range(60):

@@ -2,8 +2,10 @@
 
 Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#`` starts a
 comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns may be
-separated by commas, semicolons or blanks. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
-convention without a header: declare ``unit: mm``.
+separated by commas, semicolons or blanks; further columns are not read. The UIC 519 / EN 15302 reference profiles
+(``*.dat``) follow this convention without a header: declare ``unit: mm``. Files of profile meters (MiniProf) begin with
+lines ``Name=value``, which are passed over; in which directions their columns count, and from where, is declared beside
+the path: ``mirrored``, ``downwards``, ``shift``.
 
 SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down).
 """
@@ -17,7 +19,7 @@ from wrcore.errors import InputError
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
-_KEYS = {"points", "unit", "inclined", "smoothing"}
+_KEYS = {"points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift"}
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
@@ -27,8 +29,11 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     Parameters
     ----------
     spec : str, pathlib.Path or dict
-        Path, or ``{"points": path, "unit": "m"|"mm", "inclined": bool, "smoothing": float}``; ``inclined`` (default
-        True) says that a rail's points already lie in the track pose, ``smoothing`` is a distance in m.
+        Path, or ``{"points": path, "unit": "m"|"mm", "inclined": bool, "smoothing": float, "mirrored": bool,
+        "downwards": bool, "shift": [float, float]}``; ``inclined`` (default True) says that a rail's points already lie
+        in the track pose, ``smoothing`` is a distance in m. For files of columns: ``mirrored`` says that the first
+        column counts towards the track's centre, ``downwards`` that the second one counts down, and ``shift`` (m) is
+        added to u and f after that.
     kind : {"wheel", "rail"}
         What the profile is used for.
     inclination : float
@@ -52,11 +57,20 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     if simpack:
         _check_type(path, text, kind)
     u, f, lines = read_simpack(path, text, "smoothing" in spec) if simpack else read_columns(path, text, unit)
+    if not simpack:
+        u, f = _turned(spec, u, f)
     turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
     return ProfileCurve.from_points(
         u, f, kind, str(path), lines=lines, trim=simpack, inclination=turn,
         smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing,
     )  # fmt: skip
+
+
+def _turned(spec, u, f):
+    """Points of columns in the package's directions, and from its origin."""
+    across, up = spec.get("shift", (0.0, 0.0))
+    u = (-u if spec.get("mirrored", False) else u) + across
+    return u, (-f if spec.get("downwards", False) else f) + up
 
 
 def _checked(spec, kind):
@@ -67,12 +81,24 @@ def _checked(spec, kind):
         raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
     if spec.get("unit") not in (None, *_UNITS):
         raise InputError(kind, "unit", f"expected m or mm, got {spec['unit']!r}")
-    if not isinstance(spec.get("inclined", True), bool):
-        raise InputError(kind, "inclined", f"expected true or false, got {spec['inclined']!r}")
+    for key in ("inclined", "mirrored", "downwards"):
+        if not isinstance(spec.get(key, True), bool):
+            raise InputError(kind, key, f"expected true or false, got {spec[key]!r}")
+    shift = spec.get("shift", [0.0, 0.0])
+    if not isinstance(shift, (list, tuple)) or len(shift) != 2 or not all(map(_is_distance, shift)):
+        raise InputError(kind, "shift", f"expected two distances in m, within 1, got {shift!r}")
+    if Path(spec["points"]).suffix.lower() in (".prw", ".prr") and {"mirrored", "downwards", "shift"} & set(spec):
+        raise InputError(
+            kind, "mirrored, downwards, shift", "expected none of these: a SIMPACK file states them itself"
+        )
     smoothing = spec.get("smoothing", 0.0)
     if isinstance(smoothing, bool) or not isinstance(smoothing, (int, float)):
         raise InputError(kind, "smoothing", f"expected a distance in m, got {smoothing!r}")
     return spec
+
+
+def _is_distance(value):
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1.0
 
 
 def _text(path):
@@ -121,6 +147,8 @@ def read_columns(path, text, unit=None):
         header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line)
         if header and not points:
             unit = _agreed(path, number, header.groups(), unit)
+        elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
+            continue
         elif line:
             points.append(_pair(path, number, line))
             lines.append(number)
