@@ -177,7 +177,6 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
 def _powers(times, states, model, work):
     """Power of all wrenches of a model at each state, W, shape (n,); gyroscopic moments have none."""
     powers = np.empty(len(times))
-    work.arc_lengths[:] = np.nan  # the last pass ended elsewhere
     _fill_powers(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), powers)
     return powers
 
@@ -216,7 +215,6 @@ def _energies(times, states, evaluation, model, work):
     """
     rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
     equations, model_handle, work_handle = evaluation
-    work.arc_lengths[:] = np.nan
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model_handle, work_handle, rate)
         kinetic, height, rise = _kinetic_and_gravitational(model, work.rotations, states[i])
@@ -236,7 +234,8 @@ def energy_channels(model, work, times, states):
     ----------
     model : Model
     work : Workspace
-        Of this model; overwritten, but for its counters of creep look-ups.
+        Of this model; overwritten, but for its counters of creep look-ups. Its arc lengths are those near which the
+        first ones are sought.
     times : numpy.ndarray, shape (n,)
         s.
     states : numpy.ndarray, shape (n, state_size(model))
@@ -251,9 +250,12 @@ def energy_channels(model, work, times, states):
     touching = model._replace(elements=pack_elements(), joints=model.joints._replace(equations=0), gravity=0.0)
     smooth = touching._replace(contact=model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"]))
     undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
-    whole, contact, normal, hertz = (
-        _powers(times, states, variant, work) for variant in (model, touching, smooth, undamped)
-    )
+    begin, parts = work.arc_lengths.copy(), []
+    for variant in (model, touching, smooth, undamped):
+        work.arc_lengths[:] = begin
+        parts.append(_powers(times, states, variant, work))
+    whole, contact, normal, hertz = parts
+    work.arc_lengths[:] = begin
     rows = _energies(times, states, Equations(model, work).arguments, model, work)
     kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
     work.counters[1] = outside

@@ -26,6 +26,9 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 LEAST_STEP = 1e-13
 """Smallest step as a fraction of the time reached, or of 1 s where that is more."""
 
+COLLAPSE = 3
+"""Rejections in a row that make a collapse of the step size: each may shorten the step fivefold."""
+
 FIRST_STEP = 1e-5
 """Length of the first attempt of a run with step control, s: below every time scale of a vehicle. The steps after it
 may grow fivefold each."""
@@ -35,11 +38,12 @@ T, T_OLD, NEXT, ERROR, SMALLEST, START, MATRIX_STEP = range(7)
 step, smallest accepted step (of those that the error bounds: it allows less than five times as much), start of the
 run (s), and the step that the factorised matrix belongs to (s)."""
 
-(STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, HAS_RATE, RETRY, AGE, SINCE_FULL, TOUCHING) = range(10)
-COUNTERS_SIZE = 10
-"""Places in the counters; the last five belong to the control: the rate at the state is known, the last attempt was
-rejected, steps since the Jacobian was refreshed (-1: there is none), contact refreshes since the last full one, patches
-at the state."""
+STEPS, REJECTED, EVALUATIONS, JACOBIANS, FACTORISATIONS, COLLAPSES = range(6)
+HAS_RATE, RETRY, AGE, SINCE_FULL, TOUCHING = range(6, 11)
+COUNTERS_SIZE = 11
+"""Places in the counters; COLLAPSES: steps rejected `COLLAPSE` times or more. The last five belong to the control: the
+rate at the state is known, rejections since the last accepted step, steps since the Jacobian was refreshed (-1: there
+is none), contact refreshes since the last full one, patches at the state."""
 
 
 class Control(NamedTuple):
@@ -183,7 +187,8 @@ def judge(control, exponent, hold, memory, error):
     if math.isfinite(error):
         factor = max(SHRINK, SAFETY * error ** (-1.0 / exponent))
     clock[NEXT] = step * factor
-    counters[RETRY] = 1
+    counters[RETRY] += 1
+    counters[COLLAPSES] += counters[RETRY] == COLLAPSE
     counters[REJECTED] += 1
     return False
 

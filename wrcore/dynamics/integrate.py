@@ -9,7 +9,15 @@
 ``cvode``                                              SUNDIALS' BDF, if scikit-sundae is installed
 =====================================================  =============================================================
 
-Failure is a value, never an exception: the states reached so far are kept.
+Failure is a value, never an exception: the states reached so far and the last valid one are kept. A run ends as
+
+============  ======================================================================================================
+completed     the end of the duration was reached; a vehicle at rest there has completed its run, too
+derailed      a wheelset went too far from the track's centre
+stalled       it was given up without a fault: told to stop, ``most_steps`` tried, or `STALL_ATTEMPTS` steps in a row
+              that brought it no further than `STALL_STEP` each on average
+failed        a number is not finite, or the step size fell below the resolution of time
+============  ======================================================================================================
 """
 
 import time
@@ -33,6 +41,11 @@ REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_
 
 STIFF_SPEED = 25.0
 """Below this speed (m/s) ``auto`` takes the Rosenbrock method."""
+
+STALL_ATTEMPTS, STALL_STEP = 100_000, 1e-9
+"""So many steps (tried ones) in a row that are this short on average, s, are no headway: a hundredth of the shortest
+time scale of a stiff contact (10 us) would be 100 times as long. Steps of a stated length may be as short as they like.
+"""
 
 CHUNK = 2000
 """Attempts between two returns to Python, for progress and interrupts."""
@@ -72,7 +85,7 @@ class Trajectory:
     t : numpy.ndarray, shape (n,)
         Output times reached, s.
     states : numpy.ndarray, shape (n, size)
-    status : {"completed", "derailed", "failed"}
+    status : {"completed", "derailed", "stalled", "failed"}
     reason : str
         Empty for a completed run.
     steps, rejected, rhs_evaluations, jacobians, factorisations : int
@@ -86,6 +99,13 @@ class Trajectory:
         Seconds spent in the integration.
     end : Checkpoint or None
         Where a compiled run stopped.
+    end_t : float
+        Time of the last valid state, s: the end of a completed run, else the last step that was accepted (by the
+        references: the last output).
+    end_state : numpy.ndarray, shape (size,)
+        That state.
+    collapses : int
+        Steps that were rejected three times in a row or more.
     """
 
     method: str
@@ -102,6 +122,9 @@ class Trajectory:
     smallest_step: float = np.nan
     wall_s: float = 0.0
     end: Checkpoint | None = None
+    end_t: float = np.nan
+    end_state: np.ndarray | None = None
+    collapses: int = 0
 
 
 def chosen_method(method, speed):
@@ -113,7 +136,7 @@ def chosen_method(method, speed):
 
 def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=1e-7, step=0.0, longest_step=0.05, derailed_y=np.inf,
-    progress=None, chunk=CHUNK,
+    progress=None, chunk=CHUNK, stop=None, most_steps=0,
 ):  # fmt: skip
     """Integrate a model's equations of motion and sample them at given times.
 
@@ -139,6 +162,10 @@ def integrate(
         Called now and then with the time reached, s.
     chunk : int
         Attempts between two such calls; of no influence on the result.
+    stop : callable, optional
+        ``stop() -> str``, asked as often: a reason to end the run as stalled, or an empty string.
+    most_steps : int
+        Steps to be tried in all, those before a checkpoint among them; 0: no bound. Accepted ones with the references.
 
     Returns
     -------
@@ -149,7 +176,8 @@ def integrate(
     if method in REFERENCES:
         from wrcore.dynamics.reference import integrate_by_reference
 
-        return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress)
+        return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress, stop,
+                                      most_steps)  # fmt: skip
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
     equations = Equations(model)
     work = equations.work
@@ -171,22 +199,54 @@ def integrate(
             return advance_explicit(tableau, control, memory, scratch, record, attempts, *equations.arguments)
         return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, *equations.arguments)
 
-    outcome = advance(0)  # compiles, or loads the kernel from the cache
+    outcome, given_up = advance(0), ""  # compiles, or loads the kernel from the cache
     before, started = memory.counters.copy(), time.perf_counter()
-    while outcome == engine.RUNNING:
-        outcome = advance(chunk)
+    headway = _Headway(memory, most_steps, step > 0.0)
+    while outcome == engine.RUNNING and not given_up:
+        outcome = advance(min(chunk, headway.attempts_left()))
         if progress is not None:
             progress(min(memory.clock[engine.T], times[-1]))
+        given_up = headway.lost() or (stop() if stop is not None else "")
     wall = time.perf_counter() - started
     counters, reached = memory.counters - before, int(record.reached[0])
-    status, reason = _ending(outcome, model, memory, work)
+    status, reason = _ending(outcome, given_up, model, memory, work)
     last = times[reached - 1] if reached else times[0]
+    completed = status == "completed"
     return Trajectory(
         method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
         int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
         int(counters[engine.FACTORISATIONS]), int(work.counters[1]), float(memory.clock[engine.SMALLEST]), wall,
         Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy()),
+        float(last if completed else memory.clock[engine.T]),
+        (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
     )  # fmt: skip
+
+
+class _Headway:
+    """Whether a run gets on: counts the steps that were tried, all of them and since it was last seen to get on."""
+
+    def __init__(self, memory, most_steps, fixed):
+        self.memory, self.fixed = memory, fixed
+        self.most = most_steps or np.inf
+        self.seen, self.t = self.attempts(), memory.clock[engine.T]
+
+    def attempts(self):
+        return int(self.memory.counters[engine.STEPS] + self.memory.counters[engine.REJECTED])
+
+    def attempts_left(self):
+        """Before the next look is due."""
+        return int(max(min(self.seen + STALL_ATTEMPTS, self.most) - self.attempts(), 0))
+
+    def lost(self):
+        """A reason to give up, or an empty string."""
+        t, attempts = self.memory.clock[engine.T], self.attempts()
+        if attempts >= self.most:
+            return f"{attempts} steps were tried, as many as integration.most_steps allows, at t = {t:.6g} s"
+        if attempts >= self.seen + STALL_ATTEMPTS:
+            if t - self.t < STALL_STEP * STALL_ATTEMPTS and not self.fixed:
+                return f"{STALL_ATTEMPTS} steps brought it {t - self.t:.2g} s ahead, to t = {t:.6g} s"
+            self.seen, self.t = attempts, t
+        return ""
 
 
 def _copied(part):
@@ -196,13 +256,15 @@ def _copied(part):
     return part.copy() if isinstance(part, np.ndarray) else part
 
 
-def _ending(outcome, model, memory, work):
-    """Status and reason of a compiled run's outcome."""
+def _ending(outcome, given_up, model, memory, work):
+    """Status and reason of a compiled run's outcome, or why it was given up."""
     t = memory.clock[engine.T]
     if outcome == engine.COMPLETED:
         return "completed", ""
     if outcome == engine.DERAILED:
         return "derailed", derailment(model, t, memory.state, work.arc_lengths)
+    if outcome == engine.RUNNING:
+        return "stalled", given_up
     if not np.isfinite(memory.rate).all():
         return "failed", f"the accelerations are not finite at t = {t:.6g} s"
     if outcome == engine.NOT_FINITE:

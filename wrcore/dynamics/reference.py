@@ -16,7 +16,8 @@ SOLVERS = {
 """scipy's classes by method name."""
 
 
-def integrate_by_reference(model, state, times, method, rtol, atol, longest_step, derailed_y, progress=None):
+def integrate_by_reference(model, state, times, method, rtol, atol, longest_step, derailed_y, progress=None, halt=None,
+                           most_steps=0):  # fmt: skip
     """Integrate a model with a solver of another library; arguments as for :func:`wrcore.dynamics.integrate.integrate`.
 
     Returns
@@ -34,12 +35,15 @@ def integrate_by_reference(model, state, times, method, rtol, atol, longest_step
         return derailment(model, t, state, function.work.arc_lengths, derailed_y)
 
     bounded = stop if np.isfinite(derailed_y) else None
-    return integrate_function(function, state, times, method, rtol, atol, longest_step, bounded, progress)
+    return integrate_function(
+        function, state, times, method, rtol, atol, longest_step, bounded, progress, halt, most_steps
+    )
 
 
 def integrate_function(
-    function, state, times, method="scipy_rk45", rtol=1e-6, atol=1e-9, longest_step=np.inf, stop=None, progress=None
-):
+    function, state, times, method="scipy_rk45", rtol=1e-6, atol=1e-9, longest_step=np.inf, stop=None, progress=None,
+    halt=None, most_steps=0,
+):  # fmt: skip
     """Integrate any right-hand side with a solver of another library.
 
     Parameters
@@ -60,6 +64,10 @@ def integrate_function(
         ``stop(t, state) -> str``: a reason to end the run, or an empty string. Asked after each step.
     progress : callable, optional
         Called with the time reached after each step.
+    halt : callable, optional
+        ``halt() -> str``, asked after each step of scipy's solvers: a reason to end the run as stalled.
+    most_steps : int
+        Accepted steps after which it ends as stalled; 0: no bound.
 
     Returns
     -------
@@ -75,26 +83,45 @@ def integrate_function(
     times, started = np.asarray(times, float), time.perf_counter()
     run = _by_cvode if method == "cvode" else _by_scipy
     reached, states, status, reason, counts = run(
-        counted, np.array(state, float), times, method, rtol, atol, longest_step, stop, progress
+        counted,
+        np.array(state, float),
+        times,
+        method,
+        rtol,
+        atol,
+        longest_step,
+        stop,
+        progress,
+        halt,
+        most_steps,
     )
     if method in ("scipy_rk45", "scipy_rk23"):  # two evaluations to start with, as many as stages for each attempt
         counts["rejected"] = (evaluations - 2) // (6 if method == "scipy_rk45" else 3) - counts["steps"]
     return Trajectory(
         method, times[:reached], states[:reached], status, reason, rhs_evaluations=evaluations,
-        wall_s=time.perf_counter() - started, **counts,
+        wall_s=time.perf_counter() - started, end_t=float(times[reached - 1]), end_state=np.array(states[reached - 1]),
+        **counts,
     )  # fmt: skip
 
 
-def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, progress):
+@np.errstate(over="ignore", invalid="ignore")  # a wild trial step is rejected by its error estimate
+def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, progress, halt, most_steps):
     states = np.full((len(times), len(state)), np.nan)
     states[0] = state
     reached, steps, smallest, status, reason = 1, 0, np.inf, "completed", ""
-    solver = getattr(scipy_integrate, SOLVERS[method])(
-        function, times[0], state, times[-1], rtol=rtol, atol=atol, max_step=longest_step
-    )
+    try:
+        solver = getattr(scipy_integrate, SOLVERS[method])(
+            function, times[0], state, times[-1], rtol=rtol, atol=atol, max_step=longest_step
+        )
+    except (ValueError, ArithmeticError) as error:  # a Jacobian that is not finite
+        counts = {"steps": 0, "jacobians": 0, "factorisations": 0, "smallest_step": smallest}
+        return reached, states, "failed", f"{error} at t = {times[0]:.6g} s", counts
     while solver.status == "running":
-        with np.errstate(over="ignore", invalid="ignore"):  # a wild trial step is rejected by its error estimate
+        try:
             message = solver.step()
+        except (ValueError, ArithmeticError) as error:
+            status, reason = "failed", f"{error} at t = {solver.t:.6g} s"
+            break
         if solver.status == "failed":
             status, reason = "failed", f"step size fell below the resolution of time at t = {solver.t:.6g} s: {message}"
             break
@@ -112,11 +139,20 @@ def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, pr
             break
         if progress is not None:
             progress(solver.t)
+        if halt is not None and (reason := halt()):
+            status = "stalled"
+            break
+        if most_steps and steps >= most_steps and solver.status == "running":
+            status, reason = (
+                "stalled",
+                f"{steps} steps, as many as integration.most_steps allows, at t = {solver.t:.6g} s",
+            )
+            break
     counts = {"steps": steps, "jacobians": solver.njev, "factorisations": solver.nlu, "smallest_step": smallest}
     return reached, states, status, reason, counts
 
 
-def _by_cvode(function, state, times, method, rtol, atol, longest_step, stop, progress):
+def _by_cvode(function, state, times, method, rtol, atol, longest_step, stop, progress, halt, most_steps):
     try:
         from sksundae.cvode import CVODE
     except ImportError:
@@ -133,7 +169,7 @@ def _by_cvode(function, state, times, method, rtol, atol, longest_step, stop, pr
 
     if stop is not None:
         limit |= {"eventsfn": stopped, "num_events": 1}
-    solution = CVODE(fill, rtol=rtol, atol=atol, max_num_steps=10**7, **limit).solve(times, state)
+    solution = CVODE(fill, rtol=rtol, atol=atol, max_num_steps=most_steps or 10**7, **limit).solve(times, state)
     counts = {"jacobians": int(solution.njev)}
     if not solution.success:
         reason = f"{solution.message} at t = {solution.t[-1]:.6g} s"
