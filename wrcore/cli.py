@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 from wrcore import __version__
@@ -30,7 +31,7 @@ def main(arguments=None):
     Returns
     -------
     int
-        Exit status: 0 done, 2 bad input, 1 a run that did not complete.
+        Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 128 and its number for a signal.
     """
     try:
         options = _parser().parse_args(arguments)
@@ -66,6 +67,9 @@ def _add_simulate(commands):
     command.add_argument("scene", metavar="SCENE.yaml")
     command.add_argument("--set", action="append", default=[], metavar="key.path=value", dest="overrides")
     command.add_argument("--out", metavar="run.h5", help="write the run here")
+    command.add_argument(
+        "--resume", action=argparse.BooleanOptionalAction, default=True, help="go on with an interrupted run of --out"
+    )
     command.add_argument("--json", action="store_true", help="end with one line of JSON")
     command.add_argument(
         "--accuracy", type=float, metavar="m", help="choose the fastest model and integrator with this error of y (rms)"
@@ -174,43 +178,53 @@ def _write_csv(frame, path):
 
 
 def _simulate(options):
+    from wrcore.progress import simulated_time
     from wrcore.scene import load_scene
-    from wrcore.simulate import simulate
+    from wrcore.streaming import simulate_to
 
     out = _output(options.out) if options.out else None
-    scene, reason = load_scene(options.scene, options.overrides), None
+    scene, record = load_scene(options.scene, options.overrides), {}
     if options.accuracy is not None:
         from wrcore.accuracy import choose
 
         _positive(options.accuracy, "--accuracy")
         choice, reason = choose(scene, options.accuracy)
         scene = load_scene(options.scene, [*choice.overrides(), *options.overrides])
+        record = {"accuracy_m": options.accuracy, "accuracy_reason": reason}
         print(f"{scene.data['name']}: {reason}")
-    run = simulate(scene)
-    if reason:
-        run.settings |= {"accuracy_m": options.accuracy, "accuracy_reason": reason}
-    if out:
-        from wrcore.results import write_run
+    with simulated_time(scene.data["integration"]["duration"]) as advance:
+        say = partial(print, f"{scene.data['name']}:")
+        run, interrupted = simulate_to(scene, out, advance, options.resume, say, record=record)
+    _print_run(run, options.json)
+    if interrupted:
+        return 128 + interrupted
+    return 0 if run.status in ("completed", "derailed") else 1
 
-        write_run(out, run)
+
+def _print_run(run, as_json):
+    """How a run ended, what it cost, and which limits of validity it exceeded."""
+    from wrcore.validity import LIMITS
+
     counters = run.counters
+    factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0
     summary = {
         "status": run.status, "reason": run.reason, "simulated_s": counters["simulated_s"],
-        "wall_s": counters["wall_s"], "real_time_factor": counters["simulated_s"] / counters["wall_s"],
-        "steps": counters["steps"], "rejected": counters["rejected"],
-        "rhs_evaluations": counters["rhs_evaluations"], "compile_s": counters["compile_s"],
-        "table_out_of_range": counters["table_out_of_range"],
+        "wall_s": counters["wall_s"], "real_time_factor": factor, "steps": counters["steps"],
+        "rejected": counters["rejected"], "rhs_evaluations": counters["rhs_evaluations"],
+        "compile_s": counters["compile_s"], "patches": counters["patches"],
+        **{name: counters[name] for name in LIMITS},
     }  # fmt: skip
-    if options.json:
+    if as_json:
         print(json.dumps(summary))
-    else:
-        print(
-            f"{scene.data['name']}: {run.status}{': ' + run.reason if run.reason else ''}; "
-            f"{summary['simulated_s']:g} s in {summary['wall_s']:.3g} s, {summary['real_time_factor']:.3g} times real "
-            f"time; {summary['steps']} steps, {summary['rejected']} rejected, {summary['rhs_evaluations']} right-hand "
-            f"sides, {summary['table_out_of_range']} creep look-ups out of the table's range"
-        )
-    return 0 if run.status in ("completed", "derailed") else 1
+        return
+    print(
+        f"{run.scene['name']}: {run.status}{': ' + run.reason if run.reason else ''}; "
+        f"{summary['simulated_s']:g} s in {summary['wall_s']:.3g} s, {factor:.3g} times real time; {summary['steps']} "
+        f"steps, {summary['rejected']} rejected, {summary['rhs_evaluations']} right-hand sides"
+    )
+    exceeded = [f"{counters[name]} {text}" for name, text in LIMITS.items() if counters[name]]
+    if exceeded:
+        print(f"beyond the models' limits: {', '.join(exceeded)}; {counters['patches']} patches at the output times")
 
 
 def _sweep(options):

@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack, contextmanager
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
 from wrcore import __version__
 from wrcore.channels import DESCRIPTIONS, unit_of
+from wrcore.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.errors import InputError
 from wrcore.run import Run
 
 FORMAT = "wrcore run"
 FORMAT_VERSION = 1
+STATUSES = ("completed", "derailed", "stalled", "failed")
+END = "end"
+"""Group that is no body: the last valid state."""
+
+COMPRESSION = {"compression": "gzip", "shuffle": True}
 
 
-def write_run(path: str | PathLike[str], run: Run) -> None:
+def write_run(
+    path: str | PathLike[str], run: Run, also: Callable[[h5py.File, Run], object] | None = None, **options: Any
+) -> None:
     """Write a run; the file appears under its name only when it is complete.
 
     The same run gives the same bytes: no date, host or path is stored.
@@ -31,14 +41,34 @@ def write_run(path: str | PathLike[str], run: Run) -> None:
         File to write (HDF5); its folder is created if needed.
     run : Run
         What to write.
+    also : callable, optional
+        Adds to the file.
+    **options
+        Of its datasets, instead of `COMPRESSION`.
     """
+    with _appearing(path) as file:
+        _write_attributes(file, run)
+        time = _create_dataset(file, "t", data=run.t, **options)
+        time.make_scale("t")
+        for group in sorted(run.groups):
+            for name, values in sorted(run.groups[group].items()):
+                dataset = _create_dataset(file.require_group(group), name, data=np.asarray(values), **options)
+                dataset.dims[0].attach_scale(time)
+        if run.end_state is not None:
+            _write_end(file.create_group(END), run)
+        if also is not None:
+            also(file, run)
+
+
+@contextmanager
+def _appearing(path):
+    """A new HDF5 file that gets its name when it is complete."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with h5py.File(part, "w") as file:
-            _write_attributes(file, run)
-            _write_channels(file, run)
+            yield file
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
@@ -51,7 +81,11 @@ def _write_attributes(file, run):
     file.attrs["status"] = run.status
     file.attrs["reason"] = run.reason
     for name in ("scene", "settings", "counters"):
-        file.attrs[name] = json.dumps(getattr(run, name), sort_keys=True, default=_plain)
+        file.attrs[name] = _record(getattr(run, name))
+
+
+def _record(values):
+    return json.dumps(values, sort_keys=True, default=_plain)
 
 
 def _plain(value):
@@ -61,20 +95,80 @@ def _plain(value):
     raise TypeError(f"{type(value).__name__} cannot be written to a run file")
 
 
-def _write_channels(file, run):
-    time = _write_dataset(file, "t", run.t)
-    time.make_scale("t")
-    for group in sorted(run.groups):
-        for name in sorted(run.groups[group]):
-            dataset = _write_dataset(file.require_group(group), name, run.groups[group][name])
-            dataset.dims[0].attach_scale(time)
-
-
-def _write_dataset(group, name, values):
-    dataset = group.create_dataset(name, data=np.asarray(values), compression="gzip", shuffle=True)
+def _create_dataset(group, name, **options):
+    dataset = group.create_dataset(name, **(COMPRESSION | options))
     dataset.attrs["units"] = unit_of(name)
     dataset.attrs["description"] = DESCRIPTIONS.get(name, name.replace("_", " "))
     return dataset
+
+
+def _write_end(group, run):
+    """The last valid state, and all that a run needs to go on from there."""
+    for name, value, unit, text in (
+        ("t", run.end_t, "s", "time of the last valid state"),
+        ("state", run.end_state, "SI", "13 numbers per body, then the force elements' own states"),
+    ):
+        dataset = group.create_dataset(name, data=value)
+        dataset.attrs["units"], dataset.attrs["description"] = unit, text
+
+
+def write_going_on(file: h5py.File, run: Run, mark: str, places: tuple[np.ndarray, ...]) -> None:
+    """Add what it takes to go on with a run that ends here: a mark of what it belongs to, and its checkpoint."""
+    file.attrs["fingerprint"] = mark
+    if run.end is not None:
+        write_checkpoint(file[END].create_group("checkpoint"), run.end)
+        for k, place in enumerate(places):
+            file[END].create_dataset(f"place_{k}", data=place)
+
+
+def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], counters: dict[str, Any]) -> None:
+    """Write one run file from files of its stretches, a dataset of one stretch in memory at a time.
+
+    Parameters
+    ----------
+    path : path-like
+    parts : sequence of path-like
+        In their order; status, reason and end are those of the last one.
+    counters : dict
+        Of the whole.
+    """
+    with ExitStack() as stack:
+        files = [stack.enter_context(h5py.File(part, "r")) for part in parts]
+        file = stack.enter_context(_appearing(path))
+        names = [name for name, item in _items(files[0]) if isinstance(item, h5py.Dataset)]
+        time = None
+        for name in ["t", *(name for name in names if name != "t")]:
+            group, _, channel = name.rpartition("/")
+            shape = (sum(len(part["t"]) for part in files), *files[0][name].shape[1:])
+            dataset = _create_dataset(
+                file.require_group(group or "/"), channel, shape=shape, dtype=files[0][name].dtype
+            )
+            at = 0
+            for part in files:
+                for values in _slices(part[name]):
+                    dataset[at : at + len(values)] = values
+                    at += len(values)
+            if time is None:
+                time = dataset
+                time.make_scale("t")
+            else:
+                dataset.dims[0].attach_scale(time)
+        for name, value in files[-1].attrs.items():
+            file.attrs[name] = value
+        file.attrs["counters"] = _record(counters)
+        files[-1].copy(END, file)
+
+
+def _items(file):
+    """Names and items of a file, but for its end."""
+    found: list[tuple[str, Any]] = []
+    file.visititems(lambda name, item: found.append((name, item)))
+    return [(name, item) for name, item in found if name.split("/")[0] != END]
+
+
+def _slices(dataset, rows=8192):
+    for at in range(0, len(dataset), rows):
+        yield dataset[at : at + rows]
 
 
 def load_run(path: str | PathLike[str]) -> Run:
@@ -106,11 +200,15 @@ def load_run(path: str | PathLike[str]) -> Run:
     try:
         with h5py.File(path, "r") as file:
             _check_format(path, file)
-            return _read(file)
+            run = _read(file)
     except FileNotFoundError:
         raise InputError(path, "", "expected a run file (HDF5), got no such file") from None
-    except (OSError, RuntimeError, KeyError, json.JSONDecodeError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails in as many ways as h5py, numpy and JSON have
         raise InputError(path, "", f"expected a complete run file (HDF5), got: {error}") from None
+    _check_run(path, run)
+    return run
 
 
 def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]:
@@ -145,14 +243,46 @@ def _check_format(path, file):
         raise InputError(path, "attribute format_version", f"expected {FORMAT_VERSION}, got {version}")
 
 
+def _check_run(path, run):
+    """What every other part of the package relies on."""
+    if run.status not in STATUSES or not isinstance(run.reason, str):
+        raise InputError(path, "attribute status", f"expected one of {', '.join(STATUSES)}, got {run.status!r}")
+    for name in ("scene", "settings", "counters"):
+        if not isinstance(getattr(run, name), dict):
+            raise InputError(path, f"attribute {name}", "expected a JSON object")
+    times = np.asarray(run.t)
+    if times.ndim != 1 or times.dtype.kind != "f" or not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
+        raise InputError(path, "t", "expected increasing times")
+    for group, channels in run.groups.items():
+        for name, values in channels.items():
+            values = np.asarray(values)
+            if values.dtype.kind != "f" or values.ndim not in (1, 2) or len(values) != len(times):
+                expected = f"expected {len(times)} numbers or rows of numbers, got {values.dtype} {values.shape}"
+                raise InputError(path, f"{group}/{name}", expected)
+
+
 def _read(file):
     groups: dict[str, dict[str, np.ndarray]] = {}
-
-    def _collect(name, item):
+    for name, item in _items(file):
         if isinstance(item, h5py.Dataset) and "/" in name:
             group, channel = name.rsplit("/", 1)
             groups.setdefault(group, {})[channel] = item[()]
+    run = _read_frame(file)
+    run.groups = groups
+    return run
 
-    file.visititems(_collect)
+
+def _read_frame(file):
+    """A run without its channels."""
     records = {name: json.loads(file.attrs[name]) for name in ("scene", "settings", "counters")}
-    return Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups=groups, **records)
+    run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
+    if END in file:
+        run.end_t, run.end_state = float(file[END]["t"][()]), file[END]["state"][()]
+        if "checkpoint" in file[END]:
+            run.end = read_checkpoint(file[END]["checkpoint"])
+    return run
+
+
+def read_part(file: h5py.File) -> tuple[Run, list[np.ndarray]]:
+    """A stretch of a run without its channels, and the places that :func:`write_going_on` added."""
+    return _read_frame(file), [file[END][name][()] for name in sorted(file[END]) if name.startswith("place_")]

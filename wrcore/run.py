@@ -89,7 +89,13 @@ class Run:
     settings : dict
         Flat record of the numerical choices, with the package version.
     end : Checkpoint or None
-        Where a run of the compiled engine stopped, for one that goes on from there. Not written to files.
+        Where a run of the compiled engine stopped, for one that goes on from there.
+    end_t : float
+        Time of the last valid state, s: the end of a completed run, else the last accepted step before whatever
+        happened.
+    end_state : ndarray, shape (size,), or None
+        That state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the force
+        elements' own; :func:`wrcore.simulate` takes it as a start.
 
     Examples
     --------
@@ -113,6 +119,8 @@ class Run:
     counters: dict[str, Any] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
     end: Checkpoint | None = None
+    end_t: float = float("nan")
+    end_state: np.ndarray | None = None
 
     def __getitem__(self, group: str) -> Channels:
         """Channels of one group as attributes; KeyError names the groups that exist."""

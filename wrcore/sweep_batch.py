@@ -158,7 +158,7 @@ def _run(task: _Task, with_forces: bool) -> _Outcome:
     times = _times(settings["duration"], scene.data["output"]["rate"])
     trajectory = integrate(
         model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
-        settings["longest_step"], DERAILED_Y,
+        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"],
     )  # fmt: skip
     starts = scene.vehicle.positions[model.bodies.wheelsets, 0]
     motion = wheelset_motion(model, starts, trajectory.states)

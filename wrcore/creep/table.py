@@ -173,25 +173,48 @@ def load_table(path):
         If the file is missing or is not a creep table.
     """
     try:
-        with h5py.File(path, "r") as file:
+        with h5py.File(path, "r") as file, np.errstate(over="ignore"):
             if file.attrs.get("schema") != _SCHEMA:
                 raise InputError(path, "schema", f"expected {_SCHEMA!r}, got {file.attrs.get('schema')!r}")
-            return _read_datasets(file)
-    except OSError as error:
+            return _read_datasets(path, file)
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails in as many ways as h5py and numpy have
         raise InputError(path, "", f"expected a creep table in HDF5 ({error})") from error
 
 
-def _read_datasets(file):
+def _read_datasets(path, file):
     attributes = file.attrs
     kinds = TableAxes.__annotations__
     axes = TableAxes(*(kinds[name](attributes[f"axes.{name}"]) for name in TableAxes._fields))
-    coefficients = np.ascontiguousarray(file["coefficients"][...], dtype=np.float32).ravel()
+    coefficients = np.ascontiguousarray(file["coefficients"][...], dtype=np.float32)
+    _check_axes(path, axes, attributes["planes"], coefficients)
+    coefficients = coefficients.ravel()
     data = CreepTableData(axes, kalker_data(float(attributes["nu"])), coefficients)
     resolution = Resolution(*(int(value) for value in attributes["resolution"]))
     errors = tuple(tuple(float(value) for value in file[name][...]) for name in ("force_error", "moment_error"))
+    if not all(len(part) == len(QUANTILES) for part in errors):
+        raise InputError(path, "force_error", f"expected {', '.join(QUANTILES)}")
     return CreepTable(
         data, str(attributes["planes"]), float(attributes["tolerance"]), resolution, int(attributes["cases"]), *errors
     )
+
+
+def _check_axes(path, axes, planes, coefficients):
+    """Refuse a table that a look-up would read beyond: kernels trust its axes."""
+    ellipse = axes.n_psi == 1
+    angles = (axes.n_alpha // 2 if ellipse else axes.n_alpha) + 3
+    shape = (axes.n_g + 2, axes.n_psi + 2 * (not ellipse), axes.n_t + 2, angles, axes.n_beta + 2, 4)
+    if planes not in RESOLUTIONS or ellipse != (planes == "ellipse") or min(axes[3:]) < 1 or axes.n_g < 2:
+        raise InputError(path, "axes", f"expected the axes of a table, got {planes!r} with {axes}")
+    if not (
+        -20.0 < axes.log_g_min < axes.log_g_max < 20.0 and 0.0 <= axes.psi_max < 1.0 and ellipse == (not axes.psi_max)
+    ):
+        raise InputError(path, "axes", f"expected ranges of ln(a/b) and psi, got {axes}")
+    if coefficients.shape != shape or not np.isfinite(coefficients).all():
+        raise InputError(
+            path, "coefficients", f"expected finite numbers in the shape {shape}, got {coefficients.shape}"
+        )
 
 
 def show_progress(patches):

@@ -1,11 +1,12 @@
 """Named profiles from their published sections, and one entrance for every way to name a profile."""
 
+import os
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
+from wrcore.checked_yaml import parse_ratio
 from wrcore.errors import InputError
 from wrcore.geometry import profile_files
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
@@ -198,7 +199,7 @@ def _is_file(spec):
     """True for text that is meant as a path: it has a suffix or a folder, or such a file exists."""
     if not isinstance(spec, str) or spec.startswith(("cone:", "circle:")):
         return False
-    return bool(Path(spec).suffix) or "/" in spec or "\\" in spec or Path(spec).is_file()
+    return bool(Path(spec).suffix) or "/" in spec or "\\" in spec or os.path.isfile(spec)
 
 
 def _sections(spec, kind):
@@ -223,10 +224,7 @@ def _sections(spec, kind):
 
 
 def _number(spec, value, low, high):
-    try:
-        number = float(Fraction(value.strip()))
-    except (ValueError, ZeroDivisionError, OverflowError):
-        number = float("nan")
+    number = parse_ratio(value)
     if not low <= number <= high:
         raise InputError("profile", spec, f"expected a number from {low:g} to {high:g} after the colon, got {value!r}")
     return number

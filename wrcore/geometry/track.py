@@ -1,5 +1,6 @@
 """The track: where the rails stand."""
 
+import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +26,9 @@ LEAST_RADIUS = 20.0
 
 STEEPEST_RAMP = 0.01
 """Cant ramps that are steeper are taken for a mistake, m/m (lines are laid with at most a quarter of it)."""
+
+MOST_SAMPLES = 2_000_000
+"""More samples of a generated irregularity take too much memory."""
 
 _KINDS = ("tangent", "transition", "curve")
 
@@ -168,7 +172,7 @@ def _irregularity(data, source, folder):
     if ("points" in data) == ("spectrum" in data):
         raise InputError(source, key, "expected either points or spectrum")
     if "points" in data:
-        found = [base / data["points"] for base in (folder, folder.parent) if (base / data["points"]).is_file()]
+        found = [base / data["points"] for base in (folder, folder.parent) if os.path.isfile(base / data["points"])]
         if not found:
             raise InputError(source, f"{key}.points", f"expected an existing file, got {data['points']!r}")
         s, values = read_irregularity(found[0])
@@ -183,6 +187,9 @@ def _generated(data, source, key):
         raise InputError(source, f"{key}.longest", f"{expected}, got {data['longest']!r}")
     if data["spacing"] > 0.1 * data["shortest"]:
         expected = f"expected at most a tenth of the shortest wavelength, {0.1 * data['shortest']:g} m"
+        raise InputError(source, f"{key}.spacing", f"{expected}, got {data['spacing']!r}")
+    if data["length"] > MOST_SAMPLES * data["spacing"]:
+        expected = f"expected at least {data['length'] / MOST_SAMPLES:g} m for {data['length']:g} m of track"
         raise InputError(source, f"{key}.spacing", f"{expected}, got {data['spacing']!r}")
     names = ("level", "seed", "length", "spacing", "shortest", "longest")
     s, values = generate(*(data[name] for name in names))

@@ -1,0 +1,60 @@
+"""Checkpoints in HDF5 files: nested tuples of arrays and numbers, as groups of datasets and attributes, bit by bit."""
+
+from typing import NamedTuple, get_type_hints
+
+import h5py
+import numpy as np
+
+from wrcore.dynamics.integrate import Checkpoint
+from wrcore.dynamics.engine import Memory
+from wrcore.dynamics.rosenbrock import Linear
+
+
+class _Saved(NamedTuple):
+    """A checkpoint as it lies in a file; a method without a Jacobian has no ``linear``."""
+
+    memory: Memory
+    linear: Linear
+    arc_lengths: np.ndarray
+
+
+def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint into an empty group."""
+    group.attrs["method"], group.attrs["t"] = checkpoint.method, checkpoint.t
+    _write(group, _Saved(checkpoint.memory, checkpoint.linear, checkpoint.arc_lengths))
+
+
+def read_checkpoint(group: h5py.Group) -> Checkpoint:
+    """Read what `write_checkpoint` wrote; KeyError where something is missing."""
+    saved = _read(group, _Saved)
+    return Checkpoint(str(group.attrs["method"]), float(group.attrs["t"]), *saved)
+
+
+def _write(group, parts):
+    for name, part in parts._asdict().items():
+        if isinstance(part, tuple):
+            _write(group.create_group(name), part)
+        elif isinstance(part, np.ndarray):
+            group.create_dataset(name, data=part)
+        elif part is not None:
+            group.attrs[name] = part
+
+
+def _read(group, kind):
+    """The tuple of a class that a group holds; arrays and numbers get the types that kernels were compiled for."""
+    parts = {}
+    for name, type_ in get_type_hints(kind).items():
+        if type_ is np.ndarray:
+            parts[name] = np.ascontiguousarray(group[name][()])
+        elif issubclass(type_, tuple):
+            parts[name] = _read(group[name], type_) if name in group else None
+        else:
+            parts[name] = type_(group.attrs[name])
+    return kind(**parts)
+
+
+def numbers_of(parts) -> list[np.ndarray]:
+    """All arrays and numbers of nested tuples, in their order."""
+    if isinstance(parts, tuple):
+        return [array for part in parts for array in numbers_of(part)]
+    return [np.ascontiguousarray(parts)]

@@ -1,0 +1,226 @@
+"""A scene under way: integrated stretch by stretch, with the channels of each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import wrcore
+from wrcore.contact import reduction
+from wrcore.dynamics.body import STATE_SIZE, angles
+from wrcore.dynamics.energy import energy_channels
+from wrcore.dynamics.integrate import Checkpoint, Trajectory, integrate
+from wrcore.dynamics.outputs import evaluations_at
+from wrcore.dynamics.system import Equations, Model, Workspace, workspace
+from wrcore.dynamics.track import track_poses
+from wrcore.run import Run
+from wrcore.scene import Scene, compile_scene
+from wrcore.validity import exceeded
+
+DERAILED_Y = 0.05
+"""A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
+
+SIDES = ("left", "right")
+CONTACT_CHANNELS = {
+    "u_wheel_m": reduction.U_WHEEL, "s_wheel_rad": reduction.S_WHEEL, "u_rail_m": reduction.U_RAIL,
+    "x_m": reduction.X, "y_m": reduction.Y, "z_m": reduction.Z, "contact_angle_rad": reduction.ANGLE,
+    "penetration_m": reduction.PENETRATION, "a_m": reduction.SEMI_A, "b_m": reduction.SEMI_B,
+    "N_N": reduction.NORMAL, "Fx_N": reduction.FX, "Fy_N": reduction.FY, "Mz_Nm": reduction.MZ,
+    "xi": reduction.XI, "eta": reduction.ETA, "phi_per_m": reduction.PHI,
+}  # fmt: skip
+"""Contact channels and their columns in the patch array."""
+
+
+class Places(NamedTuple):
+    """Arc lengths from which those of the next output are sought on a curved track, m."""
+
+    wheelsets: np.ndarray
+    """(k,): NaN where nothing is known yet."""
+    bodies: np.ndarray
+    """(n,)."""
+
+
+class Course:
+    """A compiled scene and where it has got to.
+
+    Parameters
+    ----------
+    scene : Scene
+    start : Checkpoint or ndarray, shape (size,), optional
+        Where it begins instead of at the scene's initial state.
+    progress : callable, optional
+        Wraps the list of patches if a creep table has to be built.
+    shared : dict, optional
+        As for :func:`wrcore.scene.compile_scene`.
+
+    Attributes
+    ----------
+    model : Model
+    start : Checkpoint or ndarray
+        Where the next stretch begins.
+    places : Places
+        For the channels of the next stretch.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        start: Checkpoint | np.ndarray | None = None,
+        progress: Callable | None = None,
+        shared: dict[Any, Any] | None = None,
+    ) -> None:
+        self._began = time.perf_counter()
+        self.scene = scene
+        self.model, state = compile_scene(scene, progress, shared)
+        self.start = state if start is None else start
+        unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
+        self.places = Places(unknown, scene.vehicle.positions[:, 0].astype(float))
+
+    def advance(
+        self,
+        times: np.ndarray,
+        progress: Callable[[float], object] | None = None,
+        stop: Callable[[], str] | None = None,
+    ) -> Run:
+        """Integrate one stretch.
+
+        Parameters
+        ----------
+        times : ndarray, shape (n,)
+            Output times, s; after a first stretch, those that follow.
+        progress : callable, optional
+            Called now and then with the time reached, s.
+        stop : callable, optional
+            A reason to stop, or an empty string: :func:`wrcore.dynamics.integrate.integrate`.
+
+        Returns
+        -------
+        Run
+            Of this stretch alone.
+        """
+        scene, settings = self.scene, self.scene.data["integration"]
+        begin = self.start.t if isinstance(self.start, Checkpoint) else float(times[0])
+        trajectory = integrate(
+            self.model, self.start, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
+            settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
+        )  # fmt: skip
+        compiled = time.perf_counter() - self._began - trajectory.wall_s
+        counters = {
+            "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
+            "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
+            "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses, "table_out_of_range": trajectory.out_of_range,
+            "wall_s": trajectory.wall_s, "compile_s": compiled,
+            "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
+        }  # fmt: skip
+        groups, limits = self._channels(trajectory)
+        record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
+        record["method_used"] = trajectory.method
+        if trajectory.end is not None:
+            self.start = trajectory.end
+        self._began = time.perf_counter()
+        return Run(
+            scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,
+            trajectory.end, trajectory.end_t, trajectory.end_state,
+        )  # fmt: skip
+
+    def _channels(self, trajectory: Trajectory):
+        """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs."""
+        scene, model, states = self.scene, self.model, trajectory.states
+        wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
+        work = self._workspace()
+        patches, bounds, rates = evaluated(model, trajectory, work)
+        poses = self._poses(states)
+        energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
+        if len(states):
+            self.places = Places(work.arc_lengths.copy(), poses[-1, :, 0].copy())
+        groups = {}
+        for body, name in enumerate(scene.vehicle.body_names):
+            own = slice(STATE_SIZE * body, STATE_SIZE * (body + 1))
+            groups[name] = _body_channels(states[:, own], rates[:, own], poses[:, body], wanted)
+            if "pose" in wanted and not model.track.tangent:
+                groups[name]["s_m"] = poses[:, body, 0]
+            if "contact" in wanted and body in wheelsets:
+                k = int(np.flatnonzero(wheelsets == body)[0])
+                for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
+                    groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+                if scene.detection == "auto":
+                    groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
+                    spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
+                    groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
+        if energies is not None:
+            groups["energy"] = energies
+        standing = poses[:, wheelsets]
+        return groups, exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
+
+    def _workspace(self):
+        work = workspace(self.model)
+        work.arc_lengths[:] = self.places.wheelsets
+        return work
+
+    def _poses(self, states):
+        """Arc length, y, z, roll and yaw of all bodies relative to the track, shape (n, bodies, 5)."""
+        count = len(self.model.bodies.mass)
+        poses = np.empty((len(states), count, 5))
+        for body in range(count):
+            at = STATE_SIZE * body
+            if self.model.track.tangent:
+                roll, _, yaw = angles(states[:, at + 3 : at + 7])
+                poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw])
+            else:
+                own = np.empty((len(states), 5))
+                track_poses(self.model.track, states, at, self.places.bodies[body], own)
+                poses[:, body] = own
+        return poses
+
+
+def evaluated(
+    model: Model, trajectory: Trajectory, work: Workspace | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate the equations of motion again at a run's output times.
+
+    Parameters
+    ----------
+    model : Model
+    trajectory : Trajectory
+    work : Workspace, optional
+        Its arc lengths are those near which the first ones are sought.
+
+    Returns
+    -------
+    patches : ndarray, shape (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS)
+        NaN where a patch is absent; left and right.
+    bounds : ndarray, shape (n, wheelsets, 2)
+        Bound of planar detection's error (detection ``auto`` only), m.
+    rates : ndarray, shape (n, size)
+        Derivatives of the states.
+    """
+    shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
+    patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
+    rates = np.full(trajectory.states.shape, np.nan)
+    evaluations_at(trajectory.t, trajectory.states, *Equations(model, work).arguments, rates, patches, bounds)
+    return patches, bounds, rates
+
+
+def _body_channels(state, rate, pose, wanted):
+    """Channels of a body; its pose is relative to the track, but for x, which stays absolute."""
+    channels: dict[str, np.ndarray] = {}
+    if "pose" in wanted:
+        channels |= {"x_m": state[:, 0]}
+        channels |= dict(zip(("y_m", "z_m", "roll_rad", "yaw_rad"), pose[:, 1:].T, strict=True))
+    if "velocity" in wanted:
+        names = ("vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s")
+        channels |= {name: state[:, 7 + i] for i, name in enumerate(names)}
+    if "acceleration" in wanted:
+        channels |= {f"a{axis}_m_per_s2": rate[:, 7 + i] for i, axis in enumerate("xyz")}
+    return channels
+
+
+def flat(settings, prefix=""):
+    """Nested settings as one level, keys joined by dots."""
+    out: dict[str, Any] = {}
+    for key, value in settings.items():
+        out |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {prefix + key: value}
+    return out

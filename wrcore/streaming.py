@@ -1,0 +1,315 @@
+"""Runs of any length: written as they go, kept when they are interrupted, taken up again where they were.
+
+A run is integrated in blocks of output times. What does not fit into one block, or takes longer than a minute, is written
+block by block into a folder beside the file (``.run.h5.parts``), each block a run file of its own with a checkpoint,
+renamed when it is complete. At the end the blocks become the run file and the folder goes. A process that is killed
+leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file with what was reached. The same command
+goes on from either, bit by bit as if nothing had happened: blocks do not change a result. Neither of them is used if
+anything decisive is different: the compiled model, integration, output, or the sources of the kernels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import shutil
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from wrcore._jit import source_digest
+from wrcore.checkpoints import numbers_of
+from wrcore.contact import reduction
+from wrcore.course import Course, Places
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import METHODS, chosen_method
+from wrcore.errors import InputError
+from wrcore.results import join_runs, read_part, write_going_on, write_run
+from wrcore.run import Run
+from wrcore.scene import Scene
+from wrcore.simulate import check_memory, output_blocks
+
+try:
+    import fcntl
+except ImportError:  # a system without such locks
+    fcntl = None
+
+BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
+"""Size of a block's channels in memory, bytes, and its number of output times at most."""
+
+PLAIN = {"compression": None, "shuffle": False}
+"""Blocks are compressed when they are joined."""
+
+WHOLE = 2**62
+"""Output times in a block that holds all of them."""
+
+STOP, INTERRUPTED = "stop", "interrupted"
+"""Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""
+
+CHECKPOINT_S = 60.0
+"""Wall time between two checkpoints at most, s."""
+
+
+class Interrupts:
+    """SIGINT and SIGTERM as a question that can be asked; a second one does what it always does.
+
+    Attributes
+    ----------
+    caught : int
+        Number of the signal, 0 for none.
+    """
+
+    caught = 0
+
+    def __enter__(self):
+        self._before = {}
+        if threading.current_thread() is threading.main_thread():
+            self._before = {number: signal.signal(number, self._catch) for number in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def _catch(self, number, _):
+        self.caught = number
+        signal.signal(number, self._before[number])
+
+    def __exit__(self, *_):
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
+def simulate_to(
+    scene: Scene,
+    path: str | os.PathLike[str] | None,
+    progress: Callable[[float], object] | None = None,
+    resume: bool = True,
+    say: Callable[[str], object] = lambda text: None,
+    checkpoint_s: float = CHECKPOINT_S,
+    block: int | None = None,
+    record: dict[str, Any] | None = None,
+) -> tuple[Run, int]:
+    """Run a scene with bounded memory, its channels going to a file.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : path-like or None
+        Run file to write; None: nothing is kept but counters.
+    progress : callable, optional
+        Called now and then with the simulated time reached, s.
+    resume : bool
+        Go on with an interrupted run of the same scene if there is one; False: begin anew.
+    say : callable, optional
+        Told, in one line, that a run is taken up again.
+    checkpoint_s : float
+        Wall time between two checkpoints at most, s.
+    block : int, optional
+        Output times in a block; of no influence on the result.
+    record : dict, optional
+        Further settings to keep with the run.
+
+    Returns
+    -------
+    run : Run
+        How it ended and what it cost, with the channels of the last block only: :func:`wrcore.results.load_run` reads
+        those of the file.
+    interrupted : int
+        Number of the signal that interrupted it, 0 for none.
+
+    Raises
+    ------
+    InputError
+        If another process writes the same file.
+    """
+    course, settings = Course(scene), scene.data["integration"]
+    if chosen_method(settings["method"], course.model.speed) in METHODS:
+        size = block or _block_size(course)
+    else:  # methods of other libraries have no checkpoints
+        check_memory(scene)
+        size = WHOLE
+    total, parts = Total(), None
+    with ExitStack() as stack:
+        if path is not None:
+            parts = stack.enter_context(Parts(path, fingerprint(course)))
+            if parts.take_up(course, total, resume):
+                say(f"goes on at t = {total.t:.6g} s, where it was interrupted")
+        interrupts = stack.enter_context(Interrupts())
+        for times, final in _with_last(output_blocks(0.0, settings["duration"], scene.data["output"]["rate"], size)):
+            while len(rest := times[times > total.t]) and not total.over:
+                deadline = time.monotonic() + checkpoint_s if size < WHOLE else math.inf
+                run = course.advance(rest, progress, partial(_stop, interrupts, deadline))
+                run.settings |= record or {}
+                end = final and len(run.t) and run.t[-1] == times[-1]
+                total.add(run, 0 if end else interrupts.caught)
+                if parts is not None:
+                    parts.add(run, course, end or total.over)
+        if parts is not None:
+            parts.join(total)
+    return total.summary(), interrupts.caught
+
+
+def _stop(interrupts, deadline):
+    return STOP if interrupts.caught or time.monotonic() > deadline else ""
+
+
+def _with_last(items):
+    """Items, each with whether it is the last one."""
+    items = iter(items)
+    item = next(items)
+    for following in items:
+        yield item, False
+        item = following
+    yield item, True
+
+
+def _block_size(course):
+    """Output times whose channels take `BLOCK_BYTES` at most, and at least one."""
+    numbers = len(course.model.bodies.mass) * STATE_SIZE
+    numbers += len(course.model.bodies.wheelsets) * 2 * reduction.MAX_PATCHES * reduction.PATCH_COLUMNS
+    return max(1, min(LONGEST_BLOCK, int(BLOCK_BYTES / (8 * numbers))))
+
+
+def fingerprint(course):
+    """Digest of everything that decides on the bits of a run's channels: model, start, settings, sources of kernels."""
+    data = course.scene.data
+    digest = hashlib.sha256(source_digest().encode())
+    digest.update(json.dumps([data["integration"], data["output"]], sort_keys=True).encode())
+    for array in numbers_of((course.model, course.start)):
+        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
+    return digest.hexdigest()
+
+
+class Total:
+    """The blocks of a run so far: how far they reach, what they cost, how they end.
+
+    Attributes
+    ----------
+    t : float
+        Last output time, s.
+    over : bool
+        Whether the run has ended before its duration.
+    last : Run
+        The last block.
+    """
+
+    def __init__(self):
+        self.first, self.t, self.over, self.last = math.nan, -math.inf, False, None
+        self.counters = {}
+
+    def add(self, run, interrupted=0):
+        """Add a block; one that was stopped for a checkpoint, and not by a signal, is not the end."""
+        if run.reason == STOP:
+            run.status, run.reason = "completed", ""
+        if interrupted and run.status == "completed":
+            name = signal.Signals(interrupted).name
+            run.status, run.reason = "stalled", f"{INTERRUPTED} ({name}) at t = {run.end_t:.6g} s"
+        if len(run.t):
+            self.first = float(run.t[0]) if math.isnan(self.first) else self.first
+            self.t = float(run.t[-1])
+        self.over, self.last = run.status != "completed", run
+        for name, value in run.counters.items():
+            if name == "smallest_step_s":
+                self.counters[name] = min(value, self.counters.get(name, math.inf))
+            elif name != "compile_s":
+                self.counters[name] = self.counters.get(name, 0) + value
+            else:
+                self.counters.setdefault(name, value)
+
+    def summary(self):
+        """The last block with the counters of all."""
+        self.last.counters = {**self.counters, "simulated_s": self.t - self.first}
+        return self.last
+
+
+class Parts:
+    """The folder of blocks beside a run file.
+
+    Parameters
+    ----------
+    path : path-like
+    mark : str
+        Fingerprint of the run.
+    """
+
+    def __init__(self, path, mark):
+        self.path, self.mark, self.lock = Path(path), mark, None
+        self.folder = self.path.with_name(f".{self.path.name}.parts")
+
+    def __enter__(self):
+        if self.folder.is_dir():
+            self._open()
+        return self
+
+    def __exit__(self, *_):
+        if self.lock is not None:
+            os.close(self.lock)
+
+    def _open(self):
+        """One process at a time writes; the lock goes with it, however it ends."""
+        if self.lock is not None:
+            return
+        self.folder.mkdir(exist_ok=True)
+        self.lock = os.open(self.folder, os.O_RDONLY)
+        try:
+            if fcntl is not None:
+                fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError("--out", self.path, "expected a file that no other process is writing") from None
+
+    def _files(self):
+        """Blocks in their order."""
+        return sorted(self.folder.glob("[0-9]*.h5"))
+
+    def take_up(self, course, total, resume):
+        """Put a course where an interrupted run has got to; whether there is one of the same scene, and it is wanted."""
+        if resume and not self._files() and self._goes_on(self.path, only_interrupted=True):
+            self._open()
+            os.replace(self.path, self.folder / "000000.h5")
+        files = self._files()
+        if not (resume and files and all(map(self._goes_on, files))):
+            for file in files:
+                file.unlink()
+            return False
+        for file in files:
+            with h5py.File(file) as content:
+                run, places = read_part(content)
+            total.add(run)
+            total.over &= not run.reason.startswith(INTERRUPTED)
+        del total.counters["compile_s"]
+        course.start, course.places = run.end, Places(*places)
+        return True
+
+    def _goes_on(self, file, only_interrupted=False):
+        """Whether a file holds a block of this run that can be gone on from."""
+        try:
+            with h5py.File(file) as content:
+                reason = str(content.attrs.get("reason", ""))
+                same = content.attrs.get("fingerprint") == self.mark and "end/checkpoint" in content
+                return same and (not only_interrupted or reason.startswith(INTERRUPTED))
+        except OSError:
+            return False
+
+    def add(self, run, course, last):
+        """Write a block: as a part, or as the run file if it is the only one."""
+        files = self._files()
+        if last and not files:
+            write_run(self.path, run, partial(write_going_on, mark=self.mark, places=course.places))
+            return
+        self._open()
+        part = self.folder / f"{len(files):06d}.h5"
+        write_run(part, run, partial(write_going_on, mark=self.mark, places=course.places), **PLAIN)
+
+    def join(self, total):
+        """Make the run file of the blocks and remove them."""
+        files = self._files()
+        if files:
+            join_runs(self.path, files, total.summary().counters)
+        if self.lock is not None:
+            shutil.rmtree(self.folder)

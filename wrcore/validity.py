@@ -1,0 +1,85 @@
+"""Where a run left the range that its models are made for: counted at the output times, not while it is integrated.
+
+=====================  ================================================================================================
+`half_space`           patches whose semi-axis across exceeds `WIDEST` of the smaller lateral radius of curvature there
+`conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
+`profile_edge`         patches that reach beyond the end of a profile
+`search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
+=====================  ================================================================================================
+
+A patch of an output time counts once; counters of what happens between outputs (creep look-ups out of the table's
+range, collapses of the step size) come from the integration itself.
+
+*Half-space.* Hertz's theory takes both bodies for half-spaces and their surfaces for paraboloids: the patch must be
+small against the radii of curvature (Johnson, Contact Mechanics (1985), section 4.1). It states no number; at b = R/3 the
+parabola is off a circle's height by (b/R)^2/4 = 2.8 % at the edge of the patch, and the surface there is inclined by 19
+degrees. *Conformal.* The pressure acts along the surface's own normal; where this turns by 0.35 rad (20 degrees) over the
+patch, the pressure at its edges points 10 degrees past the patch's one normal, and 17 % of it lie in the tangent plane.
+Curvatures are those that Hertz is given, averaged over the profile's window.
+"""
+
+import numpy as np
+
+from wrcore.contact import reduction
+from wrcore.contact.detection import PLANAR
+from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, YAW_STRAY
+
+WIDEST = 1.0 / 3.0
+"""Largest semi-axis across rolling over the smaller radius of curvature."""
+
+WIDEST_TURN = 0.35
+"""Largest turn of the normal over a patch in a hollow, rad."""
+
+LIMITS = {
+    "half_space": "patches too wide for a half-space",
+    "conformal": "conformal patches",
+    "profile_edge": "patches at a profile's end",
+    "search_fallback": "wheels searched strip by strip",
+    "table_out_of_range": "creep look-ups out of the table's range",
+    "step_collapses": "collapses of the step size",
+}
+"""Counters of a run, as a person reads them."""
+
+
+def exceeded(contact, patches, roll, yaw):
+    """Count the limits that patches and poses at the output times exceed.
+
+    Parameters
+    ----------
+    contact : ContactModel
+    patches : numpy.ndarray, shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS)
+        From :func:`wrcore.dynamics.outputs.evaluations_at`, NaN where there is none.
+    roll, yaw : numpy.ndarray, shape (n, k)
+        Of the wheelsets relative to the track, rad.
+
+    Returns
+    -------
+    dict of str to int
+        ``patches`` that were looked at, and the counts by name.
+    """
+    rows = patches[np.isfinite(patches[..., reduction.NORMAL])]
+    geometry, width = contact.geometry, rows[:, reduction.SEMI_B]
+    wheel, wheel_ends = _convexity(
+        geometry.wheel, geometry.wheel_start, geometry.wheel_step, rows[:, reduction.U_WHEEL]
+    )
+    rail, rail_ends = _convexity(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
+    reach = width * np.cos(rows[:, reduction.ANGLE])
+    tilt = np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
+    stray = ROLL_STRAY * np.abs(np.sin(roll)) + YAW_STRAY * tilt**2  # as the search sees it
+    return {
+        "patches": len(rows),
+        "half_space": int(np.sum(width * np.maximum(abs(wheel), abs(rail)) > WIDEST)),
+        "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
+        "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
+        "search_fallback": 2 * int(np.sum(stray > STRAY)),
+    }
+
+
+def _convexity(nodes, start, step, u):
+    """Curvature at u (1/m), positive where wheel or rail bulge, and distance from there to the profile's end (m).
+
+    Both the wheel's radius and the rail's height grow out of the body.
+    """
+    places = start + step * np.arange(len(nodes))
+    slope, second = (np.interp(u, places, nodes[:, column]) for column in (SLOPE, CURVATURE))
+    return -second / (1.0 + slope**2) ** 1.5, np.minimum(u - places[0], places[-1] - u)
