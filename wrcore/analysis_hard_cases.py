@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from scipy.integrate import simpson
 
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
@@ -23,8 +24,8 @@ from wrcore.simulate import DERAILED_Y, output_times
 
 COLUMNS = (
     "family", "case", "condition", "vehicle", "detection", "integrator", "outcome", "status", "reason", "simulated_s",
-    "steps", "rejected", "smallest_step_s", "wall_s", "out_of_range", "invariant", "value", "unit", "relation", "limit",
-    "source", "passed", "known_limit",
+    "steps", "rejected", "collapses", "smallest_step_s", "wall_s", "out_of_range", "invariant", "value", "unit",
+    "relation", "limit", "source", "passed", "known_limit",
 )  # fmt: skip
 """Columns of the table."""
 
@@ -187,7 +188,9 @@ def run_in_parts(setting, duration, rate, part, change, **control):
 
 def joined(parts):
     """One trajectory of several that follow each other."""
-    counted = ("steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "out_of_range", "wall_s")
+    counted = (
+        "steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "out_of_range", "wall_s", "collapses",
+    )  # fmt: skip
     starts = [1 if index else 0 for index in range(len(parts))]
     return replace(
         parts[-1],
@@ -212,6 +215,36 @@ def wheel_forces(patches):
     normal, lateral, angle = (patches[..., k] for k in (reduction.NORMAL, reduction.FY, reduction.ANGLE))
     vertical = np.nansum(normal * np.cos(angle) + lateral * np.sin(angle), axis=-1)
     return vertical, -np.nansum(lateral * np.cos(angle) - normal * np.sin(angle), axis=-1)
+
+
+def impulse_error(setting, trajectory, patches):
+    """Impulse of the rails less that of the load and less the momentum gained by all bodies, of the load's.
+
+    Parameters
+    ----------
+    setting : Setting
+        Whose elements to the moving frame have no vertical stiffness: their preloads and the weight are the load.
+    trajectory : Trajectory
+        Sampled uniformly, closely enough for the forces.
+    patches : numpy.ndarray
+        From :func:`contacts`.
+
+    Returns
+    -------
+    float
+    """
+    bodies, elements = setting.model.bodies, setting.model.elements
+    preloads = [
+        elements.springs[first:last, 14].sum()
+        for (_, second), first, last in zip(
+            elements.pairs, elements.first_spring[:-1], elements.first_spring[1:], strict=True
+        )
+        if second == FRAME
+    ]
+    load = (np.sum(bodies.mass) * setting.model.gravity - sum(preloads)) * (trajectory.t[-1] - trajectory.t[0])
+    given = simpson(np.sum(wheel_forces(patches)[0], axis=(1, 2)), x=trajectory.t)
+    rise = trajectory.states[[0, -1], 9 : STATE_SIZE * len(bodies.mass) : STATE_SIZE]
+    return float(abs(given - load - np.diff(rise @ bodies.mass)[0]) / load)
 
 
 def sound(setting, trajectory):
@@ -250,8 +283,9 @@ def rows(family, case, condition, setting, trajectory, checks, expected="complet
     cost = {
         "outcome": outcome, "status": trajectory.status, "reason": trajectory.reason,
         "simulated_s": float(trajectory.t[-1] - trajectory.t[0]) if len(trajectory.t) else 0.0,
-        "steps": trajectory.steps, "rejected": trajectory.rejected, "smallest_step_s": trajectory.smallest_step,
-        "wall_s": trajectory.wall_s, "out_of_range": trajectory.out_of_range,
+        "steps": trajectory.steps, "rejected": trajectory.rejected, "collapses": trajectory.collapses,
+        "smallest_step_s": trajectory.smallest_step, "wall_s": trajectory.wall_s,
+        "out_of_range": trajectory.out_of_range,
     }  # fmt: skip
     finished = Check("ends as expected", float(trajectory.status != expected), 0.0, "1", f"expected: {expected}")
     return [_row(family, case, condition, label | cost, check) for check in (finished, *checks)]

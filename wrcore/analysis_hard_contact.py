@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from scipy.integrate import quad, simpson
+from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from wrcore.analysis_contact import lateral_sweep, pair_geometry, study_pair, sweep_jumps
@@ -13,6 +13,7 @@ from wrcore.analysis_hard_cases import (
     Check,
     computed,
     contacts,
+    impulse_error,
     prepare,
     rows,
     run,
@@ -213,17 +214,12 @@ def crests(vehicles, speed, length, duration, detections, methods):
 
 def _crest_checks(setting, trajectory, share):
     """Lift-off where it must be and nowhere else, return, and impulse of the rails against momentum of all bodies."""
-    patches, bodies = contacts(setting.model, trajectory.t, trajectory.states), setting.model.bodies
-    vertical = np.sum(wheel_forces(patches)[0], axis=(1, 2))
-    masses = np.repeat(bodies.mass[None, :], 2, axis=0)
-    rise = trajectory.states[[0, -1], 9 : STATE_SIZE * len(bodies.mass) : STATE_SIZE]
-    gained = float(np.diff(np.sum(masses * rise, axis=1))[0])
-    load = vertical[0] * trajectory.t[-1]  # in equilibrium at the start: the weight, and what preloads add
-    given = float(simpson(vertical, x=trajectory.t))
+    patches = contacts(setting.model, trajectory.t, trajectory.states)
     front = np.all(~np.isfinite(patches[:, 0, ..., reduction.NORMAL]), axis=2)
     away = float(np.mean(np.all(front, axis=1)))
-    checks = [Check("impulse of the rails less load and momentum, of the load's", abs(given - load - gained) / load,
-                    IMPULSE_ERROR, "1", "Newton's law for all bodies")]  # fmt: skip
+    off = impulse_error(setting, trajectory, patches)
+    source = "Newton's law for all bodies"
+    checks = [Check("impulse of the rails less load and momentum, of the load's", off, IMPULSE_ERROR, "1", source)]
     if share < 1.0:
         return [*checks, Check("share of time off the rails", away, 0.0, "1", "a quarter of the load's acceleration")]
     landings = float(np.min(np.count_nonzero(np.diff(front.astype(int), axis=0) == -1, axis=0)))

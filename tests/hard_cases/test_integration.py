@@ -1,0 +1,64 @@
+"""Tolerances, stable steps, Baumgarte's parameters, long runs, restarts."""
+
+import numpy as np
+import pytest
+
+from wrcore.analysis_hard_integration import (
+    amplification,
+    baumgarte,
+    long_run,
+    predicted_step,
+    restarts,
+    stability_map,
+    tolerance_ladder,
+)
+
+
+@pytest.fixture(scope="module")
+def boxes(vehicles):
+    trailer = vehicles["trailer vehicle"]
+    return vehicles | {"with axle boxes": trailer | {"set": {"vehicle.axle_boxes": True}}}
+
+
+def test_stability_functions_against_known_limits():
+    # Taylor polynomials of order p on the negative real axis (Hairer and Wanner, Solving ODEs II, table IV.2.1)
+    assert predicted_step("rk23", np.array([-1.0 + 0j]), 10.0) == pytest.approx(2.5127, abs=1e-3)
+    assert predicted_step("rk45", np.array([-1.0 + 0j]), 10.0) == pytest.approx(3.3066, abs=1e-3)
+    for method in ("rodas4", "ros34pw2"):  # L-stable
+        assert abs(amplification(method, -1e9)) < 1e-6
+    for method in ("tsit5", "rk4", "rodas4", "ros34pw2"):
+        assert amplification(method, 0.01) == pytest.approx(np.exp(0.01), abs=1e-8)
+
+
+def test_errors_fall_with_the_tolerance(vehicles, assert_passed):
+    methods = ["tsit5", "rk45", "rk23", "rk4", "rodas4", "ros34pw2"]
+    found, curve = tolerance_ladder(
+        vehicles, ["suspended wheelset"], 20.0, [1e-1, 1e-4, 1e-6], methods, ["spatial"], 0.5
+    )
+    assert_passed(found)
+    errors = {(row["integrator"], row["rtol"]): row["error_m"] for row in curve}
+    assert all(errors[method, 1e-6] < 0.1 * errors[method, 1e-4] for method in methods)
+
+
+def test_the_largest_stable_step_is_that_of_the_linearised_motion(vehicles, assert_passed):
+    found, curve = stability_map(vehicles, ["suspended wheelset"], [1.0, 20.0], ["tsit5", "ros34pw2"], 0.05)
+    assert_passed(found)
+    assert curve[0]["found_s"] < 0.1 * curve[2]["found_s"]
+    assert curve[1]["found_s"] == 0.05
+
+
+def test_baumgarte_s_feedback_bounds_the_drift(boxes, assert_passed):
+    pairs = [(0.0, 0.0), (50.0, 50.0), (1000.0, 1000.0)]
+    found, curve = baumgarte(boxes, "with axle boxes", pairs, 1.0, ["tsit5"])
+    assert_passed(found)
+    assert curve[1]["violation_m"] < 0.1 * curve[0]["violation_m"]
+
+
+def test_long_hunting_does_not_drift(boxes, assert_passed):
+    start = {"speed": 65.0, "initial.y": 0.006}
+    found, _ = long_run(boxes, ["suspended wheelset"], 30.0, {"suspended wheelset": start}, 100.0, ["auto"])
+    assert_passed(found)
+
+
+def test_restarts_are_bit_identical(vehicles, assert_passed):
+    assert_passed(restarts(vehicles, ["trailer vehicle"], 0.4, 0.15, ["tsit5", "ros34pw2"], ["planar", "spatial"]))

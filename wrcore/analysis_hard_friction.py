@@ -1,0 +1,167 @@
+"""Hard cases of the tangential contact: friction from none to 0.8, its jumps, creep laws out of their usual range."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import Check, computed, contacts, joined, prepare, refused, rows, run, sound
+from wrcore.contact import reduction
+from wrcore.creep.laws import LAWS, creep_forces
+from wrcore.scene import load_scene
+
+TABLE_ERROR = 0.01
+"""Of a creep force, as a fraction of mu N: the tolerance to which creep tables are built."""
+
+FRICTIONLESS = 1e-9
+"""Friction coefficient that stands for none."""
+
+UNBOUNDED = "linear theory knows no friction limit"
+NO_SPIN_IN_BOUND = "Shen-Hedrick-Elkins and Polach reduce linear forces; the power of a large spin may come out wrong"
+
+
+def used_friction(patches, friction):
+    """Largest creep force of all patches over the friction limit."""
+    force = np.hypot(patches[..., reduction.FX], patches[..., reduction.FY])
+    return float(np.nanmax(force / (friction * patches[..., reduction.NORMAL])))
+
+
+def friction_ladder(vehicles, names, values, laws, duration, detections, unstable=()):
+    """Vehicles released off the centre at frictions from none to very high.
+
+    Parameters
+    ----------
+    vehicles, names
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+    values : sequence of float
+        Friction coefficients.
+    laws : sequence of str
+        Creep laws.
+    duration : float
+        s.
+    detections : sequence of str
+    unstable : sequence of str
+        Vehicles that may end in a derailment: their motion grows until they climb.
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    entry = vehicles[names[0]]
+    label = {"vehicle": names[0], "detection": "any", "integrator": "any"}
+    found = refused("friction", "none", "friction 0", label, lambda: load_scene(entry["scene"], ["contact.friction=0"]))
+    for name, value, law, detection in product(names, values, laws, detections):
+        changes = {"contact.friction": value, "contact.creep.model": law, "contact.detection": detection}
+        setting = prepare(vehicles, name, {**changes, "initial.y": 0.004})
+        trajectory = run(setting, duration)
+        used = used_friction(contacts(setting.model, trajectory.t, trajectory.states), value)
+        checks = [
+            *sound(setting, trajectory),
+            Check("largest creep force over mu N", used, 1.0 + TABLE_ERROR, "1", "Coulomb, and the table's tolerance",
+                  known_limit=UNBOUNDED if law == "linear" else ""),
+        ]  # fmt: skip
+        expected = "derailed" if name in unstable and trajectory.status == "derailed" else "completed"
+        found += rows("friction", f"law {law}", f"friction {value:g}", setting, trajectory, checks, expected)
+    return found
+
+
+def frictionless(vehicles, name, duration, detections, methods):
+    """A wheelset without friction: nothing changes its speed ahead and its spin."""
+    found = []
+    for detection, method in product(detections, methods):
+        changes = {"contact.friction": FRICTIONLESS, "contact.detection": detection, "integration.method": method}
+        setting = prepare(vehicles, name, changes)
+        trajectory = run(setting, duration)
+        states, speed = trajectory.states, setting.model.speed
+        change = float(np.max(np.abs(states[:, 7] / states[0, 7] - 1.0)))
+        limit = 2.0 * FRICTIONLESS * setting.model.gravity * duration / speed
+        checks = [*sound(setting, trajectory), Check("change of the speed ahead", change, limit, "1", "2 mu g t/V")]
+        found += rows("friction", "none", f"friction {FRICTIONLESS:g}", setting, trajectory, checks)
+    return found
+
+
+def friction_step(vehicles, names, values, part, detections, methods):
+    """A track whose friction changes suddenly: the run goes on from the state at each change.
+
+    Parameters
+    ----------
+    vehicles, names
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+    values : sequence of float
+        Friction of the parts.
+    part : float
+        Length of a part, s.
+    detections, methods : sequence of str
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name, detection, method in product(names, detections, methods):
+        changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.004}
+        setting = prepare(vehicles, name, changes)
+        done, used, state = [], [], setting.state
+        for index, value in enumerate(values):
+            model = setting.model._replace(contact=setting.model.contact._replace(friction=value))
+            here = replace(setting, model=model, state=state)
+            done.append(run(here, part, 1000.0, index * part))
+            used.append(used_friction(contacts(model, done[-1].t, done[-1].states), value))
+            if done[-1].status != "completed":
+                break
+            state = done[-1].states[-1]
+        trajectory = joined(done)
+        checks = [
+            *sound(setting, trajectory),
+            Check("largest creep force over mu N", max(used), 1.0 + TABLE_ERROR, "1", "Coulomb on every part"),
+        ]
+        condition = " to ".join(f"{value:g}" for value in values)
+        found += rows("friction", "step along the track", condition, setting, trajectory, checks)
+    return found
+
+
+def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
+    """Creep laws at the ends of their range: flat and slender patches, creepages and spin without bounds.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; their creep table and material are used.
+    ratios : sequence of float
+        a/b.
+    sizes : sequence of float
+        Nondimensional creepages; each alone and all together.
+    tolerance : float
+        Change of a force, as a fraction of mu N, that a change of a/b by a tenth of it may make.
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    directions = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    for law, number in LAWS.items():
+        setting = prepare(vehicles, name, {"contact.creep.model": law})
+        g = np.repeat(np.asarray(ratios, float), len(sizes) * len(directions))
+        creepages = np.tile(np.concatenate([size * directions for size in sizes]), (len(ratios), 1))
+        forces, beside = np.full((len(g), 3), np.nan), np.full((len(g), 3), np.nan)
+        outside = creep_forces(number, setting.model.contact.creep, g, np.zeros(len(g)), creepages, forces)
+        creep_forces(number, setting.model.contact.creep, g * (1.0 + 1e-4), np.zeros(len(g)), creepages, beside)
+        size, power = np.hypot(forces[:, 0], forces[:, 1]), np.sum(forces * creepages, axis=1)
+        scale = np.maximum(np.linalg.norm(creepages, axis=1), 1e-300)
+        jump = np.max(np.abs(beside - forces)[:, :2], initial=0.0) if law != "linear" else 0.0
+        checks = [
+            Check("results that are no numbers", float(np.sum(~np.isfinite(forces))), 0.0, "1", "always a number"),
+            Check("largest force over mu N", float(np.max(size)), 1.0 + TABLE_ERROR, "1", "Coulomb",
+                  known_limit=UNBOUNDED if law == "linear" else ""),
+            Check("largest power gained, over mu N and creepage", float(np.max(power / scale)), TABLE_ERROR, "1",
+                  "friction takes energy", known_limit=NO_SPIN_IN_BOUND if law in ("she", "polach", "fastsim") else ""),
+            Check("step of the force over 1e-4 of a/b", float(jump), tolerance, "1", "continuous at a table's ends"),
+        ]  # fmt: skip
+        condition = f"a/b {min(ratios):g} to {max(ratios):g}, creepages to {max(sizes):g}; {outside} out of range"
+        label = {"vehicle": "one patch", "detection": "none", "integrator": "none"}
+        found += computed("friction", f"law {law} at its ends", condition, label, checks)
+    return found

@@ -1,0 +1,303 @@
+"""Hard cases of the integration: tolerances, steps, Baumgarte's parameters, long runs, restarts."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy.optimize import brentq
+
+from wrcore.analysis_hard_cases import Check, prepare, rows, run, sound
+from wrcore.analysis_stability import LARGEST_REST, straight_ahead
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.constraints import constraint_workspace
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.joint import evaluate_joints
+from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.system import Equations
+from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.simulate import output_times
+
+LARGEST_ERROR = 100.0
+"""Global error over the tolerance (rtol times the start's y) that a run of a second may have."""
+
+STABILITY_MATCH = 0.15
+"""Largest stable step found less the predicted one, of the predicted one: friction bends what is linear."""
+
+SEARCH = 1.04
+"""Factor to which a largest stable step is found."""
+
+DISTURBANCE = 1e-8
+"""Of velocities at the start of a trial, m/s and rad/s: small enough for friction to stay linear at 0.1 m/s."""
+
+GROWTH = 1e3
+"""A trial that drives two runs apart by more than this factor is unstable: hunting alone takes seconds for it."""
+
+UNSTEADY = 5e-4
+"""A trial whose velocities leave steady running by more than this part of the speed is unstable, too: both runs may be
+on one and the same oscillation, which friction bounds at creepages of some 1e-3."""
+
+LONGEST_TRIAL = 1.0
+"""s."""
+
+VIOLATION = 1e-5
+"""Of a joint, m or rad: a tenth of the bushes' play."""
+
+
+def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duration):
+    """Every method from very loose to very tight: it survives, and errors fall with the tolerance.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        vehicle, detection, integrator, rtol, error_m (largest in y), steps, wall_s.
+    """
+    found, curve = [], []
+    for name, detection in product(names, detections):
+        base = {"speed": speed, "contact.detection": detection, "initial.y": 0.002}
+        tight = {"integration.method": "tsit5", "integration.rtol": 1e-11, "integration.atol": 1e-14}
+        exact = run(prepare(vehicles, name, base | tight), duration).states
+        for method, rtol in product(methods, rtols):
+            changes = {"integration.method": method, "integration.rtol": rtol, "integration.atol": 1e-3 * rtol}
+            setting = prepare(vehicles, name, base | changes)
+            trajectory = run(setting, duration)
+            size = STATE_SIZE * int(setting.model.bodies.wheelsets[0]) + 1
+            y, reference = trajectory.states[:, size], exact[: len(trajectory.t), size]
+            error = float(np.max(np.abs(y - reference)))
+            label = {"vehicle": name, "detection": detection, "integrator": method, "rtol": rtol}
+            curve.append(label | {"error_m": error, "steps": trajectory.steps, "wall_s": trajectory.wall_s})
+            limit = LARGEST_ERROR * rtol * max(abs(setting.state[size]), 1e-3 * rtol) + 1e-10
+            checks = [
+                *sound(setting, trajectory)[:1],
+                Check("error of y", error, limit, "m", "100 rtol y(0)"),
+            ]
+            found += rows("integration", "tolerances", f"{speed:g} m/s, rtol {rtol:g}", setting, trajectory, checks)
+    return found, curve
+
+
+def amplification(method, z):
+    """Stability function R(z) of a method: what a step makes of y' = lambda y, z = h lambda, for any array of z."""
+    z = np.asarray(z, complex)
+    if method in EXPLICIT:
+        weights, terms = EXPLICIT[method].stages, []
+        total = np.ones_like(z)
+        for i in range(len(weights)):
+            stage = np.ones_like(z) + sum((z * weights[i, j] * terms[j] for j in range(i)), np.zeros_like(z))
+            terms.append(stage)
+            total = stage  # the last stage is taken at the new state
+        return total
+    table, gamma = ROSENBROCK[method], ROSENBROCK[method].gamma
+    increments = []
+    for i in range(len(table.weights)):
+        inner = 1.0 + sum((table.stages[i, j] * increments[j] for j in range(i)), np.zeros_like(z))
+        right = z * inner + sum((table.couplings[i, j] * increments[j] for j in range(i)), np.zeros_like(z))
+        increments.append(right / (1.0 / gamma - z))
+    return 1.0 + sum(w * u for w, u in zip(table.weights, increments, strict=True))
+
+
+def predicted_step(method, eigenvalues, longest):
+    """Largest fixed step (s) for which a method damps all decaying motions; ``longest`` if none bounds it."""
+    decaying = eigenvalues[eigenvalues.real < -1e-6]
+
+    def excess(step):
+        return float(np.max(np.abs(amplification(method, step * decaying)))) - 1.0
+
+    steps = np.geomspace(1e-8, longest, 400)
+    over = np.flatnonzero([excess(step) > 1e-9 for step in steps])
+    if not over.size:
+        return longest
+    first, last = steps[over[0] - 1], steps[over[0]]
+    return float(brentq(excess, first, last)) if over[0] and excess(first) < 0.0 else float(last)
+
+
+def stability_map(vehicles, names, speeds, methods, longest):
+    """Largest stable fixed step of every method over speed, against that of the linearised motion.
+
+    Parameters
+    ----------
+    vehicles, names
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+    speeds : sequence of float
+        m/s.
+    methods : sequence of str
+    longest : float
+        Steps above this are not tried, s.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        vehicle, integrator, speed_m_per_s, predicted_s, found_s.
+    """
+    found, curve = [], []
+    for name, speed in product(names, speeds):
+        setting = prepare(vehicles, name, {"speed": speed, "initial.y": 0.0})
+        model, state = straight_ahead(setting.scene)
+        values = np.linalg.eigvals(steady_running(model, state).matrix)
+        setting = replace(setting, model=model, state=state)
+        for method in methods:
+            predicted = predicted_step(method, values, longest)
+            largest, trajectory = _largest_step(setting, method, predicted, longest)
+            curve.append({"vehicle": name, "integrator": method, "speed_m_per_s": speed, "predicted_s": predicted,
+                          "found_s": largest})  # fmt: skip
+            off = abs(largest / predicted - 1.0)
+            checks = [Check("largest stable step off the linear one's, of it", off, STABILITY_MATCH + SEARCH - 1.0, "1",
+                            "|R(h lambda)| <= 1 for all eigenvalues of the linearised motion")]  # fmt: skip
+            control = replace(trajectory, method=method)
+            found += rows("integration", "largest stable step", f"{speed:g} m/s", setting, control, checks)
+    return found, curve
+
+
+def _nudged(model, state):
+    """The same with all velocities disturbed."""
+    state = state.copy()
+    for body in range(len(model.bodies.mass)):
+        at = STATE_SIZE * body
+        state[at + 7 : at + 13] += DISTURBANCE * np.array([1.0, 1.0, 0.3, 0.5, 1.0, 0.5])
+    return state
+
+
+def _largest_step(setting, method, guess, longest):
+    """Largest stable step near a guess (s), bracketed by factors and halved on the logarithm; and the run with it."""
+
+    twin = _nudged(setting.model, setting.state)
+
+    def stable(step):
+        times = np.linspace(0.0, int(np.clip(LONGEST_TRIAL / step, 20, 400)) * step, 11)
+        one, other = (integrate(setting.model, state, times, method, step=step) for state in (setting.state, twin))
+        if one.status != "completed" or other.status != "completed":
+            return False, one
+        places = _velocities(setting.model)
+        apart = np.max(np.abs(other.states[-1] - one.states[-1])[places])
+        moved = np.max(np.abs(one.states[-1] - setting.state)[places])
+        still = UNSTEADY * setting.model.speed + LARGEST_REST * times[-1]
+        return bool(apart < GROWTH * DISTURBANCE and moved < still), one
+
+    low, high = guess / 1.5, min(guess * 1.5, longest)
+    fine, best = stable(low)
+    while not fine and low > 1e-9:
+        low, high = low / 2.0, low
+        fine, best = stable(low)
+    if high >= longest:
+        fine, trial = stable(longest)
+        if fine:
+            return longest, trial
+    while high / low > SEARCH:
+        middle = np.sqrt(low * high)
+        fine, trial = stable(middle)
+        if fine:
+            low, best = middle, trial
+        else:
+            high = middle
+    return float(low), best
+
+
+def _velocities(model):
+    """Places of the velocities in the state vector."""
+    return np.concatenate([STATE_SIZE * body + np.arange(7, 13) for body in range(len(model.bodies.mass))])
+
+
+def violations(model, times, states):
+    """Largest violation of the joints' equations over time, m or rad, shape (n,)."""
+    equations, work = Equations(model), constraint_workspace(model.joints)
+    largest = np.zeros(len(times))
+    for i, (t, state) in enumerate(zip(times, states, strict=True)):
+        equations(t, np.ascontiguousarray(state))
+        evaluate_joints(model.joints, t, model.speed, state, equations.work.rotations, work.joints)
+        largest[i] = np.max(np.abs(work.joints.phi))
+    return largest
+
+
+def baumgarte(vehicles, name, pairs, duration, methods):
+    """Joints under Baumgarte's feedback from none to very stiff: drift, and what it costs in steps.
+
+    Parameters
+    ----------
+    vehicles, name
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a vehicle with joints.
+    pairs : sequence of (float, float)
+        alpha and beta, 1/s.
+    duration : float
+        s.
+    methods : sequence of str
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        integrator, alpha_per_s, beta_per_s, violation_m, steps, smallest_step_s, fastest_root_per_s.
+    """
+    found, curve = [], []
+    for method, (alpha, beta) in product(methods, pairs):
+        changes = {"integration.method": method, "integration.baumgarte.alpha": alpha, "initial.y": 0.004}
+        setting = prepare(vehicles, name, changes | {"integration.baumgarte.beta": beta})
+        trajectory = run(setting, duration, 100.0)
+        drift = float(np.max(violations(setting.model, trajectory.t, trajectory.states)))
+        root = float(np.max(np.abs(np.roots([1.0, 2.0 * alpha, beta**2])))) if alpha or beta else 0.0
+        curve.append({"integrator": method, "alpha_per_s": alpha, "beta_per_s": beta, "violation_m": drift,
+                      "steps": trajectory.steps, "smallest_step_s": trajectory.smallest_step,
+                      "fastest_root_per_s": root})  # fmt: skip
+        checks = [
+            *sound(setting, trajectory)[:1],
+            Check("largest violation of a joint", drift, VIOLATION, "m", "1e-5 m, if there is feedback",
+                  known_limit="" if alpha and beta else "without damped feedback errors of joints accumulate"),
+        ]  # fmt: skip
+        found += rows("integration", "Baumgarte", f"alpha {alpha:g}, beta {beta:g} 1/s", setting, trajectory, checks)
+    return found, curve
+
+
+def long_run(vehicles, names, duration, changes, rate, methods):
+    """Long hunting: joints, Euler parameters and the amplitude do not drift.
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    curve : list of dict
+        vehicle, integrator, t_s, violation_m, norm.
+    """
+    found, curve = [], []
+    for name, method in product(names, methods):
+        setting = prepare(vehicles, name, {**changes[name], "integration.method": method})
+        trajectory = run(setting, duration, rate)
+        y = trajectory.states[:, STATE_SIZE * int(setting.model.bodies.wheelsets[0]) + 1]
+        tenth = len(trajectory.t) // 10
+        early, late = np.std(y[tenth : 5 * tenth]), np.std(y[-4 * tenth :])
+        checks = [
+            *sound(setting, trajectory),
+            Check("change of the amplitude of y", abs(late / early - 1.0), 0.01, "1", "a limit cycle is steady: 1 %"),
+        ]
+        drift = np.zeros(len(trajectory.t))
+        if setting.model.joints.equations:
+            drift = violations(setting.model, trajectory.t, trajectory.states)
+            growth = np.max(drift[-tenth:]) / max(np.max(drift[tenth : 2 * tenth]), 1e-12)
+            checks += [
+                Check("largest violation of a joint", float(np.max(drift)), VIOLATION, "m", "1e-5 m"),
+                Check("last over first tenth's violation", float(growth), 2.0, "1", "bounded drift does not grow"),
+            ]
+        found += rows("integration", "long run", f"{duration:g} s of hunting", setting, trajectory, checks)
+        shown = slice(None, None, max(tenth // 20, 1))
+        label = {"vehicle": name, "integrator": trajectory.method}
+        curve += [label | {"t_s": t, "violation_m": d} for t, d in zip(trajectory.t[shown], drift[shown], strict=True)]
+    return found, curve
+
+
+def restarts(vehicles, names, duration, pause, methods, detections):
+    """A run taken up from where it paused is the unbroken one to the bit."""
+    found = []
+    for name, method, detection in product(names, methods, detections):
+        setting = prepare(vehicles, name, {"integration.method": method, "contact.detection": detection})
+        whole = run(setting, duration)
+        first = run(setting, pause)
+        times = output_times(first.end.t, duration - pause, 200.0)
+        control = {key: value for key, value in setting.control.items() if key != "method"}
+        second = integrate(setting.model, first.end, times, **control)
+        both = np.concatenate([first.states, second.states[1:]])
+        same = both.shape == whole.states.shape and bool(np.array_equal(both, whole.states))
+        checks = [Check("numbers that differ", float(not same), 0.0, "1", "same operations in the same order")]
+        condition = f"{pause:g} s of {duration:g} s"
+        found += rows("integration", "restart", condition, setting, replace(whole, status=second.status), checks)
+    return found

@@ -1,0 +1,165 @@
+"""Hard cases of the geometry: worn, kinked, noisy, sparse and truncated wheel profiles."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import Check, contacts, impulse_error, prepare, refused, rows, run, sound
+from wrcore.contact import reduction
+from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.scene import compile_scene
+
+IMPULSE_ERROR = 1e-3
+"""Of the load's impulse: forces sampled at the output rate are integrated to about this."""
+
+HALF_SPACE = 0.1
+"""Largest semi-axis over the rail head's radius for which a patch counts as plane."""
+
+HEAD_RADIUS = 0.3
+"""Of the UIC60's running surface, m (60E1: EN 13674-1)."""
+
+
+def worn(wheel, rail, offset, share, reach):
+    """Ordinates of a wheel profile that is worn towards the rail around the tape circle.
+
+    Parameters
+    ----------
+    wheel, rail : ProfileCurve
+    offset : float
+        Wheel's minus rail's lateral coordinate of the same place in the track, m.
+    share : float
+        Part of the gap between both that wear has closed at the middle.
+    reach : float
+        Distance from the middle at which it ends, m.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        At the wheel's nodes, m.
+    """
+    on_rail = np.clip(wheel.u - offset, rail.u[0], rail.u[-1])
+    gap = wheel.f - np.interp(on_rail, rail.u, rail.f)
+    near = np.abs(wheel.u) < reach
+    window = np.where(near, np.cos(0.5 * np.pi * wheel.u / reach) ** 2, 0.0)
+    return wheel.f - share * window * (gap - np.min(gap[near]))
+
+
+def kinked(wheel, height, place, half_width):
+    """Ordinates of a wheel profile with a ridge (negative height: a groove) of triangular shape, m."""
+    return wheel.f - height * np.clip(1.0 - np.abs(wheel.u - place) / half_width, 0.0, None)
+
+
+def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.inf):
+    """A profile from points of a wheel profile.
+
+    Parameters
+    ----------
+    wheel : ProfileCurve
+    ordinates : numpy.ndarray, shape (n,)
+        At its nodes, m.
+    spacing : float
+        Distance of the points, m.
+    noise : float
+        Standard deviation of errors added to the points' ordinates, m.
+    seed : int
+        Of the errors.
+    smoothing : float
+        Root mean square distance that the curve may keep from the points, m.
+    end : float
+        Points beyond are left out, m.
+
+    Returns
+    -------
+    ProfileCurve
+    """
+    u = np.append(-np.arange(0.0, -wheel.u[0], spacing)[:0:-1], np.arange(0.0, wheel.u[-1], spacing))
+    u = u[u <= end]
+    f = np.interp(u, wheel.u, ordinates) + noise * np.random.default_rng(seed).standard_normal(len(u))
+    return ProfileCurve.from_points(u, f, "wheel", "points of the case", trim=True, smoothing=smoothing)
+
+
+def variants(setting, entries):
+    """Wheel profiles of the cases by name.
+
+    Parameters
+    ----------
+    setting : Setting
+        With the profile they come from.
+    entries : dict of str to dict
+        ``kind`` (worn, kinked or plain), its arguments, and those of :func:`sampled`.
+
+    Returns
+    -------
+    dict of str to callable
+        Each makes a ProfileCurve, or raises InputError.
+    """
+    scene = setting.scene
+    offset = scene.track.rail_distance(scene.rail) - scene.vehicle.half_distance
+
+    def maker(entry):
+        given = dict(entry)
+        kind, shape = given.pop("kind"), given.pop("shape", {})
+        if kind == "worn":
+            ordinates = worn(scene.wheel, scene.rail, offset, **shape)
+        elif kind == "kinked":
+            ordinates = kinked(scene.wheel, **shape)
+        else:
+            ordinates = scene.wheel.f
+        return lambda: sampled(scene.wheel, ordinates, **given)
+
+    return {name: maker(entry) for name, entry in entries.items()}
+
+
+def profiles(vehicles, names, entries, duration, detections, methods):
+    """Vehicles on unusual profiles: an answer that keeps the laws of mechanics, or a refusal.
+
+    Parameters
+    ----------
+    vehicles, names
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+    entries : dict of str to dict
+        As for :func:`variants`.
+    duration : float
+        s.
+    detections, methods : sequence of str
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name in names:
+        for case, make in variants(prepare(vehicles, name), entries).items():
+            for detection, method in product(detections, methods):
+                changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.003}
+                label = {"vehicle": name, "detection": detection, "integrator": method}
+                try:
+                    setting = prepare(vehicles, name, changes, wheel=make())
+                except InputError:
+                    plain = prepare(vehicles, name, changes)
+                    attempt = _attempt(plain, make)
+                    found += refused("profiles", case, "0.003 m off the centre", label, attempt)
+                    continue
+                trajectory = run(setting, duration, 2000.0)
+                checks = [*sound(setting, trajectory), *_profile_checks(setting, trajectory)]
+                condition = f"{setting.model.speed:g} m/s, 0.003 m off the centre"
+                found += rows("profiles", case, condition, setting, trajectory, checks)
+    return found
+
+
+def _attempt(setting, make):
+    return lambda: compile_scene(replace(setting.scene, wheel=make()))
+
+
+def _profile_checks(setting, trajectory):
+    """Newton's law for the vertical motion of all bodies, and the size of the patches."""
+    patches = contacts(setting.model, trajectory.t, trajectory.states)
+    off = impulse_error(setting, trajectory, patches)
+    largest = float(np.nanmax(patches[..., reduction.SEMI_B])) / HEAD_RADIUS
+    return [
+        Check("impulse of the rails less load and momentum, of the load's", off, IMPULSE_ERROR, "1", "Newton's law"),
+        Check("largest semi-axis over the rail head's radius", largest, HALF_SPACE, "1", "half-space theory"),
+    ]

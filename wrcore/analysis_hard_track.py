@@ -1,0 +1,129 @@
+"""Hard cases of the track: irregular rails, and a sharp curve at the speed of its cant and above."""
+
+import math
+from itertools import product
+
+import numpy as np
+
+from wrcore.analysis_hard_cases import Check, contacts, impulse_error, prepare, rows, run, sound, wheel_forces
+from wrcore.dynamics.marker import FRAME
+
+CANT_BASE = 1.5
+"""Distance over which cant is measured, m."""
+
+IMPULSE_ERROR = 2e-3
+"""Of the load's impulse: forces on irregular rails are sampled at the output rate."""
+
+CURVE_ERROR = 5e-3
+"""Of the weight: what swings of the bodies leave of a mean over some seconds."""
+
+
+def balance_speed(radius, cant):
+    """Speed at which a curve's cant takes up all lateral acceleration, m/s."""
+    return math.sqrt(9.81 * abs(radius) * math.tan(math.asin(cant / CANT_BASE)))
+
+
+def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
+    """Vehicles on irregular straight track: they stay on it, and the rails carry the load.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    speeds : dict of str to sequence of float
+        m/s, by vehicle.
+    spectra : sequence of (str, int)
+        Level of the disturbance and seed.
+    length, duration : float
+        Of the irregularity (m), and of the runs (s).
+    methods, detections : sequence of str
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    found = []
+    for name, (level, seed), method, detection in product(speeds, spectra, methods, detections):
+        for speed in speeds[name]:
+            spectrum = {"level": level, "seed": seed, "length": length, "begin": 15.0}
+            changes = {"speed": speed, "integration.method": method, "contact.detection": detection, "initial.y": 0.0}
+            setting = prepare(vehicles, name, changes | {"track.irregularity": {"spectrum": spectrum}})
+            trajectory = run(setting, duration, 2000.0)
+            patches = contacts(setting.model, trajectory.t, trajectory.states)
+            off = impulse_error(setting, trajectory, patches)
+            source = "Newton's law for all bodies"
+            checks = [
+                *sound(setting, trajectory),
+                Check("impulse of the rails less load and momentum, of the load's", off, IMPULSE_ERROR, "1", source),
+            ]
+            condition = f"{speed:g} m/s, level {level}, seed {seed}"
+            found += rows("track", "irregular", condition, setting, trajectory, checks)
+    return found
+
+
+def curve(vehicles, names, radius, cant, lengths, shares, duration, methods, detections):
+    """A curve with transition at the speed that its cant balances, and faster: forces of all wheels on the rails.
+
+    In the track's canted axes the rails carry m (g cos + V^2/R sin) and push with m (V^2/R cos - g sin), the angle
+    being that of the cant.
+
+    Parameters
+    ----------
+    vehicles, names
+        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+    radius, cant : float
+        m.
+    lengths : (float, float, float)
+        Of tangent, transition and curve, m.
+    shares : sequence of float
+        Speeds over the balanced one.
+    duration : float
+        s; the last quarter is looked at.
+    methods, detections : sequence of str
+
+    Returns
+    -------
+    found : list of dict
+        Rows of the table.
+    history : list of dict
+        vehicle, detection, share, t_s, Y_N (lateral force of all wheels), expected_N.
+    """
+    found, history = [], []
+    tangent, transition, length = lengths
+    path = [{"tangent": tangent}, {"transition": transition}, {"curve": length, "radius": radius, "cant": cant}]
+    for name, share, method, detection in product(names, shares, methods, detections):
+        speed = share * balance_speed(radius, cant)
+        changes = {"speed": speed, "integration.method": method, "contact.detection": detection, "initial.y": 0.0}
+        setting = prepare(vehicles, name, changes | {"track.path": path})
+        trajectory = run(setting, duration)
+        vertical, lateral = wheel_forces(contacts(setting.model, trajectory.t, trajectory.states))
+        vertical, lateral = np.sum(vertical, axis=(1, 2)), np.sum(lateral, axis=(1, 2))
+        checks, expected = _in_curve(setting, trajectory, vertical, lateral, radius, cant)
+        condition = f"R {radius:g} m, cant {1e3 * cant:g} mm, {speed:.1f} m/s ({share:g} of balance)"
+        found += rows("track", "curve", condition, setting, trajectory, [*sound(setting, trajectory), *checks])
+        label = {"vehicle": name, "detection": detection, "integrator": trajectory.method, "share": share}
+        history += [label | {"t_s": t, "Y_N": y, "expected_N": expected}
+                    for t, y in zip(trajectory.t[::10], lateral[::10], strict=True)]  # fmt: skip
+    return found, history
+
+
+def _in_curve(setting, trajectory, vertical, lateral, radius, cant):
+    """Checks of the forces in the curve, and the expected lateral force on the rails, N."""
+    elements, mass = setting.model.elements, float(np.sum(setting.model.bodies.mass))
+    held = np.flatnonzero(elements.pairs[:, 1] == FRAME)
+    springs = [k for p in held for k in range(elements.first_spring[p], elements.first_spring[p + 1])]
+    angle, push = math.asin(cant / CANT_BASE), setting.model.speed**2 / radius
+    gravity, weight = setting.model.gravity, mass * setting.model.gravity
+    load = mass * (gravity * math.cos(angle) + push * math.sin(angle)) - elements.springs[springs, 14].sum()
+    sideways = -mass * (push * math.cos(angle) - gravity * math.sin(angle))
+    late = trajectory.t >= 0.75 * trajectory.t[-1]
+    checks = [
+        Check("vertical force less m (g cos + V^2/R sin), of the weight",
+              abs(float(np.mean(vertical[late])) - load) / weight, CURVE_ERROR, "1", "Newton's law in the curve"),
+    ]  # fmt: skip
+    if not np.any(elements.springs[springs, 7]):  # nothing but the rails holds the vehicle sideways
+        off = abs(float(np.mean(lateral[late])) - sideways) / weight
+        source = "Newton's law in the curve"
+        checks.append(Check("lateral force less m (V^2/R cos - g sin), of the weight", off, CURVE_ERROR, "1", source))
+    return checks, sideways
