@@ -32,7 +32,7 @@ lint: $(STAMP)
 	$(BIN)/mypy
 
 bench: $(STAMP)
-	@for script in bench/*.py; do echo "$$script"; $(BIN)/python "$$script" || exit 1; done
+	$(SNAKEMAKE) --forcerun cost_pairs cost_growth cost_stages cost_runs -- cost_study
 
 clean:
 	rm -rf results logs benchmarks .snakemake

@@ -104,6 +104,7 @@ rule study:
         rules.ivp_study.input,
         rules.speeds_study.input,
         rules.speed_against_error.output,
+        rules.cost_study.input,
 
 
 rule report_archive:

@@ -1,0 +1,79 @@
+"""The benchmarks: what they compare, and orders of magnitude that no load of the machine hides."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.cost import pairs
+from wrcore.cost.chains import over_chains
+from wrcore.cost.runs import batch_table, rejection_table
+from wrcore.scene import compile_scene, load_scene
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene(SCENES / "suspended_wheelset.yaml", ["speed=60", "integration.duration=0.3"])
+
+
+def by_contender(rows):
+    return {row["contender"]: row for row in rows}
+
+
+def test_scipy_is_slower_at_the_same_error(scene):
+    rows = by_contender(pairs.engine_against_scipy("wheelset", scene, 1e-4, [1e-3, 1e-4, 1e-5, 1e-6], 1))
+    assert list(rows) == ["compiled", "scipy"]
+    assert 0.0 < rows["compiled"]["error_m"] == rows["scipy"]["error_m"] < 1e-7
+    assert rows["scipy"]["ratio"] > 3.0
+    assert rows["scipy"]["bar"] == "ratio at least 8"
+
+
+def test_a_ladder_beside_the_error_is_refused(scene):
+    with pytest.raises(ValueError, match="ladder: expected errors around"):
+        pairs.engine_against_scipy("wheelset", scene, 1e-4, [1e-10, 1e-11], 1)
+
+
+def test_plain_equations_are_hundreds_of_times_slower(scene):
+    rows = pairs.compiled_against_plain(scene, states=2, duration=0.002, passes=1)
+    assert [row["of"] for row in rows] == ["evaluation"] * 2 + ["run"] * 2
+    assert rows[1]["ratio"] > 100.0
+    assert rows[3]["ratio"] > 30.0
+
+
+def test_fastsim_costs_more_than_formulas(scene):
+    laws = ("she", "fastsim")
+    scenes = {law: load_scene(SCENES / "suspended_wheelset.yaml", [f"contact.creep.model={law}"]) for law in laws}
+    rows = by_contender(pairs.right_hand_sides("creep law", scenes, 3, 1))
+    assert rows["fastsim"]["ratio"] > 3.0
+    assert rows["fastsim"]["excess"] == pytest.approx(rows["fastsim"]["time"] - rows["she"]["time"])
+
+
+def test_planar_and_spatial_runs_are_timed_in_turn(scene):
+    rows = by_contender(pairs.planar_against_spatial("wheelset", scene, 2))
+    assert list(rows) == ["spatial", "planar"]
+    assert 0.1 < rows["planar"]["ratio"] < 10.0
+
+
+def test_chains_grow_no_faster_than_their_length(scene):
+    model, _ = compile_scene(scene)
+    table = over_chains(model, [4, 32], 3)
+    assert list(table["joint"]) == ["spherical"] * 2 + ["revolute"] * 2
+    for _, part in table.groupby("joint"):
+        short, long = part["evaluation_ns_per_bar"]
+        assert long < 2.0 * short  # a dense solver's cost per bar would grow by 64
+
+
+def test_parts_of_a_batch_make_up_the_whole():
+    table = batch_table(SCENES / "suspended_wheelset.yaml", ["integration.duration=0.1"], [20.0, 40.0], 1)
+    share = dict(zip(table["part"], table["share"], strict=True))
+    parts = [share[name] for name in ("integration", "reading scenes", "compiling scenes, output")]
+    assert share["whole batch"] == 1.0
+    assert sum(parts) == pytest.approx(1.0, abs=1e-9)
+    assert min(parts) > 0.0
+    assert any(name.startswith("profiled: ") for name in share)
+
+
+def test_rejected_steps_are_shares_of_all_attempts(scene):
+    table = rejection_table({"wheelset": scene}, ["tsit5", "rk23"], [1e-3])
+    assert list(table["method"]) == ["tsit5", "rk23"]
+    np.testing.assert_allclose(table["share"], table["rejected"] / (table["steps"] + table["rejected"]))
+    assert (table["smooth"] == (table["share"] <= 0.1)).all()

@@ -1,0 +1,187 @@
+# What things cost: pairs timed in turn, stages of one evaluation, growth, batches, rejected steps.
+
+COST = config["cost_study"]
+CORE["cost"] = CORE["simulation"] + sources("plain", "cost")
+COST_SCENES = {name: (entry["title"], entry["scene"], changes(entry["set"])) for name, entry in COST["scenes"].items()}
+
+
+rule cost_pairs:
+    message:
+        "Benchmarks: pairs in turn, nothing beside them"
+    input:
+        core=CORE["cost"],
+        scenes=SCENES,
+    output:
+        pairs=report(
+            "<results>/tables/benchmarks.csv",
+            caption="../report/benchmarks.rst",
+            category="Cost",
+            labels={"table": "benchmarks"},
+        ),
+        machine=report(
+            "<results>/tables/benchmark_machine.csv",
+            caption="../report/benchmark_machine.rst",
+            category="Cost",
+            labels={"table": "machine"},
+        ),
+    log:
+        "<logs>/cost_pairs.log",
+    benchmark:
+        "<benchmarks>/cost_pairs.tsv"
+    params:
+        scenes=COST_SCENES,
+        settings=COST["pairs"],
+    # all cores: nothing else may run beside what is timed
+    threads: workflow.cores
+    script:
+        "../scripts/cost_pairs.py"
+
+
+rule cost_growth:
+    message:
+        "Cost over wheelsets, duration, tolerance, simultaneous scenes"
+    input:
+        core=CORE["cost"],
+        scenes=SCENES,
+    output:
+        wheelsets=report(
+            "<results>/tables/growth_wheelsets.csv",
+            caption="../report/growth_wheelsets.rst",
+            category="Cost",
+            labels={"table": "growth with wheelsets"},
+        ),
+        runs=report(
+            "<results>/tables/growth_runs.csv",
+            caption="../report/growth_runs.rst",
+            category="Cost",
+            labels={"table": "growth with duration and tolerance"},
+        ),
+        simultaneous=report(
+            "<results>/tables/growth_scenes.csv",
+            caption="../report/growth_scenes.rst",
+            category="Cost",
+            labels={"table": "scenes at the same time"},
+        ),
+        chains=report(
+            "<results>/tables/growth_chains.csv",
+            caption="../report/growth_chains.rst",
+            category="Cost",
+            labels={"table": "growth with joints"},
+        ),
+        findings=report(
+            "<results>/tables/growth_memory.csv",
+            caption="../report/growth_memory.rst",
+            category="Cost",
+            labels={"table": "arithmetic or memory"},
+        ),
+    log:
+        "<logs>/cost_growth.log",
+    benchmark:
+        "<benchmarks>/cost_growth.tsv"
+    params:
+        scenes=COST_SCENES,
+        settings=COST["growth"],
+    threads: workflow.cores
+    script:
+        "../scripts/cost_growth.py"
+
+
+rule fig_growth:
+    message:
+        "Figure: growth of cost"
+    input:
+        core=CORE["cost"] + sources("figures", "figures_cost"),
+        wheelsets=rules.cost_growth.output.wheelsets,
+        runs=rules.cost_growth.output.runs,
+        simultaneous=rules.cost_growth.output.simultaneous,
+    output:
+        png=report(
+            "<results>/figures/growth.png",
+            caption="../report/growth.rst",
+            category="Cost",
+            labels={"figure": "growth"},
+        ),
+        svg="<results>/figures/growth.svg",
+    log:
+        "<logs>/fig_growth.log",
+    script:
+        "../scripts/fig_growth.py"
+
+
+rule cost_stages:
+    message:
+        "Time, operations and bytes of one right-hand side by stage"
+    input:
+        core=CORE["cost"] + sources("figures", "figures_cost"),
+        scenes=SCENES,
+    output:
+        stages=report(
+            "<results>/tables/cost_breakdown.csv",
+            caption="../report/cost_breakdown.rst",
+            category="Cost",
+            labels={"table": "stages of a right-hand side"},
+        ),
+        limits=report(
+            "<results>/tables/machine_limits.csv",
+            caption="../report/machine_limits.rst",
+            category="Cost",
+            labels={"table": "limits of the machine"},
+        ),
+        png=report(
+            "<results>/figures/cost_breakdown.png",
+            caption="../report/cost_breakdown.rst",
+            category="Cost",
+            labels={"figure": "stages of a right-hand side"},
+        ),
+        svg="<results>/figures/cost_breakdown.svg",
+    log:
+        "<logs>/cost_stages.log",
+    benchmark:
+        "<benchmarks>/cost_stages.tsv"
+    params:
+        scenes=COST_SCENES,
+        settings=COST["stages"],
+    threads: workflow.cores
+    script:
+        "../scripts/cost_stages.py"
+
+
+rule cost_runs:
+    message:
+        "Batch of runs, rejected steps"
+    input:
+        core=CORE["cost"],
+        scenes=SCENES,
+    output:
+        batch=report(
+            "<results>/tables/batch.csv",
+            caption="../report/batch.rst",
+            category="Cost",
+            labels={"table": "a batch in one process"},
+        ),
+        rejections=report(
+            "<results>/tables/rejected_steps.csv",
+            caption="../report/rejected_steps.rst",
+            category="Cost",
+            labels={"table": "rejected steps"},
+        ),
+    log:
+        "<logs>/cost_runs.log",
+    benchmark:
+        "<benchmarks>/cost_runs.tsv"
+    params:
+        scenes=COST_SCENES,
+        batch=COST["batch"],
+        rejections=COST["rejections"],
+    threads: workflow.cores
+    script:
+        "../scripts/cost_runs.py"
+
+
+rule cost_study:
+    input:
+        rules.cost_pairs.output,
+        rules.cost_growth.output,
+        rules.fig_growth.output,
+        rules.cost_stages.output,
+        rules.cost_runs.output,

@@ -1,0 +1,21 @@
+"""Time, operations and bytes of one right-hand side by stage, and what the machine could do at best."""
+
+import sys
+
+import pandas as pd
+
+from wrcore.cost.stages import breakdown, limits, with_limits
+from wrcore.figures import save_figure
+from wrcore.figures_cost import fig_breakdown
+from wrcore.scene import load_scene
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+settings, output = snakemake.params.settings, snakemake.output
+found = limits(settings["size"]["passes"])
+chosen = map(snakemake.params.scenes.get, settings["scenes"])
+tables = [breakdown(title, load_scene(path, changes), **settings["size"]) for title, path, changes in chosen]
+table = with_limits(tables, found)
+table.to_csv(output.stages, index=False)
+pd.DataFrame([found]).to_csv(output.limits, index=False)
+save_figure(fig_breakdown(table), output.png, output.svg)
+print(found, table.to_string())

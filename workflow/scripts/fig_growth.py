@@ -1,0 +1,13 @@
+"""Cost over wheelsets, duration, tolerance and simultaneous scenes."""
+
+import sys
+
+import pandas as pd
+
+from wrcore.figures import save_figure
+from wrcore.figures_cost import fig_growth
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+given = snakemake.input
+figure = fig_growth(*(pd.read_csv(path) for path in (given.wheelsets, given.runs, given.simultaneous)))
+save_figure(figure, snakemake.output.png, snakemake.output.svg)

@@ -1,0 +1,76 @@
+"""Cost of joints alone: chains of bars of growing length, without contact and force elements."""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.cost.recorded import Recorded, evaluation
+from wrcore.cost.timing import summary, take_turns
+from wrcore.dynamics.body import euler_parameters
+from wrcore.dynamics.joint import Joint, build_joints
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.suspension import pack_elements
+from wrcore.dynamics.system import Bodies
+
+STATES = 16
+
+
+def chain(base, n, kind):
+    """Bars that hang one below the other from the moving frame.
+
+    Parameters
+    ----------
+    base : Model
+        Any model; bodies, elements and joints are replaced.
+    n : int
+        Bars.
+    kind : {"spherical", "revolute"}
+        Of the joints.
+
+    Returns
+    -------
+    Recorded
+        With states near the hanging position, rotations and velocities at random.
+    """
+    spins = np.zeros(n, np.int64)
+    bodies = Bodies(np.ones(n), np.full((n, 3), 0.1), spins, np.zeros(0, np.int64))
+    joints = [
+        Joint(str(k), kind, (k, k - 1 if k else FRAME), [[0, 0, 0.5], [0, 0, -0.5 if k else 0.0]], axis=1)
+        for k in range(n)
+    ]
+    model = base._replace(bodies=bodies, elements=pack_elements(), joints=build_joints(joints, spins))
+    rng, states = np.random.default_rng(0), []
+    for _ in range(STATES):
+        parts = [
+            [*(1e-3 * rng.normal(size=3) + [0.0, 0.0, -0.5 - k]), *euler_parameters(*0.01 * rng.normal(size=3)),
+             20.0, *0.1 * rng.normal(size=5)]
+            for k in range(n)
+        ]  # fmt: skip
+        states.append(np.concatenate(parts))
+    return Recorded(model, np.array(states))
+
+
+def over_chains(base, lengths, passes):
+    """Time of a right-hand side over the length of a chain.
+
+    Parameters
+    ----------
+    base : Model
+    lengths : sequence of int
+        Bars.
+    passes : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        Joint, bars, nanoseconds per evaluation (median and quartiles) and per bar.
+    """
+    kinds = [(kind, n) for kind in ("spherical", "revolute") for n in lengths]
+    found = [chain(base, n, kind) for kind, n in kinds]
+    seconds = take_turns([evaluation("", each) for each in found], passes)
+    rows = []
+    for (kind, n), timed in zip(kinds, summary("", "", kinds, seconds, "ns"), strict=True):
+        row = {"joint": kind, "bars": n} | {
+            f"evaluation_ns{part}": timed[f"time{part}"] for part in ("", "_low", "_high")
+        }
+        rows.append(row | {"evaluation_ns_per_bar": timed["time"] / n})
+    return pd.DataFrame(rows)

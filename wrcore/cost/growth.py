@@ -1,0 +1,215 @@
+"""How cost grows: with wheelsets, duration, tolerance, and scenes at the same time."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from wrcore.cost.recorded import evaluation, record
+from wrcore.cost.timing import Contender, summary, take_turns
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.system import workspace
+from wrcore.scene import compile_scene, load_scene
+from wrcore.simulate import output_times, simulate_many
+
+BEYOND_ARITHMETIC = 1.25
+"""Time per evaluation and wheelset, over its least value, from which on something else than arithmetic is paid for."""
+
+
+def array_bytes(part):
+    """Bytes of all arrays in a tuple of arrays, tuples and numbers; an array that occurs twice counts once."""
+    found = {}
+
+    def collect(item):
+        if isinstance(item, np.ndarray):
+            found[item.__array_interface__["data"][0]] = item.nbytes
+        elif isinstance(item, tuple):
+            for inner in item:
+                collect(inner)
+
+    collect(part)
+    return sum(found.values())
+
+
+def cache_sizes():
+    """Sizes of the first core's data caches, bytes, by name (L1, L2, L3); empty where the system does not say."""
+    sizes = {}
+    for folder in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        if (folder / "type").read_text().strip() != "Instruction":
+            size = (folder / "size").read_text().strip()
+            sizes["L" + (folder / "level").read_text().strip()] = int(size.rstrip("K")) * 1024
+    return sizes
+
+
+def over_wheelsets(title, source, overrides, *, spacing, counts, duration, states, passes):
+    """Time of a right-hand side and of a run over the length of a train.
+
+    Parameters
+    ----------
+    title : str
+    source, overrides
+        Scene of one vehicle on tangent, perfect track, as for :func:`wrcore.scene.load_scene`.
+    spacing : float
+        Between vehicles, m.
+    counts : sequence of int
+        Vehicles.
+    duration : float
+        Of the runs, s.
+    states : int
+        States of a run at which the right-hand side is evaluated.
+    passes : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per train: bodies, wheelsets; microseconds per evaluation of the right-hand side and, in a run, per
+        evaluation with all that the integration adds, each with quartiles and per wheelset; real-time factor; bytes of
+        what belongs to each wheelset or body (``own_bytes``) and of what all share (``shared_bytes``).
+    """
+    recorded, runs, rows = [], [], []
+    for count in counts:
+        train = [f"vehicle.count={count}", f"vehicle.spacing={spacing}", f"integration.duration={duration}"]
+        scene = load_scene(source, [*overrides, *train])
+        found = record(scene, duration, states)
+        start = compile_scene(scene)[1]
+        run = _run(found.model, start, scene.data["integration"], output_times(0.0, duration, 200.0))
+        recorded.append(evaluation("", found))
+        trajectory = run()
+        runs.append(Contender("", run, trajectory.rhs_evaluations))
+        wheelsets = len(found.model.bodies.wheelsets)
+        facts = {"scene": title, "vehicles": count, "bodies": len(found.model.bodies.mass), "wheelsets": wheelsets}
+        facts |= {"evaluations_per_s": trajectory.rhs_evaluations / duration} | _bytes(found.model, trajectory)
+        rows.append(facts | {"real_time_factor": np.nan, "duration_s": duration})
+    for name, contenders in (("evaluation", recorded), ("run", runs)):
+        for row, timed in zip(rows, summary("", "", counts, take_turns(contenders, passes)), strict=True):
+            row |= {f"{name}_us{part}": timed[f"time{part}"] for part in ("", "_low", "_high")}
+            row[f"{name}_us_per_wheelset"] = timed["time"] / row["wheelsets"]
+    for row in rows:
+        row["real_time_factor"] = 1e6 / (row["evaluations_per_s"] * row["run_us"])
+    return pd.DataFrame(rows)
+
+
+def _run(model, start, settings, times):
+    return lambda: integrate(model, start, times, settings["method"], settings["rtol"], settings["atol"])
+
+
+def _bytes(model, trajectory):
+    """What all wheelsets share in an evaluation, and what bodies and wheelsets have of their own in a run."""
+    shared = array_bytes(model.contact)
+    own = array_bytes((model, workspace(model), trajectory.end.memory)) - shared
+    return {"own_bytes": own, "shared_bytes": shared}
+
+
+def over_runs(title, source, overrides, *, durations, tolerances, passes):
+    """Time of runs over their duration, and over their tolerance.
+
+    Parameters
+    ----------
+    title, source, overrides
+        As for :func:`over_wheelsets`.
+    durations : sequence of float
+        s.
+    tolerances : sequence of float
+        Relative; absolute ones are a thousandth of them.
+    passes : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per run: what is varied and its value, evaluations, steps, rejected steps, milliseconds, microseconds per
+        evaluation, real-time factor.
+    """
+    scene = load_scene(source, overrides)
+    model, start = compile_scene(scene)
+    settings = scene.data["integration"]
+    varied = [("duration_s", d, {"duration": d}) for d in durations]
+    varied += [("rtol", r, {"rtol": r, "atol": 1e-3 * r}) for r in tolerances]
+    contenders, rows = [], []
+    for name, value, change in varied:
+        changed = {**settings, **change}
+        run = _run(model, start, changed, output_times(0.0, changed["duration"], 200.0))
+        trajectory = run()
+        row = {"scene": title, "varied": name, "value": value, "simulated_s": changed["duration"]}
+        rows.append(row | {key: getattr(trajectory, key) for key in ("rhs_evaluations", "steps", "rejected")})
+        contenders.append(Contender(f"{name} {value:g}", run))
+    labels = [contender.label for contender in contenders]
+    for row, timed in zip(rows, summary("", "", labels, take_turns(contenders, passes), "ms"), strict=True):
+        row |= {f"run_ms{part}": timed[f"time{part}"] for part in ("", "_low", "_high")}
+        row["us_per_evaluation"] = 1e3 * row["run_ms"] / row["rhs_evaluations"]
+        row["real_time_factor"] = 1e3 * row["simulated_s"] / row["run_ms"]
+    return pd.DataFrame(rows)
+
+
+def over_scenes(title, source, overrides, *, counts, threads, passes):
+    """Time of several scenes in one process, one after the other and at the same time.
+
+    Parameters
+    ----------
+    title, source, overrides
+        As for :func:`over_wheelsets`; the scenes differ in speed.
+    counts, threads : sequence of int
+        Scenes, and how many run at a time.
+    passes : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per number of scenes and threads: milliseconds by the wall per scene with quartiles, how many times faster
+        than one at a time, and whether all results were those of single runs to the bit.
+    """
+    scenes = [load_scene(source, [*overrides, f"speed={speed:g}"]) for speed in np.linspace(30.0, 55.0, max(counts))]
+    alone = [simulate_many([scene], progress=False)[0] for scene in scenes]
+    rows = []
+    for count in counts:
+        results = {}
+
+        def together(at_once, count=count, results=results):
+            results[at_once] = simulate_many(scenes[:count], progress=False, threads=at_once)
+
+        contenders = [Contender(n, lambda n=n, together=together: together(n), count) for n in threads]
+        timed = summary("", "", threads, take_turns(contenders, passes, time.perf_counter), "ms")
+        for at_once, found in zip(threads, timed, strict=True):
+            row = {"scene": title, "scenes": count, "threads": at_once, "faster": 1.0 / found["ratio"]}
+            row |= {f"scene_ms{part}": found[f"time{part}"] for part in ("", "_low", "_high")}
+            same = all(identical(*pair) for pair in zip(results[at_once], alone[:count], strict=True))
+            rows.append(row | {"identical": same})
+    return pd.DataFrame(rows)
+
+
+def identical(run, other):
+    """Whether two runs have the same status and the same numbers, to the bit, in all channels."""
+    if run.status != other.status or run.groups.keys() != other.groups.keys():
+        return False
+    pairs = [(run.groups[g][c], other.groups[g][c]) for g in run.groups for c in run.groups[g]]
+    return all(np.array_equal(one, two, equal_nan=True) for one, two in [(run.t, other.t), *pairs])
+
+
+def findings(wheelsets, caches):
+    """From which train on time per evaluation is more than arithmetic, in words, a row per scene.
+
+    Parameters
+    ----------
+    wheelsets : pandas.DataFrame
+        From :func:`over_wheelsets`, several scenes.
+    caches : dict of str to int
+        From :func:`cache_sizes`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        scene, range of time per evaluation and wheelset (us), the smallest train above ``BEYOND_ARITHMETIC`` times the
+        least, bytes of the longest train with what it shares, and the smallest cache that holds them.
+    """
+    rows = []
+    for scene, part in wheelsets.groupby("scene", sort=False):
+        each = part["evaluation_us_per_wheelset"]
+        slow = part[each > BEYOND_ARITHMETIC * each.min()]
+        total = int((part["own_bytes"] + part["shared_bytes"]).iloc[-1])
+        holds = [name for name, size in caches.items() if size >= total]
+        rows.append({
+            "scene": scene, "least_us_per_wheelset": each.min(), "most_us_per_wheelset": each.max(),
+            "wheelsets_beyond_arithmetic": int(slow["wheelsets"].min()) if len(slow) else "none",
+            "longest_train_bytes": total, "held_by": holds[0] if holds else "memory",
+        })  # fmt: skip
+    return pd.DataFrame(rows)

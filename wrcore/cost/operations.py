@@ -1,0 +1,285 @@
+"""Operations and bytes of one right-hand side, counted: the kernels' own source is run by Python on numbers that count.
+
+Compiled kernels are replaced by the functions they were made from for as long as the count lasts, and the vector
+registers of :mod:`wrcore._lanes` by arrays of eight numbers.
+"""
+
+import math
+import sys
+from collections import Counter
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from wrcore.dynamics.system import workspace
+
+STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
+"""In the order in which they are added up."""
+
+QUANTITIES = ("flops", "divisions", "roots", "functions", "bytes")
+
+WHERE = {
+    ("wrcore.dynamics.system", "element_forces"): "suspension",
+    ("wrcore.dynamics.system", "add_reactions"): "joints",
+    ("wrcore.dynamics.system", "_add_rail_wrenches"): "rest",
+    ("wrcore.dynamics.wheel", "find_patches"): "patch",
+    ("wrcore.contact.detection", "make_pose"): "search",
+    ("wrcore.contact.detection", "make_window"): "search",
+    ("wrcore.contact.detection", "near_blocks"): "search",
+    ("wrcore.contact.detection", "scan"): "search",
+    ("wrcore.dynamics.wheel", "creepages"): "Hertz",
+    ("wrcore.dynamics.wheel", "_normal_contact"): "Hertz",
+    ("wrcore.dynamics.wheel", "creep_force_at"): "creep",
+}
+"""Stage that begins with a function, by the module that calls it and its name there; all else belongs to the caller."""
+
+
+class Tally:
+    """Counts by stage and quantity, and the stages under way."""
+
+    def __init__(self):
+        self.counts, self.stages = Counter(), ["bodies"]
+
+    def add(self, quantity, number=1):
+        self.counts[self.stages[-1], quantity] += number
+
+    def within(self, stage, function):
+        """The function, with its operations counted for a stage."""
+
+        def counted(*arguments):
+            self.stages.append(stage)
+            try:
+                return function(*arguments)
+            finally:
+                self.stages.pop()
+
+        return counted
+
+
+def _binary(name, quantity):
+    operation = getattr(np.float64, name)
+
+    def apply(self, other):
+        if isinstance(other, np.ndarray):  # lane by lane, from the array's side
+            return NotImplemented
+        self.tally.add(quantity)
+        return Number(operation(self.value, np.float64(getattr(other, "value", other))), self.tally)
+
+    return apply
+
+
+class Number:
+    """A float64 that counts what is done with it."""
+
+    __slots__ = ("value", "tally")
+
+    def __init__(self, value, tally):
+        self.value, self.tally = np.float64(value), tally
+
+    __add__, __radd__ = _binary("__add__", "flops"), _binary("__radd__", "flops")
+    __sub__, __rsub__ = _binary("__sub__", "flops"), _binary("__rsub__", "flops")
+    __mul__, __rmul__ = _binary("__mul__", "flops"), _binary("__rmul__", "flops")
+    __truediv__, __rtruediv__ = _binary("__truediv__", "divisions"), _binary("__rtruediv__", "divisions")
+    __pow__ = _binary("__pow__", "functions")
+
+    def __neg__(self):
+        return Number(-self.value, self.tally)
+
+    def __pos__(self):
+        return self
+
+    def __abs__(self):
+        return Number(abs(self.value), self.tally)
+
+    def __float__(self):
+        return float(self.value)
+
+    def __int__(self):
+        return int(self.value)
+
+    __trunc__ = __int__
+
+    def __floor__(self):
+        return math.floor(self.value)
+
+    def __lt__(self, other):
+        return self.value < getattr(other, "value", other)
+
+    def __le__(self, other):
+        return self.value <= getattr(other, "value", other)
+
+    def __gt__(self, other):
+        return self.value > getattr(other, "value", other)
+
+    def __ge__(self, other):
+        return self.value >= getattr(other, "value", other)
+
+    def __eq__(self, other):
+        return self.value == getattr(other, "value", other)
+
+    __hash__ = None
+
+    def _function(self, name, quantity="functions"):
+        self.tally.add(quantity)
+        return Number(getattr(np, name)(self.value), self.tally)
+
+    def sqrt(self):
+        return self._function("sqrt", "roots")
+
+    def log(self):
+        return self._function("log")
+
+    def exp(self):
+        return self._function("exp")
+
+    def arctan(self):
+        return self._function("arctan")
+
+
+class Numbers(np.ndarray):
+    """An array of numbers that count; reading or writing one of them counts its bytes."""
+
+    def __array_finalize__(self, other):
+        self.tally, self.size_of_one = getattr(other, "tally", None), getattr(other, "size_of_one", 8)
+
+    def __getitem__(self, key):
+        found = super().__getitem__(key)
+        if isinstance(found, Number):
+            self.tally.add("bytes", self.size_of_one)
+        return found
+
+    def __setitem__(self, key, value):
+        places = super().__getitem__(key)
+        self.tally.add("bytes", self.size_of_one * (places.size if isinstance(places, np.ndarray) else 1))
+        whole = isinstance(value, np.ndarray | Number)
+        super().__setitem__(key, value if whole else Number(value, self.tally))
+
+
+def counting(part, tally):
+    """A tuple of arrays, tuples and numbers with all its floating-point numbers counting."""
+    if isinstance(part, tuple):
+        return type(part)(*(counting(item, tally) for item in part))
+    if isinstance(part, np.ndarray) and part.dtype.kind == "f":
+        numbers = np.empty(part.shape, object)
+        numbers[...] = np.frompyfunc(lambda value: Number(value, tally), 1, 1)(part)
+        numbers = numbers.view(Numbers)
+        numbers.tally, numbers.size_of_one = tally, part.dtype.itemsize
+        return numbers
+    return Number(part, tally) if isinstance(part, float) else part
+
+
+def _mathematics(tally):
+    """Stands in for ``math``: functions of numbers that count."""
+
+    def counted(name):
+        plain, quantity = getattr(math, name), "roots" if name == "sqrt" else "functions"
+
+        def function(x, *more):
+            if not isinstance(x, Number):
+                return plain(x, *map(float, more))
+            tally.add(quantity)
+            return Number(plain(float(x), *map(float, more)), tally)
+
+        return function
+
+    names = ("sqrt", "log", "exp", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh")
+    plain = {name: getattr(math, name) for name in ("floor", "ceil", "pi", "inf", "nan")}
+    plain["isfinite"] = lambda x: math.isfinite(float(x))
+    plain["copysign"] = lambda x, y: Number(math.copysign(float(x), float(y)), tally)
+    return SimpleNamespace(**plain, **{name: counted(name) for name in names})
+
+
+def _registers(tally):
+    """Stand-ins for :mod:`wrcore._lanes`, by name: lanes are arrays of numbers that count one by one."""
+
+    def load(rows, start, count):
+        tally.add("bytes", rows.size_of_one * count)
+        return np.array(rows.view(np.ndarray)[int(start) : int(start) + count])
+
+    def below(lanes, limit):
+        return sum(1 << k for k, (one, other) in enumerate(zip(lanes, limit, strict=True)) if one < other)
+
+    def where_below(lanes, limit, value, other):
+        chosen = [v if a < b else o for a, b, v, o in zip(lanes, limit, value, other, strict=True)]
+        return np.array(chosen, object)
+
+    def total(lanes):
+        return sum(lanes[1:], start=lanes[0])
+
+    return {
+        "load8": lambda rows, row, start: load(rows[int(row)], start, 8),
+        "load4": lambda values, start: load(values, start, 4),
+        "lanes8": lambda number: np.full(8, number, object),
+        "ramp8": lambda: np.array([Number(k, tally) for k in range(8)], object),
+        "lane": lambda lanes, k: lanes[int(k)],
+        "total": total,
+        "greatest": max,
+        "below": below,
+        "where_below": where_below,
+        "count_bits": lambda bits: int(bits).bit_count(),
+        "lowest_bit": lambda bits: (int(bits) & -int(bits)).bit_length() - 1 if bits else 64,
+        "highest_bit": lambda bits: int(bits).bit_length() - 1,
+    }
+
+
+@contextmanager
+def interpreted(tally):
+    """Kernels run by Python, their stages told apart, until the block ends."""
+    registers, mathematics, before = _registers(tally), _mathematics(tally), []
+    modules = [
+        m for name, m in sys.modules.items() if name.startswith("wrcore.") and not name.startswith("wrcore.cost")
+    ]
+    for module in modules:
+        for name, value in list(vars(module).items()):
+            new = value
+            if isinstance(value, Dispatcher):
+                new = value.py_func
+            elif value is math:
+                new = mathematics
+            elif name in registers and getattr(value, "__module__", "") == "wrcore._lanes":
+                new = registers[name]
+            elif name == "rarely_called":
+                new = lambda: None  # noqa: E731
+            if (module.__name__, name) in WHERE:
+                new = tally.within(WHERE[module.__name__, name], new)
+            if new is not value:
+                before.append((module, name, value))
+                setattr(module, name, new)
+    try:
+        yield
+    finally:
+        for module, name, value in before:
+            setattr(module, name, value)
+
+
+def count_operations(recorded, states=20):
+    """Operations and bytes of one right-hand side, on average over some states.
+
+    Parameters
+    ----------
+    recorded : Recorded
+    states : int
+        Spread over those of the run.
+
+    Returns
+    -------
+    dict of str to dict
+        By stage, and for the ``whole``: floating-point sums and products (a fused one counts two), divisions, square
+        roots, other functions, and bytes of floating-point numbers read from and written to arrays.
+    """
+    chosen = recorded.states[:: max(1, len(recorded.states) // states)]
+    tally = Tally()
+    model, work = counting(recorded.model, tally), counting(workspace(recorded.model), tally)
+    with interpreted(tally), np.errstate(all="ignore"):
+        from wrcore.dynamics import system
+
+        for state in chosen:
+            row = counting(state, tally)
+            system.fill_derivatives(0.0, row, model, work, counting(np.empty_like(state), tally))
+    found = {
+        stage: {quantity: tally.counts[stage, quantity] / len(chosen) for quantity in QUANTITIES} for stage in STAGES
+    }
+    found["whole"] = {quantity: sum(part[quantity] for part in found.values()) for quantity in QUANTITIES}
+    return found

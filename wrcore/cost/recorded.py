@@ -1,0 +1,77 @@
+"""Evaluations of the equations of motion at the states of a run: what a right-hand side costs where it is needed."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.cost.timing import Contender
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import integrate
+from wrcore.dynamics.system import Equations, Model, fill_many
+from wrcore.errors import InputError
+from wrcore.scene import compile_scene
+
+LASTING = 5e-3
+"""Processor time of a timed call, s: a thousand times what a call from Python into compiled code costs."""
+
+
+class Recorded(NamedTuple):
+    """A model and states that one of its runs went through, each moved back along the track to where it began."""
+
+    model: Model
+    states: np.ndarray
+    """(n, size)."""
+
+
+def record(scene, duration, count):
+    """States at equal intervals of a run.
+
+    Parameters
+    ----------
+    scene : Scene
+        On tangent, perfect track, which looks the same at every place and time.
+    duration : float
+        s.
+    count : int
+
+    Returns
+    -------
+    Recorded
+
+    Raises
+    ------
+    InputError
+        For another track.
+    """
+    if not scene.track.tangent:
+        raise InputError(scene.source, "track", "expected a tangent, perfect track where evaluations are timed")
+    model, start = compile_scene(scene)
+    run = integrate(model, start, np.linspace(0.0, duration, count + 1))
+    states = run.states[1:].copy()
+    bodies = STATE_SIZE * len(model.bodies.mass)
+    states[:, 0:bodies:STATE_SIZE] -= model.speed * run.t[1:, None]
+    return Recorded(model, states)
+
+
+def evaluation(label, recorded):
+    """Contender that evaluates the right-hand side at all states, over and over.
+
+    Parameters
+    ----------
+    label : str
+    recorded : Recorded
+
+    Returns
+    -------
+    Contender
+        Its units are evaluations.
+    """
+    equations, model, work = Equations(recorded.model).arguments
+    states, rates = recorded.states, np.empty_like(recorded.states)
+    fill_many(equations, 0.0, states, model, work, rates)
+    started = time.process_time()
+    fill_many(equations, 0.0, states, model, work, rates)
+    turns = max(1, int(LASTING / max(time.process_time() - started, 1e-6)))
+    states, rates = np.tile(states, (turns, 1)), np.tile(rates, (turns, 1))
+    return Contender(label, lambda: fill_many(equations, 0.0, states, model, work, rates), len(states))
