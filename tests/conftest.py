@@ -1,10 +1,12 @@
 """Fixtures that several test modules share: the benchmark pair and where data that is never committed may lie."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
+import wrcore.scene
 from wrcore.contact.geometry import contact_geometry
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
@@ -41,3 +43,21 @@ def shared_file():
         return path
 
     return find
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with the vehicle files, and one for results."""
+    path = tmp_path_factory.mktemp("scenes")
+    shutil.copytree(ROOT / "config" / "vehicles", path / "vehicles")
+    (path / "out").mkdir()
+    return path
+
+
+@pytest.fixture(scope="module")
+def no_new_tables():
+    """A spoiled material would have a creep table built, which takes its time: only the one at hand is given."""
+    table = wrcore.scene.ensure_table(0.28, "ellipse", 0.01)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wrcore.scene, "ensure_table", lambda *_: table)
+        yield table

@@ -5,8 +5,8 @@ from typing import NamedTuple, get_type_hints
 import h5py
 import numpy as np
 
-from wrcore.dynamics.integrate import Checkpoint
 from wrcore.dynamics.engine import Memory
+from wrcore.dynamics.integrate import Checkpoint
 from wrcore.dynamics.rosenbrock import Linear
 
 

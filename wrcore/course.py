@@ -111,7 +111,8 @@ class Course:
         counters = {
             "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
             "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
-            "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses, "table_out_of_range": trajectory.out_of_range,
+            "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses,
+            "table_out_of_range": trajectory.out_of_range,
             "wall_s": trajectory.wall_s, "compile_s": compiled,
             "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
         }  # fmt: skip

@@ -1,11 +1,11 @@
 """Runs of any length: written as they go, kept when they are interrupted, taken up again where they were.
 
-A run is integrated in blocks of output times. What does not fit into one block, or takes longer than a minute, is written
-block by block into a folder beside the file (``.run.h5.parts``), each block a run file of its own with a checkpoint,
-renamed when it is complete. At the end the blocks become the run file and the folder goes. A process that is killed
-leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file with what was reached. The same command
-goes on from either, bit by bit as if nothing had happened: blocks do not change a result. Neither of them is used if
-anything decisive is different: the compiled model, integration, output, or the sources of the kernels.
+A run is integrated in blocks of output times. What does not fit into one block, or takes longer than a minute, is
+written block by block into a folder beside the file (``.run.h5.parts``), each block a run file of its own with a
+checkpoint, renamed when it is complete. At the end the blocks become the run file and the folder goes. A process that
+is killed leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file with what was reached. The
+same command goes on from either, bit by bit as if nothing had happened: blocks do not change a result. Neither of them
+is used if anything decisive is different: the compiled model, integration, output, or the sources of the kernels.
 """
 
 from __future__ import annotations
@@ -268,7 +268,7 @@ class Parts:
         return sorted(self.folder.glob("[0-9]*.h5"))
 
     def take_up(self, course, total, resume):
-        """Put a course where an interrupted run has got to; whether there is one of the same scene, and it is wanted."""
+        """Put a course where an interrupted run of the same scene has got to; False if there is none to go on with."""
         if resume and not self._files() and self._goes_on(self.path, only_interrupted=True):
             self._open()
             os.replace(self.path, self.folder / "000000.h5")

@@ -11,11 +11,11 @@ A patch of an output time counts once; counters of what happens between outputs 
 range, collapses of the step size) come from the integration itself.
 
 *Half-space.* Hertz's theory takes both bodies for half-spaces and their surfaces for paraboloids: the patch must be
-small against the radii of curvature (Johnson, Contact Mechanics (1985), section 4.1). It states no number; at b = R/3 the
-parabola is off a circle's height by (b/R)^2/4 = 2.8 % at the edge of the patch, and the surface there is inclined by 19
-degrees. *Conformal.* The pressure acts along the surface's own normal; where this turns by 0.35 rad (20 degrees) over the
-patch, the pressure at its edges points 10 degrees past the patch's one normal, and 17 % of it lie in the tangent plane.
-Curvatures are those that Hertz is given, averaged over the profile's window.
+small against the radii of curvature (Johnson, Contact Mechanics (1985), section 4.1). The number is ours: at b = R/3
+the parabola is off a circle's height by (b/R)^2/4 = 2.8 % at the edge of the patch, and the surface there is inclined
+by 19 degrees. *Conformal.* The pressure acts along the surface's own normal; where this turns by 0.35 rad (20 degrees)
+over the patch, the pressure at its edges points 10 degrees past the patch's one normal, and 17 % of it lie in the
+tangent plane. Curvatures are those that Hertz is given, averaged over the profile's window.
 """
 
 import numpy as np
