@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore._references import Handle
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.cost import pairs
 from wrcore.cost.chains import over_chains
 from wrcore.cost.runs import batch_table, rejection_table
+from wrcore.cost.search import loaded_wheels, search_costs
+from wrcore.cost.stages import search_all
 from wrcore.scene import compile_scene, load_scene
 
 
@@ -51,6 +55,17 @@ def test_planar_and_spatial_runs_are_timed_in_turn(scene):
     rows = by_contender(pairs.planar_against_spatial("wheelset", scene, 2))
     assert list(rows) == ["spatial", "planar"]
     assert 0.1 < rows["planar"]["ratio"] < 10.0
+
+
+def test_search_is_timed_on_tread_and_flange(scene):
+    model, _ = compile_scene(scene)
+    rows = search_costs(model.contact, 20, 1)
+    groups = ["tread, maximum", "tread, moment", "flange, maximum", "flange, moment"]
+    assert [row["group"] for row in rows[::2]] == [f"search: {group}" for group in groups]
+    assert [row["contender"] for row in rows] == ["spatial", "planar"] * 4
+    motions = loaded_wheels(model.contact, "flange", 5)
+    patches = np.zeros((5, MAX_PATCHES, PATCH_COLUMNS))
+    assert search_all(Handle(model.contact), motions, patches) >= 5  # all of them touch
 
 
 def test_chains_grow_no_faster_than_their_length(scene):

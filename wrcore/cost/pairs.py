@@ -14,6 +14,7 @@ import pandas as pd
 
 from wrcore.contact.detection import PLANAR, SPATIAL
 from wrcore.cost.recorded import evaluation, record
+from wrcore.cost.search import search_costs
 from wrcore.cost.timing import Bar, Contender, compare, summary, take_turns
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
@@ -206,6 +207,7 @@ def benchmark_table(scenes, settings):
     rows += compiled_against_plain(scene(settings["plain"]["scene"]), **settings["plain"]["size"])
     for name in settings["detection"]:
         rows += planar_against_spatial(scenes[name][0], scene(name), passes)
+    rows += search_costs(compile_scene(scene(settings["creep"]))[0].contact, count, passes)
     laws = {law: scene(settings["creep"], f"contact.creep.model={law}") for law in LAWS}
     rows += right_hand_sides("creep law", laws, count, passes)
     boxes = {label: scene(settings["axle_boxes"], f"vehicle.axle_boxes={value}") for label, value in BOXES.items()}

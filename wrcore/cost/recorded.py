@@ -1,6 +1,7 @@
 """Evaluations of the equations of motion at the states of a run: what a right-hand side costs where it is needed."""
 
 import time
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +55,31 @@ def record(scene, duration, count):
     return Recorded(model, states)
 
 
+def lasting(label, call, arrays, units):
+    """Contender that goes through so many copies of arrays that it can be timed.
+
+    Parameters
+    ----------
+    label : str
+    call : callable
+        Takes the arrays.
+    arrays : sequence of numpy.ndarray
+        Repeated along their first axis.
+    units : int
+        Units in one pass over the arrays.
+
+    Returns
+    -------
+    Contender
+    """
+    call(*arrays)
+    started = time.process_time()
+    call(*arrays)
+    turns = max(1, int(LASTING / max(time.process_time() - started, 1e-6)))
+    copies = [np.ascontiguousarray(np.concatenate([array] * turns)) for array in arrays]
+    return Contender(label, partial(call, *copies), units * turns)
+
+
 def evaluation(label, recorded):
     """Contender that evaluates the right-hand side at all states, over and over.
 
@@ -68,10 +94,8 @@ def evaluation(label, recorded):
         Its units are evaluations.
     """
     equations, model, work = Equations(recorded.model).arguments
-    states, rates = recorded.states, np.empty_like(recorded.states)
-    fill_many(equations, 0.0, states, model, work, rates)
-    started = time.process_time()
-    fill_many(equations, 0.0, states, model, work, rates)
-    turns = max(1, int(LASTING / max(time.process_time() - started, 1e-6)))
-    states, rates = np.tile(states, (turns, 1)), np.tile(rates, (turns, 1))
-    return Contender(label, lambda: fill_many(equations, 0.0, states, model, work, rates), len(states))
+
+    def evaluate(states, rates):
+        fill_many(equations, 0.0, states, model, work, rates)
+
+    return lasting(label, evaluate, (recorded.states, np.empty_like(recorded.states)), len(recorded.states))

@@ -6,7 +6,6 @@ waiting, and what puts the stages together, is the stage ``rest``.
 """
 
 import math
-import time
 from functools import partial
 
 import numpy as np
@@ -23,7 +22,7 @@ from wrcore.contact.normal import damping_factor, hertz_shape_at, inverse_cube_r
 from wrcore.contact.scan import first_zone, make_window, near_blocks, scan
 from wrcore.contact.strip import make_pose
 from wrcore.cost.operations import STAGES, count_operations
-from wrcore.cost.recorded import LASTING, evaluation, record
+from wrcore.cost.recorded import evaluation, lasting, record
 from wrcore.cost.timing import Contender, summary, take_turns
 from wrcore.creep.laws import creep_force_at
 from wrcore.dynamics.joint import build_joints
@@ -53,7 +52,7 @@ def _scan(model, motions):
 
 
 @jit(allocates=False)
-def _search(model, motions, patches):
+def search_all(model, motions, patches):
     """Patches of all wheels."""
     found = 0
     for i in range(motions.shape[0]):
@@ -177,16 +176,6 @@ def _wheels(recorded):
     return motions, patches, counts, np.column_stack([np.log(a / b), a / b, creepage])
 
 
-def _lasting(call, arrays, units):
-    """Contender that goes through copies of arrays for `LASTING` seconds."""
-    call(*arrays)
-    started = time.process_time()
-    call(*arrays)
-    turns = max(1, int(LASTING / max(time.process_time() - started, 1e-6)))
-    copies = [np.ascontiguousarray(np.concatenate([array] * turns)) for array in arrays]
-    return Contender("", partial(call, *copies), units * turns)
-
-
 def breakdown(title, scene, states, passes):
     """Time, operations and bytes of the stages of one evaluation.
 
@@ -213,12 +202,12 @@ def breakdown(title, scene, states, passes):
     contact = Handle(model.contact)
     calls = [
         (partial(_scan, contact), (motions,)),
-        (partial(_search, contact), (motions, patches)),
+        (partial(search_all, contact), (motions, patches)),
         (partial(_hertz, contact), (motions, patches, counts)),
         (partial(_creep, contact), (creep,)),
     ]
     contenders = [evaluation("", recorded._replace(model=variant)) for variant in variants]
-    contenders += [_lasting(call, arrays, len(recorded.states)) for call, arrays in calls]
+    contenders += [lasting("", call, arrays, len(recorded.states)) for call, arrays in calls]
     bodies, elements, joints, whole, scanned, patches, hertz, creeping = take_turns(contenders, passes).T
     stages = [bodies, elements - bodies, joints - elements, scanned, patches - scanned, hertz, creeping]
     seconds = np.column_stack([*stages, whole - np.sum(stages, axis=0), whole])

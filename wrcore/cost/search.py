@@ -1,0 +1,76 @@
+"""Cost of the contact search of one wheel: on the tread and on the flange, planar and spatial, by both reductions."""
+
+from functools import partial
+
+import numpy as np
+
+from wrcore._references import Handle
+from wrcore.contact.detection import PLANAR, SPATIAL, axle_direction
+from wrcore.contact.normal import contact_modulus
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
+from wrcore.contact.statics import height_at_load
+from wrcore.cost.recorded import lasting
+from wrcore.cost.stages import search_all
+from wrcore.cost.timing import compare
+from wrcore.dynamics.wheel import MOTION_COLUMNS
+
+PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.0078), (-0.015, 0.015))}
+"""Ranges of lateral position (m) and yaw (rad) of the left wheel."""
+
+LOAD = 5e4
+"""N on the wheel, to 20 %."""
+
+
+def loaded_wheels(contact, place, count):
+    """Left wheels that carry `LOAD` at a place, in random order.
+
+    Parameters
+    ----------
+    contact : ContactModel
+    place : str
+        Key of `PLACES`.
+    count : int
+
+    Returns
+    -------
+    numpy.ndarray, shape (count, MOTION_COLUMNS)
+        Motions at rest, as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
+    """
+    rng, rows, motions = np.random.default_rng(0), np.empty((MAX_PATCHES, PATCH_COLUMNS)), []
+    (low, high), (least, most) = PLACES[place]
+    modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio)
+    for _ in range(count):
+        y, yaw, load = rng.uniform(low, high), rng.uniform(least, most), LOAD * rng.uniform(0.8, 1.2)
+        z = height_at_load(
+            contact.geometry, contact.hertz, modulus, 1.0, y, 0.0, yaw, True, MOMENT, load,
+            contact.geometry.rolling_radius, rows,
+        )  # fmt: skip
+        motions.append([1.0, y, z, *axle_direction(0.0, yaw)])
+    return np.pad(motions, ((0, 0), (0, MOTION_COLUMNS - len(motions[0]))))
+
+
+def search_costs(contact, count, passes):
+    """Time of the search per wheel.
+
+    Parameters
+    ----------
+    contact : ContactModel
+    count : int
+        Wheels at random.
+    passes : int
+
+    Returns
+    -------
+    list of dict
+        Rows of :func:`wrcore.cost.timing.compare`: a group for each place and reduction.
+    """
+    rows, patches = [], np.zeros((count, MAX_PATCHES, PATCH_COLUMNS))
+    for place in PLACES:
+        motions = loaded_wheels(contact, place, count)
+        for name, reduction in REDUCTIONS.items():
+            contenders = []
+            for label, detection in (("spatial", SPATIAL), ("planar", PLANAR)):
+                model = Handle(contact._replace(detection=detection, reduction=reduction))
+                contenders.append(lasting(label, partial(search_all, model), (motions, patches), count))
+            rows += compare(f"search: {place}, {name}", "wheel", contenders, passes, "ns")
+    return rows
