@@ -299,6 +299,71 @@ def test_failures_are_values(wheelset, contact, method):  # noqa: F811
     assert np.isfinite(run.states).all() and np.isfinite(run.end.memory.state).all()
 
 
+@pytest.mark.parametrize("method", ["tsit5", "ros34pw2", "scipy_rk45"])
+def test_a_run_that_is_told_to_stop_keeps_what_was_reached(wheelset, method):
+    model, start = wheelset
+    times = np.linspace(0.0, 1.0, 201)
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return "enough" if len(asked) == 5 else ""
+
+    run = integrate(model, start, times, method, chunk=10, stop=stop)
+    assert (run.status, run.reason) == ("stalled", "enough") and 0 < len(run.t) < 201
+    whole = integrate(model, start, times, method)
+    np.testing.assert_array_equal(run.states, whole.states[: len(run.t)])
+    assert run.t[-1] <= run.end_t < 1.0 and np.isfinite(run.end_state).all()
+    assert (whole.end_t, whole.status) == (1.0, "completed")
+    np.testing.assert_array_equal(whole.end_state, whole.states[-1])
+    if method != "scipy_rk45":
+        rest = integrate(model, run.end, times[times > run.t[-1]])
+        np.testing.assert_array_equal(rest.states, whole.states[len(run.t) :])
+
+
+@pytest.mark.parametrize("method", ["tsit5", "ros34pw2", "scipy_rk45"])
+def test_most_steps(wheelset, method):
+    run = integrate(*wheelset, np.linspace(0.0, 10.0, 11), method, most_steps=37)
+    assert run.status == "stalled" and "37 steps" in run.reason and "most_steps" in run.reason
+    assert run.steps + (run.rejected if method != "scipy_rk45" else 0) == 37
+    if method != "scipy_rk45":  # steps before a checkpoint count
+        more = integrate(wheelset[0], run.end, np.linspace(1.0, 10.0, 10), most_steps=50)
+        assert more.steps + more.rejected == 13
+
+
+def test_no_headway_is_a_stall(wheelset, monkeypatch):
+    """Steps as short as they would be below `STALL_STEP`: the bound is set above what this run needs."""
+    monkeypatch.setattr("wrcore.dynamics.integrate.STALL_ATTEMPTS", 50)
+    calm = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
+    assert calm.status == "completed"
+    monkeypatch.setattr("wrcore.dynamics.integrate.STALL_STEP", 1.0)
+    run = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
+    assert run.status == "stalled" and run.reason.startswith("50 steps brought it") and run.steps + run.rejected == 50
+    assert np.isfinite(run.end_state).all()
+    fixed = integrate(*wheelset, np.linspace(0.0, 0.1, 11), "tsit5", step=1e-4)  # as short as they were asked for
+    assert fixed.status == "completed" and fixed.steps > 50
+
+
+def test_collapses_are_rejections_three_in_a_row(wheelset):
+    """The free wheelset's flange impacts reject steps again and again; the calm one's never thrice."""
+    assert integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5").collapses == 0
+    scene = load_scene(SCENES / "wheelset.yaml", ["speed=20", "contact.creep.model=linear"])
+    run = integrate(*compile_scene(scene), np.linspace(0.0, 3.0, 11), "tsit5", 1e-6, 1e-9)
+    assert 0 < run.collapses <= run.rejected / 3
+
+
+def test_an_error_in_a_reference_is_a_failed_run(monkeypatch):
+    def broken(t, y):
+        return np.array([np.nan if t > 0.5 else 1.0])
+
+    for method in ("scipy_radau", "scipy_bdf", "scipy_rk45", "scipy_lsoda"):
+        run = integrate_function(broken, [0.0], np.linspace(0.0, 1.0, 11), method)
+        assert run.status == "failed" and run.reason and np.isfinite(run.states).all(), method
+        assert run.end_t <= 0.5 and np.isfinite(run.end_state).all()
+    run = integrate_function(lambda t, y: np.array([np.nan]), [0.0], [0.0, 1.0], "scipy_radau")
+    assert run.status == "failed" and len(run.t) == 1
+
+
 def test_any_function_can_be_integrated_by_the_references():
     times = np.linspace(0, 3, 7)
     run = integrate_function(lambda t, y: np.array([y[1], -y[0]]), [0.0, 1.0], times, "scipy_radau", 1e-9)

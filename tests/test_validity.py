@@ -1,0 +1,85 @@
+"""Limits of validity: each is counted where it is exceeded, and only there."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.cli import main
+from wrcore.contact import reduction
+from wrcore.scene import compile_scene, load_scene
+from wrcore.simulate import simulate
+from wrcore.validity import LIMITS, WIDEST, WIDEST_TURN, exceeded
+
+RADIUS = 0.3
+
+
+@pytest.fixture(scope="module")
+def contact():
+    """Contact model of a cone on a circular rail head of `RADIUS`: curvatures are known everywhere."""
+    changes = {"wheel.profile": "cone:1/20", "rail.profile": f"circle:{RADIUS}", "rail.inclination": 0}
+    return compile_scene(load_scene(SCENES / "wheelset.yaml", changes | {"contact.creep.model": "she"}))[0].contact
+
+
+def patch(u_wheel=0.0, u_rail=0.0, width=1e-3, angle=0.0):
+    """Patches of one wheelset at one time, one of them on the left wheel."""
+    rows = np.full((1, 1, 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS), np.nan)
+    row = rows[0, 0, 0, 0]
+    row[reduction.NORMAL], row[reduction.SEMI_B], row[reduction.ANGLE] = 1e4, width, angle
+    row[reduction.U_WHEEL], row[reduction.U_RAIL] = u_wheel, u_rail
+    return rows
+
+
+def counts(contact, rows, roll=0.0, yaw=0.0):
+    found = exceeded(contact, rows, np.array([[roll]]), np.array([[yaw]]))
+    return {name for name, count in found.items() if count and name != "patches"}
+
+
+def test_an_ordinary_patch_exceeds_nothing(contact):
+    assert counts(contact, patch()) == set()
+    assert exceeded(contact, patch(), np.zeros((1, 1)), np.zeros((1, 1)))["patches"] == 1
+
+
+def test_half_space(contact):
+    assert counts(contact, patch(width=0.99 * WIDEST * RADIUS)) <= {"profile_edge"}
+    assert "half_space" in counts(contact, patch(width=1.01 * WIDEST * RADIUS))
+
+
+def test_profile_edges(contact):
+    rail, wheel = contact.geometry.rail_start, contact.geometry.wheel_start
+    for place in ({"u_rail": rail}, {"u_wheel": wheel}):
+        ((name, end),) = place.items()
+        assert counts(contact, patch(**{name: end + 1.01e-3})) == set()
+        assert counts(contact, patch(**{name: end + 0.99e-3})) == {"profile_edge"}
+        # the patch is inclined: it reaches less far across
+        assert counts(contact, patch(**{name: end + 0.6e-3}, angle=np.pi / 3)) == set()
+
+
+def test_search_fallback_counts_both_wheels_of_a_turned_wheelset(contact):
+    for roll, yaw in ((0.013, 0.0), (0.0, 0.016)):  # the search's own limits: 12 mrad of roll, 15 mrad of yaw
+        turned = exceeded(contact, patch(), np.array([[roll]]), np.array([[yaw]]))
+        assert turned["search_fallback"] == 2
+        assert counts(contact, patch(), 0.9 * roll, 0.9 * yaw) == set()
+    planar = contact._replace(detection=0)
+    assert counts(planar, patch(), yaw=0.016) == set()
+
+
+def test_conformal_patches_lie_in_hollows_of_the_wheel():
+    scene = load_scene(SCENES / "wheelset.yaml", {"contact.creep.model": "she"})
+    contact = compile_scene(scene)[0].contact
+    root = flank = corner = -0.037  # EN 13715: the root of the S1002 flange is an arc of 13 mm, UIC 60's corner, too
+    flank -= 0.005  # the flange's flank bulges with 20 mm
+    width = 0.5 * WIDEST_TURN * 0.013
+    assert counts(contact, patch(root, corner, 1.01 * width)) == {"conformal"}
+    assert counts(contact, patch(root, corner, 0.99 * width)) == set()
+    assert counts(contact, patch(flank, corner, 1.01 * width)) == set()
+
+
+def test_counters_of_a_run_and_what_the_command_says(tmp_path, capsys):
+    calm = simulate(SCENES / "suspended_wheelset.yaml", integration__duration=0.5, contact__creep__model="she")
+    assert all(calm.counters[name] == 0 for name in LIMITS) and calm.counters["patches"] >= 2 * len(calm.t)
+    sets = ["--set=integration.duration=0.05", "--set=initial.yaw=0.02", "--set=contact.creep.model=she"]
+    assert main(["simulate", str(SCENES / "wheelset.yaml"), *sets]) == 0
+    printed = capsys.readouterr().out
+    assert "beyond the models' limits" in printed and LIMITS["search_fallback"] in printed
+    assert main(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets[::2]]) == 0
+    assert "limits" not in capsys.readouterr().out
