@@ -104,6 +104,11 @@ class Handle:
         _write(value, self._memory)
         self.address = self._memory.ctypes.data
 
+    def renew(self, value):
+        """Keep another value of the same type: nothing is looked up."""
+        self.value = value
+        _write(value, self._memory)
+
 
 _LAYOUTS = {}
 

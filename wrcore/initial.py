@@ -119,7 +119,7 @@ def _rolling(scene, model, y, z, roll, yaw):
     """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
     detection = "planar" if scene.detection == "planar" else "spatial"
     patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
-    radius = np.mean([z - patch.z_m for patch in patches])
+    radius = sum(z - patch.z_m for patch in patches) / len(patches)
     return rotation(roll, yaw)[:, 1] * model.speed / radius
 
 
@@ -163,7 +163,7 @@ def initial_state(scene, model, at_rest=None):
     for k, body in enumerate(vehicle.bodies.wheelsets):
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         if y or yaw:
-            roll, z = _settled(scene, model, y, yaw, float(np.mean(at_rest.wheel_loads[k])))
+            roll, z = _settled(scene, model, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             part[10:13] = _rolling(scene, model, y, z, roll, yaw)
         else:

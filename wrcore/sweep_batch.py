@@ -10,6 +10,7 @@ import dataclasses
 import json
 import os
 import shutil
+import threading
 import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +25,7 @@ import pandas as pd
 
 from wrcore.channels import unit_of
 from wrcore.dynamics.integrate import Trajectory, integrate
+from wrcore.dynamics.system import Equations, Model
 from wrcore.errors import InputError
 from wrcore.progress import counted
 from wrcore.scene import Scene, compile_scene, load_scene
@@ -158,13 +160,22 @@ def _run(task: _Task, with_forces: bool) -> _Outcome:
     times = _times(settings["duration"], scene.data["output"]["rate"])
     trajectory = integrate(
         model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
-        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"],
+        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"], equations=_equations(task, model),
     )  # fmt: skip
     starts = scene.vehicle.positions[model.bodies.wheelsets, 0]
     motion = wheelset_motion(model, starts, trajectory.states)
     forces = wheel_forces(model, trajectory) if with_forces else None
     trajectory = dataclasses.replace(trajectory, states=trajectory.states[:0], end=None)  # measured: no longer needed
     return _Outcome(task.run, bool(model.track.tangent), times, trajectory, motion, forces)
+
+
+def _equations(task: _Task, model: Model) -> Equations:
+    """Equations of motion that a thread uses again for all runs that share their parts."""
+    key = "equations", threading.get_ident()
+    if key not in task.shared:
+        task.shared[key] = Equations(model)
+        return task.shared[key]
+    return task.shared[key].renew(model)
 
 
 @lru_cache

@@ -136,7 +136,7 @@ def chosen_method(method, speed):
 
 def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=1e-7, step=0.0, longest_step=0.05, derailed_y=np.inf,
-    progress=None, chunk=CHUNK, stop=None, most_steps=0,
+    progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
 ):  # fmt: skip
     """Integrate a model's equations of motion and sample them at given times.
 
@@ -166,6 +166,8 @@ def integrate(
         ``stop() -> str``, asked as often: a reason to end the run as stalled, or an empty string.
     most_steps : int
         Steps to be tried in all, those before a checkpoint among them; 0: no bound. Accepted ones with the references.
+    equations : Equations, optional
+        Of this very model, where they are at hand. Compiled methods only.
 
     Returns
     -------
@@ -179,7 +181,7 @@ def integrate(
         return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
-    equations = Equations(model)
+    equations = equations or Equations(model)
     work = equations.work
     if isinstance(start, Checkpoint):
         memory, linear = _copied(start.memory), _copied(start.linear)

@@ -240,6 +240,13 @@ class Equations:
         state = np.empty(0)
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
 
+    def renew(self, model):
+        """Turn to another model of the same types, in fresh scratch arrays: a series of runs looks nothing up again."""
+        self.work = workspace(model)
+        self.arguments[1].renew(model)
+        self.arguments[2].renew(self.work)
+        return self
+
     def __call__(self, t, state):
         """Rate of a state, shape (size,), at a time (s)."""
         return self.at(t, state[None, :])[0]
