@@ -15,11 +15,14 @@ from wrcore.sweep_batch import UNITS
 ENDS = {
     "completed": {"color": "#0072B2", "marker": "o", "s": 3, "linewidths": 0, "alpha": 0.5},
     "derailed": {"color": "#CC3311", "marker": "x", "s": 14, "linewidths": 0.8},
+    "stalled": {"color": "0.5", "marker": "^", "s": 14, "linewidths": 0},
     "failed": {"color": "0.1", "marker": "+", "s": 20, "linewidths": 0.8},
 }
 """How a run that ended so is drawn."""
 
 MOST_COLUMNS = 3
+FEW = 300
+"""Points of smaller sweeps are drawn larger."""
 
 
 @styled
@@ -66,7 +69,8 @@ def _over(axes: Axes, table: pd.DataFrame, key: str, values: np.ndarray) -> None
     for end, style in ENDS.items():
         here = (table["status"] == end).to_numpy()
         if here.any():
-            axes.scatter(places[here], values[here], label=end, rasterized=True, **style)
+            size = style["s"] * (4.0 if len(table) < FEW else 1.0)
+            axes.scatter(places[here], values[here], label=end, rasterized=True, **{**style, "s": size})
     axes.set(xlabel=label.replace("_", " "))
 
 

@@ -1,0 +1,67 @@
+"""reports/bring_your_own.md works as written: its files are written, its commands and lines of Python are run."""
+
+import re
+import shlex
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import wrcore as wr
+from tests.conftest import ROOT
+from wrcore.cli import main
+
+TEXT = (ROOT / "reports" / "bring_your_own.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(\w+)\n(.*?)```", TEXT, re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder in which all blocks were run in their order."""
+    place = tmp_path_factory.mktemp("own")
+    (place / "config").symlink_to(ROOT / "config")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
+        for kind, text in BLOCKS:
+            name = re.match(r"# file: (\S+)\n", text)
+            if name:
+                (place / name[1]).write_text(text)
+            elif kind == "python":
+                exec(compile(text, "bring_your_own.md", "exec"), {})
+            else:
+                assert kind == "bash", kind
+                for line in text.strip().splitlines():
+                    program, *arguments = shlex.split(line)
+                    assert program == "wrcore" and main(arguments) == 0, line
+    return place
+
+
+def test_every_block_ran(folder):
+    assert {"worn.h5", "rough.h5", "curve.h5", "curve.png", "my_sweep.csv"} <= {path.name for path in folder.iterdir()}
+
+
+def test_the_three_forms_of_a_profile_are_the_same_wheel(folder):
+    one, other = (pd.read_csv(folder / name) for name in ("conicity.csv", "conicity_simpack.csv"))
+    np.testing.assert_allclose(one, other, rtol=1e-6)
+    turned = {
+        "points": str(folder / "meter.txt"),
+        "unit": "mm",
+        "mirrored": True,
+        "downwards": True,
+        "shift": [0.07, 0],
+    }
+    u = np.linspace(-0.03, 0.03, 61)
+    worn, read = (wr.named_profile(spec, "wheel")(u) for spec in (str(folder / "worn.csv"), turned))
+    np.testing.assert_allclose(worn, read, rtol=0, atol=2e-8)
+    assert (worn - wr.named_profile("S1002", "wheel")(u)).min() == pytest.approx(-3e-4, abs=1e-6)
+
+
+def test_runs_feel_what_was_brought(folder):
+    worn, rough, curve = (wr.load_run(folder / name) for name in ("worn.h5", "rough.h5", "curve.h5"))
+    assert {run.status for run in (worn, rough, curve)} == {"completed"}
+    nominal = wr.simulate(ROOT / "config/scenes/suspended_wheelset.yaml", integration__duration=0.2)
+    assert np.abs(worn["wheelset"].y_m - nominal["wheelset"].y_m).max() > 1e-5
+    assert np.ptp(rough["wheelset"].z_m) > 1e-4
+    assert curve["wheelset"].yaw_rad[-1] != 0.0 and curve.scene["track"]["path"][2]["radius"] == 800
+    table = pd.read_csv(folder / "my_sweep.csv")
+    assert len(table) == 6 and set(table["wheel.profile"]) == {"S1002", "worn.csv"}
