@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,7 +14,7 @@ from wrcore.figures import _shared_legend, styled
 from wrcore.figures_run import PRINTED
 from wrcore.sweep_batch import UNITS
 
-ENDS = {
+ENDS: dict[str, dict[str, Any]] = {
     "completed": {"color": "#0072B2", "marker": "o", "s": 3, "linewidths": 0, "alpha": 0.5},
     "derailed": {"color": "#CC3311", "marker": "x", "s": 14, "linewidths": 0.8},
     "stalled": {"color": "0.5", "marker": "^", "s": 14, "linewidths": 0},
