@@ -43,6 +43,7 @@ def test_table_of_simultaneous_scenes_says_that_they_are_identical():
     table = over_scenes("wheelset", source, SHORT, counts=[1, 2], threads=[1, 2], passes=1)
     assert list(table["threads"]) == [1, 2, 1, 2]
     assert table["identical"].all()
+    assert table["processors"].between(0.0, 3.0).all()
     assert (table["faster"][table["threads"] == 1] == 1.0).all()
 
 

@@ -156,22 +156,27 @@ def over_scenes(title, source, overrides, *, counts, threads, passes):
     -------
     pandas.DataFrame
         A row per number of scenes and threads: milliseconds by the wall per scene with quartiles, how many times faster
-        than one at a time, and whether all results were those of single runs to the bit.
+        than one at a time, how many processors the runs got on average (with other work on the machine less than there
+        are), and whether all results were those of single runs to the bit.
     """
     scenes = [load_scene(source, [*overrides, f"speed={speed:g}"]) for speed in np.linspace(30.0, 55.0, max(counts))]
     alone = [simulate_many([scene], progress=False)[0] for scene in scenes]
     rows = []
     for count in counts:
-        results = {}
+        results, spent = {}, {at_once: [] for at_once in threads}
 
-        def together(at_once, count=count, results=results):
+        def together(at_once, count=count, results=results, spent=spent):
+            began = time.process_time(), time.perf_counter()
             results[at_once] = simulate_many(scenes[:count], progress=False, threads=at_once)
+            spent[at_once].append((time.process_time() - began[0], time.perf_counter() - began[1]))
 
         contenders = [Contender(n, lambda n=n, together=together: together(n), count) for n in threads]
         timed = summary("", "", threads, take_turns(contenders, passes, time.perf_counter), "ms")
         for at_once, found in zip(threads, timed, strict=True):
             row = {"scene": title, "scenes": count, "threads": at_once, "faster": 1.0 / found["ratio"]}
             row |= {f"scene_ms{part}": found[f"time{part}"] for part in ("", "_low", "_high")}
+            processor, wall = np.sum(spent[at_once], axis=0)
+            row["processors"] = processor / wall
             same = all(identical(*pair) for pair in zip(results[at_once], alone[:count], strict=True))
             rows.append(row | {"identical": same})
     return pd.DataFrame(rows)
