@@ -159,3 +159,11 @@ def test_a_scene_starts_in_vertical_equilibrium(name):
     rows = work.patches[0, :, 0]
     np.testing.assert_allclose(rows[:, NORMAL] * np.cos(rows[:, ANGLE]), load, rtol=1e-6)
     assert load == pytest.approx({"wheelset": 8893, "suspended_wheelset": 54546}[name], rel=1e-4)
+
+
+def test_rails_named_like_numbers_stay_names_and_numbers_numbers():
+    # a person writes 60E1 without quotes; YAML's own rules would make it 600
+    changes = ["rail.profile=60E1", "integration.rtol=1e-5", "integration.atol=1E-8"]
+    scene = load_scene(SCENES / "wheelset.yaml", changes)
+    assert scene.data["rail"]["profile"] == "60E1" and scene.rail.name == "60E1"
+    assert (scene.data["integration"]["rtol"], scene.data["integration"]["atol"]) == (1e-5, 1e-8)

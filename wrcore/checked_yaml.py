@@ -35,7 +35,8 @@ def _mapping(loader, node, deep=False):
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"),
+    # 1e6, 1E-6 and 1.0E6 are numbers; 60E1 and 54E1 are rails
+    re.compile(r"^[-+]?(?:[0-9]+(?:e[-+]?|E[-+])|(?:[0-9]+\.[0-9]*|\.[0-9]+)[eE][-+]?)[0-9]+$"),
     list("-+0123456789."),
 )
 

@@ -132,7 +132,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     if "table" in data["contact"]["creep"]:
         table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
         data["contact"]["creep"]["table"] = str(table)
-    track = build_track(data["track"], source, folder)
+    track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
@@ -170,6 +170,15 @@ def _find(path, folder, source, field):
         if os.path.isfile(base / path):  # Path.is_file raises where a name is too long or a folder is closed
             return base / path
     raise InputError(source, field, f"expected an existing file, got {path!r}")
+
+
+def _with_points(track, folder, source):
+    """The scene's track with the place of its measured irregularity, which is looked for as all other files are."""
+    irregularity = track.get("irregularity")
+    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("points"), str):
+        return track
+    points = _find(irregularity["points"], folder, source, "track.irregularity.points")
+    return {**track, "irregularity": {**irregularity, "points": str(points.resolve())}}
 
 
 def _ratio(value, source, field):
