@@ -216,3 +216,19 @@ def test_figure_of_a_sweep_has_a_panel_with_units_per_key(smoke):
     shown = figure.axes[0].collections[0].get_offsets()
     np.testing.assert_allclose(shown[:, 1], 1e3 * smoke["amplitude_m"])
     np.testing.assert_allclose(shown[:, 0], smoke["speed"])
+
+
+def test_runs_that_differ_in_their_models_are_those_of_scenes_alone():
+    """Equations of motion are used again from run to run: none may keep anything of the one before."""
+    keys = {
+        "contact.creep.model": {"values": ["table", "she", "linear"]},
+        "contact.detection": {"values": ["spatial", "auto"]},
+        "contact.patch": {"values": ["moment", "maximum"]},
+        "integration.method": {"values": ["tsit5", "rodas4"]},
+    }
+    table = wr.run_sweep(small(keys=keys, sampling={"kind": "grid"}, measures=["y_rms_m", "rhs_evaluations"]))
+    sweep = wr.load_sweep(small(keys=keys, sampling={"kind": "grid"}))
+    for row in (0, 7, 9, 14, 23):
+        run = wr.simulate(sweep.scene, overrides=sweep.runs.loc[row].to_dict())
+        assert table["rhs_evaluations"][row] == run.counters["rhs_evaluations"]
+        assert table["y_rms_m"][row] == pytest.approx(np.sqrt(np.mean(run["wheelset"].y_m ** 2)), rel=1e-14)
