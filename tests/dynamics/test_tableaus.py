@@ -101,7 +101,7 @@ def test_rosenbrock_methods_have_their_orders(name):
     assert (rosenbrock_order(alpha, gamma, main), rosenbrock_order(alpha, gamma, embedded)) == ORDERS[name]
     assert t.exponent == ORDERS[name][1] + 1
     np.testing.assert_allclose(alpha.sum(axis=1), t.nodes, atol=1e-14)
-    np.testing.assert_allclose(gamma.sum(axis=1), t.drift, atol=1e-14)
+    np.testing.assert_allclose(gamma.sum(axis=1), t.by_time, atol=1e-14)
     for theta in (0.2, 0.6):
         assert rosenbrock_order(alpha, gamma, dense_weights(t, theta) @ back, theta) == 3
     np.testing.assert_allclose(dense_weights(t, 1.0), t.weights, atol=1e-13)

@@ -85,6 +85,8 @@ class Scratch(NamedTuple):
     """(n,): largest size that counts in a component's error weight."""
     defect: np.ndarray
     """(n,)."""
+    still: np.ndarray
+    """(n,): zeros."""
 
 
 class Record(NamedTuple):
@@ -127,7 +129,7 @@ def new_scratch(size, bodies):
     caps = np.ones(size)
     for b in range(bodies):
         caps[STATE_SIZE * b + VELOCITY : STATE_SIZE * (b + 1)] = np.inf
-    return Scratch(np.zeros(size), np.zeros(size), caps, np.zeros(size))
+    return Scratch(np.zeros(size), np.zeros(size), caps, np.zeros(size), np.zeros(size))
 
 
 @jit(allocates=False, inline="always")
@@ -226,7 +228,7 @@ def _on_the_rails(limit, state, model, work):
 
 
 @jit(allocates=False)
-def take_stock(control, dense, scale, memory, record, model, work):
+def take_stock(control, dense, scale, drift, memory, record, model, work):
     """Write the outputs that the run has come to and say whether it goes on.
 
     Parameters
@@ -235,6 +237,8 @@ def take_stock(control, dense, scale, memory, record, model, work):
     dense : numpy.ndarray, shape (s, d)
     scale : float
         Factor of the stages in the dense output.
+    drift : numpy.ndarray, shape (n,)
+        Part of the rate that is constant during the step and not in the stages.
     memory : Memory
     record : Record
     model : Model
@@ -253,7 +257,8 @@ def take_stock(control, dense, scale, memory, record, model, work):
             copy_into(out, memory.state)
         else:
             theta = (times[reached] - clock[T_OLD]) / (clock[T] - clock[T_OLD])
-            copy_into(out, memory.old)
+            for j in range(out.shape[0]):
+                out[j] = memory.old[j] + (times[reached] - clock[T_OLD]) * drift[j]
             for i in range(stages.shape[0]):
                 weight = 0.0
                 for k in range(dense.shape[1] - 1, -1, -1):
@@ -300,7 +305,8 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
     clock, counters, state, stages, trial = memory.clock, memory.counters, memory.state, memory.stages, scratch.trial
     n, last = state.shape[0], stages.shape[0] - 1
     while True:
-        outcome = take_stock(control, tableau.dense, clock[T] - clock[T_OLD], memory, record, model, work)
+        last_step = clock[T] - clock[T_OLD]
+        outcome = take_stock(control, tableau.dense, last_step, scratch.still, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1

@@ -111,7 +111,8 @@ def _touchdown_error(tableau, control, memory, scratch, linear):
     is stiff.
     """
     step, stages, defect = memory.clock[NEXT], memory.stages, scratch.defect
-    copy_into(defect, scratch.slope)
+    for k in range(defect.shape[0]):
+        defect[k] = scratch.slope[k] - linear.jacobian.drift[k]
     for i in range(stages.shape[0]):
         weight = 0.0
         for k in range(tableau.dense.shape[1]):
@@ -147,11 +148,11 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
         Outcome.
     """
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
-    trial, slope = scratch.trial, scratch.slope
+    trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last = state.shape[0], stages.shape[0] - 1
     hold = HOLD if tableau.reuse > 1 else 1.0
     while True:
-        outcome = take_stock(control, tableau.dense, 1.0, memory, record, model, work)
+        outcome = take_stock(control, tableau.dense, 1.0, drift, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
@@ -163,6 +164,9 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                 if weight != 0.0:
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
+            if i > 0:
+                for k in range(n):
+                    trial[k] += tableau.nodes[i] * step * drift[k]
             if i > 0 or not counters[HAS_RATE]:
                 derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, slope)
                 counters[EVALUATIONS] += 1
@@ -172,15 +176,16 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                     counters[HAS_RATE], counters[TOUCHING] = 1, _touching(work)
                 regular = _renew(tableau, memory, scratch, linear, equations, model, work)
                 copy_into(slope, memory.rate)
-            increment, drift = stages[i], step * tableau.drift[i]
+            increment, by_time = stages[i], step * tableau.by_time[i]
             for k in range(n):
-                increment[k] = slope[k] + drift * linear.jacobian.by_time[k]
+                increment[k] = slope[k] - drift[k] + by_time * linear.jacobian.by_time[k]
             for j in range(i):
                 weight = tableau.couplings[i, j] / step
                 for k in range(n):
                     increment[k] += weight * stages[j, k]
             solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), increment)
-        copy_into(trial, state)
+        for k in range(n):
+            trial[k] = state[k] + step * drift[k]
         slope[:] = 0.0
         for i in range(last + 1):
             for k in range(n):

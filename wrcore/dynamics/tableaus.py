@@ -44,7 +44,7 @@ class RosenbrockTableau(NamedTuple):
 
     nodes: np.ndarray
     """(s,)."""
-    drift: np.ndarray
+    by_time: np.ndarray
     """(s,): factors d_i of h df/dt."""
     stages: np.ndarray
     """(s, s): a."""
