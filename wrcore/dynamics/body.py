@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 
 STATE_SIZE = 13
 POSITION, EULER, VELOCITY, OMEGA = 0, 3, 7, 10
@@ -74,7 +74,7 @@ def angles(p):
     return roll, pitch, yaw
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def rotation_matrix(state, at, matrix):
     """Write A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3)."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
@@ -89,7 +89,7 @@ def rotation_matrix(state, at, matrix):
     matrix[2, 2] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def euler_rates(state, at, wx, wy, wz, alpha, rate):
     """Rates of the Euler parameters for an angular velocity in track axes, p' = 1/2 E(p)^T w.
 

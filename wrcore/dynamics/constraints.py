@@ -19,16 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.dynamics.joint import MOST_EQUATIONS, JointState, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.vector import cross, dot, load, minus, store
 
 VANISHED = 1e-10
 """A pivot below this part of its diagonal entry belongs to a redundant equation. Rounding leaves some 1e-16 of it."""
-
-FUSED = {"contract"}
-"""Fast-math flag of the kernels below: products and sums may be fused, which rounds once instead of twice."""
 
 
 class ConstraintWork(NamedTuple):
@@ -64,7 +61,7 @@ def constraint_workspace(joints):
     )  # fmt: skip
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def apply_inverse_inertia(inertia, matrix, wrench, out):
     """out = J^-1 n for the moment part of a wrench (6,), J = A diag(inertia) A^T."""
     for i in range(3):

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.track import moving_frame
@@ -105,7 +105,7 @@ def pack_elements(springs=(), directed=(), turning=()):
     )  # fmt: skip
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def characteristic(table, first, last, x):
     """Value at x of the polygon through the points ``first`` to ``last - 1``, continued with its outer slopes."""
     k = first
@@ -114,7 +114,7 @@ def characteristic(table, first, last, x):
     return table[k, 1] + (x - table[k, 0]) * (table[k + 1, 1] - table[k, 1]) / (table[k + 1, 0] - table[k, 0])
 
 
-@jit(allocates=False, forceinline=True)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _directed_force(elements, k, stretch, speed, state, own):
     """Force against stretch and speed of the k-th element along one direction, and the rate of its own state."""
     row, law = elements.directed[k], elements.law[k]
@@ -132,7 +132,7 @@ def _directed_force(elements, k, stretch, speed, state, own):
     return force, 0.0
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def element_forces(elements, track, t, speed, state, rotations, turns, wrenches, rate):
     """Add the forces of all elements to the wrenches of the bodies and write the rates of the elements' own states.
 

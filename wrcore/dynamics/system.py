@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore._references import Handle, Kernel, call_at
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
@@ -112,7 +112,7 @@ def workspace(model):
     )  # fmt: skip
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     """Subtract w x J w from the moment part of a wrench (6,)."""
     wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
@@ -127,7 +127,7 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[5] -= wx * hy - wy * hx
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _add_rail_wrenches(model, state, work):
     """Add the wrenches of the rails to those of the wheelsets."""
     wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
@@ -159,7 +159,7 @@ def _add_rail_wrenches(model, state, work):
             wrench[i] += work.rail_wrenches[k, 0, i] + work.rail_wrenches[k, 1, i]
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def fill_derivatives(t, state, model, work, rate):
     """Right-hand side of the equations of motion.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
+from wrcore._jit import FUSED, jit
 from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.geometry.irregularity import IrregularityData, irregularity_at
@@ -31,7 +31,7 @@ class TrackModel(NamedTuple):
     irregularity: IrregularityData
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _turn_into(frame, x, y, z):
     """Components of a vector along the columns of a frame."""
     return (
@@ -41,7 +41,7 @@ def _turn_into(frame, x, y, z):
     )
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _turn_back(frame, x, y, z):
     """Vector whose components along the columns of a frame are given."""
     return (
@@ -51,7 +51,7 @@ def _turn_back(frame, x, y, z):
     )
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def _rail_frame(frame, lateral, vertical, out):
     """Frame of a rail whose direction leaves t by slopes towards n and b: its own t, n, b as columns of ``out``."""
     ahead = 1.0 / math.sqrt(1.0 + lateral * lateral + vertical * vertical)
@@ -65,7 +65,7 @@ def _rail_frame(frame, lateral, vertical, out):
         out[i, 2] = -frame[i, 0] * tz * ny + frame[i, 1] * tz * nx + frame[i, 2] * (tx * ny - ty * nx)
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def rail_motions(track, rail_distance, state, at, axle, guess, frame, values, rails, shifts, motions):
     """A wheelset's motion in the frames of its two rails.
 
@@ -119,7 +119,7 @@ def rail_motions(track, rail_distance, state, at, axle, guess, frame, values, ra
     return s
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
     """Turn what was found in the frames of two rails into absolute axes, and patches to where they are in the track's.
 
@@ -140,7 +140,7 @@ def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
             patches[wheel, k, Z] += shifts[wheel, 1]
 
 
-@jit(allocates=False)
+@jit(allocates=False, fastmath=FUSED)
 def moving_frame(track, speed, t, ahead, axes):
     """The track's frame that runs ahead along the track at constant speed.
 
