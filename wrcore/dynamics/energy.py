@@ -19,7 +19,6 @@ normal forces is left; without contact damping, too, that of Hertz's.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from wrcore._jit import jit
 from wrcore.contact import reduction
@@ -280,6 +279,7 @@ def energy_balance(channels, times):
     -------
     EnergyBalance
     """
+    from scipy.integrate import cumulative_simpson  # its import takes longer than most runs
 
     def gone(name):
         return cumulative_simpson(channels[name], x=times, initial=0.0)
