@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from wrcore.accuracy import MARGIN, choose
+from wrcore.accuracy import MARGIN, choose, front_markdown
 from wrcore.dynamics.integrate import METHODS
 from wrcore.errors import InputError
 from wrcore.scene import load_scene
@@ -49,3 +49,15 @@ def test_the_measurements_of_the_package_serve_its_own_scene():
 def test_nothing_measured_is_that_accurate():
     with pytest.raises(InputError, match="3e-08 m"):
         choose(scene("suspended_wheelset", 20.0), 1e-9, FRONT)
+
+
+def test_the_table_of_choices_has_a_row_for_each_accuracy_that_needs_another_choice():
+    head, _, *rows = front_markdown(FRONT, [1e-3, 1e-4, 1e-6, 1e-9]).splitlines()
+    assert head.count("|") == 6 and all(row.count("|") == 6 for row in rows)
+    assert [row.split(" | ")[:2] for row in rows] == [
+        ["| suspended wheelset, 20 m/s", "1 µm"],
+        ["| suspended wheelset, 20 m/s", "100 µm"],
+        ["| suspended wheelset, 60 m/s", "1 µm"],
+        ["| vehicle, 20 m/s", "1 µm"],
+    ]
+    assert "planar, she, rk23, 0.01 | 1e+02 µm | 5e+03 |" in rows[1]
