@@ -1,7 +1,7 @@
 # What things cost: pairs timed in turn, stages of one evaluation, growth, batches, rejected steps.
 
 COST = config["cost_study"]
-CORE["cost"] = CORE["simulation"] + sources("plain", "cost")
+CORE["cost"] = CORE["simulation"] + sources("plain", "cost", "sweep_batch", "sweep_measures", "sweep_plan")
 COST_SCENES = {name: (entry["title"], entry["scene"], changes(entry["set"])) for name, entry in COST["scenes"].items()}
 
 

@@ -5,6 +5,7 @@ point, as in ``process``). All functions return rows of :func:`wrcore.cost.timin
 """
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -166,6 +167,12 @@ def right_hand_sides(group, scenes, count, passes, bar=None):
     return compare(group, "evaluation", contenders, passes, "us", bar)
 
 
+def children_time():
+    """Processor time of all processes started so far that have ended, s."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
 def process(scene, passes):
     """A process that runs one scene with kernels and creep table cached, against one that only imports NumPy."""
     command = [sys.executable, "-m", "wrcore.cli", "simulate", str(scene), "--json"]
@@ -178,7 +185,7 @@ def process(scene, passes):
         Contender("import of NumPy", started([sys.executable, "-c", "import numpy"])),
         Contender(f"scene of {report['simulated_s']:g} s", started(command)),
     ]
-    rows = compare("process", "process", contenders, passes, "s", clock=time.perf_counter)
+    rows = compare("process", "process", contenders, passes, "s", clock=children_time)
     rows[1] |= {"bar": "at most 1.5 s", "met": "yes" if rows[1]["time"] <= 1.5 else "no"}
     return rows
 

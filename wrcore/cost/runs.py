@@ -8,16 +8,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from wrcore.checked_yaml import parse_value
 from wrcore.dynamics.integrate import integrate
 from wrcore.scene import compile_scene, load_scene
 from wrcore.simulate import output_times, simulate_many
+from wrcore.sweep_batch import run_sweep
+from wrcore.sweep_plan import load_sweep
 
 SMOOTH = 0.1
 """Part of rejected steps that a smooth scene may have."""
 
 
 def batch_table(source, overrides, speeds, passes, functions=8):
-    """Where the time of a batch of runs in one process goes.
+    """Where the time of a batch of runs in one process goes: as a sweep, and as runs with all their channels.
 
     Parameters
     ----------
@@ -28,32 +31,45 @@ def batch_table(source, overrides, speeds, passes, functions=8):
     passes : int
         Batches; one more before them warms up and another one afterwards is profiled.
     functions : int
-        Rows for the functions that take most of the profiled batch.
+        Rows for the functions that take most of a profiled batch.
 
     Returns
     -------
     pandas.DataFrame
-        part, seconds (median over the passes) and share of the whole: the whole, integration, reading and checking the
-        scenes, and the rest (compiling scenes, output channels). Then the functions with their own time, profiled.
+        batch (``sweep`` or ``runs``), part, seconds (median over the passes) and share of the whole: the whole,
+        integration, and what is not integration. Then the functions with their own times, profiled.
     """
+    changes = dict(change.partition("=")[::2] for change in overrides)
+    sweep = load_sweep({
+        "name": "batch", "scene": str(source), "set": {key: parse_value(text) for key, text in changes.items()},
+        "sampling": {"kind": "grid"}, "keys": {"speed": {"values": [float(v) for v in speeds]}},
+        "measures": ["y_max_m", "wall_s"],
+    })  # fmt: skip
 
-    def batch():
-        started = time.perf_counter()
+    def as_sweep():
+        return float(run_sweep(sweep, progress=iter)["wall_s"].sum())
+
+    def as_runs():
         scenes = [load_scene(source, [*overrides, f"speed={speed:g}"]) for speed in speeds]
-        loaded = time.perf_counter()
-        runs = simulate_many(scenes, progress=False)
-        integration = sum(run.counters["wall_s"] for run in runs)
-        ended = time.perf_counter()
-        return ended - started, integration, loaded - started, ended - loaded - integration
+        return sum(run.counters["wall_s"] for run in simulate_many(scenes, progress=False))
 
-    batch()
-    whole, *parts = np.median([batch() for _ in range(passes)], axis=0)
-    names = ("integration", "reading scenes", "compiling scenes, output")
-    rows = [{"part": "whole batch", "seconds": whole, "share": 1.0}]
-    rows += [{"part": name, "seconds": part, "share": part / whole} for name, part in zip(names, parts, strict=True)]
-    profile = cProfile.Profile()
-    profile.runcall(batch)
-    return pd.DataFrame(rows + _functions(profile, functions))
+    rows = []
+    for name, batch in (("sweep", as_sweep), ("runs", as_runs)):
+        batch()
+        whole, integration = np.median([_timed(batch) for _ in range(passes)], axis=0)
+        for part, seconds in (("whole", whole), ("integration", integration), ("all else", whole - integration)):
+            rows.append({"batch": name, "part": part, "seconds": seconds, "share": seconds / whole})
+        profile = cProfile.Profile()
+        profile.runcall(batch)
+        rows += [{"batch": name} | row for row in _functions(profile, functions)]
+    return pd.DataFrame(rows)
+
+
+def _timed(batch):
+    """Seconds by the wall of a batch, and of the integrations in it."""
+    started = time.perf_counter()
+    integration = batch()
+    return time.perf_counter() - started, integration
 
 
 def _functions(profile, count):
