@@ -265,7 +265,7 @@ def long_run(vehicles, names, duration, changes, rate, methods):
         trajectory = run(setting, duration, rate)
         y = trajectory.states[:, STATE_SIZE * int(setting.model.bodies.wheelsets[0]) + 1]
         tenth = len(trajectory.t) // 10
-        early, late = np.std(y[tenth : 5 * tenth]), np.std(y[-4 * tenth :])
+        early, late = np.std(y[4 * tenth : 7 * tenth]), np.std(y[-3 * tenth :])
         checks = [
             *sound(setting, trajectory),
             Check("change of the amplitude of y", abs(late / early - 1.0), 0.01, "1", "a limit cycle is steady: 1 %"),

@@ -110,17 +110,17 @@ def slow_path(vehicles, name, speeds, distance, critical_speed):
     return found
 
 
-def regularisation(vehicles, name, speed, least_speeds, distance):
-    """Influence of the smallest speed that creepages are divided by, at a speed above or below it.
+def regularisation(vehicles, name, speeds, least_speeds, distance):
+    """Influence of the smallest speed that creepages are divided by, at speeds above and below it.
 
     Parameters
     ----------
     vehicles, name
         As :func:`wrcore.analysis_hard_cases.prepare` takes them.
-    speed : float
+    speeds : sequence of float
         m/s.
     least_speeds : sequence of float
-        ``contact.creep.least_speed``, m/s; the first one is compared with.
+        ``contact.creep.least_speed``, m/s; the first one, below all speeds, is compared with.
     distance : float
         m.
 
@@ -131,20 +131,19 @@ def regularisation(vehicles, name, speed, least_speeds, distance):
     curve : list of dict
         vehicle, speed_m_per_s, least_speed_m_per_s, y_off_m (largest departure from the first run).
     """
-    found, curve, reference = [], [], None
-    for least in least_speeds:
+    found, curve, reference = [], [], {}
+    for speed, least in product(speeds, least_speeds):
         setting = prepare(vehicles, name, {"speed": speed, "contact.creep.least_speed": least})
         trajectory = run(setting, distance / speed, rate=50.0 * speed / distance)
-        reference = trajectory if reference is None else reference
-        off = float(np.max(np.abs(trajectory.states[:, 1] - reference.states[:, 1])))
+        y = trajectory.states[:, STATE_SIZE * int(setting.model.bodies.wheelsets[0]) + 1]
+        off = float(np.max(np.abs(y - reference.setdefault(speed, y))))
         curve.append({"vehicle": name, "speed_m_per_s": speed, "least_speed_m_per_s": least, "y_off_m": off})
-        below = least < speed
-        limit = setting.control["rtol"] * abs(setting.state[1]) if below else np.inf
-        source = "creepages are the same: rtol y(0)" if below else "measured, not limited"
+        limit = setting.control["rtol"] * abs(y[0]) if least < speed else np.inf
+        source = "creepages are the same: rtol y(0)" if least < speed else "measured, not limited"
         influence = Check("y off that with the smallest least_speed", off, limit, "m", source)
         condition = f"{speed:g} m/s, least_speed {least:g} m/s"
-        found += rows("low speed", "regularisation", condition, setting, trajectory,
-                      [*sound(setting, trajectory), influence])  # fmt: skip
+        checks = [*sound(setting, trajectory), influence]
+        found += rows("low speed", "regularisation", condition, setting, trajectory, checks)
     return found, curve
 
 

@@ -15,7 +15,7 @@ def test_the_path_does_not_depend_on_a_low_speed(vehicles, assert_passed):
 
 
 def test_regularisation_does_not_touch_higher_speeds(vehicles, assert_passed):
-    found, curve = regularisation(vehicles, "suspended wheelset", 0.01, [1e-4, 1e-3, 1e-1], 0.02)
+    found, curve = regularisation(vehicles, "suspended wheelset", [0.01], [1e-4, 1e-3, 1e-1], 0.02)
     assert_passed(found)
     assert curve[1]["y_off_m"] < 1e-9 < 1e-5 < curve[2]["y_off_m"]
 

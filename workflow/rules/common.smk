@@ -46,6 +46,8 @@ def check_config():
             scenes[f"speeds.vehicles.{vehicle} on speeds.tracks.{track}"] = (entry["scene"], entry["set"] | there)
     for name, entry in config["cost_study"]["scenes"].items():
         scenes[f"cost_study.scenes.{name}"] = (entry["scene"], entry["set"])
+    for name, entry in config["stability_study"]["vehicles"].items():
+        scenes[f"stability_study.vehicles.{name}"] = (entry["scene"], entry["set"])
     scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():

@@ -100,6 +100,7 @@ rule study:
         rules.creep_study.input,
         rules.contact_study.input,
         rules.critical_speed_study.input,
+        rules.stability_study.input,
         rules.sweeps.input,
         rules.ivp_study.input,
         rules.speeds_study.input,
