@@ -138,8 +138,28 @@ rule vehicle_over_speed:
         "../scripts/vehicle_over_speed.py"
 
 
+rule vehicle_values:
+    message:
+        "Page: vehicle values and their sources"
+    input:
+        core="wrcore/vehicle_page.py",
+        vehicles=sorted(str(path.relative_to(HERE)) for path in HERE.glob("config/vehicles/*.yaml")),
+    output:
+        report(
+            "<results>/tables/vehicle_values.html",
+            caption="../report/vehicle_values.rst",
+            category="Vehicles",
+            labels={"table": "values and their sources"},
+        ),
+    log:
+        "<logs>/vehicle_values.log",
+    script:
+        "../scripts/vehicle_values.py"
+
+
 rule speeds_study:
     input:
+        rules.vehicle_values.output,
         expand(rules.vehicle_lateral_motion.output, vehicle=VEHICLES),
         expand(rules.vehicle_guiding_forces.output, vehicle=VEHICLES),
         rules.vehicle_over_speed.output,
