@@ -247,11 +247,11 @@ def compile_scene(
     shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
-    material, damping = contact["material"], contact["normal"]["damping"]
+    material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
     model = Model(
         vehicle.bodies,
         ContactModel(
-            _once(shared, "geometry", _parts(scene), lambda: contact_geometry(
+            _once(shared, "geometry", parts, lambda: contact_geometry(
                 scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
             )),
             hertz_table(), LAWS[contact["creep"]["model"]],
@@ -266,7 +266,7 @@ def compile_scene(
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
     )  # fmt: skip
     decisive = (
-        _parts(scene), scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
+        parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
         *damping.values(), *integration["baumgarte"].values(),
     )  # fmt: skip
     at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
@@ -285,11 +285,11 @@ def _parts(scene):
     return tuple(_Same(part) for part in (scene.vehicle, scene.wheel, scene.rail, scene.track))
 
 
-@dataclass(frozen=True, eq=False)
 class _Same:
     """A key that is equal for the same object only, and keeps it alive."""
 
-    part: object
+    def __init__(self, part):
+        self.part = part
 
     def __eq__(self, other):
         return self.part is other.part

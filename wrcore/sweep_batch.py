@@ -12,7 +12,7 @@ import os
 import shutil
 import threading
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from os import PathLike
@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.channels import unit_of
-from wrcore.dynamics.integrate import Trajectory, integrate
+from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.system import Equations, Model
 from wrcore.errors import InputError
 from wrcore.progress import counted
@@ -58,9 +58,33 @@ class _Outcome(NamedTuple):
     run: int
     tangent: bool
     times: np.ndarray
-    trajectory: Trajectory
+    record: dict[str, Any]
     motion: np.ndarray
     forces: np.ndarray | None
+
+
+class _Series:
+    """Equations of motion that a thread uses again for all runs with the same parts: nothing is looked up anew."""
+
+    def __init__(self, model: Model) -> None:
+        self.equations = Equations(model)
+        self.scratch = list(_arrays(self.equations.work))
+        self.fresh = [array.copy() for array in self.scratch]
+
+    def turn_to(self, model: Model) -> Equations:
+        for array, values in zip(self.scratch, self.fresh, strict=True):
+            array[...] = values
+        self.equations.arguments[1].renew(model)
+        return self.equations
+
+
+def _arrays(part: Any) -> Iterator[np.ndarray]:
+    """All arrays of a tuple of arrays, tuples and numbers."""
+    if isinstance(part, np.ndarray):
+        yield part
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from _arrays(item)
 
 
 def run_sweep(
@@ -107,10 +131,9 @@ def run_rows(
     sweep: Sweep, rows: pd.DataFrame, threads: int = 1, progress: Callable[[Iterable], Iterable] | None = None
 ) -> pd.DataFrame:
     """Run some rows of a sweep's table; arguments and result as for :func:`run_sweep`."""
-    with_forces = bool(set(sweep.data["measures"]) & set(FORCES))
 
     def work(task):
-        return _run(task, with_forces)
+        return _run(task, sweep.data["measures"])
 
     tasks, bar = _tasks(sweep, rows), progress or (lambda items: counted(items, total=len(rows)))
     tables: list[pd.DataFrame] = []
@@ -153,29 +176,24 @@ def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
     return dataclasses.replace(scene, data=data)
 
 
-def _run(task: _Task, with_forces: bool) -> _Outcome:
+def _run(task: _Task, measures: list[str]) -> _Outcome:
     scene = _changed(task.scene, task.values)
     model, state = compile_scene(scene, shared=task.shared)
-    settings = scene.data["integration"]
+    key = "series", threading.get_ident()
+    if key not in task.shared:
+        task.shared[key] = _Series(model)
+    settings, equations = scene.data["integration"], task.shared[key].turn_to(model)
     times = _times(settings["duration"], scene.data["output"]["rate"])
     trajectory = integrate(
         model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
-        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"], equations=_equations(task, model),
+        settings["longest_step"], DERAILED_Y, most_steps=settings["most_steps"], equations=equations,
     )  # fmt: skip
     starts = scene.vehicle.positions[model.bodies.wheelsets, 0]
     motion = wheelset_motion(model, starts, trajectory.states)
-    forces = wheel_forces(model, trajectory) if with_forces else None
-    trajectory = dataclasses.replace(trajectory, states=trajectory.states[:0], end=None)  # measured: no longer needed
-    return _Outcome(task.run, bool(model.track.tangent), times, trajectory, motion, forces)
-
-
-def _equations(task: _Task, model: Model) -> Equations:
-    """Equations of motion that a thread uses again for all runs that share their parts."""
-    key = "equations", threading.get_ident()
-    if key not in task.shared:
-        task.shared[key] = Equations(model)
-        return task.shared[key]
-    return task.shared[key].renew(model)
+    forces = wheel_forces(model, trajectory) if set(measures) & set(FORCES) else None
+    record = {"status": trajectory.status, "method": trajectory.method}
+    record |= {name: COUNTERS[name](trajectory) for name in measures if name in COUNTERS}
+    return _Outcome(task.run, bool(model.track.tangent), times, record, motion, forces)
 
 
 @lru_cache
@@ -192,10 +210,8 @@ def _alike(one: _Outcome, other: _Outcome) -> bool:
 def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
     """Measures of runs with the same output times, a row per run."""
     times = outcomes[0].times
-    table: dict[str, Any] = {
-        "status": [outcome.trajectory.status for outcome in outcomes],
-        "method": [outcome.trajectory.method for outcome in outcomes],
-    }
+    records = [outcome.record for outcome in outcomes]
+    table: dict[str, Any] = {name: [record[name] for record in records] for name in ("status", "method")}
     late = times >= sweep.data["begin"]
     motion = _stacked([outcome.motion for outcome in outcomes], len(times))[:, late]
     y, yaw = lateral_and_yaw(motion, outcomes[0].tangent)
@@ -207,7 +223,7 @@ def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
         warnings.simplefilter("ignore", RuntimeWarning)  # all NaN: a run that ended before ``begin`` has no measure
         for name in sweep.data["measures"]:
             if name in COUNTERS:
-                table[name] = [COUNTERS[name](outcome.trajectory) for outcome in outcomes]
+                table[name] = [record[name] for record in records]
             else:
                 table[name] = (MOTION | FORCES)[name](motions)
     return pd.DataFrame(table, index=pd.Index([outcome.run for outcome in outcomes], name="run"))
