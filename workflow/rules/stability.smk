@@ -12,7 +12,6 @@ CORE["hard_cases"] = CORE["stability"] + sources(
 
 wildcard_constraints:
     family="|".join(FAMILIES),
-    hard_figure="|".join(HARD_FIGURES),
 
 
 def hard_settings(wildcards):
@@ -74,20 +73,23 @@ rule stability_table:
 
 rule fig_hard_cases:
     message:
-        "Hard cases: {wildcards.hard_figure}"
+        "Hard cases: figures"
     input:
         core=CORE["hard_cases"] + sources("figures", "figures_hard_cases"),
         curves=expand(rules.hard_cases.output.curves, family=FAMILIES),
     output:
-        report(
-            "<results>/figures/hard_cases_{hard_figure}.png",
-            caption="../report/hard_cases_{hard_figure}.rst",
-            category="Hard cases",
-            labels={"figure": "{hard_figure}"},
-        ),
-        "<results>/figures/hard_cases_{hard_figure}.svg",
+        **{
+            name: report(
+                f"<results>/figures/hard_cases_{name}.png",
+                caption=f"../report/hard_cases_{name}.rst",
+                category="Hard cases",
+                labels={"figure": name.replace("_", " ")},
+            )
+            for name in HARD_FIGURES
+        },
+        svg=expand("<results>/figures/hard_cases_{name}.svg", name=HARD_FIGURES),
     log:
-        "<logs>/fig_hard_cases/{hard_figure}.log",
+        "<logs>/fig_hard_cases.log",
     script:
         "../scripts/fig_hard_cases.py"
 
@@ -95,4 +97,4 @@ rule fig_hard_cases:
 rule stability_study:
     input:
         rules.stability_table.output,
-        expand(rules.fig_hard_cases.output, hard_figure=HARD_FIGURES),
+        rules.fig_hard_cases.output,

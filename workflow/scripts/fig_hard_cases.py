@@ -1,4 +1,4 @@
-"""One figure of the hard cases."""
+"""Figures of the hard cases."""
 
 import json
 import sys
@@ -8,6 +8,7 @@ from wrcore.figures import save_figure
 from wrcore.figures_hard_cases import FIGURES
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-family, figure = FIGURES[snakemake.wildcards.hard_figure]
-path = next(path for path in map(Path, snakemake.input.curves) if path.name == f"{family}_curves.json")
-save_figure(figure(json.loads(path.read_text())), *snakemake.output)
+paths = map(Path, snakemake.input.curves)
+curves = {path.name.removesuffix("_curves.json"): json.loads(path.read_text()) for path in paths}
+for (name, (family, figure)), svg in zip(FIGURES.items(), snakemake.output.svg, strict=True):
+    save_figure(figure(curves[family]), snakemake.output[name], svg)
