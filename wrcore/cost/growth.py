@@ -22,6 +22,7 @@ def array_bytes(part):
     found = {}
 
     def collect(item):
+        """Note the arrays in a part."""
         if isinstance(item, np.ndarray):
             found[item.__array_interface__["data"][0]] = item.nbytes
         elif isinstance(item, tuple):
@@ -166,6 +167,7 @@ def over_scenes(title, source, overrides, *, counts, threads, passes):
         results, spent = {}, {at_once: [] for at_once in threads}
 
         def together(at_once, count=count, results=results, spent=spent):
+            """Run the scenes, so many at once, and note what they gave and took."""
             began = time.process_time(), time.perf_counter()
             results[at_once] = simulate_many(scenes[:count], progress=False, threads=at_once)
             spent[at_once].append((time.process_time() - began[0], time.perf_counter() - began[1]))

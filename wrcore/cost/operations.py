@@ -49,6 +49,7 @@ class Tally:
         """The function, with its operations counted for a stage."""
 
         def counted(*arguments):
+            """The function, within the stage."""
             self.stages.append(stage)
             try:
                 return function(*arguments)
@@ -62,6 +63,7 @@ def _binary(name, quantity):
     operation = getattr(np.float64, name)
 
     def apply(self, other):
+        """The operation on a number and another one, counted."""
         if isinstance(other, np.ndarray):  # lane by lane, from the array's side
             return NotImplemented
         self.tally.add(quantity)
@@ -174,9 +176,11 @@ def _mathematics(tally):
     """Stands in for ``math``: functions of numbers that count."""
 
     def counted(name):
+        """The function of that name for numbers that count and for others."""
         plain, quantity = getattr(math, name), "roots" if name == "sqrt" else "functions"
 
         def function(x, *more):
+            """Its value, counted."""
             if not isinstance(x, Number):
                 return plain(x, *map(float, more))
             tally.add(quantity)
