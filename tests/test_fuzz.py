@@ -48,6 +48,7 @@ def test_scenes(folder, data):
     simulate_text(folder, yaml.dump(bounded(data)))
 
 
+@cache
 def within_schema():
     """Values between the bounds that the schema allows, and at them."""
     found = {"vehicle.axle_boxes": st.booleans(), "rail.inclination": st.sampled_from([0, 0.2, -0.2, "1/20"])}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,9 @@ FORMAT_VERSION = 1
 STATUSES = ("completed", "derailed", "stalled", "failed")
 END = "end"
 """Group that is no body: the last valid state."""
+
+ROWS = 8192
+"""Output times of a joined run that are in memory at once."""
 
 COMPRESSION = {"compression": "gzip", "shuffle": True}
 
@@ -132,31 +135,39 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
     counters : dict
         Of the whole.
     """
-    with ExitStack() as stack:
-        files = [stack.enter_context(h5py.File(part, "r")) for part in parts]
-        file = stack.enter_context(_appearing(path))
-        names = [name for name, item in _items(files[0]) if isinstance(item, h5py.Dataset)]
-        time = None
-        for name in ["t", *(name for name in names if name != "t")]:
+    lengths = [_length(part) for part in parts]
+    rows = min(max(lengths), ROWS)
+    with _appearing(path) as file:
+        with h5py.File(parts[0], "r") as first:
+            shapes = {name: item.shape[1:] for name, item in _items(first) if isinstance(item, h5py.Dataset)}
+        for name, shape in sorted(shapes.items(), key=lambda item: item[0] != "t"):
             group, _, channel = name.rpartition("/")
-            shape = (sum(len(part["t"]) for part in files), *files[0][name].shape[1:])
             dataset = _create_dataset(
-                file.require_group(group or "/"), channel, shape=shape, dtype=files[0][name].dtype
-            )
-            at = 0
-            for part in files:
-                for values in _slices(part[name]):
-                    dataset[at : at + len(values)] = values
-                    at += len(values)
-            if time is None:
-                time = dataset
-                time.make_scale("t")
+                file.require_group(group or "/"), channel, shape=(sum(lengths), *shape), dtype=float,
+                chunks=(max(rows, 1), *(1 for _ in shape)),
+            )  # fmt: skip
+            if name == "t":
+                dataset.make_scale("t")
             else:
-                dataset.dims[0].attach_scale(time)
-        for name, value in files[-1].attrs.items():
-            file.attrs[name] = value
+                dataset.dims[0].attach_scale(file["t"])
+        begin = 0
+        for part, length in zip(parts, lengths, strict=True):
+            with h5py.File(part, "r") as content:
+                for at in range(0, length, ROWS):
+                    end = min(at + ROWS, length)
+                    for name in shapes:
+                        file[name][begin + at : begin + end] = content[name][at:end]
+            begin += length
+        with h5py.File(parts[-1], "r") as last:
+            for name, value in last.attrs.items():
+                file.attrs[name] = value
+            last.copy(END, file)
         file.attrs["counters"] = _record(counters)
-        files[-1].copy(END, file)
+
+
+def _length(part):
+    with h5py.File(part, "r") as file:
+        return len(file["t"])
 
 
 def _items(file):
@@ -164,11 +175,6 @@ def _items(file):
     found: list[tuple[str, Any]] = []
     file.visititems(lambda name, item: found.append((name, item)))
     return [(name, item) for name, item in found if name.split("/")[0] != END]
-
-
-def _slices(dataset, rows=8192):
-    for at in range(0, len(dataset), rows):
-        yield dataset[at : at + rows]
 
 
 def load_run(path: str | PathLike[str]) -> Run:
