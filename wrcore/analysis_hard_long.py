@@ -1,0 +1,143 @@
+"""Hard cases over a long time: hunting for an hour, streamed to a file, broken off and taken up again."""
+
+import tracemalloc
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import h5py
+import numpy as np
+
+from wrcore.analysis_hard_cases import NORM_LIMIT, Check, prepare, rows
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.integrate import Trajectory
+from wrcore.results import load_run
+from wrcore.streaming import simulate_to
+
+BLOCKS = 16
+"""Blocks that a run is written in."""
+
+PARTS = 10
+"""Parts of a run whose amplitudes are compared; the first one settles."""
+
+MEMORY_GROWTH = 1.05
+"""Peak of the memory in the second half of a run over that in the first: blocks are of one size."""
+
+
+class _BrokenOffError(Exception):
+    """What ends a run half-way, as a crash would."""
+
+
+def hunting(vehicles, name, changes, duration, rate=200.0):
+    """A limit cycle over a long time: as a whole, and broken off half-way and taken up again.
+
+    Parameters
+    ----------
+    vehicles : dict
+        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+    name : str
+    changes : dict
+        To the scene: the speed of a stable limit cycle.
+    duration : float
+        s.
+    rate : float
+        Outputs, 1/s.
+
+    Returns
+    -------
+    list of dict
+        Rows of the table.
+    """
+    kept = {"integration.duration": duration, "output.rate": rate, "output.channels": "[pose, velocity]"}
+    setting = prepare(vehicles, name, {**changes, **kept})
+    block = int(np.ceil(duration * rate / BLOCKS))
+    with TemporaryDirectory() as folder:
+        whole, again = (Path(folder, file) for file in ("whole.h5", "again.h5"))
+        run, growth = _with_memory(setting.scene, whole, block, duration)
+        try:
+            simulate_to(setting.scene, again, _break_off_at(0.5 * duration), block=block)
+        except _BrokenOffError:
+            simulate_to(setting.scene, again, block=block)
+        differing = _differing_channels(whole, again)
+        amplitude, energy = _drifts(load_run(whole), setting)
+    parameters = run.end_state[: STATE_SIZE * len(setting.model.bodies.mass)].reshape(-1, STATE_SIZE)[:, 3:7]
+    norm = float(np.max(np.abs(np.linalg.norm(parameters, axis=1) - 1.0)))
+    rtol = setting.control["rtol"]
+    checks = [
+        Check("Euler parameters' norm less 1", norm, NORM_LIMIT, "1", "a hundredth of rtol = 1e-4"),
+        Check("change of the amplitude, of its own", amplitude, rtol, "1", "relative tolerance of a step"),
+        Check("change of the lateral kinetic energy, of its own", energy, 10.0 * rtol, "1", "ten times that tolerance"),
+        Check("channels that differ when taken up again", float(differing), 0.0, "1", "bit by bit"),
+        Check("peak memory, second half over first", growth, MEMORY_GROWTH, "1", "blocks are of one size"),
+    ]
+    condition = f"{setting.model.speed:g} m/s, {duration:g} s"
+    return rows("long run", "hunting", condition, setting, _trajectory(run), checks)
+
+
+def _with_memory(scene, path, block, duration):
+    """A run, and the peak of its memory in the second half over that in the first."""
+    peaks = []
+
+    def half_way(t):
+        if not peaks and t >= 0.5 * duration:
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.reset_peak()
+
+    tracemalloc.start()
+    try:
+        run, _ = simulate_to(scene, path, half_way, block=block)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+    finally:
+        tracemalloc.stop()
+    return run, peaks[-1] / peaks[0]
+
+
+def _break_off_at(t):
+    def progress(reached):
+        if reached >= t:
+            raise _BrokenOffError
+
+    return progress
+
+
+def _differing_channels(one, other):
+    """Number of datasets in which two run files differ by any bit, the end's among them."""
+    differing = 0
+    with h5py.File(one, "r") as first, h5py.File(other, "r") as second:
+        names = []
+        first.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+        for name in names:
+            same = name in second and first[name].shape == second[name].shape
+            differing += not (same and np.array_equal(first[name][()], second[name][()], equal_nan=True))
+    return differing
+
+
+def _drifts(run, setting):
+    """Relative change of the first wheelset's amplitude and mean lateral kinetic energy, second part to last.
+
+    The amplitude is sqrt(2) times the root mean square over whole periods.
+    """
+    body = int(setting.model.bodies.wheelsets[0])
+    wheelset = run[setting.scene.vehicle.body_names[body]]
+    length = len(run.t) // PARTS
+    amplitudes, energies = [], []
+    for part in (slice(length, 2 * length), slice(-length, None)):
+        y = wheelset.y_m[part] - wheelset.y_m[part].mean()
+        rising = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+        periods = slice(rising[0], rising[-1])
+        amplitudes.append(np.sqrt(2.0 * np.mean(y[periods] ** 2)))
+        speeds = wheelset.vy_m_per_s[part][periods], wheelset.wz_rad_per_s[part][periods]
+        mass, inertia = setting.model.bodies.mass[body], setting.model.bodies.inertia[body, 2]
+        energies.append(0.5 * np.mean(mass * speeds[0] ** 2 + inertia * speeds[1] ** 2))
+    return tuple(float(abs(last / first - 1.0)) for first, last in (amplitudes, energies))
+
+
+def _trajectory(run):
+    """The counters of a run as the table takes them."""
+    counters = run.counters
+    ends = np.array([run.t[-1] - counters["simulated_s"], run.t[-1]])
+    return Trajectory(
+        run.settings["method_used"], ends, np.empty((2, 0)), run.status, run.reason, counters["steps"],
+        counters["rejected"], counters["rhs_evaluations"], counters["jacobians"], counters["factorisations"],
+        counters["table_out_of_range"], counters["smallest_step_s"], counters["wall_s"],
+        collapses=counters["step_collapses"],
+    )  # fmt: skip
