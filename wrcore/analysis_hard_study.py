@@ -6,6 +6,7 @@ from wrcore import analysis_hard_contact as contact
 from wrcore import analysis_hard_flange as flange
 from wrcore import analysis_hard_friction as friction
 from wrcore import analysis_hard_integration as integration
+from wrcore import analysis_hard_long as long
 from wrcore import analysis_hard_low_speed as low_speed
 from wrcore import analysis_hard_profiles as profiles
 from wrcore import analysis_hard_track as track
@@ -31,6 +32,7 @@ FAMILIES = {
         "tolerance_ladder": integration.tolerance_ladder, "stability_map": integration.stability_map,
         "baumgarte": integration.baumgarte, "long_run": integration.long_run, "restarts": integration.restarts,
     },
+    "streaming": {"hunting": long.hunting},
     "track": {"irregular": track.irregular, "curve": track.curve},
 }  # fmt: skip
 """Functions of each family by the name of their settings; all but ``pose_sweeps`` take the vehicles first."""

@@ -78,6 +78,7 @@ def sources(*rooms):
 
 
 SCENE = ("vehicle", "schemas", "checked_yaml", "initial", "scene")
+RUN = ("course", "validity", "simulate", "run", "channels", "checkpoints", "results")
 CORE = {
     "creep": sources("creep"),
     "creep_study": sources("creep", "analysis_creep"),
@@ -87,13 +88,13 @@ CORE = {
     "contact_figures": sources(
         "geometry", "contact", "analysis_contact", "analysis_contact_reference", "figures", "figures_contact"
     ),
-    "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, "simulate", "run", "channels", "results"),
-    "vehicle": sources("analysis", "analysis_vehicle", "sweep", "run", "channels", "results"),
-    "vehicle_figures": sources("simulate", "run", "channels", "results", "analysis", "analysis_vehicle", "figures", "figures_vehicle"),
+    "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, *RUN),
+    "vehicle": sources("analysis", "analysis_vehicle", "sweep", *RUN),
+    "vehicle_figures": sources(*RUN, "analysis", "analysis_vehicle", "figures", "figures_vehicle"),
     "accuracy": sources("analysis", "analysis_vehicle", "analysis_accuracy"),
     "accuracy_figures": sources("analysis", "analysis_vehicle", "analysis_accuracy", "figures", "figures_accuracy"),
-    "analysis": sources("simulate", "run", "channels", "results", "analysis"),
-    "figures": sources("geometry", "contact", *SCENE, "simulate", "run", "channels", "results", "analysis", "figures"),
+    "analysis": sources(*RUN, "analysis"),
+    "figures": sources("geometry", "contact", *SCENE, *RUN, "analysis", "figures"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

@@ -6,7 +6,7 @@ HARD_FIGURES = ["low_speed", "contact_jumps", "lift_off", "nadal", "stability_ma
 CORE["hard_cases"] = CORE["stability"] + sources(
     "analysis_contact", "analysis_hard_cases", "analysis_hard_low_speed", "analysis_hard_contact",
     "analysis_hard_flange", "analysis_hard_profiles", "analysis_hard_friction", "analysis_hard_integration",
-    "analysis_hard_track", "analysis_hard_study",
+    "analysis_hard_long", "analysis_hard_track", "analysis_hard_study", "streaming", "checkpoints",
 )  # fmt: skip
 
 
