@@ -20,6 +20,7 @@ include: "workflow/rules/critical_speed.smk"
 include: "workflow/rules/stability.smk"
 include: "workflow/rules/cost.smk"
 include: "workflow/rules/sweep.smk"
+include: "workflow/rules/notebooks.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 

@@ -149,11 +149,13 @@ def test_sweep_of_the_study_has_all_its_runs(smoke):
     assert (smoke / "figures" / "sweep_smoke.svg").is_file()
 
 
-def test_notebook_was_executed_and_holds_fig4(smoke):
-    cells = json.loads((smoke / "notebooks" / "first_light.ipynb").read_text())["cells"]
+@pytest.mark.parametrize("name", sorted(path.name for path in (ROOT / "notebooks").glob("*.ipynb")))
+def test_notebooks_were_executed_and_hold_figures(smoke, name):
+    cells = json.loads((smoke / "notebooks" / name).read_text())["cells"]
     outputs = [output for cell in cells if cell["cell_type"] == "code" for output in cell["outputs"]]
-    assert not [output for output in outputs if output["output_type"] == "error"]
+    assert not [output for output in outputs if output["output_type"] == "error" or output.get("name") == "stderr"]
     assert any("image/png" in output.get("data", {}) for output in outputs)
+    assert str(ROOT) not in json.dumps(outputs)
 
 
 def test_report_holds_the_figures(smoke):

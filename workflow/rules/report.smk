@@ -97,6 +97,7 @@ rule study:
         rules.timing_table.output,
         rules.comparison_table.output,
         rules.first_light_notebook.output,
+        rules.notebooks.input,
         rules.creep_study.input,
         rules.contact_study.input,
         rules.critical_speed_study.input,
