@@ -123,11 +123,11 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
     assert factorise(jacobian, system, sigma)
     solve_stage(jacobian, system, sigma, increment)
     np.testing.assert_allclose(unknowns(increment), expected, atol=1e-12 * np.abs(expected).max())
-    # along p, what is left is the length's own equation: sigma l = g_l + turning . (theta, w)
+    # along p, what is left is the length's own equation: (sigma + 2 alpha) l = g_l + turning . (theta, w)
     for b in range(n):
         p, at = jacobian.axes[b, 3], 13 * b
         turns = np.r_[2 * jacobian.axes[b, :3] @ increment[at + 3 : at + 7], increment[at + 10 : at + 13]]
-        length = (p @ right[at + 3 : at + 7] + jacobian.turning[b, 3] @ turns) / sigma
+        length = (p @ right[at + 3 : at + 7] + jacobian.turning[b, 3] @ turns) / (sigma + 2.0 * model.alpha)
         assert p @ increment[at + 3 : at + 7] == pytest.approx(length * (p @ p), abs=1e-14)
 
 

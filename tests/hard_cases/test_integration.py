@@ -54,6 +54,13 @@ def test_baumgarte_s_feedback_bounds_the_drift(boxes, assert_passed):
     assert curve[1]["violation_m"] < 0.1 * curve[0]["violation_m"]
 
 
+def test_stiff_feedback_costs_implicit_steps_nothing(boxes, assert_passed):
+    # left out of the Jacobian, the feedback on Euler parameters bounds steps by about 1/alpha: ten times as many
+    found, curve = baumgarte(boxes, "with axle boxes", [(5.0, 5.0), (1000.0, 1000.0)], 2.0, ["ros34pw2"])
+    assert_passed(found)
+    assert curve[1]["steps"] < 1.2 * curve[0]["steps"]
+
+
 def test_long_hunting_does_not_drift(boxes, assert_passed):
     start = {"speed": 60.0, "initial.y": 0.006}
     found, _ = long_run(boxes, ["suspended wheelset"], 60.0, {"suspended wheelset": start}, 100.0, ["auto"])

@@ -348,6 +348,6 @@ def solve_stage(jacobian, system, sigma, increment):
         for j in range(3):
             length += turning[3, j] * to[3 + j] + turning[3, 3 + j] * velocity[3 + j]
         for j in range(4):
-            increment[at + 3 + j] = axes[3, j] * length / sigma
+            increment[at + 3 + j] = axes[3, j] * length / (sigma - jacobian.length[0])
             for i in range(3):
                 increment[at + 3 + j] += 0.5 * axes[i, j] * to[3 + i]

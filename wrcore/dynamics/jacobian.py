@@ -60,6 +60,8 @@ class Jacobian(NamedTuple):
     """(m, m): with respect to velocities and the elements' own states."""
     turning: np.ndarray
     """(n, 4, 6): rate of the rotation vector, and of the length of p, with respect to rotation and angular velocity."""
+    length: np.ndarray
+    """(1,): rate of the length of p with respect to itself, which is that of Baumgarte's feedback, 1/s."""
     by_time: np.ndarray
     """(size,): time derivative of the state's rate at positions that move with the drift."""
     drift: np.ndarray
@@ -185,8 +187,9 @@ def new_jacobian(model):
     n, size = len(model.bodies.mass), state_size(model)
     m = size - 7 * n
     return Jacobian(
-        np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(size), np.zeros(size), np.zeros((n, 4, 4))
-    )
+        np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros(size), np.zeros(size),
+        np.zeros((n, 4, 4)),
+    )  # fmt: skip
 
 
 @jit(allocates=False)
@@ -251,6 +254,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     """
     n = jacobian.axes.shape[0]
     _take_axes(state, jacobian.axes)
+    jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW)
     for b in range(n):
         for k in range(STATE_SIZE * b, STATE_SIZE * b + 3):
