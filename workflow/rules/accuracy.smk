@@ -74,14 +74,14 @@ rule speed_against_error:
         report(
             "<results>/figures/speed_against_error.png",
             caption="../report/speed_against_error.rst",
-            category="Speed against error",
+            category="07 Speed against error",
             labels={"figure": "speed against error"},
         ),
         "<results>/figures/speed_against_error.svg",
         report(
             "<results>/tables/choose_for_accuracy.csv",
             caption="../report/choose_for_accuracy.rst",
-            category="Speed against error",
+            category="07 Speed against error",
             labels={"table": "choose this for that accuracy"},
         ),
         "<results>/tables/accuracy_front.csv",

@@ -15,13 +15,13 @@ rule ivp_wheelset:
         work_precision=report(
             "<results>/tables/ivp_work_precision.csv",
             caption="../report/ivp_work_precision.rst",
-            category="Benchmark",
+            category="10 Benchmark of integrators",
             labels={"table": "error and work"},
         ),
         stabilisation=report(
             "<results>/tables/ivp_stabilisation.csv",
             caption="../report/ivp_stabilisation.rst",
-            category="Benchmark",
+            category="10 Benchmark of integrators",
             labels={"table": "Baumgarte and projection"},
         ),
         values="<results>/tables/ivp_values.csv",
@@ -50,13 +50,13 @@ rule fig_ivp:
         work_precision=report(
             "<results>/figures/ivp_work_precision.png",
             caption="../report/ivp_work_precision.rst",
-            category="Benchmark",
+            category="10 Benchmark of integrators",
             labels={"figure": "error and work"},
         ),
         constraints=report(
             "<results>/figures/ivp_constraints.png",
             caption="../report/ivp_constraints.rst",
-            category="Benchmark",
+            category="10 Benchmark of integrators",
             labels={"figure": "drift of the constraints"},
         ),
         svg=expand("<results>/figures/ivp_{name}.svg", name=["work_precision", "constraints"]),

@@ -18,31 +18,31 @@ rule contact_pairs:
         location=report(
             "<results>/figures/contact_location.png",
             caption="../report/contact_location.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "contact points"},
         ),
         radius=report(
             "<results>/figures/contact_radius_difference.png",
             caption="../report/contact_radius_difference.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "rolling radius difference"},
         ),
         angle=report(
             "<results>/figures/contact_angle.png",
             caption="../report/contact_angle.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "contact angle"},
         ),
         conicity_figure=report(
             "<results>/figures/contact_conicity.png",
             caption="../report/contact_conicity.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "equivalent conicity"},
         ),
         yaw_figure=report(
             "<results>/figures/contact_location_with_yaw.png",
             caption="../report/contact_location_with_yaw.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "contact points with yaw"},
         ),
         svg=expand("<results>/figures/contact_{name}.svg", name=CONTACT_PAIR_FIGURES),
@@ -67,7 +67,7 @@ rule contact_planar_error:
         figure=report(
             "<results>/figures/contact_planar_error.png",
             caption="../report/contact_planar_error.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "planar against spatial"},
         ),
         svg="<results>/figures/contact_planar_error.svg",
@@ -91,7 +91,7 @@ rule contact_reductions:
         summary=report(
             "<results>/tables/contact/reductions.csv",
             caption="../report/contact_reductions.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"table": "reductions against CONTACT"},
         ),
         jumps="<results>/tables/contact/force_steps.csv",
@@ -99,13 +99,13 @@ rule contact_reductions:
         sweep_figure=report(
             "<results>/figures/contact_force_sweep.png",
             caption="../report/contact_force_sweep.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "force in a lateral sweep"},
         ),
         patch_figure=report(
             "<results>/figures/contact_patch_forces.png",
             caption="../report/contact_patch_forces.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"figure": "two patches"},
         ),
         svg=expand("<results>/figures/contact_{name}.svg", name=["force_sweep", "patch_forces"]),
@@ -127,7 +127,7 @@ rule contact_search:
         report(
             "<results>/tables/contact/search.csv",
             caption="../report/contact_search.rst",
-            category="Contact geometry",
+            category="03 Contact geometry",
             labels={"table": "search against dense search"},
         ),
     log:

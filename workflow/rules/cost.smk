@@ -15,13 +15,13 @@ rule cost_pairs:
         pairs=report(
             "<results>/tables/benchmarks.csv",
             caption="../report/benchmarks.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "benchmarks"},
         ),
         machine=report(
             "<results>/tables/benchmark_machine.csv",
             caption="../report/benchmark_machine.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "machine"},
         ),
     log:
@@ -47,31 +47,31 @@ rule cost_growth:
         wheelsets=report(
             "<results>/tables/growth_wheelsets.csv",
             caption="../report/growth_wheelsets.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "growth with wheelsets"},
         ),
         runs=report(
             "<results>/tables/growth_runs.csv",
             caption="../report/growth_runs.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "growth with duration and tolerance"},
         ),
         simultaneous=report(
             "<results>/tables/growth_scenes.csv",
             caption="../report/growth_scenes.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "scenes at the same time"},
         ),
         chains=report(
             "<results>/tables/growth_chains.csv",
             caption="../report/growth_chains.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "growth with joints"},
         ),
         findings=report(
             "<results>/tables/growth_memory.csv",
             caption="../report/growth_memory.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "arithmetic or memory"},
         ),
     log:
@@ -98,7 +98,7 @@ rule fig_growth:
         png=report(
             "<results>/figures/growth.png",
             caption="../report/growth.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"figure": "growth"},
         ),
         svg="<results>/figures/growth.svg",
@@ -118,19 +118,19 @@ rule cost_stages:
         stages=report(
             "<results>/tables/cost_breakdown.csv",
             caption="../report/cost_breakdown.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "stages of a right-hand side"},
         ),
         limits=report(
             "<results>/tables/machine_limits.csv",
             caption="../report/machine_limits.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "limits of the machine"},
         ),
         png=report(
             "<results>/figures/cost_breakdown.png",
             caption="../report/cost_breakdown.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"figure": "stages of a right-hand side"},
         ),
         svg="<results>/figures/cost_breakdown.svg",
@@ -156,13 +156,13 @@ rule cost_runs:
         batch=report(
             "<results>/tables/batch.csv",
             caption="../report/batch.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "a batch in one process"},
         ),
         rejections=report(
             "<results>/tables/rejected_steps.csv",
             caption="../report/rejected_steps.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "rejected steps"},
         ),
     log:

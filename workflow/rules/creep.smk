@@ -96,7 +96,7 @@ rule creep_laws:
         report(
             "<results>/tables/creep_laws.csv",
             caption="../report/creep_laws.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"table": "laws, error and cost"},
         ),
         "<results>/tables/creep_laws.md",
@@ -116,7 +116,7 @@ rule fig_creep_curves:
         report(
             "<results>/figures/creep_curves.png",
             caption="../report/creep_curves.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"figure": "curves"},
         ),
         "<results>/figures/creep_curves.svg",
@@ -139,7 +139,7 @@ rule fig_creep_traction:
         report(
             "<results>/figures/creep_traction.png",
             caption="../report/creep_traction.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"figure": "traction"},
         ),
         "<results>/figures/creep_traction.svg",
@@ -163,7 +163,7 @@ rule fig_creep_cost:
         report(
             "<results>/figures/creep_cost.png",
             caption="../report/creep_cost.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"figure": "cost against error"},
         ),
         "<results>/figures/creep_cost.svg",
@@ -185,7 +185,7 @@ rule fig_creep_error_map:
         report(
             "<results>/figures/creep_error_map.png",
             caption="../report/creep_error_map.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"figure": "error of the table"},
         ),
         "<results>/figures/creep_error_map.svg",
@@ -211,7 +211,7 @@ rule fig_creep_smoothness:
         report(
             "<results>/figures/creep_smoothness.png",
             caption="../report/creep_smoothness.rst",
-            category="Creep",
+            category="04 Creep forces",
             labels={"figure": "smoothness of the table"},
         ),
         "<results>/figures/creep_smoothness.svg",

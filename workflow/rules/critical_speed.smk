@@ -76,25 +76,25 @@ rule critical_speeds:
         table=report(
             "<results>/tables/critical_speeds.csv",
             caption="../report/critical_speeds.rst",
-            category="Stability",
+            category="06 Hunting: critical speeds",
             labels={"table": "critical speeds"},
         ),
         variants=report(
             "<results>/tables/critical_speed_variants.csv",
             caption="../report/critical_speed_variants.rst",
-            category="Stability",
+            category="06 Hunting: critical speeds",
             labels={"table": "what the critical speed depends on"},
         ),
         locus=report(
             "<results>/figures/root_locus.png",
             caption="../report/root_locus.rst",
-            category="Stability",
+            category="06 Hunting: critical speeds",
             labels={"figure": "root locus"},
         ),
         cycles=report(
             "<results>/figures/limit_cycles.png",
             caption="../report/limit_cycles.rst",
-            category="Stability",
+            category="06 Hunting: critical speeds",
             labels={"figure": "limit cycles"},
         ),
         svg=expand("<results>/figures/{name}.svg", name=["root_locus", "limit_cycles"]),
@@ -117,7 +117,7 @@ rule fig_modes:
         report(
             "<results>/figures/modes_{vehicle}.png",
             caption="../report/modes.rst",
-            category="Stability",
+            category="06 Hunting: critical speeds",
             labels={"figure": "modes", "vehicle": "{vehicle}"},
         ),
         "<results>/figures/modes_{vehicle}.svg",

@@ -12,7 +12,7 @@ rule fig1_parametrisation:
         report(
             "<results>/figures/fig1_parametrisation.png",
             caption="../report/fig1.rst",
-            category="Geometry",
+            category="02 The paper's figures",
             labels={"figure": "1"},
         ),
         "<results>/figures/fig1_parametrisation.svg",
@@ -33,7 +33,7 @@ rule fig2_profiles:
         report(
             "<results>/figures/fig2_profiles.png",
             caption="../report/fig2.rst",
-            category="Geometry",
+            category="02 The paper's figures",
             labels={"figure": "2"},
         ),
         "<results>/figures/fig2_profiles.svg",
@@ -54,7 +54,7 @@ rule fig3_detection:
         report(
             "<results>/figures/fig3_detection.png",
             caption="../report/fig3.rst",
-            category="Geometry",
+            category="02 The paper's figures",
             labels={"figure": "3"},
         ),
         "<results>/figures/fig3_detection.svg",
@@ -78,7 +78,7 @@ rule fig4_lateral_position:
         report(
             "<results>/figures/fig4_lateral_position.png",
             caption="../report/fig4.rst",
-            category="Wheelset",
+            category="02 The paper's figures",
             labels={"figure": "4"},
         ),
         "<results>/figures/fig4_lateral_position.svg",
@@ -105,7 +105,7 @@ rule fig5_contact_points:
         report(
             "<results>/figures/fig5_contact_points.png",
             caption="../report/fig5.rst",
-            category="Wheelset",
+            category="02 The paper's figures",
             labels={"figure": "5"},
         ),
         "<results>/figures/fig5_contact_points.svg",

@@ -14,7 +14,7 @@ rule motion_table:
         report(
             "<results>/tables/motion.csv",
             caption="../report/motion.rst",
-            category="Wheelset",
+            category="02 The paper's figures",
             labels={"table": "motion"},
         ),
     log:
@@ -35,7 +35,7 @@ rule timing_table:
         report(
             "<results>/tables/timing.csv",
             caption="../report/timing.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "timing"},
         ),
     log:
@@ -57,7 +57,7 @@ rule comparison_table:
         report(
             "<results>/tables/comparison.csv",
             caption="../report/comparison.rst",
-            category="Comparison with published values",
+            category="01 The paper's values and ours",
             labels={"table": "comparison"},
         ),
         "<results>/tables/comparison.md",

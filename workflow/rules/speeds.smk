@@ -62,7 +62,7 @@ rule vehicle_lateral_motion:
         report(
             "<results>/figures/vehicle_lateral_motion_{vehicle}.png",
             caption="../report/vehicle_lateral_motion.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"figure": "lateral motion", "vehicle": "{vehicle}"},
         ),
         "<results>/figures/vehicle_lateral_motion_{vehicle}.svg",
@@ -84,14 +84,14 @@ rule vehicle_guiding_forces:
         report(
             "<results>/figures/vehicle_guiding_forces_{vehicle}.png",
             caption="../report/vehicle_guiding_forces.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"figure": "guiding forces", "vehicle": "{vehicle}"},
         ),
         "<results>/figures/vehicle_guiding_forces_{vehicle}.svg",
         report(
             "<results>/tables/vehicle_wheels_{vehicle}.csv",
             caption="../report/vehicle_wheels.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"table": "wheels", "vehicle": "{vehicle}"},
         ),
     log:
@@ -111,21 +111,21 @@ rule vehicle_over_speed:
         report(
             "<results>/figures/vehicle_hunting.png",
             caption="../report/vehicle_hunting.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"figure": "hunting over speed"},
         ),
         "<results>/figures/vehicle_hunting.svg",
         report(
             "<results>/figures/vehicle_response.png",
             caption="../report/vehicle_response.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"figure": "response over speed"},
         ),
         "<results>/figures/vehicle_response.svg",
         report(
             "<results>/tables/vehicle_timing.csv",
             caption="../report/vehicle_timing.rst",
-            category="Cost",
+            category="08 Cost",
             labels={"table": "timing over vehicles"},
         ),
     log:
@@ -148,7 +148,7 @@ rule vehicle_values:
         report(
             "<results>/tables/vehicle_values.html",
             caption="../report/vehicle_values.rst",
-            category="Vehicles",
+            category="05 Wheelset and trailer vehicle",
             labels={"table": "values and their sources"},
         ),
     log:

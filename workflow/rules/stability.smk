@@ -49,19 +49,19 @@ rule stability_table:
         table=report(
             "<results>/tables/stability.csv",
             caption="../report/stability_table.rst",
-            category="Hard cases",
+            category="09 Hard cases",
             labels={"table": "every check"},
         ),
         summary=report(
             "<results>/tables/stability_summary.csv",
             caption="../report/stability_summary.rst",
-            category="Hard cases",
+            category="09 Hard cases",
             labels={"table": "cases"},
         ),
         limits=report(
             "<results>/tables/stability_limits.csv",
             caption="../report/stability_limits.rst",
-            category="Hard cases",
+            category="09 Hard cases",
             labels={"table": "known limits"},
         ),
         text="<results>/tables/stability.md",
@@ -82,7 +82,7 @@ rule fig_hard_cases:
             name: report(
                 f"<results>/figures/hard_cases_{name}.png",
                 caption=f"../report/hard_cases_{name}.rst",
-                category="Hard cases",
+                category="09 Hard cases",
                 labels={"figure": name.replace("_", " ")},
             )
             for name in HARD_FIGURES

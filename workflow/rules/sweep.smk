@@ -65,7 +65,7 @@ rule sweep_table:
         figure=report(
             "<results>/figures/sweep_{sweep}.png",
             caption="../report/sweep.rst",
-            category="Sweeps",
+            category="11 Sweeps",
             labels={"figure": "{sweep}"},
         ),
         svg="<results>/figures/sweep_{sweep}.svg",
