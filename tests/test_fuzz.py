@@ -117,6 +117,15 @@ def test_a_document_that_contains_itself_is_refused(folder):
     assert simulate_text(folder, text.replace("initial:\n", "initial: &i\n  y: *i\n")) == 2
 
 
+def test_whole_numbers_may_be_written_with_a_point(folder):
+    spectrum = TRACK["irregularity"]["spectrum"] | {"seed": 3.0}
+    changes = {"track": TRACK | {"irregularity": {"spectrum": spectrum, "fade_in": 5.0}}}
+    changes["vehicle"] = {"parameters": "vehicles/suspended_wheelset.yaml", "count": 2.0, "spacing": 3.0}
+    changes["integration"] = base_scene()["integration"] | {"most_steps": 1000.0}
+    assert simulate_text(folder, yaml.dump(base_scene() | changes | {"track": {"path": "tangent"}})) == 0
+    assert simulate_text(folder, yaml.dump(base_scene() | {"track": changes["track"]})) == 0
+
+
 @examples(60)
 @given(text=st.one_of(st.binary(max_size=60), st.deferred(lambda: spoiled_text(yaml.dump(base_scene())))))
 def test_text_of_scenes(folder, text):

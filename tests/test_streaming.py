@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from contextlib import nullcontext
 
 import h5py
 import numpy as np
@@ -176,6 +177,21 @@ def test_the_command_tells_how_a_run_ended(tmp_path, capsys):
     run = load_run(out)
     assert (run.status, run.reason) == (summary["status"], summary["reason"])
     assert run.counters["steps"] + run.counters["rejected"] == 50
+
+
+def test_the_command_is_interrupted_and_goes_on(tmp_path, capsys, monkeypatch):
+    out = tmp_path / "run.h5"
+    sets = [f"--set={key}={value}" for key, value in HUNTING.items()]
+    command = ["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)]
+    with monkeypatch.context() as patch:
+        patch.setattr("wrcore.progress.simulated_time", lambda _: nullcontext(interrupt_at(1.5, signal.SIGTERM)))
+        assert main(command) == 128 + signal.SIGTERM
+    assert "stalled: interrupted (SIGTERM)" in capsys.readouterr().out
+    kept = out.read_bytes()
+    assert main(command) == 0 and "goes on at t" in capsys.readouterr().out
+    out.write_bytes(kept)
+    assert main([*command, "--no-resume"]) == 0 and "goes on" not in capsys.readouterr().out
+    assert_same(load_run(out), simulate(scene_of(HUNTING)))
 
 
 def test_last_valid_state_in_the_file_says_what_it_is(tmp_path):

@@ -121,7 +121,7 @@ def validate(data, schema_name, source):
     Returns
     -------
     dict
-        A copy with all defaults.
+        A copy with all defaults; whole numbers are integers where the schema asks for them.
 
     Raises
     ------
@@ -229,6 +229,8 @@ def _fill_defaults(data, schema, root):
         if key not in data and "default" in part:
             data[key] = copy.deepcopy(part["default"])
         if key in data:
+            if part.get("type") == "integer":
+                data[key] = int(data[key])  # 3.0 is an integer to JSON
             _fill_inside(data[key], part, root)
     if isinstance(schema.get("additionalProperties"), dict):
         for item in data.values():
