@@ -22,11 +22,15 @@ from wrcore.results import load_run
 STATUSES = {"completed", "derailed", "stalled", "failed"}
 
 
+SHARES = 1200
+"""Sum of the shares of all tests."""
+
+
 def examples(share):
-    """Hypothesis settings of a test that takes its share (per mille) of all inputs; see ``tests/test_fuzz.py``."""
+    """Hypothesis settings of a test that takes its share (of `SHARES`) of all inputs; see ``tests/test_fuzz.py``."""
     total = int(os.environ.get("WRCORE_FUZZ", "600"))
     return settings(
-        max_examples=max(1, round(total * share / 1000)), derandomize=True, deadline=None, database=None,
+        max_examples=max(1, round(total * share / SHARES)), derandomize=True, deadline=None, database=None,
         suppress_health_check=list(HealthCheck),
     )  # fmt: skip
 
