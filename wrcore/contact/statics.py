@@ -75,6 +75,9 @@ CLOSE = 1e-12
 ROLL_SLOPE = -1.5
 """First guess of the change with roll of the left wheel's own height less the right wheel's, m: the rails' distance."""
 
+MOST_SECANTS = 20
+"""Heights tried before the search for one halves its interval instead."""
+
 LARGEST_TURN = 0.02
 """A step in roll beyond this is not trusted, rad."""
 
@@ -108,7 +111,7 @@ def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reductio
     z, step, last = guess, FIRST_STEP, 0
     low = high = np.nan
     excess_low = excess_high = 0.0
-    for _ in range(60):
+    for k in range(90):
         force = wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1]
         excess = force ** (2.0 / 3.0) - goal
         if abs(excess) <= CLOSE * goal:
@@ -126,17 +129,19 @@ def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reductio
             continue
         last = 1 if pressed else -1
         z = low + (high - low) * excess_low / (excess_low - excess_high)
-        if not low < z < high:
-            break
+        if k > MOST_SECANTS or not low < z < high:  # the force jumps over the load: find the place of the jump
+            z = 0.5 * (low + high)
+        if high - low < 1e-14 or z == low or z == high:
+            return low
     return np.nan
 
 
 @jit(allocates=False)
 def _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
-    """As `settle`, by secants: fifty times as fast where forces are continuous. NaN where they jump or it is lost."""
+    """As `settle`, by secants: far faster. NaN where it is lost."""
     roll = before = difference = 0.0
     slope, left, right = ROLL_SLOPE, nominal, nominal
-    for k in range(12):
+    for k in range(25):
         left = _height_near(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, left, patches)
         right = _height_near(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, right, patches)
         if k > 0 and roll != before:
