@@ -72,6 +72,7 @@ class _Series:
         self.fresh = [array.copy() for array in self.scratch]
 
     def turn_to(self, model: Model) -> Equations:
+        """The equations of another model, with scratch arrays as if they were new."""
         for array, values in zip(self.scratch, self.fresh, strict=True):
             array[...] = values
         self.equations.arguments[1].renew(model)
