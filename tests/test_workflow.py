@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from wrcore.analysis_hard_study import unexplained
 from wrcore.results import load_run
 
 ROOT = Path(__file__).parent.parent
@@ -141,6 +142,13 @@ def test_benchmark_of_the_study_meets_its_bar(smoke):
     assert bar == 1e-6 and (table.status == "completed").all()
     assert (table.error_x_m[table.rtol <= 1e-6] < bar).all(), table.to_string()
     assert len(pd.read_csv(smoke / "tables" / "ivp_values.csv")) == 17
+
+
+def test_no_hard_case_of_the_study_fails_without_a_known_limit(smoke):
+    table = pd.read_csv(smoke / "tables" / "stability.csv")
+    assert {"survived", "refused"} == set(table["outcome"])
+    assert len(unexplained(table)) == 0, unexplained(table).to_string()
+    assert set(table["family"]) >= {"low speed", "contact jumps", "lift-off", "flange", "profiles", "friction", "track"}
 
 
 def test_sweep_of_the_study_has_all_its_runs(smoke):
