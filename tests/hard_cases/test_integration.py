@@ -62,7 +62,7 @@ def test_stiff_feedback_costs_implicit_steps_nothing(boxes, assert_passed):
 
 
 def test_long_hunting_does_not_drift(boxes, assert_passed):
-    start = {"speed": 60.0, "initial.y": 0.006}
+    start = {"speed": 60.0, "initial.y": 0.0025}
     found, _ = long_run(boxes, ["suspended wheelset"], 60.0, {"suspended wheelset": start}, 100.0, ["auto"])
     assert_passed(found)
 
