@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from functools import partial
 from pathlib import Path
 
@@ -234,7 +235,7 @@ def _sweep(options):
     out = _output(options.out)
     if not 1 <= options.threads <= 1000:
         raise InputError("wrcore sweep", "--threads", f"expected 1 to 1000, got {options.threads}")
-    sweep = load_sweep(options.sweep)
+    sweep, started = load_sweep(options.sweep), time.perf_counter()
     if options.gather:
         gather(options.gather, out)
     elif options.batch:
@@ -243,7 +244,10 @@ def _sweep(options):
         sweep_to_file(sweep, out, options.threads)
     table = load_table(out)
     ends = ", ".join(f"{count} {status}" for status, count in table["status"].value_counts().items())
-    print(f"{sweep.data['name']}: {len(table)} of {len(sweep.runs)} runs, {ends}: {out}")
+    seconds = f"{time.perf_counter() - started:.3g} s"
+    if "wall_s" in table:
+        seconds += f", integrations {table['wall_s'].sum():.3g} s in all"
+    print(f"{sweep.data['name']}: {len(table)} of {len(sweep.runs)} runs, {ends}, in {seconds}: {out}")
     return 0
 
 
