@@ -29,6 +29,7 @@ from hypothesis import strategies as st
 from tests.conftest import ROOT
 from wrcore.checked_yaml import read_yaml
 from wrcore.errors import InputError
+from wrcore.sweep_plan import load_sweep
 from wrcore.vehicle.description import build_vehicle
 
 pytestmark = pytest.mark.usefixtures("no_new_tables")
@@ -182,6 +183,38 @@ def test_overrides(folder, overrides):
     out = folder / "out" / "run.h5"
     sets = [word for override in overrides for word in ("--set", override)]
     check_command(["simulate", folder / "scene.yaml", *sets, "--out", out], folder / "out", out)
+
+
+SWEEP = {
+    "name": "fuzz", "scene": "scene.yaml", "set": {"output.rate": 500.0}, "sampling": {"kind": "grid"},
+    "keys": {"speed": {"from": 20.0, "to": 30.0, "steps": 2}, "contact.detection": {"values": ["planar", "spatial"]}},
+    "measures": ["y_rms_m", "Q_min_N", "steps"], "begin": 0.0, "window": 0.002, "batch": 3,
+}  # fmt: skip
+
+
+def test_a_grid_beyond_reason_is_refused(folder):
+    (folder / "scene.yaml").write_text(yaml.dump(base_scene()))
+    axis = {"from": 1.0, "to": 2.0, "steps": 100_000}
+    keys = {"speed": axis, "contact.friction": axis | {"from": 0.1, "to": 0.5}}
+    (folder / "sweep.yaml").write_text(yaml.dump(SWEEP | {"keys": keys}))
+    out = folder / "out" / "sweep.csv"
+    assert check_command(["sweep", folder / "sweep.yaml", "--out", out], folder / "out", out) == 2
+
+
+@examples(50)
+@given(data=spoiled(SWEEP))
+def test_sweeps(folder, data):
+    (folder / "scene.yaml").write_text(yaml.dump(base_scene()))
+    path, out = folder / "sweep.yaml", folder / "out" / "sweep.csv"
+    path.write_text(yaml.dump(data))
+    try:
+        sweep = load_sweep(path)
+    except InputError as error:
+        assert "\n" not in str(error)
+    else:
+        changed = {key.split(".")[0] for key in (*data["keys"], *data.get("set", ()))}
+        if len(sweep.runs) < 50 and "integration" not in changed:  # which might last
+            check_command(["sweep", path, "--out", out], folder / "out", out)
 
 
 OPTIONS = {

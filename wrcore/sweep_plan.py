@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import json
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -22,6 +23,9 @@ from wrcore.dynamics.integrate import METHODS
 from wrcore.errors import InputError
 from wrcore.scene import Scene, load_scene
 from wrcore.sweep_measures import MEASURES
+
+MOST_RUNS = 10_000_000
+"""Runs of a sweep."""
 
 MOST_BATCHES = 500
 """A sweep with more batches than this would be many short processes."""
@@ -111,8 +115,14 @@ def load_sweep(
     scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     _check_values(scene, data["keys"], values, name)
-    runs = _grid(values) if data["sampling"]["kind"] == "grid" else _hypercube(values, data["sampling"], name)
+    grid = data["sampling"]["kind"] == "grid"
+    if grid and (count := math.prod(map(len, values.values()))) > MOST_RUNS:
+        raise InputError(name, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
+    runs = _grid(values) if grid else _hypercube(values, data["sampling"], name)
     runs.index.name = "run"
+    shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
+    if data["begin"] >= shortest:
+        raise InputError(name, "begin", f"expected less than the shortest run's {shortest:g} s, got {data['begin']:g}")
     sweep = Sweep(data, name, scene, runs)
     if sweep.batches > MOST_BATCHES:
         least = math.ceil(len(runs) / MOST_BATCHES)
@@ -122,7 +132,7 @@ def load_sweep(
 
 def _scene_file(path, folder, source):
     for base in (folder, folder.parent, Path()):
-        if (base / path).is_file():
+        if os.path.isfile(base / path):
             return base / path
     raise InputError(source, "scene", f"expected an existing file, got {path!r}")
 
