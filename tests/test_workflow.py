@@ -200,6 +200,8 @@ def test_every_key_of_the_study_is_described_and_smoke_adds_none():
     schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
 
     def undescribed(part, key):
+        if "$ref" in part:
+            part = schema["$defs"][part["$ref"].rpartition("/")[2]]
         missing = [key] if part.get("type") != "object" and "description" not in part else []
         return missing + [
             m for name, inner in part.get("properties", {}).items() for m in undescribed(inner, f"{key}.{name}")
