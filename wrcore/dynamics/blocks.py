@@ -181,17 +181,20 @@ def _subtract_product(target, left, right):
 
 @jit(allocates=False)
 def _carry_rotations(jacobian, system, sigma):
+    """Eliminate the lengths of p, then the rotations."""
     for b in range(system.carried.shape[0]):
         turning, inverse, carried = jacobian.turning[b], system.inverse[b], system.carried[b]
+        by_length = jacobian.spin[b]
+        share = 1.0 / (sigma - jacobian.length[0])
         for i in range(3):
             for j in range(3):
-                carried[i, j] = (sigma if i == j else 0.0) - turning[i, j]
+                carried[i, j] = (sigma if i == j else 0.0) - turning[i, j] - share * by_length[i] * turning[3, j]
         _invert_rotation(carried, inverse)
         for i in range(3):
             for j in range(3):
                 carried[i, j] = 0.0
                 for k in range(3):
-                    carried[i, j] += inverse[i, k] * turning[k, 3 + j]
+                    carried[i, j] += inverse[i, k] * (turning[k, 3 + j] + share * by_length[k] * turning[3, 3 + j])
 
 
 @jit(allocates=False, inline="always")
@@ -316,8 +319,12 @@ def solve_stage(jacobian, system, sigma, increment):
             to[i] = increment[at + i] / sigma
             to[3 + i] = 0.0
             right[b, i], right[b, 3 + i] = increment[at + 7 + i], increment[at + 10 + i]
+        length = 0.0
+        for j in range(4):
+            length += axes[3, j] * increment[at + 3 + j]
+        length /= sigma - jacobian.length[0]
         for k in range(3):
-            turn = 0.0
+            turn = length * jacobian.spin[b, k]
             for j in range(4):
                 turn += 2.0 * axes[k, j] * increment[at + 3 + j]
             for i in range(3):

@@ -76,17 +76,18 @@ def angles(p):
 
 @jit(allocates=False, fastmath=FUSED)
 def rotation_matrix(state, at, matrix):
-    """Write A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3)."""
+    """Write A(p) of the body whose state starts at ``at`` into ``matrix`` (3, 3): a rotation, however long p is."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
-    matrix[0, 0] = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
-    matrix[0, 1] = 2.0 * (e1 * e2 - e0 * e3)
-    matrix[0, 2] = 2.0 * (e1 * e3 + e0 * e2)
-    matrix[1, 0] = 2.0 * (e1 * e2 + e0 * e3)
-    matrix[1, 1] = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
-    matrix[1, 2] = 2.0 * (e2 * e3 - e0 * e1)
-    matrix[2, 0] = 2.0 * (e1 * e3 - e0 * e2)
-    matrix[2, 1] = 2.0 * (e2 * e3 + e0 * e1)
-    matrix[2, 2] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+    two = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+    matrix[0, 0] = 1.0 - two * (e2 * e2 + e3 * e3)
+    matrix[0, 1] = two * (e1 * e2 - e0 * e3)
+    matrix[0, 2] = two * (e1 * e3 + e0 * e2)
+    matrix[1, 0] = two * (e1 * e2 + e0 * e3)
+    matrix[1, 1] = 1.0 - two * (e1 * e1 + e3 * e3)
+    matrix[1, 2] = two * (e2 * e3 - e0 * e1)
+    matrix[2, 0] = two * (e1 * e3 - e0 * e2)
+    matrix[2, 1] = two * (e2 * e3 + e0 * e1)
+    matrix[2, 2] = 1.0 - two * (e1 * e1 + e2 * e2)
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -62,6 +62,8 @@ class Jacobian(NamedTuple):
     """(n, 4, 6): rate of the rotation vector, and of the length of p, with respect to rotation and angular velocity."""
     length: np.ndarray
     """(1,): rate of the length of p with respect to itself, which is that of Baumgarte's feedback, 1/s."""
+    spin: np.ndarray
+    """(n, 3): rate of the rotation vector with respect to the length of p: the frame's angular velocity, rad/s."""
     by_time: np.ndarray
     """(size,): time derivative of the state's rate at positions that move with the drift."""
     drift: np.ndarray
@@ -187,14 +189,14 @@ def new_jacobian(model):
     n, size = len(model.bodies.mass), state_size(model)
     m = size - 7 * n
     return Jacobian(
-        np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros(size), np.zeros(size),
-        np.zeros((n, 4, 4)),
+        np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
+        np.zeros(size), np.zeros((n, 4, 4)),
     )  # fmt: skip
 
 
 @jit(allocates=False)
-def _take_axes(state, axes):
-    """Write E(p) and p of all bodies, see :class:`Jacobian`."""
+def _take_axes(state, rate, axes, spin):
+    """Write E(p), p and the frames' angular velocities 2 E(p) p' of all bodies, see :class:`Jacobian`."""
     for b in range(axes.shape[0]):
         at = STATE_SIZE * b
         e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
@@ -203,6 +205,10 @@ def _take_axes(state, axes):
         rows[1, 0], rows[1, 1], rows[1, 2], rows[1, 3] = -e2, e3, e0, -e1
         rows[2, 0], rows[2, 1], rows[2, 2], rows[2, 3] = -e3, -e2, e1, e0
         rows[3, 0], rows[3, 1], rows[3, 2], rows[3, 3] = e0, e1, e2, e3
+        for i in range(3):
+            spin[b, i] = 0.0
+            for j in range(4):
+                spin[b, i] += 2.0 * rows[i, j] * rate[at + 3 + j]
 
 
 @jit(allocates=False)
@@ -253,7 +259,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
         Number of evaluations.
     """
     n = jacobian.axes.shape[0]
-    _take_axes(state, jacobian.axes)
+    _take_axes(state, rate, jacobian.axes, jacobian.spin)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW)
     for b in range(n):
