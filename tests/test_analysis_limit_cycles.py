@@ -100,13 +100,16 @@ def test_motions_that_do_not_settle_say_so(oscillator, suspended):
 
 
 def test_limit_cycle_of_a_wheelset_equals_that_of_a_plain_run():
-    """From another start and in one go, `simulate` ends on the same flange-to-flange motion, within a per cent."""
+    """From another start and in one go, `simulate` ends on the same limit cycle, within a per cent.
+
+    Both start near it: on the flanges the wheelset hunts irregularly first, for as long as it happens to.
+    """
     source = SCENES / "suspended_wheelset.yaml"
     changes = ["contact.detection=planar", "speed=60.0"]
-    table = limit_cycles(load_scene(source, changes), [60.0], Settling(longest=10.0, change=0.01), [0.007], 1.0)
+    table = limit_cycles(load_scene(source, changes), [60.0], Settling(longest=10.0, change=0.01), [0.003], 1.0)
     cycle = table[table["branch"] == "falling"].iloc[0]
     assert cycle["status"] == "limit cycle"
-    further = ["output.channels=[pose]", "initial.y=0.006", "integration.duration=6.0", "output.rate=500"]
+    further = ["output.channels=[pose]", "initial.y=0.0025", "integration.duration=6.0", "output.rate=500"]
     run = simulate(load_scene(source, changes + further))
     assert cycle["amplitude_m"] == pytest.approx(amplitude(run["wheelset"].y_m[run.t >= 4.0]), rel=0.01)
 

@@ -18,7 +18,11 @@ FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
 
 FUSED = {"contract"}
-"""Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once."""
+"""Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once.
+
+Which ones do depends on the code around. A kernel that is called, not inlined, exists once in each kernel that calls
+it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
+where this showed, goes without the flag so that all copies give the same bits."""
 
 KERNEL_ROOMS = ("geometry", "contact", "creep", "dynamics")
 _KEEP_SECONDS = 14 * 86400

@@ -32,9 +32,10 @@ DISTURBANCE = 1e-8
 GROWTH = 1e3
 """A trial that drives two runs apart by more than this factor is unstable: hunting alone takes seconds for it."""
 
-UNSTEADY = 5e-4
-"""A trial whose velocities leave steady running by more than this part of the speed is unstable, too: both runs may be
-on one and the same oscillation, which friction bounds at creepages of some 1e-3."""
+UNSTEADY, SETTLING = 1e-4, 3e-5
+"""A trial whose velocities leave steady running by more than this part of the speed and this much (m/s, rad/s) is
+unstable, too: both runs may be on one and the same oscillation, which friction bounds at creepages of some 1e-3. The
+second number is what velocities settle by: a computed steady state is the less exact the slower it is."""
 
 LONGEST_TRIAL = 1.0
 """s."""
@@ -172,7 +173,7 @@ def _largest_step(setting, method, guess, longest):
         places = _velocities(setting.model)
         apart = np.max(np.abs(other.states[-1] - one.states[-1])[places])
         moved = np.max(np.abs(one.states[-1] - setting.state)[places])
-        still = UNSTEADY * setting.model.speed + LARGEST_REST * times[-1]
+        still = UNSTEADY * setting.model.speed + SETTLING + LARGEST_REST * times[-1]
         return bool(apart < GROWTH * DISTURBANCE and moved < still), one
 
     low, high = guess / 1.5, min(guess * 1.5, longest)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit, rarely_called
+from wrcore._jit import jit, rarely_called
 from wrcore.contact.geometry import RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, WHEEL_RESERVE, YAW_LIMIT
 from wrcore.contact.reduction import (
     CURVATURE_Y,
@@ -68,7 +68,7 @@ _WIDE = 10
 those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepest, depth, m0, m1, m2, nodes, patches,
                  count):  # fmt: skip
     """Reduce one overlap and store its patch; when all rows are taken the shallowest patch gives way to a deeper one.
@@ -103,7 +103,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
     return count + found if row == count else count
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def _search(geometry, pose, grid, reduction, first_close, last_close, patches, count):
     """All overlaps strip by strip, with a closer look wherever the reserve allows one between two nodes without.
 
@@ -177,7 +177,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
     return count
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def planar_error_bound(geometry, side, y, z, ex, ey, ez):
     """Bound of the normal penetration that planar detection misses for one wheel, from yaw and contact angle.
 
@@ -209,7 +209,7 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
     return 1.05 * bound
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patch):
     """Patch of the only overlap of a zone that begins at strip ``begin``: 1, 0 without penetration, -1 if too narrow.
 
@@ -232,7 +232,7 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
     return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patch))
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
     """Patches of the strips from ``begin`` to before ``end``, added to ``count`` others; returns their new number."""
     grid = window.grid
@@ -252,7 +252,7 @@ def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
     return _search(geometry, pose, grid, reduction, begin + close.first, begin + close.last, patches, count)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     """All contact patches of one wheel.
 

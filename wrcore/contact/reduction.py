@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
+from wrcore._jit import jit
 from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.strip import (
     cubic_at,
@@ -58,7 +58,7 @@ _EDGE_TOLERANCE = 4e-7
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def deepest_point(geometry, pose, u, tolerance):
     """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
 
@@ -83,7 +83,7 @@ def deepest_point(geometry, pose, u, tolerance):
     return new if abs(new - u) < 2.9 * SCAN_STEP else u
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def _edge_by_newton(geometry, pose, u, low, high):
     """Zero of the gap from a good guess by a few Newton steps; NaN if that does not settle in (low, high)."""
     for _ in range(6):
@@ -97,7 +97,7 @@ def _edge_by_newton(geometry, pose, u, low, high):
     return np.nan
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def _edge_by_bracket(geometry, pose, outside, inside):
     """Zero of the gap between a point outside and one inside an overlap (Illinois steps)."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
@@ -124,7 +124,7 @@ def _edge_by_bracket(geometry, pose, outside, inside):
     return 0.5 * (outside + inside)
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     """Both ends of a narrow overlap: from the parabola at its deepest point where that leads there, else by bracketing.
 
@@ -144,7 +144,7 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     return start, end
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def overlap_moments(geometry, pose, first, last):
     """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature, M1 and M2 about the interval's middle."""
     middle, half = 0.5 * (first + last), 0.5 * (last - first)
@@ -159,7 +159,7 @@ def overlap_moments(geometry, pose, first, last):
     return half * m0, half * m1, half * m2
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
 
@@ -180,7 +180,7 @@ def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration
     patch[Y] = pose.side * (ur + geometry.rail_distance - 0.5 * penetration * slope * cosine)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def _arc_tangent(x):
     """atan x; its series where seven terms give it to rounding."""
     s = x * x
@@ -191,7 +191,7 @@ def _arc_tangent(x):
     return x - x * s * (1.0 / 3.0 - s * (1.0 / 5.0) + s2 * (1.0 / 7.0 - s * high))
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def _arc_sine(x):
     """asin x; its series where eight terms give it to rounding."""
     s = x * x
@@ -202,7 +202,7 @@ def _arc_sine(x):
     return x + x * s * (1.0 / 6.0 + s * (3.0 / 40.0) + s2 * (15.0 / 336.0 + s * high))
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False)
 def patch_at_maximum(geometry, pose, u, patch):
     """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
     u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE)
@@ -239,7 +239,7 @@ def patch_at_maximum(geometry, pose, u, patch):
     return True
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     """Reduction ``moment`` from the moments of g^2 about ``middle``; returns whether there is penetration."""
     if not m0 > 0.0:

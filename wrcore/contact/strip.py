@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
+from wrcore._jit import jit
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
 
 
@@ -43,7 +43,7 @@ class Pose(NamedTuple):
     z_along: float
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def make_pose(side, y, z, ex, ey, ez, spatial):
     """Pose of a wheel from the wheelset's centre and the wheel's outward axle direction."""
     q = math.sqrt(1.0 - ex * ex)
@@ -52,7 +52,7 @@ def make_pose(side, y, z, ex, ey, ez, spatial):
     return Pose(side, y, z, ex, ey, ez, q, tilt, side * ez * r, -ex * ey * r, -side * ey * r, -ex * ez * r)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def cubic_at(nodes, start, step, u):
     """Value, slope and second derivative of the cubic Hermite interpolant; end cells are continued outwards."""
     inverse = 1.0 / step
@@ -69,7 +69,7 @@ def cubic_at(nodes, start, step, u):
     return value, slope, (2.0 * c2 + 6.0 * t * c3) * (inverse * inverse)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def curvature_at(nodes, start, step, u):
     """Second derivative for Hertz: its window mean, interpolated linearly."""
     position = (u - start) / step
@@ -78,7 +78,7 @@ def curvature_at(nodes, start, step, u):
     return nodes[i, CURVATURE] * (1.0 - t) + nodes[i + 1, CURVATURE] * t
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def strip_point(geometry, pose, u):
     """Extreme point of the strip at wheel coordinate u.
 
@@ -100,20 +100,20 @@ def strip_point(geometry, pose, u):
     return pose.side * y - geometry.rail_distance, z, radius, slope, second, along
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def radius_direction(pose, along):
     """Components y and z of the direction d of a strip's radius."""
     down = math.sqrt(max(1.0 - along * along, 0.0))
     return down * pose.y_down + along * pose.y_along, down * pose.z_down + along * pose.z_along
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def on_rail(geometry, ur):
     """Whether a rail coordinate lies inside the rail's profile."""
     return geometry.rail_start <= ur <= geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def gap_at(geometry, pose, u):
     """Vertical gap of the strip at u: negative in overlap, 1 m where there is no rail below; and the rail's slope."""
     ur, z, _, _, _, _ = strip_point(geometry, pose, u)
@@ -123,7 +123,7 @@ def gap_at(geometry, pose, u):
     return z - f, slope
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def wheel_slope(pose, slope, along):
     """Slope of the wheel in the cross-section over the rail's lateral coordinate.
 
@@ -136,7 +136,7 @@ def wheel_slope(pose, slope, along):
     return pose.side * (pose.ez + slope * pose.z_down) / (pose.ey + slope * pose.y_down)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def gap_and_slope(geometry, pose, u):
     """Vertical gap of the strip at u and its slope over u (but for the small turn by roll and yaw)."""
     ur, z, _, slope, _, along = strip_point(geometry, pose, u)
@@ -144,7 +144,7 @@ def gap_and_slope(geometry, pose, u):
     return z - f, wheel_slope(pose, slope, along) - rail_slope
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
+@jit(allocates=False, forceinline=True)
 def slope_difference(geometry, pose, u):
     """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate.
 
