@@ -18,7 +18,7 @@ study: $(STAMP)
 	$(SNAKEMAKE)
 
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
 smoke: $(STAMP)
 	$(SNAKEMAKE) --configfile config/smoke.yaml
