@@ -133,7 +133,7 @@ def test_text_of_scenes(folder, text):
     try:
         data = yaml.safe_load(text)
         long = isinstance(data, dict) and bounded(json.loads(json.dumps(data, default=str))) != data
-    except Exception:
+    except Exception:  # whatever the parser or a constructor of the text objects to: the command must not
         long = False
     if not long:
         simulate_text(folder, text)

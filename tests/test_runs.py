@@ -10,7 +10,7 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.contact.detection import detect
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.results import load_run
 from wrcore.scene import compile_scene, load_scene
 from wrcore.simulate import simulate
@@ -61,7 +61,7 @@ def test_mirrored_start_gives_the_mirrored_run():
 def test_the_right_hand_side_has_no_memory():
     scene = load_scene(SCENES / "wheelset.yaml", ["contact.creep.model=she"])
     model, state = compile_scene(scene)
-    function = right_hand_side(model, workspace(model))
+    function = Equations(model, workspace(model))
     first = function(0.0, state)
     function(0.3, state + 1e-4)
     np.testing.assert_array_equal(function(0.0, state.copy()), first)

@@ -11,7 +11,7 @@ from tests.conftest import ROOT, SCENES
 from wrcore.checked_yaml import read_yaml
 from wrcore.cli import main
 from wrcore.contact.reduction import ANGLE, NORMAL
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.scene import GRAVITY, compile_scene, load_scene
 
@@ -153,7 +153,7 @@ def test_a_scene_starts_in_vertical_equilibrium(name):
     scene = load_scene(SCENES / f"{name}.yaml", ["contact.creep.model=linear"])
     model, state = compile_scene(scene)
     work = workspace(model)
-    right_hand_side(model, work)(0.0, state)
+    Equations(model, work)(0.0, state)
     # static wheel load of Manchester vehicle 1: 54 546 N (derived there); the free wheelset's own: 1813 kg g/2
     load = {"wheelset": 1813 * GRAVITY / 2, "suspended_wheelset": 45653 + 1813 * GRAVITY / 2}[name]
     rows = work.patches[0, :, 0]

@@ -13,7 +13,7 @@ from wrcore.dynamics.full_equations import full_equations
 from wrcore.dynamics.joint import Joint, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.projection import project_positions, project_velocities
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 
 
 def some_markers(rng):
@@ -81,7 +81,7 @@ def test_solver_agrees_with_eq_8_written_out(contact, system):  # noqa: F811
         model = jointed(contact, masses, inertia, spins, joints, speed=4.0, alpha=3.0, beta=7.0)
         state = np.concatenate([body_state(*rng.normal(size=(4, 3))) for _ in spins])
         work = workspace(model)
-        rate = right_hand_side(model, work)(0.3, state)
+        rate = Equations(model, work)(0.3, state)
         full = full_equations(model, state, 0.3)
         accelerations = rate.reshape(n, STATE_SIZE)[:, 7:]
         used = np.arange(5) < model.joints.size[:, None]
@@ -103,7 +103,7 @@ def test_a_door_on_two_hinges_swings(contact, kind, redundant):  # noqa: F811
     place = -c * math.sin(start), 0.0, -c * math.cos(start)
     state = body_state(place, (0, start, 0))
     work = workspace(model)
-    right_hand_side(model, work)(0.0, state)
+    Equations(model, work)(0.0, state)
     assert work.constraints.redundant[0] == redundant
     period = 4 * math.sqrt((J + m * c**2) / (m * 9.81 * c)) * ellipk(math.sin(start / 2) ** 2)
     result = run(model, state, period)
@@ -140,7 +140,7 @@ def energy(model, state):
 def runge_kutta(model, state, step, duration, projected):
     """Classical Runge-Kutta steps; largest |Phi|, |Phi'| and change of energy over the run."""
     work = workspace(model)
-    f = right_hand_side(model, work)
+    f = Equations(model, work)
     start, worst = energy(model, state), np.zeros(3)
     for k in range(round(duration / step)):
         t = k * step

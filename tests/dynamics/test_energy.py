@@ -11,7 +11,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import CHANNELS, energy_balance, energy_channels
 from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.track import build_track
 from wrcore.results import DESCRIPTIONS, load_run, unit_of, write_run
@@ -62,7 +62,7 @@ def test_energy_of_a_run_adds_up(finished):
 
 def test_the_rails_carry_the_weight_on_average(finished):
     model, work, times, states, _, _ = finished
-    function, loads = right_hand_side(model, work), np.zeros(len(times))
+    function, loads = Equations(model, work), np.zeros(len(times))
     for i, (t, state) in enumerate(zip(times, states, strict=True)):
         function(t, state)
         rows, present = work.patches, np.arange(reduction.MAX_PATCHES) < work.counts[..., None]

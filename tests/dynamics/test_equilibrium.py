@@ -11,7 +11,7 @@ from wrcore.checked_yaml import read_yaml
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.equilibrium import wheel_loads
-from wrcore.dynamics.system import Equations, right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
@@ -64,7 +64,7 @@ def test_wheels_roll_without_slip_at_the_start(patch):
     )
     model, state = compile_scene(scene)
     work = workspace(model)
-    right_hand_side(model, work)(0.0, state)
+    Equations(model, work)(0.0, state)
     np.testing.assert_allclose(work.patches[:, :, 0, reduction.XI], 0.0, atol=1e-12)
 
 
@@ -79,7 +79,7 @@ def test_load_off_the_centre(equilibrium_of):
     assert loads.sum() == pytest.approx(CAR + 2 * rest, rel=1e-9)
     # moments of all forces on the vehicle about the track's centre line, with the places where wheels do touch
     work = workspace(model)
-    right_hand_side(model._replace(contact=model.contact._replace(friction=1e-9)), work)(0.0, equilibrium.state)
+    Equations(model._replace(contact=model.contact._replace(friction=1e-9)), work)(0.0, equilibrium.state)
     moment = 0.0
     for wheelset in range(4):
         for side in range(2):

@@ -11,7 +11,7 @@ from tests.dynamics.test_system import LEVEL, body_state, contact, make_model, r
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.joint import Joint, build_joints, evaluate_joints, joint_jacobian, joint_state
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 
 SPINS = np.array([0, 0, 1])
@@ -183,7 +183,7 @@ def test_conical_pendulum_on_a_rigid_link(contact):  # noqa: F811
     radius, depth = length * math.sin(theta), -length * math.cos(theta)
     state = body_state((radius, 0, depth), velocity=(0, w * radius, 0))
     work = workspace(model)
-    right_hand_side(model, work)(0.0, state)
+    Equations(model, work)(0.0, state)
     assert work.constraints.multipliers[0, 0] == pytest.approx(m * 9.81 / math.cos(theta), rel=1e-12)
     result = run(model, state, 2 * math.pi / w)
     np.testing.assert_allclose(np.hypot(*result.states[:, :2].T), radius, atol=1e-7)

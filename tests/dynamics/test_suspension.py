@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from tests.dynamics.test_body import matrix_of
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.vehicle.element_checks import check_element
 from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
@@ -31,7 +31,7 @@ def model_with(contact, items, positions=((0.0, 0.0, 2.0), (0.0, 0.0, 1.0)), spi
 def evaluate(model, state):
     """Force and moment (about the centre, without gyroscopic terms) of the elements on both bodies, and own rates."""
     work = workspace(model)
-    rate = right_hand_side(model, work)(0.0, state)
+    rate = Equations(model, work)(0.0, state)
     wrenches = work.wrenches.copy()
     for b, inertia in enumerate(INERTIAS):
         A, w = work.rotations[b], state[STATE_SIZE * b + 10 : STATE_SIZE * b + 13]
@@ -255,7 +255,7 @@ def driven(model, displacement, times, own):
     def state_at(t, x):
         return at_rest(upper=(0, 0, 2.0 + displacement(t)), own=x)
 
-    function = right_hand_side(model, workspace(model))
+    function = Equations(model, workspace(model))
     ends = times[0], times[-1]
     solved = solve_ivp(
         lambda t, x: function(0.0, state_at(t, x))[2 * STATE_SIZE :], ends, own, "DOP853", times, rtol=1e-10, atol=1e-13

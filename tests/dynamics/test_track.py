@@ -9,7 +9,7 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.contact import reduction as columns
 from wrcore.dynamics.body import euler_of
-from wrcore.dynamics.system import right_hand_side, workspace
+from wrcore.dynamics.system import Equations, workspace
 from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import rotation
 from wrcore.scene import compile_scene, load_scene
@@ -36,7 +36,7 @@ def evaluated(model, state, arc_length):
     """Right-hand side, patches per side and workspace at a state."""
     work = workspace(model)
     work.arc_lengths[:] = arc_length
-    rate = right_hand_side(model, work)(0.0, state)
+    rate = Equations(model, work)(0.0, state)
     return rate, [work.patches[0, i, : work.counts[0, i]].copy() for i in range(2)], work
 
 

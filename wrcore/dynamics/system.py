@@ -257,18 +257,3 @@ class Equations:
         equations, model, work = self.arguments
         fill_many(equations, t, states, model, work, rates)
         return rates
-
-
-def right_hand_side(model, work):
-    """The equations of motion as ``function(t, state)`` for a solver that is written in Python.
-
-    Parameters
-    ----------
-    model : Model
-    work : Workspace
-
-    Returns
-    -------
-    Equations
-    """
-    return Equations(model, work)
