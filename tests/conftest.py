@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-import wrcore.scene
 from wrcore.contact.geometry import contact_geometry
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
+from wrcore.scene import description
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
@@ -57,7 +57,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def no_new_tables():
     """A spoiled material would have a creep table built, which takes its time: only the one at hand is given."""
-    table = wrcore.scene.ensure_table(0.28, "ellipse", 0.01)
+    table = description.ensure_table(0.28, "ellipse", 0.01)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(wrcore.scene, "ensure_table", lambda *_: table)
+        patch.setattr(description, "ensure_table", lambda *_: table)
         yield table

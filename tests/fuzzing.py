@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from tests.conftest import SCENES
-from wrcore.checked_yaml import read_yaml
 from wrcore.cli import main
-from wrcore.results import load_run
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.run.results import load_run
 
 STATUSES = {"completed", "derailed", "stalled", "failed"}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.simulate import Run
+from wrcore.run.simulate import Run
 
 BODY = ("x_m", "y_m", "z_m", "roll_rad", "yaw_rad", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s") + (
     "wx_rad_per_s",

@@ -3,10 +3,11 @@
 import pandas as pd
 import pytest
 
-from wrcore.accuracy import MARGIN, choose, front_markdown
-from wrcore.dynamics.integrate import METHODS
+from study.accuracy.front import front_markdown
 from wrcore.errors import InputError
-from wrcore.scene import load_scene
+from wrcore.integrate.integrator import METHODS
+from wrcore.run.accuracy import MARGIN, choose
+from wrcore.scene.description import load_scene
 
 ROWS = [
     # kind, speed, detection, patch, creep, method, rtol, error, real-time factor

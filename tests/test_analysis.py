@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from synthetic import hunting_run
 
-from wrcore import analysis
-from wrcore.scene import load_scene
+from wrcore.analysis.motion import motion as analysis
+from wrcore.scene.description import load_scene
 
 
 @pytest.mark.parametrize("frequency", [0.7, 2.6, 9.0])

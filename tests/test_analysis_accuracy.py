@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.accuracy import errors as aa
 from tests.synthetic import hunting_run
-from wrcore import analysis_accuracy as aa
-from wrcore.scene import load_scene
+from wrcore.scene.description import load_scene
 
 
 def worn_run(**kwargs):

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.contact import search
+from study.contact import tables as study
+from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
-from wrcore import analysis_contact as study
-from wrcore import analysis_contact_search as search
-from wrcore.analysis_contact_reference import compare_with_contact, longitudinal_excess, summarise
 from wrcore.contact.detection import axle_direction, detect
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wrcore.analysis_creep import (
+from study.creep.laws import (
     REFERENCE_FILES,
     ReferenceCases,
     contact_points,
@@ -24,7 +24,7 @@ from wrcore.analysis_creep import (
     time_models,
     timed_table,
 )
-from wrcore.analysis_creep_table import error_map, sized_creepages, smoothness, smoothness_table
+from study.creep.smoothness import error_map, sized_creepages, smoothness, smoothness_table
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import scales
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases

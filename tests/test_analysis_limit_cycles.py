@@ -7,9 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.conftest import SCENES
-from wrcore import analysis_limit_cycles
-from wrcore.analysis import amplitude
-from wrcore.analysis_limit_cycles import (
+from wrcore.analysis.limit_cycles import (
     Settling,
     critical_table,
     falling_branch,
@@ -19,9 +17,11 @@ from wrcore.analysis_limit_cycles import (
     settle_motion,
     shifted,
 )
-from wrcore.analysis_stability import at_speed
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate
+from wrcore.analysis.motion import limit_cycles as analysis_limit_cycles
+from wrcore.analysis.stability import at_speed
+from wrcore.run.motion import amplitude
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
 
 HOPF = 50.0
 """Speed at which the oscillator below loses its stability, m/s."""

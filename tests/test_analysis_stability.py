@@ -6,18 +6,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT, SCENES
-from wrcore.analysis_modes import families, modes, shape_table
-from wrcore.analysis_stability import (
-    at_speed,
-    critical_speed,
-    growth,
-    root_locus,
-    steady_motion,
-    straight_ahead,
-)
+from wrcore.analysis.modes import families, linear_modes, shape_table
+from wrcore.analysis.stability import at_speed, critical_speed, growth, root_locus, steady_motion, straight_ahead
 from wrcore.dynamics.linear import DIRECTIONS
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, load_scene
+from wrcore.scene.description import compile_scene, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +37,7 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
     """
     vehicle, model, state = trailer
     linear = steady_motion(model, state, speed)
-    table, shapes, _ = modes(vehicle, linear)
+    table, shapes, _ = linear_modes(vehicle, linear)
     count = table["name"].value_counts()
     for name in ("lower sway", "upper sway", "bounce", "pitch", "yaw", "surge"):
         assert count[f"car body {name}"] == 1
@@ -70,7 +63,7 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
 def test_lower_sway_turns_about_a_pole_below_the_centre_of_mass(trailer):
     """A point h above the centre moves by y - h roll: it rests at h = y/roll."""
     vehicle, model, state = trailer
-    table, shapes, _ = modes(vehicle, steady_motion(model, state, 20.0))
+    table, shapes, _ = linear_modes(vehicle, steady_motion(model, state, 20.0))
     poles = {}
     for name in ("lower sway", "upper sway"):
         shape = shapes[table.index[table["name"] == f"car body {name}"][0], 0]
@@ -80,7 +73,7 @@ def test_lower_sway_turns_about_a_pole_below_the_centre_of_mass(trailer):
 
 def test_shape_table(suspended):
     vehicle, model, state = suspended
-    table, shapes, _ = modes(vehicle, steady_motion(model, state, 40.0))
+    table, shapes, _ = linear_modes(vehicle, steady_motion(model, state, 40.0))
     rows = shape_table(vehicle, table, shapes)
     k = table.index[table["name"] == "wheelset hunting"][0]
     row = rows[(rows["mode"] == k) & (rows["coordinate"] == "yaw")].iloc[0]
@@ -99,7 +92,7 @@ def test_free_wheelset_hunts_at_klingel_s_frequency():
         "wheel": {"profile": "cone:1/100"}, "rail": {"profile": "circle:0.3"},
     })  # fmt: skip
     model, state = compile_scene(scene)
-    table, _, _ = modes(scene.vehicle, steady_motion(model, state, 5.0))
+    table, _, _ = linear_modes(scene.vehicle, steady_motion(model, state, 5.0))
     slope, radius = 0.01, 0.46
     b = scene.track.rail_distance(scene.rail) - 0.3 * math.sin(math.atan(slope))
     conicity = slope * (b + 0.3 * slope) / (b - radius * slope)
@@ -139,7 +132,7 @@ def test_root_locus_is_a_table_of_modes_over_speed(suspended):
     locus = root_locus(vehicle, model, state, [20.0, 60.0])
     assert locus.columns[0] == "speed_m_per_s"
     for speed, rows in locus.groupby("speed_m_per_s"):
-        alone, _, _ = modes(vehicle, steady_motion(model, state, speed))
+        alone, _, _ = linear_modes(vehicle, steady_motion(model, state, speed))
         np.testing.assert_allclose(rows["real_per_s"], alone["real_per_s"], rtol=1e-6)
 
 
@@ -160,8 +153,8 @@ def test_axle_boxes_add_their_pitch_and_leave_the_other_modes(trailer):
     """
     vehicle, model, state = trailer
     scene = load_scene(SCENES / "trailer_vehicle.yaml", ["initial.y=0.0", "vehicle.axle_boxes=true"])
-    lumped, _, _ = modes(vehicle, steady_motion(model, state, 60.0))
-    table, _, _ = modes(scene.vehicle, steady_motion(*compile_scene(scene), 60.0))
+    lumped, _, _ = linear_modes(vehicle, steady_motion(model, state, 60.0))
+    table, _, _ = linear_modes(scene.vehicle, steady_motion(*compile_scene(scene), 60.0))
     values = (table["real_per_s"] + 1j * table["imag_rad_per_s"]).to_numpy()
     for mode in lumped[lumped["damping_ratio"] < 0.95].itertuples():
         value = complex(mode.real_per_s, mode.imag_rad_per_s)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.synthetic import hunting_run
-from wrcore import analysis_vehicle as av
+from wrcore.analysis.motion import wheels as av
 
 
 @pytest.fixture

@@ -98,7 +98,7 @@ def test_figures_of_a_run_have_units():
 
 
 def test_the_public_function_is_not_hidden_by_the_file_of_its_name():
-    code = "import wrcore.simulate, wrcore as wr; from wrcore.simulate import simulate; assert wr.simulate is simulate"
+    code = "import wrcore as wr; from wrcore.run.simulate import simulate; assert wr.simulate is simulate"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
@@ -110,7 +110,7 @@ def test_import_is_cheap_and_names_are_complete():
 
 
 def test_no_bar_in_a_log_and_one_in_a_terminal(monkeypatch):
-    from wrcore import progress
+    from wrcore.run.run import progress
 
     assert not progress.somebody_watches()  # pytest captures
     assert progress.counted([1, 2]) == [1, 2]
@@ -126,7 +126,7 @@ def test_no_bar_in_a_log_and_one_in_a_terminal(monkeypatch):
 
 
 def test_bar_reaches_the_simulated_time(capsys, monkeypatch):
-    from wrcore import progress
+    from wrcore.run.run import progress
 
     monkeypatch.setattr(progress, "somebody_watches", lambda: True)
     monkeypatch.setattr(progress, "DELAY", 0.0)

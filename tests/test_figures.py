@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from synthetic import hunting_run
 
-from wrcore import figures
-from wrcore.scene import load_scene
+from wrcore.analysis.motion import style as figures
+from wrcore.scene.description import load_scene
 
 POSE = {"y": 6.3e-3, "yaw": 0.015, "load": 1e4, "lowered": 4e-4}
 

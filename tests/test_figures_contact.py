@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from wrcore import analysis_contact, figures_contact
+from study.contact import figures as figures_contact
+from study.contact import tables as analysis_contact
+from wrcore.analysis.style import LINES, save_figure
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
-from wrcore.figures import LINES, save_figure
 
 
 @pytest.fixture(scope="module")

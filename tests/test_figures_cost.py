@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wrcore.cost.operations import STAGES
-from wrcore.figures import save_figure
-from wrcore.figures_cost import STAGE_COLOURS, fig_breakdown, fig_growth
+from study.cost.figures import STAGE_COLOURS, fig_breakdown, fig_growth
+from study.cost.operations import STAGES
+from wrcore.analysis.style import save_figure
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 
-from wrcore import figures_creep
-from wrcore.analysis_creep import contact_points
+from study.creep import figures as figures_creep
+from study.creep.figures import LAW_STYLES, binned_errors, stick_border
+from study.creep.laws import contact_points
+from wrcore.analysis.style import save_figure
 from wrcore.creep.halfspace import solve_field
-from wrcore.figures import save_figure
-from wrcore.figures_creep import LAW_STYLES, binned_errors, stick_border
 
 DATA = Path(__file__).parent / "data" / "creep"
 FAMILIES = ("exact", "table sdec", "fastsim", "polach", "she", "linear")

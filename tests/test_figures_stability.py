@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.critical_speed.figures import fig_limit_cycles, fig_modes, fig_root_locus
 from tests.conftest import SCENES
-from wrcore.analysis_stability import critical_speeds, loci, modes_in_full
-from wrcore.figures import ACCENT, save_figure
-from wrcore.figures_stability import fig_limit_cycles, fig_modes, fig_root_locus
-from wrcore.scene import load_scene
+from wrcore.analysis.stability import critical_speeds, loci, modes
+from wrcore.analysis.style import ACCENT, save_figure
+from wrcore.scene.description import load_scene
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_root_locus_shows_hunting_of_both_detections(over_speed, tmp_path):
 
 
 def test_modes_are_labelled_and_their_energies_written_in_per_cent():
-    table, _ = modes_in_full(load_scene(SCENES / "suspended_wheelset.yaml"), 50.0)
+    table, _ = modes(load_scene(SCENES / "suspended_wheelset.yaml"), 50.0)
     figure = fig_modes(table, "suspended wheelset")
     axes = figure.axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]

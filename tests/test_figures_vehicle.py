@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.speeds.figures import HUNTING, RESPONSE, guiding_forces, lateral_motion, over_speed
+from study.speeds.tables import speed_row
 from tests.synthetic import hunting_run
-from wrcore.analysis_vehicle import speed_row
-from wrcore.figures_vehicle import HUNTING, RESPONSE, guiding_forces, lateral_motion, over_speed
 
 
 def vehicle_run(detection):

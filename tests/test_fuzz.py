@@ -27,9 +27,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.conftest import ROOT
-from wrcore.checked_yaml import read_yaml
 from wrcore.errors import InputError
-from wrcore.sweep_plan import load_sweep
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.sweep.plan import load_sweep
 from wrcore.vehicle.description import build_vehicle
 
 pytestmark = pytest.mark.usefixtures("no_new_tables")

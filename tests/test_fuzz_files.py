@@ -31,9 +31,9 @@ from wrcore.creep.build import Resolution
 from wrcore.creep.kalker import kalker_data
 from wrcore.creep.table import CreepTable, write_table
 from wrcore.errors import InputError
-from wrcore.results import load_run
-from wrcore.scene import load_scene
-from wrcore.streaming import simulate_to
+from wrcore.run.results import load_run
+from wrcore.run.streaming import simulate_to
+from wrcore.scene.description import load_scene
 
 pytestmark = pytest.mark.usefixtures("no_new_tables")
 
@@ -275,7 +275,7 @@ def test_a_disk_that_fills_up_is_one_line(folder, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("wrcore.results._write_attributes", full)
+    monkeypatch.setattr("wrcore.run.results._write_attributes", full)
     status, _, err = run_command(["simulate", folder / "scene.yaml", "--out", out])
     assert status == 2 and err == "wrcore: No space left on device\n"
     assert not list((folder / "out").iterdir())

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wrcore.analysis_ivp import PROJECTED, error_of, solve, stabilisation_table, value_table, violation_history
-from wrcore.analysis_ivp import work_precision as work_precision_table
-from wrcore.analysis_ivp_problem import read_problem, workspace
-from wrcore.analysis_ivp_wheelset import project, right_hand_side
+from study.ivp.figures import METHOD_STYLES, fig_ivp_constraints, fig_ivp_work_precision
+from study.ivp.problem import read_problem, workspace
+from study.ivp.runs import PROJECTED, error_of, solve, stabilisation_table, value_table, violation_history
+from study.ivp.runs import work_precision as work_precision_table
+from study.ivp.wheelset import project, right_hand_side
 from wrcore.errors import InputError
-from wrcore.figures_benchmarks import METHOD_STYLES, fig_ivp_constraints, fig_ivp_work_precision
 
 FILE = Path(__file__).parent.parent / "config" / "benchmarks" / "ivp_wheelset.json"
 BAR = 1e-6  # m, error of x at 10 s

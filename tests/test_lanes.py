@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wrcore._jit import FUSED, jit
-from wrcore._lanes import (
+from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.lanes import (
     below,
     count_bits,
     greatest,

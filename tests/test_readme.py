@@ -2,8 +2,8 @@
 
 import re
 
+from study.accuracy.front import front_markdown
 from tests.conftest import ROOT
-from wrcore.accuracy import front_markdown
 
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from wrcore._jit import jit
-from wrcore._references import Handle, Kernel, call_at
+from wrcore.kernels.handles import Handle, Kernel, call_at
+from wrcore.kernels.jit import jit
 
 
 class Inner(NamedTuple):

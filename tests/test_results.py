@@ -7,8 +7,8 @@ from synthetic import hunting_run
 
 from wrcore import __version__
 from wrcore.errors import InputError
-from wrcore.results import load_run, load_runs, unit_of, write_run
-from wrcore.simulate import Run
+from wrcore.run.results import load_run, load_runs, unit_of, write_run
+from wrcore.run.simulate import Run
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.contact.detection import detect
 from wrcore.dynamics.system import Equations, workspace
-from wrcore.results import load_run
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate
+from wrcore.run.results import load_run
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
 
 
 def test_conical_wheelset_follows_klingel():

@@ -8,12 +8,12 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT, SCENES
-from wrcore.checked_yaml import read_yaml
 from wrcore.cli import main
 from wrcore.contact.reduction import ANGLE, NORMAL
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
-from wrcore.scene import GRAVITY, compile_scene, load_scene
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.scene.description import GRAVITY, compile_scene, load_scene
 
 
 @pytest.fixture

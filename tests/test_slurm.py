@@ -9,7 +9,7 @@ import slurm_node
 import yaml
 
 from tests.conftest import ROOT
-from wrcore.sweep_batch import load_table, run_sweep
+from wrcore.sweep.batch import load_table, run_sweep
 
 REASON = slurm_node.missing()
 

@@ -16,10 +16,10 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.errors import InputError
-from wrcore.results import load_run
-from wrcore.scene import load_scene
-from wrcore.simulate import output_blocks, output_times, simulate
-from wrcore.streaming import Parts, simulate_to
+from wrcore.run.results import load_run
+from wrcore.run.simulate import output_blocks, output_times, simulate
+from wrcore.run.streaming import Parts, simulate_to
+from wrcore.scene.description import load_scene
 
 HUNTING = {"speed": 60.0, "integration.duration": 4.0, "contact.creep.model": "she"}
 CURVE = HUNTING | {
@@ -79,7 +79,7 @@ def test_a_run_that_ends_before_its_time_keeps_its_last_valid_state(tmp_path):
 KILLED = """
 import sys
 from tests.test_streaming import HUNTING, scene_of
-from wrcore.streaming import simulate_to
+from wrcore.run.streaming import simulate_to
 simulate_to(scene_of(HUNTING | {"integration.duration": 20.0}), sys.argv[1], block=200)
 """
 
@@ -184,7 +184,7 @@ def test_the_command_is_interrupted_and_goes_on(tmp_path, capsys, monkeypatch):
     sets = [f"--set={key}={value}" for key, value in HUNTING.items()]
     command = ["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)]
     with monkeypatch.context() as patch:
-        patch.setattr("wrcore.progress.simulated_time", lambda _: nullcontext(interrupt_at(1.5, signal.SIGTERM)))
+        patch.setattr("wrcore.run.progress.simulated_time", lambda _: nullcontext(interrupt_at(1.5, signal.SIGTERM)))
         assert main(command) == 128 + signal.SIGTERM
     assert "stalled: interrupted (SIGTERM)" in capsys.readouterr().out
     kept = out.read_bytes()

@@ -7,12 +7,12 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
-from wrcore import sweep_batch
-from wrcore.analysis import amplitude, hunting_frequency
-from wrcore.analysis_vehicle import wear_number, wheel_forces
+from wrcore.analysis.wheels import wear_number, wheel_forces
 from wrcore.cli import main
 from wrcore.errors import InputError
-from wrcore.sweep_measures import MEASURES
+from wrcore.run.motion import amplitude, hunting_frequency
+from wrcore.sweep import batch as sweep_batch
+from wrcore.sweep.measures import MEASURES
 
 SMOKE = ROOT / "config" / "sweeps" / "smoke.yaml"
 
@@ -206,7 +206,7 @@ def test_a_table_of_another_kind_is_refused(tmp_path):
 
 
 def test_figure_of_a_sweep_has_a_panel_with_units_per_key(smoke):
-    from wrcore.figures_sweep import sweep_scatter
+    from study.sweeps.figures import sweep_scatter
 
     keys = ["speed", "contact.detection", "rail.inclination", "contact.friction"]
     figure = sweep_scatter(smoke, keys, "amplitude_m")

@@ -6,9 +6,9 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.contact import reduction
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate
-from wrcore.validity import LIMITS, WIDEST, WIDEST_TURN, exceeded
+from wrcore.run.simulate import simulate
+from wrcore.run.validity import LIMITS, WIDEST, WIDEST_TURN, exceeded
+from wrcore.scene.description import compile_scene, load_scene
 
 RADIUS = 0.3
 

@@ -1,7 +1,7 @@
 """The page of vehicle values."""
 
+from study.report.vehicle_page import vehicle_page
 from tests.conftest import ROOT
-from wrcore.vehicle_page import vehicle_page
 
 
 def test_every_line_of_every_vehicle_file_is_there_and_marks_are_set_off(tmp_path):

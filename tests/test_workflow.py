@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 import yaml
 
-from wrcore.analysis_hard_study import unexplained
-from wrcore.results import load_run
+from study.hard_cases.study import unexplained
+from wrcore.run.results import load_run
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "results" / "smoke"

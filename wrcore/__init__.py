@@ -15,46 +15,76 @@ sides. Penetration is positive in contact. Creepages are velocities of the wheel
 rolling speed; forces act on the wheel. Units are SI throughout.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wrcore.analysis.contact import contact_table as contact_table
+    from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
+    from wrcore.analysis.plot_contact import plot_pair as plot_pair
+    from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
+    from wrcore.analysis.plot_run import plot_run as plot_run
+    from wrcore.analysis.stability import critical_speeds as critical_speeds
+    from wrcore.analysis.stability import modes as modes
+    from wrcore.analysis.wheels import wear_number as wear_number
+    from wrcore.analysis.wheels import wheel_forces as wheel_forces
+    from wrcore.analysis.wheels import wheel_table as wheel_table
+    from wrcore.contact.conicity import conicity_curve as conicity_curve
+    from wrcore.contact.first_touch import WheelsetOnTrack as WheelsetOnTrack
+    from wrcore.contact.first_touch import first_touch as first_touch
+    from wrcore.creep.cases import creep_force as creep_force
     from wrcore.creep.halfspace import RollingContact as RollingContact
+    from wrcore.creep.table import CreepTable as CreepTable
     from wrcore.creep.table import ensure_table as ensure_table
     from wrcore.errors import InputError as InputError
     from wrcore.geometry.standards import list_profiles as list_profiles
     from wrcore.geometry.standards import named_profile as named_profile
-    from wrcore.results import load_run as load_run
-    from wrcore.results import load_runs as load_runs
-    from wrcore.results import write_run as write_run
-    from wrcore.run import Run as Run
-    from wrcore.scene import Scene as Scene
-    from wrcore.scene import load_scene as load_scene
-    from wrcore.simulate import simulate as simulate
-    from wrcore.simulate import simulate_many as simulate_many
-    from wrcore.sweep_batch import run_sweep as run_sweep
-    from wrcore.sweep_plan import load_sweep as load_sweep
+    from wrcore.run.motion import hunting_frequency as hunting_frequency
+    from wrcore.run.results import load_run as load_run
+    from wrcore.run.results import load_runs as load_runs
+    from wrcore.run.results import write_run as write_run
+    from wrcore.run.run import Run as Run
+    from wrcore.run.simulate import simulate as simulate
+    from wrcore.run.simulate import simulate_many as simulate_many
+    from wrcore.scene.description import Scene as Scene
+    from wrcore.scene.description import load_scene as load_scene
+    from wrcore.sweep.batch import run_sweep as run_sweep
+    from wrcore.sweep.plan import load_sweep as load_sweep
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
     "InputError": "wrcore.errors",
+    "CreepTable": "wrcore.creep.table",
     "RollingContact": "wrcore.creep.halfspace",
-    "Run": "wrcore.run",
-    "Scene": "wrcore.scene",
+    "Run": "wrcore.run.run",
+    "Scene": "wrcore.scene.description",
+    "WheelsetOnTrack": "wrcore.contact.first_touch",
+    "conicity_curve": "wrcore.contact.conicity",
+    "contact_table": "wrcore.analysis.contact",
+    "creep_force": "wrcore.creep.cases",
+    "critical_speeds": "wrcore.analysis.stability",
     "ensure_table": "wrcore.creep.table",
+    "first_touch": "wrcore.contact.first_touch",
+    "hunting_frequency": "wrcore.run.motion",
+    "limit_cycles": "wrcore.analysis.limit_cycles",
     "list_profiles": "wrcore.geometry.standards",
-    "load_run": "wrcore.results",
-    "load_runs": "wrcore.results",
-    "load_scene": "wrcore.scene",
-    "load_sweep": "wrcore.sweep_plan",
+    "load_run": "wrcore.run.results",
+    "load_runs": "wrcore.run.results",
+    "load_scene": "wrcore.scene.description",
+    "load_sweep": "wrcore.sweep.plan",
+    "modes": "wrcore.analysis.stability",
     "named_profile": "wrcore.geometry.standards",
-    "run_sweep": "wrcore.sweep_batch",
-    "simulate": "wrcore.simulate",
-    "simulate_many": "wrcore.simulate",
-    "write_run": "wrcore.results",
+    "plot_creep_force": "wrcore.analysis.plot_creep",
+    "plot_pair": "wrcore.analysis.plot_contact",
+    "plot_run": "wrcore.analysis.plot_run",
+    "run_sweep": "wrcore.sweep.batch",
+    "simulate": "wrcore.run.simulate",
+    "simulate_many": "wrcore.run.simulate",
+    "wear_number": "wrcore.analysis.wheels",
+    "wheel_forces": "wrcore.analysis.wheels",
+    "wheel_table": "wrcore.analysis.wheels",
+    "write_run": "wrcore.run.results",
 }
 __all__ = ["__version__", *_PUBLIC]
 
@@ -68,14 +98,3 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-class _Package(ModuleType):
-    """``wrcore.simulate`` is the function, also once the file ``simulate.py`` has been imported."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _PUBLIC and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

@@ -179,14 +179,14 @@ def _write_csv(frame, path):
 
 
 def _simulate(options):
-    from wrcore.progress import simulated_time
-    from wrcore.scene import load_scene
-    from wrcore.streaming import simulate_to
+    from wrcore.run.progress import simulated_time
+    from wrcore.run.streaming import simulate_to
+    from wrcore.scene.description import load_scene
 
     out = _output(options.out) if options.out else None
     scene, record = load_scene(options.scene, options.overrides), {}
     if options.accuracy is not None:
-        from wrcore.accuracy import choose
+        from wrcore.run.accuracy import choose
 
         _positive(options.accuracy, "--accuracy")
         choice, reason = choose(scene, options.accuracy)
@@ -204,7 +204,7 @@ def _simulate(options):
 
 def _print_run(run, as_json):
     """How a run ended, what it cost, and which limits of validity it exceeded."""
-    from wrcore.validity import LIMITS
+    from wrcore.run.validity import LIMITS
 
     counters = run.counters
     factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0
@@ -229,8 +229,8 @@ def _print_run(run, as_json):
 
 
 def _sweep(options):
-    from wrcore.sweep_batch import gather, load_table, run_rows, sweep_to_file, write_table
-    from wrcore.sweep_plan import load_sweep
+    from wrcore.sweep.batch import gather, load_table, run_rows, sweep_to_file, write_table
+    from wrcore.sweep.plan import load_sweep
 
     out = _output(options.out)
     if not 1 <= options.threads <= 1000:
@@ -329,7 +329,7 @@ def _profile(options, spec, kind):
 
 def _ratio(text):
     """A ratio such as 1/40."""
-    from wrcore.checked_yaml import parse_ratio
+    from wrcore.errors.checked_yaml import parse_ratio
 
     ratio = parse_ratio(text)
     if not abs(ratio) <= 0.2:

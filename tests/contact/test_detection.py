@@ -18,8 +18,8 @@ from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.surface import rail_surface, wheel_surface, wheelset_transform
 from wrcore.geometry.track import Track
-from wrcore.scene import load_scene
-from wrcore.simulate import simulate
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
 
 GEOMETRY_FIELDS = (
     "u_wheel_m",

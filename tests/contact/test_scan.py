@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from wrcore._jit import jit
 from wrcore.contact.geometry import CALM, LANES, RAIL_COSINE, RAIL_RESERVE, STRAY, WHEEL_RESERVE, contact_geometry
 from wrcore.contact.reduction import _arc_sine, _arc_tangent
 from wrcore.contact.scan import (
@@ -20,6 +19,7 @@ from wrcore.contact.scan import (
 from wrcore.contact.strip import make_pose
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track
+from wrcore.kernels.jit import jit
 
 
 @jit

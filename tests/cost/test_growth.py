@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.cost.growth import array_bytes, cache_sizes, findings, identical, over_scenes
+from study.cost.recorded import evaluation, record
 from tests.conftest import SCENES
-from wrcore.cost.growth import array_bytes, cache_sizes, findings, identical, over_scenes
-from wrcore.cost.recorded import evaluation, record
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate, simulate_many
+from wrcore.run.simulate import simulate, simulate_many
+from wrcore.scene.description import compile_scene, load_scene
 
 SHORT = ["integration.duration=0.2"]
 

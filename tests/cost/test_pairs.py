@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
+from study.cost import pairs
+from study.cost.chains import over_chains
+from study.cost.runs import batch_table, rejection_table
+from study.cost.search import loaded_wheels, search_costs
+from study.cost.stages import search_all
 from tests.conftest import SCENES
-from wrcore._references import Handle
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.cost import pairs
-from wrcore.cost.chains import over_chains
-from wrcore.cost.runs import batch_table, rejection_table
-from wrcore.cost.search import loaded_wheels, search_costs
-from wrcore.cost.stages import search_all
-from wrcore.scene import compile_scene, load_scene
+from wrcore.kernels.handles import Handle
+from wrcore.scene.description import compile_scene, load_scene
 
 
 @pytest.fixture(scope="module")

@@ -7,16 +7,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.cost import operations
+from study.cost.operations import STAGES, Number, Tally, count_operations, counting, interpreted
+from study.cost.recorded import record
+from study.cost.stages import breakdown, limits, with_limits
 from tests.conftest import SCENES
 from wrcore.contact import strip
 from wrcore.contact.detection import find_patches
-from wrcore.cost import operations
-from wrcore.cost.operations import STAGES, Number, Tally, count_operations, counting, interpreted
-from wrcore.cost.recorded import record
-from wrcore.cost.stages import breakdown, limits, with_limits
 from wrcore.dynamics import system
 from wrcore.dynamics.system import Equations, workspace
-from wrcore.scene import load_scene
+from wrcore.scene.description import load_scene
 
 
 def scene(name, *overrides):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrcore.cost.timing import Bar, Contender, compare, machine, summary, take_turns
+from study.cost.timing import Bar, Contender, compare, machine, summary, take_turns
 
 
 class Clock:

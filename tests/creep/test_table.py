@@ -6,7 +6,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from wrcore._jit import jit
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import _atan2, _stretch, creepages_at, node_distances, table_lookup
 from wrcore.creep.build import RESOLUTIONS, Resolution, axis_values, build_data, count_cases, table_axes
@@ -14,6 +13,7 @@ from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.creep.table import build_table, ensure_table, load_table, table_info, table_path, write_table
 from wrcore.errors import InputError
+from wrcore.kernels.jit import jit
 
 TINY = Resolution(4, 4, 6, 8, 4, 6)
 

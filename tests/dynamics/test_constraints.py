@@ -12,8 +12,8 @@ from wrcore.dynamics.body import STATE_SIZE, euler_parameters, matrix_of
 from wrcore.dynamics.full_equations import full_equations
 from wrcore.dynamics.joint import Joint, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.projection import project_positions, project_velocities
 from wrcore.dynamics.system import Equations, workspace
+from wrcore.integrate.projection import project_positions, project_velocities
 
 
 def some_markers(rng):

@@ -9,14 +9,14 @@ from tests.dynamics.test_system import body_state, contact, make_model, run  # n
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import CHANNELS, energy_balance, energy_channels
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.track import build_track
-from wrcore.results import DESCRIPTIONS, load_run, unit_of, write_run
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate
+from wrcore.integrate.integrator import integrate
+from wrcore.run.results import DESCRIPTIONS, load_run, unit_of, write_run
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
 
 IRREGULAR = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 15}}"
 CURVED = "track.path=[{tangent: 15}, {transition: 20}, {curve: 100, radius: 400, cant: 0.08}]"

@@ -7,12 +7,12 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT, SCENES
-from wrcore.checked_yaml import read_yaml
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.equilibrium import wheel_loads
 from wrcore.dynamics.system import Equations, workspace
-from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
 CAR = 32000 * GRAVITY

@@ -8,14 +8,14 @@ import pytest
 
 from tests.conftest import SCENES
 from tests.dynamics.test_system import body_state, contact, make_model  # noqa: F401 (contact is a fixture)
-from wrcore.dynamics import engine
-from wrcore.dynamics.integrate import METHODS, STIFF_SPEED, chosen_method, integrate
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.reference import SOLVERS, integrate_function
-from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import output_times, simulate, simulate_many
+from wrcore.integrate import engine
+from wrcore.integrate.integrator import METHODS, STIFF_SPEED, chosen_method, integrate
+from wrcore.integrate.reference import SOLVERS, integrate_function
+from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.run.simulate import output_times, simulate, simulate_many
+from wrcore.scene.description import compile_scene, load_scene
 
 ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas4": 4, "ros34pw2": 3}
 WHEELSET = SCENES / "suspended_wheelset.yaml"
@@ -347,10 +347,10 @@ def test_most_steps(wheelset, method):
 
 def test_no_headway_is_a_stall(wheelset, monkeypatch):
     """Steps as short as they would be below `STALL_STEP`: the bound is set above what this run needs."""
-    monkeypatch.setattr("wrcore.dynamics.integrate.STALL_ATTEMPTS", 50)
+    monkeypatch.setattr("wrcore.integrate.integrator.STALL_ATTEMPTS", 50)
     calm = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
     assert calm.status == "completed"
-    monkeypatch.setattr("wrcore.dynamics.integrate.STALL_STEP", 1.0)
+    monkeypatch.setattr("wrcore.integrate.integrator.STALL_STEP", 1.0)
     run = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
     assert run.status == "stalled" and run.reason.startswith("50 steps brought it") and run.steps + run.rejected == 50
     assert np.isfinite(run.end_state).all()

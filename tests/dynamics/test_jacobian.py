@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.dynamics.blocks import factorise, new_system, solve_stage
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.jacobian import new_jacobian, plan_sweeps, refresh_jacobian
 from wrcore.dynamics.system import Equations
-from wrcore.scene import compile_scene, load_scene
+from wrcore.integrate.blocks import factorise, new_system, solve_stage
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.jacobian import new_jacobian, plan_sweeps, refresh_jacobian
+from wrcore.scene.description import compile_scene, load_scene
 
 CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
 CASES = {

@@ -8,17 +8,17 @@ from scipy.linalg import eigh
 
 from tests.conftest import ROOT, SCENES
 from tests.dynamics.test_system import LEVEL, body_state, make_model
-from wrcore.analysis import growth_rate
-from wrcore.analysis_modes import modes
-from wrcore.analysis_stability import at_speed, steady_motion
+from wrcore.analysis.modes import linear_modes
+from wrcore.analysis.stability import at_speed, steady_motion
 from wrcore.contact import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.linear import linearise, moved_states, steady_running
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations, Model, state_size
-from wrcore.scene import compile_scene, load_scene
+from wrcore.integrate.integrator import integrate
+from wrcore.run.motion import growth_rate
+from wrcore.scene.description import compile_scene, load_scene
 from wrcore.vehicle.description import build_vehicle
 
 
@@ -77,7 +77,7 @@ def test_sprung_vehicle_has_the_frequencies_of_its_stiffness_and_mass_matrices(c
     ]  # fmt: skip
     vehicle = build_vehicle({"name": "sprung", "bodies": BODIES, "elements": elements}, "test")
     model = sprung_model(vehicle, contact, 0.0)
-    table, shapes, _ = modes(vehicle, linearise(model, nominal_state(vehicle, model)))
+    table, shapes, _ = linear_modes(vehicle, linearise(model, nominal_state(vehicle, model)))
 
     names = list(BODIES)
     stiffness, mass = np.zeros((18, 18)), np.zeros((18, 18))
@@ -119,7 +119,7 @@ def test_body_above_its_springs_swings_like_an_inverted_pendulum(contact):
     }  # fmt: skip
     vehicle = build_vehicle(data, "test")
     model = sprung_model(vehicle, contact, g)
-    table, shapes, _ = modes(vehicle, linearise(model, nominal_state(vehicle, model)))
+    table, shapes, _ = linear_modes(vehicle, linearise(model, nominal_state(vehicle, model)))
     sideways = table[np.max(np.abs(shapes[:, 0, [1, 3]]), axis=1) > 1e-3]
     stiffness = [[2 * ky, 2 * ky * h], [2 * ky * h, 2 * kz * b**2 + 2 * ky * h**2 - m * g * h]]
     exact = np.sqrt(eigh(stiffness, np.diag([m, roll]), eigvals_only=True))
@@ -254,7 +254,7 @@ def test_small_free_motion_grows_as_its_eigenvalue_says(speed):
     linear = steady_motion(model, state, speed)
     model, _ = at_speed(model, state, speed)
     values, vectors = np.linalg.eig(linear.matrix)
-    table, _, _ = modes(scene.vehicle, linear)
+    table, _, _ = linear_modes(scene.vehicle, linear)
     mode = table[table["name"] == "wheelset hunting"].iloc[0]
     vector = vectors[:, np.argmin(np.abs(values - complex(mode["real_per_s"], mode["imag_rad_per_s"])))]
     move = np.real(linear.basis @ vector / (linear.basis @ vector)[1]) * 1e-5

@@ -8,7 +8,6 @@ import pytest
 from tests.conftest import ROOT
 from tests.dynamics.test_body import matrix_of
 from wrcore.dynamics.body import euler_parameters
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import Joint, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import pack_elements
@@ -16,7 +15,8 @@ from wrcore.dynamics.system import Bodies, Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import tangent_path
-from wrcore.scene import compile_scene, load_scene
+from wrcore.integrate.integrator import integrate
+from wrcore.scene.description import compile_scene, load_scene
 
 LEVEL = TrackModel(True, tangent_path(), no_irregularity())
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import RK23, RK45
 
-from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 
 ORDERS = {"rk45": (5, 4), "tsit5": (5, 4), "rk23": (3, 2), "rk4": (4, 3), "rodas4": (4, 3), "ros34pw2": (3, 2)}
 """Orders of the method and of its embedded one."""

@@ -12,8 +12,8 @@ from wrcore.dynamics.body import euler_of
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import rotation
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import simulate
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
 
 SAME = (columns.U_WHEEL, columns.U_RAIL, columns.ANGLE, columns.PENETRATION, columns.CURVATURE_Y)
 

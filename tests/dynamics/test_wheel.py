@@ -9,7 +9,7 @@ from wrcore.contact.normal import damping_factor, hertz_ellipse
 from wrcore.creep.laws import LAWS, creep_force
 from wrcore.dynamics.wheel import MOTION_COLUMNS, wheel_wrenches
 from wrcore.geometry.track import rotation
-from wrcore.scene import compile_scene, load_scene
+from wrcore.scene.description import compile_scene, load_scene
 
 POSES = [  # side, y, roll, yaw: tread, both sides, and a flange contact
     (1.0, 0.002, 1e-4, 0.004), (-1.0, 0.002, 1e-4, 0.004), (-1.0, -0.0068, -1.5e-3, -0.006),

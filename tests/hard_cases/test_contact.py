@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrcore.analysis_hard_contact import crests, drops, impacts, pose_sweeps, restitution, slow_push
+from study.hard_cases.contact import crests, drops, impacts, pose_sweeps, restitution, slow_push
 
 
 def test_fast_impacts_keep_the_root_of_the_damping_factor():

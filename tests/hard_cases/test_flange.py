@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from wrcore.analysis_hard_cases import prepare
-from wrcore.analysis_hard_flange import derailments, flange_angle, nadal, nadal_limit
+from study.hard_cases.cases import prepare
+from study.hard_cases.flange import derailments, flange_angle, nadal, nadal_limit
 
 
 def test_nadal_limit_of_the_s1002(vehicles):

@@ -1,6 +1,6 @@
 """Friction from none to very high, its jumps, creep laws at their ends."""
 
-from wrcore.analysis_hard_friction import friction_ladder, friction_step, frictionless, law_ends
+from study.hard_cases.friction import friction_ladder, friction_step, frictionless, law_ends
 
 
 def test_friction_from_none_to_high(vehicles, assert_passed):

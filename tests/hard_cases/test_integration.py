@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrcore.analysis_hard_integration import (
+from study.hard_cases.integration import (
     amplification,
     baumgarte,
     long_run,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from study.hard_cases import long as analysis_hard_long
+from study.hard_cases.long import hunting
 from tests.conftest import SCENES
-from wrcore import analysis_hard_long
-from wrcore.analysis_hard_long import hunting
 
 VEHICLES = {"suspended wheelset": {"scene": str(SCENES / "suspended_wheelset.yaml")}}
 CHANGES = {"speed": 60.0, "contact.creep.model": "she"}

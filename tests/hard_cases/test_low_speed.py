@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import table
-from wrcore.analysis_hard_low_speed import braking, ladder, regularisation, slow_path
+from study.hard_cases.cases import table
+from study.hard_cases.low_speed import braking, ladder, regularisation, slow_path
 
 
 def test_wheelsets_run_at_any_speed(vehicles, assert_passed):

@@ -1,6 +1,6 @@
 """Worn, kinked, noisy, sparse and truncated profiles."""
 
-from wrcore.analysis_hard_profiles import profiles
+from study.hard_cases.profiles import profiles
 
 
 def test_profiles_are_run_or_refused(vehicles, assert_passed):

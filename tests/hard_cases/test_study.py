@@ -5,10 +5,10 @@ import math
 import pandas as pd
 import pytest
 
-from wrcore.analysis_hard_cases import Check, computed, refused, table
-from wrcore.analysis_hard_study import FAMILIES, known_limits, report_text, run_family, summary, unexplained
+from study.hard_cases.cases import Check, computed, refused, table
+from study.hard_cases.figures import FIGURES, fig_low_speed, fig_nadal, fig_stability_map
+from study.hard_cases.study import FAMILIES, known_limits, report_text, run_family, summary, unexplained
 from wrcore.errors import InputError
-from wrcore.figures_hard_cases import FIGURES, fig_low_speed, fig_nadal, fig_stability_map
 
 LABEL = {"vehicle": "a", "detection": "planar", "integrator": "b"}
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wrcore.analysis_hard_track import balance_speed, curve, irregular
+from study.hard_cases.track import balance_speed, curve, irregular
 
 
 def test_balance_speed():

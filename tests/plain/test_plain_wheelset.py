@@ -9,16 +9,16 @@ from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data, creep_force
 from wrcore.creep.table import ensure_table
 from wrcore.dynamics.body import euler_of, matrix_of
-from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.reference import integrate_function
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.reference import integrate_function
 from wrcore.plain.contact import cut_strips, find_patches
 from wrcore.plain.forces import creep_force as plain_creep_force
 from wrcore.plain.forces import hertz
 from wrcore.plain.wheelset import plain_wheelset
-from wrcore.scene import compile_scene, load_scene
+from wrcore.scene.description import compile_scene, load_scene
 
 LOAD, LEVER = 54546.0, 0.75
 """Wheel load (N) and tape circle (m): what differences of force and moment are measured by."""

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT, SCENES
-from wrcore.checked_yaml import read_yaml
+from wrcore.errors.checked_yaml import read_yaml
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
 

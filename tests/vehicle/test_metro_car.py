@@ -5,8 +5,8 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.scene import GRAVITY, compile_scene, load_scene, static_equilibrium
-from wrcore.simulate import simulate
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
 
 
 def test_seventeen_bodies_stand_evenly_on_eight_wheels():

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT
-from wrcore.checked_yaml import parse_value
+from wrcore.errors.checked_yaml import parse_value
 from wrcore.vehicle.description import build_vehicle
 from wrcore.vehicle.element_checks import KEYS
 

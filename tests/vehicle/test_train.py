@@ -10,8 +10,8 @@ from wrcore.dynamics.equilibrium import solve_equilibrium
 from wrcore.dynamics.system import Equations
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, load_scene, static_equilibrium
-from wrcore.simulate import simulate
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
 
 COUPLED = ["vehicle.count=3", "vehicle.spacing=26"]
 

@@ -6,7 +6,7 @@ import yaml
 from snakemake.exceptions import WorkflowError
 
 from wrcore.errors import InputError
-from wrcore.scene import load_scene
+from wrcore.scene.description import load_scene
 
 HERE = Path(workflow.basedir)
 

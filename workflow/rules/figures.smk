@@ -1,4 +1,4 @@
-# One rule per figure of the paper; the function in wrcore.figures has the rule's name.
+# One rule per figure of the paper; the function in wrcore.analysis.style has the rule's name.
 
 
 rule fig1_parametrisation:

@@ -1,5 +1,5 @@
 # Sweeps: a few long jobs of many short runs each, and one table. Which batches there are, the sweep's file says.
-from wrcore.sweep_plan import load_sweep
+from wrcore.sweep.plan import load_sweep
 
 SWEEPS = {}
 for file in config["sweeps"]:

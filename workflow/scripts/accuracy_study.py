@@ -2,7 +2,7 @@
 
 import sys
 
-from wrcore.analysis_accuracy import combinations, reference_row, reference_runs, study
+from study.accuracy.errors import combinations, reference_row, reference_runs, study
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings = snakemake.params.settings

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from wrcore.analysis import comparison_table, our_values
+from study.paper.tables import comparison_table, our_values
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = (pd.read_csv(snakemake.input[name][0]) for name in ("geometry", "motion", "timing"))

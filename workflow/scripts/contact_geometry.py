@@ -2,8 +2,8 @@
 
 import sys
 
-from wrcore.analysis import geometry_table
-from wrcore.scene import load_scene
+from study.paper.tables import geometry_table
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 geometry_table(load_scene(snakemake.input.scene), snakemake.params.y).to_csv(snakemake.output[0], index=False)

@@ -4,9 +4,10 @@ import sys
 
 import numpy as np
 
-from wrcore import analysis_contact, figures_contact
+from study.contact import figures as figures_contact
+from study.contact import tables as analysis_contact
+from wrcore.analysis.style import save_figure
 from wrcore.contact.first_touch import first_touch
-from wrcore.figures import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params, output = snakemake.params, snakemake.output

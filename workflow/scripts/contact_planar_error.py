@@ -4,9 +4,10 @@ import sys
 
 import numpy as np
 
-from wrcore.analysis_contact import pair_geometry, planar_error_map, study_pair
-from wrcore.figures import save_figure
-from wrcore.figures_contact import fig_planar_error
+from study.contact.figures import fig_planar_error
+from study.contact.tables import planar_error_map, study_pair
+from wrcore.analysis.contact import pair_geometry
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings = snakemake.params.settings

@@ -5,9 +5,10 @@ import sys
 import numpy as np
 import pandas as pd
 
-from wrcore import analysis_contact, figures_contact
-from wrcore.analysis_contact_reference import compare_with_contact, summarise
-from wrcore.figures import save_figure
+from study.contact import figures as figures_contact
+from study.contact import tables as analysis_contact
+from study.contact.reference import compare_with_contact, summarise
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output

@@ -2,8 +2,9 @@
 
 import sys
 
-from wrcore.analysis_contact import pair_geometry, study_pair
-from wrcore.analysis_contact_search import search_table
+from study.contact.search import search_table
+from study.contact.tables import study_pair
+from wrcore.analysis.contact import pair_geometry
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 geometry = pair_geometry(study_pair(snakemake.params.pair))

@@ -4,8 +4,8 @@ import sys
 
 import pandas as pd
 
-from wrcore.cost.pairs import benchmark_table
-from wrcore.cost.timing import machine
+from study.cost.pairs import benchmark_table
+from study.cost.timing import machine
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 found = machine()

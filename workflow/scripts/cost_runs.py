@@ -4,8 +4,8 @@ import sys
 
 import numpy as np
 
-from wrcore.cost.runs import batch_table, rejection_table
-from wrcore.scene import load_scene
+from study.cost.runs import batch_table, rejection_table
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 scenes, batch, rejections = snakemake.params.scenes, snakemake.params.batch, dict(snakemake.params.rejections)

@@ -4,10 +4,10 @@ import sys
 
 import pandas as pd
 
-from wrcore.cost.stages import breakdown, limits, with_limits
-from wrcore.figures import save_figure
-from wrcore.figures_cost import fig_breakdown
-from wrcore.scene import load_scene
+from study.cost.figures import fig_breakdown
+from study.cost.stages import breakdown, limits, with_limits
+from wrcore.analysis.style import save_figure
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output

@@ -7,7 +7,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"  # the job holds all cores but computes
 import sys  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from wrcore.analysis_creep import ReferenceCases, creep_models, read_reference, time_models  # noqa: E402
+from study.creep.laws import ReferenceCases, creep_models, read_reference, time_models
 from wrcore.creep.table import load_table  # noqa: E402
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

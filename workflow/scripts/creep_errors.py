@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from wrcore.analysis_creep import creep_models, error_table, read_reference
+from study.creep.laws import creep_models, error_table, read_reference
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

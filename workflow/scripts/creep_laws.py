@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from wrcore.analysis_creep import laws_markdown, laws_table
+from study.creep.laws import laws_markdown, laws_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = pd.concat([pd.read_csv(path) for path in snakemake.input.tables])

@@ -6,7 +6,7 @@ from functools import partial
 import pandas as pd
 from tqdm import tqdm
 
-from wrcore.analysis_creep import timed_table
+from study.creep.laws import timed_table
 from wrcore.creep.table import write_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -4,9 +4,9 @@ import sys
 
 import pandas as pd
 
-from wrcore.analysis_limit_cycles import critical_table
-from wrcore.figures import save_figure
-from wrcore.figures_stability import fig_limit_cycles, fig_root_locus
+from study.critical_speed.figures import fig_limit_cycles, fig_root_locus
+from wrcore.analysis.limit_cycles import critical_table
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 titles, given, output = list(snakemake.params.titles.values()), snakemake.input, snakemake.output

@@ -2,8 +2,9 @@
 
 import sys
 
-from wrcore.figures import fig3_detection, save_figure
-from wrcore.scene import load_scene
+from study.paper.figures import fig3_detection
+from wrcore.analysis.style import save_figure
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 save_figure(fig3_detection(load_scene(snakemake.input.scene), **snakemake.params.pose), *snakemake.output)

@@ -2,9 +2,10 @@
 
 import sys
 
-from wrcore.analysis import horizons
-from wrcore.figures import fig4_lateral_position, save_figure
-from wrcore.results import load_runs
+from study.paper.figures import fig4_lateral_position
+from study.paper.tables import horizons
+from wrcore.analysis.style import save_figure
+from wrcore.run.results import load_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 cases = load_runs([*snakemake.input.planar, *snakemake.input.spatial, *snakemake.input.tight])

@@ -2,10 +2,11 @@
 
 import sys
 
-from wrcore.analysis import horizons
-from wrcore.figures import fig5_contact_points, save_figure
-from wrcore.results import load_runs
-from wrcore.scene import load_scene
+from study.paper.figures import fig5_contact_points
+from study.paper.tables import horizons
+from wrcore.analysis.style import save_figure
+from wrcore.run.results import load_runs
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 scene = load_scene(snakemake.input.scene)

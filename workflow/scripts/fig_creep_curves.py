@@ -2,10 +2,10 @@
 
 import sys
 
-from wrcore.analysis_creep import creep_curves, creep_models
+from study.creep.figures import fig_creep_curves
+from study.creep.laws import creep_curves, creep_models
+from wrcore.analysis.style import save_figure
 from wrcore.creep.table import load_table
-from wrcore.figures import save_figure
-from wrcore.figures_creep import fig_creep_curves
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params = snakemake.params

@@ -2,11 +2,11 @@
 
 import sys
 
-from wrcore.analysis_creep import table_model
-from wrcore.analysis_creep_table import error_map
+from study.creep.figures import fig_creep_error_map
+from study.creep.laws import table_model
+from study.creep.smoothness import error_map
+from wrcore.analysis.style import save_figure
 from wrcore.creep.table import load_table
-from wrcore.figures import save_figure
-from wrcore.figures_creep import fig_creep_error_map
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params = snakemake.params

@@ -2,11 +2,11 @@
 
 import sys
 
-from wrcore.analysis_creep import table_model
-from wrcore.analysis_creep_table import smoothness, smoothness_table
+from study.creep.figures import fig_creep_smoothness
+from study.creep.laws import table_model
+from study.creep.smoothness import smoothness, smoothness_table
+from wrcore.analysis.style import save_figure
 from wrcore.creep.table import load_table
-from wrcore.figures import save_figure
-from wrcore.figures_creep import fig_creep_smoothness
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 lines = smoothness(table_model("table", load_table(snakemake.input.table[0])), **dict(snakemake.params.items()))

@@ -2,9 +2,9 @@
 
 import sys
 
+from study.creep.figures import fig_creep_traction
+from wrcore.analysis.style import save_figure
 from wrcore.creep.halfspace import solve_field
-from wrcore.figures import save_figure
-from wrcore.figures_creep import fig_creep_traction
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params = snakemake.params

@@ -4,8 +4,8 @@ import sys
 
 import pandas as pd
 
-from wrcore.figures import save_figure
-from wrcore.figures_cost import fig_growth
+from study.cost.figures import fig_growth
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 given = snakemake.input

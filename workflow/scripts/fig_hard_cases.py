@@ -4,8 +4,8 @@ import json
 import sys
 from pathlib import Path
 
-from wrcore.figures import save_figure
-from wrcore.figures_hard_cases import FIGURES
+from study.hard_cases.figures import FIGURES
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 paths = map(Path, snakemake.input.curves)

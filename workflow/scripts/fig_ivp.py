@@ -4,9 +4,9 @@ import sys
 
 import pandas as pd
 
-from wrcore.analysis_ivp_problem import read_problem
-from wrcore.figures import save_figure
-from wrcore.figures_benchmarks import fig_ivp_constraints, fig_ivp_work_precision
+from study.ivp.figures import fig_ivp_constraints, fig_ivp_work_precision
+from study.ivp.problem import read_problem
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables, output = snakemake.input, snakemake.output

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 
-from wrcore.analysis_hard_study import run_family
+from study.hard_cases.study import run_family
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 vehicles = {}

@@ -2,8 +2,8 @@
 
 import sys
 
-from wrcore.analysis_ivp import solve, stabilisation_table, value_table, violation_history, work_precision
-from wrcore.analysis_ivp_problem import read_problem
+from study.ivp.problem import read_problem
+from study.ivp.runs import solve, stabilisation_table, value_table, violation_history, work_precision
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output

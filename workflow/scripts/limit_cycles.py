@@ -3,8 +3,8 @@
 import os
 import sys
 
-from wrcore.analysis_limit_cycles import Settling, limit_cycles
-from wrcore.scene import load_scene
+from wrcore.analysis.limit_cycles import Settling, limit_cycles
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 source, settings = snakemake.input.scene, dict(snakemake.params.settings)

@@ -5,8 +5,8 @@ import sys
 
 import numpy as np
 
-from wrcore.analysis_stability import critical_speeds, loci, modes_in_full
-from wrcore.scene import load_scene
+from wrcore.analysis.stability import critical_speeds, loci, modes
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 source, params, output = snakemake.input.scene, snakemake.params, snakemake.output
@@ -16,6 +16,6 @@ scenes = {name: load_scene(source, [*overrides, *changes]) for name, changes in 
 speeds = np.linspace(**params.speeds)
 locus = loci({name: scenes[name] for name in ("planar", "spatial")}, speeds)
 linear = critical_speeds(scenes, speeds)
-shown, shapes = modes_in_full(scenes["spatial"], params.shown)
+shown, shapes = modes(scenes["spatial"], params.shown)
 for name, content in (("locus", locus), ("linear", linear), ("shown", shown), ("shapes", shapes)):
     content.to_csv(output[name], index=False)

@@ -3,9 +3,9 @@
 import os
 import sys
 
-from wrcore.results import write_run
-from wrcore.scene import load_scene
-from wrcore.simulate import simulate
+from wrcore.run.results import write_run
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 # a scene names files relative to its own folder

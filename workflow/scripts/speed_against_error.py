@@ -4,9 +4,9 @@ import sys
 
 import pandas as pd
 
-from wrcore.analysis_accuracy import front_table, recommendation_table
-from wrcore.figures import save_figure
-from wrcore.figures_accuracy import speed_against_error
+from study.accuracy.errors import front_table, recommendation_table
+from study.accuracy.figures import speed_against_error
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 titles = snakemake.params.titles.values()

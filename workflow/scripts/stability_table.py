@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from wrcore.analysis_hard_study import known_limits, report_text, summary
+from study.hard_cases.study import known_limits, report_text, summary
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 found = pd.concat(map(pd.read_csv, snakemake.input.tables), ignore_index=True)

@@ -2,8 +2,8 @@
 
 import sys
 
-from wrcore.sweep_batch import run_rows, write_table
-from wrcore.sweep_plan import load_sweep
+from wrcore.sweep.batch import run_rows, write_table
+from wrcore.sweep.plan import load_sweep
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 sweep = load_sweep(snakemake.input.sweep)

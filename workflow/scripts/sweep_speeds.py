@@ -3,9 +3,9 @@
 import os
 import sys
 
-from wrcore.analysis_vehicle import speed_table
-from wrcore.results import write_run
-from wrcore.sweep import sweep_speeds
+from study.speeds.sweep import sweep_speeds
+from study.speeds.tables import speed_table
+from wrcore.run.results import write_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 # a scene names files relative to its own folder

@@ -2,9 +2,9 @@
 
 import sys
 
-from wrcore.figures import save_figure
-from wrcore.figures_sweep import sweep_scatter
-from wrcore.sweep_batch import gather, load_table
+from study.sweeps.figures import sweep_scatter
+from wrcore.analysis.style import save_figure
+from wrcore.sweep.batch import gather, load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 gather(snakemake.input.batches, snakemake.output.table)

@@ -3,8 +3,8 @@
 import os
 import sys
 
-from wrcore.analysis import time_runs
-from wrcore.scene import load_scene
+from study.paper.tables import time_runs
+from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 cases = {}

@@ -2,10 +2,10 @@
 
 import sys
 
-from wrcore.analysis_vehicle import wheel_table
-from wrcore.figures import save_figure
-from wrcore.figures_vehicle import guiding_forces
-from wrcore.results import load_run
+from study.speeds.figures import guiding_forces
+from wrcore.analysis.style import save_figure
+from wrcore.analysis.wheels import wheel_table
+from wrcore.run.results import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 run = load_run(snakemake.input.run)

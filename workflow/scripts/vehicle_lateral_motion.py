@@ -2,9 +2,9 @@
 
 import sys
 
-from wrcore.figures import save_figure
-from wrcore.figures_vehicle import lateral_motion
-from wrcore.results import load_run
+from study.speeds.figures import lateral_motion
+from wrcore.analysis.style import save_figure
+from wrcore.run.results import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 runs = [load_run(path) for path in snakemake.input.runs]

@@ -4,9 +4,9 @@ import sys
 
 import pandas as pd
 
-from wrcore.analysis_vehicle import cost_table
-from wrcore.figures import save_figure
-from wrcore.figures_vehicle import HUNTING, RESPONSE, over_speed
+from study.speeds.figures import HUNTING, RESPONSE, over_speed
+from study.speeds.tables import cost_table
+from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = dict(zip(snakemake.params.titles.values(), map(pd.read_csv, snakemake.input.speeds), strict=True))

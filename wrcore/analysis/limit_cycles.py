@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis import hunting_frequency
-from wrcore.analysis_stability import at_speed, straight_ahead
+from wrcore.analysis.stability import at_speed, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import integrate
-from wrcore.simulate import DERAILED_Y
+from wrcore.integrate.integrator import integrate
+from wrcore.run.motion import hunting_frequency
+from wrcore.run.simulate import DERAILED_Y
 
 CYCLES = ("limit cycle", "irregular")
 """Status of motions that do not die away."""
@@ -42,7 +42,7 @@ class Settling:
         Samples per second of the amplitude.
     method : str
     rtol, atol : float
-        Integration method and tolerances, see `wrcore.dynamics.integrate.integrate`.
+        Integration method and tolerances, see `wrcore.integrate.integrator.integrate`.
     """
 
     window: float = 2.0
@@ -235,7 +235,7 @@ def critical_table(linear, cycles):
     Parameters
     ----------
     linear : dict of str to pandas.DataFrame
-        Tables of `wrcore.analysis_stability.critical_speeds` by vehicle; the variants ``planar`` and ``spatial`` count.
+        Tables of `wrcore.analysis.stability.critical_speeds` by vehicle; the variants ``planar`` and ``spatial`` count.
     cycles : dict of str to pandas.DataFrame
         Tables of :func:`limit_cycles` with a column detection, by the same vehicles.
 

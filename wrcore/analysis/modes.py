@@ -139,7 +139,7 @@ class _Namer:
         return f"{name}, in {'phase' if together else 'antiphase'}"
 
 
-def modes(vehicle, linearisation):
+def linear_modes(vehicle, linearisation):
     """Modes of small motions.
 
     Parameters

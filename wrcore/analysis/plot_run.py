@@ -9,14 +9,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wrcore.analysis import SIDES
-from wrcore.analysis_vehicle import wheel_forces, wheelsets_of
-from wrcore.channels import UNIT_SUFFIXES, unit_of
+from wrcore.analysis.motion import SIDES
+from wrcore.analysis.style import styled
+from wrcore.analysis.wheels import wheel_forces, wheelsets_of
 from wrcore.errors import InputError
-from wrcore.figures import styled
+from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 
 if TYPE_CHECKING:
-    from wrcore.run import Run
+    from wrcore.run.run import Run
 
 PRINTED = {
     "m": (1e3, "mm"), "rad": (1e3, "mrad"), "N": (1e-3, "kN"), "N m": (1.0, "N m"), "J": (1e-3, "kJ"),

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from wrcore.analysis_modes import NEUTRAL, energy_table, modes, shape_table
+from wrcore.analysis.modes import NEUTRAL, energy_table, linear_modes, shape_table
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, static_equilibrium
+from wrcore.scene.description import compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
 """Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
@@ -89,7 +89,7 @@ def steady_motion(model, state, speed):
     return motion
 
 
-def modes_in_full(scene, speed):
+def modes(scene, speed):
     """Modes of a scene's vehicle at one speed, with their energies and shapes.
 
     Parameters
@@ -101,11 +101,11 @@ def modes_in_full(scene, speed):
     Returns
     -------
     table : pandas.DataFrame
-        That of `wrcore.analysis_modes.modes`, followed by the columns of `energy_table`.
+        That of `wrcore.analysis.modes.linear_modes`, followed by the columns of `energy_table`.
     shapes : pandas.DataFrame
         From `shape_table`.
     """
-    table, shapes, energies = modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
+    table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
     full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
     return full, shape_table(scene.vehicle, table, shapes)
 
@@ -124,11 +124,11 @@ def root_locus(vehicle, model, state, speeds):
     Returns
     -------
     pandas.DataFrame
-        Tables of `wrcore.analysis_modes.modes` below each other, after a column speed_m_per_s.
+        Tables of `wrcore.analysis.modes.linear_modes` below each other, after a column speed_m_per_s.
     """
     tables = []
     for speed in speeds:
-        table, _, _ = modes(vehicle, steady_motion(model, state, speed))
+        table, _, _ = linear_modes(vehicle, steady_motion(model, state, speed))
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -170,7 +170,7 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
     if before is None:
         return {"critical_speed_m_per_s": -np.inf, **nothing}
     found = brentq(lambda v: growth(model, state, v), before, speed, xtol=tolerance)
-    table, _, _ = modes(vehicle, steady_motion(model, state, found))
+    table, _, _ = linear_modes(vehicle, steady_motion(model, state, found))
     lost = table.loc[table["real_per_s"].where(table["damping_ratio"].notna()).idxmax()]
     with np.errstate(divide="ignore"):
         wavelength = np.float64(found) / lost["frequency_Hz"]

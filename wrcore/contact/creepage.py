@@ -1,6 +1,6 @@
 """From rigid-body motion to creepages at a patch."""
 
-from wrcore._jit import FUSED, jit
+from wrcore.kernels.jit import FUSED, jit
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore._jit import jit, rarely_called
 from wrcore.contact.geometry import RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, WHEEL_RESERVE, YAW_LIMIT
 from wrcore.contact.reduction import (
     CURVATURE_Y,
@@ -52,6 +51,7 @@ from wrcore.contact.scan import (
 )
 from wrcore.contact.strip import gap_at, make_pose, strip_point
 from wrcore.errors import InputError
+from wrcore.kernels.jit import jit, rarely_called
 
 DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
 PLANAR, SPATIAL, AUTO = 0, 1, 2

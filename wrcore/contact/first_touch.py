@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FAST, jit
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import GAUGE_DEPTH
+from wrcore.kernels.jit import FAST, jit
 
 SCAN_STEP = 1e-4
 """Distance of the wheel's nodes in the search for the first touch, m."""

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipkm1
 
-from wrcore._jit import FUSED, jit
+from wrcore.kernels.jit import FUSED, jit
 
 LOG_RATIO_MAX = 14.0
 _NODES = 561

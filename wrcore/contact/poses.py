@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from wrcore.checked_csv import read_csv_table
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import cubic_at
 from wrcore.errors import InputError
+from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.surface import SIDES
 
 PATCH_FIELDS = {

@@ -13,7 +13,6 @@ import math
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.strip import (
     cubic_at,
@@ -26,6 +25,7 @@ from wrcore.contact.strip import (
     strip_point,
     wheel_slope,
 )
+from wrcore.kernels.jit import jit
 
 REDUCTIONS = {"maximum": 0, "moment": 1}
 MAXIMUM, MOMENT = 0, 1

@@ -12,20 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
-from wrcore._lanes import (
-    below,
-    count_bits,
-    greatest,
-    highest_bit,
-    lane,
-    lanes8,
-    load8,
-    lowest_bit,
-    ramp8,
-    total,
-    where_below,
-)
 from wrcore.contact.geometry import (
     ALONG,
     CALM,
@@ -46,6 +32,20 @@ from wrcore.contact.geometry import (
     YAW_STRAY,
 )
 from wrcore.contact.strip import strip_point
+from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.lanes import (
+    below,
+    count_bits,
+    greatest,
+    highest_bit,
+    lane,
+    lanes8,
+    load8,
+    lowest_bit,
+    ramp8,
+    total,
+    where_below,
+)
 
 MOST_STRIPS = 128
 """Strips that one call of `scan` can tell apart: the bits of two words."""

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact.detection import find_patches
 from wrcore.contact.normal import hertz_ellipse
 from wrcore.contact.reduction import (
@@ -18,6 +17,7 @@ from wrcore.contact.reduction import (
     SEMI_A,
     SEMI_B,
 )
+from wrcore.kernels.jit import jit
 
 Z_RANGE = 0.03
 """Half of the range of heights that is searched around the nominal one, m."""

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
+from wrcore.kernels.jit import jit
 
 
 class Pose(NamedTuple):

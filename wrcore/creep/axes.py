@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
-from wrcore._lanes import lane, load4
 from wrcore.creep.kalker import KalkerData, coefficients_at
+from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.lanes import lane, load4
 
 LEVER = 0.25
 SPIN_FLOOR = 0.8

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from wrcore.checked_csv import read_csv_table
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
 from wrcore.errors import InputError
+from wrcore.errors.checked_csv import read_csv_table
 
 MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
@@ -178,3 +178,47 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
         outside += creep_forces(LAWS[model], data, g[rows], psi[rows], creepages[rows], part)
         forces[rows] = part
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
+
+
+def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8.2e10, nu=0.28, table=None):
+    """Creep force of any law on elliptic patches, in physical units; scalars and arrays broadcast.
+
+    Parameters
+    ----------
+    model : {"table", "exact", "fastsim", "polach", "she", "linear"}
+    a, b : float or array_like
+        Semi-axes along and across rolling, m.
+    normal_force : float or array_like
+        N.
+    xi, eta, phi : float or array_like
+        Longitudinal and lateral creepage (1) and spin (1/m), of the wheel relative to the rail.
+    mu, shear_modulus, nu : float or array_like
+        Friction coefficient, shear modulus (Pa), Poisson's ratio.
+    table : CreepTable or path, optional
+        For the model "table"; left out: the cached table for nu, built first if need be.
+
+    Returns
+    -------
+    Fx, Fy, Mz : numpy.ndarray or float
+        Force on the wheel, N, and moment about the contact normal, N m.
+
+    Raises
+    ------
+    InputError
+        For an unknown model or a value that is not possible.
+
+    Examples
+    --------
+    >>> Fx, Fy, Mz = creep_force("polach", 6e-3, 4e-3, 5e4, xi=[0.0, 1e-3], eta=0.0, phi=0.0)
+    >>> Fx.round(-2)
+    array([   -0., -9200.])
+    """
+    import pandas as pd
+
+    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "ux", "uy", "phi_per_m")
+    values = np.broadcast_arrays(a, b, b, normal_force, mu, shear_modulus, nu, xi, eta, phi)
+    frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
+    frame.insert(0, "case_id", range(len(frame)))
+    forces = solve_cases(frame, model, table, source="creep_force")
+    shape = values[0].shape
+    return tuple(forces[name].to_numpy().reshape(shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.creep.kalker import kalker_coefficients
+from wrcore.kernels.jit import jit
 
 
 class FastsimData(NamedTuple):

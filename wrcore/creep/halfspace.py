@@ -27,8 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.creep.operator import make_operator, panel_counts
+from wrcore.kernels.jit import jit
 
 DEFAULT_LEVEL = 22
 TOLERANCE = 1e-3

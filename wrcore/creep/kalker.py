@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline, krogh_interpolate
 
-from wrcore._jit import FUSED, jit
 from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
+from wrcore.kernels.jit import FUSED, jit
 
 COEFFICIENTS_FILE = "kalker_coefficients.csv"
 GRID_A_OVER_B = 2.0 ** np.arange(-5, 5.25, 0.5)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit, rarely_called
 from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup_at
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
+from wrcore.kernels.jit import FUSED, jit, rarely_called
 
 LAWS = {"table": 0, "linear": 1, "she": 2, "polach": 3, "fastsim": 4}
 _TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from wrcore._jit import jit
+from wrcore.kernels.jit import jit
 
 SUB_STRIPS = 2
 STEP_SCALE = 2.5

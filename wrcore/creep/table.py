@@ -16,11 +16,11 @@ import h5py
 import numpy as np
 
 from wrcore import __version__
-from wrcore._jit import cache_root
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
+from wrcore.kernels.jit import cache_root
 
 DEFAULT_TOLERANCE = 0.007
 CHECK_LEVEL = 20

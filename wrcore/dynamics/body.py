@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
+from wrcore.kernels.jit import FUSED, jit
 
 STATE_SIZE = 13
 POSITION, EULER, VELOCITY, OMEGA = 0, 3, 7, 10

@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
 from wrcore.dynamics.joint import MOST_EQUATIONS, JointState, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.vector import cross, dot, load, minus, store
+from wrcore.kernels.jit import FUSED, jit
 
 VANISHED = 1e-10
 """A pivot below this part of its diagonal entry belongs to a redundant equation. Rounding leaves some 1e-16 of it."""

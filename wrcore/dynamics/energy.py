@@ -20,7 +20,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact import reduction
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
@@ -38,6 +37,7 @@ from wrcore.dynamics.suspension import (
 from wrcore.dynamics.system import Equations, derivatives_at
 from wrcore.dynamics.track import moving_frame
 from wrcore.dynamics.wheel import normal_contact
+from wrcore.kernels.jit import jit
 
 CHANNELS = (
     "kinetic_J", "gravitational_J", "springs_J", "elastic_contact_J",

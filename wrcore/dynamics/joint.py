@@ -29,12 +29,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import OMEGA, STATE_SIZE
 from wrcore.dynamics.joint_order import JointOrder, order_joints
 from wrcore.dynamics.marker import FRAME, marker_motion
 from wrcore.dynamics.vector import cross, dot, load, minus, store
 from wrcore.errors import InputError
+from wrcore.kernels.jit import jit
 
 COORDINATE, SPHERICAL, REVOLUTE, RIGID_LINK = 0, 1, 2, 3
 KINDS = {"coordinate": COORDINATE, "spherical": SPHERICAL, "revolute": REVOLUTE, "rigid_link": RIGID_LINK}

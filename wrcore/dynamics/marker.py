@@ -1,7 +1,7 @@
 """Markers: points fixed to a body or to the frame that runs ahead along the track."""
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.kernels.jit import jit
 
 FRAME = -1
 """Body number of the frame that runs ahead along the track at the scene's speed."""

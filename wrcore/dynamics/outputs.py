@@ -1,7 +1,7 @@
 """What an evaluation of the equations of motion leaves besides the rates, at many states."""
 
-from wrcore._jit import jit
 from wrcore.dynamics.system import derivatives_at
+from wrcore.kernels.jit import jit
 
 
 @jit(allocates=False, nogil=True)

@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.track import moving_frame
+from wrcore.kernels.jit import FUSED, jit
 
 LINEAR, DISPLACEMENT, VELOCITY, SERIES, SERIES_VELOCITY = range(5)
 """Laws of an element that acts along one direction."""

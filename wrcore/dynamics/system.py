@@ -12,8 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
-from wrcore._references import Handle, Kernel, call_at
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
@@ -21,6 +19,8 @@ from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
+from wrcore.kernels.handles import Handle, Kernel, call_at
+from wrcore.kernels.jit import FUSED, jit
 
 
 class Bodies(NamedTuple):

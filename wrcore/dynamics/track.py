@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import FUSED, jit
 from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.geometry.irregularity import IrregularityData, irregularity_at
 from wrcore.geometry.path import PathData, arc_length_of, frame_turn, rail_direction, track_frame
+from wrcore.kernels.jit import FUSED, jit
 
 
 class TrackModel(NamedTuple):

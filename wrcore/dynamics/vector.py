@@ -1,6 +1,6 @@
 """Vectors of three numbers as tuples, which the compiler keeps in registers."""
 
-from wrcore._jit import jit
+from wrcore.kernels.jit import jit
 
 
 @jit(allocates=False, inline="always")

@@ -3,7 +3,6 @@
 import math
 from typing import NamedTuple
 
-from wrcore._jit import FUSED, jit
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
@@ -28,6 +27,7 @@ from wrcore.contact.reduction import (
     Z,
 )
 from wrcore.creep.laws import CreepData, creep_force_at
+from wrcore.kernels.jit import FUSED, jit
 
 MOTION_COLUMNS = 14
 

@@ -102,7 +102,7 @@ def parse_ratio(value):
 @cache
 def _schema(name):
     """A schema of the package, parsed once: a sweep validates as many scenes as it has runs."""
-    text = files("wrcore").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8")
+    text = files("wrcore").joinpath("scene", "schemas", f"{name}.yaml").read_text(encoding="utf-8")
     return yaml.load(text, Loader=_Loader)  # reads 1.0e9 as a number
 
 
@@ -114,7 +114,7 @@ def validate(data, schema_name, source):
     data : dict
         Left as it is.
     schema_name : str
-        File in ``wrcore/schemas`` without its ending.
+        File in ``wrcore/scene/schemas`` without its ending.
     source : str
         Named in errors.
 

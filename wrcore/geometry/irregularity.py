@@ -16,8 +16,8 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
-from wrcore._jit import jit
 from wrcore.errors import InputError
+from wrcore.kernels.jit import jit
 
 CHANNELS = ("left_lateral", "left_vertical", "right_lateral", "right_vertical")
 """Order of the channels."""

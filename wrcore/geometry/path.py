@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.geometry.path_pieces import (
     CENTRE,
     COLUMNS,
@@ -35,6 +34,7 @@ from wrcore.geometry.path_pieces import (
     Y,
     cut,
 )
+from wrcore.kernels.jit import jit
 
 
 class PathData(NamedTuple):

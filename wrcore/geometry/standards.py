@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.checked_yaml import parse_ratio
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry import profile_files
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 from wrcore.geometry.profile_sections import Arc, Line, Polynomial, incline

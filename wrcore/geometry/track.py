@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.checked_yaml import validate
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import validate
 from wrcore.geometry.irregularity import (
     IrregularityData,
     faded_irregularity,
@@ -76,7 +76,7 @@ def build_track(data, source, folder="."):
     Parameters
     ----------
     data : dict
-        Content of the key (``wrcore/schemas/track.yaml``); left as it is.
+        Content of the key (``wrcore/scene/schemas/track.yaml``); left as it is.
     source : str
         Named in errors.
     folder : str or Path

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.jacobian import own_state_bodies, reached_bodies
+from wrcore.integrate.jacobian import own_state_bodies, reached_bodies
+from wrcore.kernels.jit import jit
 
 
 class Pattern(NamedTuple):

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.system import derivatives_at
 from wrcore.geometry.path import arc_length_of, track_frame
+from wrcore.kernels.jit import jit
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
 """Outcomes of a chunk of attempts."""

@@ -21,110 +21,36 @@ failed        a number is not finite, or the step size fell below the resolution
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.dynamics import engine
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.engine import Control, Memory, Record, advance_explicit, new_memory, new_scratch
-from wrcore.dynamics.rosenbrock import Linear, advance_rosenbrock, new_linear
 from wrcore.dynamics.system import Equations
-from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.dynamics.track import track_poses
+from wrcore.integrate import engine
+from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
+from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
+from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.integrate.trajectory import Checkpoint, Trajectory, derailment
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""
 
+
 REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_bdf", "scipy_lsoda", "cvode")
 """Methods of other libraries."""
 
+
 STIFF_SPEED = 25.0
 """Below this speed (m/s) ``auto`` takes the Rosenbrock method."""
+
 
 STALL_ATTEMPTS, STALL_STEP = 100_000, 1e-9
 """So many steps (tried ones) in a row that are this short on average, s, are no headway: a hundredth of the shortest
 time scale of a stiff contact (10 us) would be 100 times as long. Steps of a stated length may be as short as they like.
 """
 
+
 CHUNK = 2000
 """Attempts between two returns to Python, for progress and interrupts."""
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """Everything a compiled run knows: a run taken up from it goes on bit by bit as if it had not paused.
-
-    Attributes
-    ----------
-    method : str
-    t : float
-        Last output time written, s; the run itself is up to a step ahead.
-    memory : Memory
-    linear : Linear or None
-        Of Rosenbrock methods.
-    arc_lengths : numpy.ndarray, shape (k,)
-        Of the wheelsets, m: where the search for the next ones starts.
-    """
-
-    method: str
-    t: float
-    memory: Memory
-    linear: Linear | None
-    arc_lengths: np.ndarray
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """States at the output times, and what they cost.
-
-    Attributes
-    ----------
-    method : str
-        The method used, where ``auto`` was asked for.
-    t : numpy.ndarray, shape (n,)
-        Output times reached, s.
-    states : numpy.ndarray, shape (n, size)
-    status : {"completed", "derailed", "stalled", "failed"}
-    reason : str
-        Empty for a completed run.
-    steps, rejected, rhs_evaluations, jacobians, factorisations : int
-        Accepted steps, rejected attempts, right-hand sides in all (those of Jacobians, too), refreshed Jacobians and
-        factorised matrices.
-    out_of_range : int
-        Creep look-ups out of range.
-    smallest_step : float
-        Smallest accepted step, s.
-    wall_s : float
-        Seconds spent in the integration.
-    end : Checkpoint or None
-        Where a compiled run stopped.
-    end_t : float
-        Time of the last valid state, s: the end of a completed run, else the last step that was accepted (by the
-        references: the last output).
-    end_state : numpy.ndarray, shape (size,)
-        That state.
-    collapses : int
-        Steps that were rejected three times in a row or more.
-    """
-
-    method: str
-    t: np.ndarray
-    states: np.ndarray
-    status: str
-    reason: str
-    steps: int = 0
-    rejected: int = 0
-    rhs_evaluations: int = 0
-    jacobians: int = 0
-    factorisations: int = 0
-    out_of_range: int = 0
-    smallest_step: float = np.nan
-    wall_s: float = 0.0
-    end: Checkpoint | None = None
-    end_t: float = np.nan
-    end_state: np.ndarray | None = None
-    collapses: int = 0
 
 
 def chosen_method(method, speed):
@@ -151,7 +77,7 @@ def integrate(
         One of `METHODS` or `REFERENCES`, or ``auto``.
     rtol, atol : float
         Tolerance of a step: ``atol + rtol |y|``, where no more than 1 counts of a position or a Euler parameter (see
-        :mod:`wrcore.dynamics.engine`; the references count all of it).
+        :mod:`wrcore.integrate.engine`; the references count all of it).
     step : float
         Length of all steps, s; 0 for steps by the tolerance. Compiled methods only.
     longest_step : float
@@ -176,7 +102,7 @@ def integrate(
     times = np.ascontiguousarray(times, float)
     method = start.method if isinstance(start, Checkpoint) else chosen_method(method, model.speed)
     if method in REFERENCES:
-        from wrcore.dynamics.reference import integrate_by_reference
+        from wrcore.integrate.reference import integrate_by_reference
 
         return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
@@ -272,33 +198,3 @@ def _ending(outcome, given_up, model, memory, work):
     if outcome == engine.NOT_FINITE:
         return "failed", f"the state is not finite a step after t = {t:.6g} s"
     return "failed", f"step size fell below the resolution of time at t = {t:.6g} s"
-
-
-def derailment(model, t, state, arc_lengths, limit=-1.0):
-    """Say how far the farthest wheelset is off the track's centre; empty if none is farther than the limit.
-
-    Parameters
-    ----------
-    model : Model
-    t : float
-        s.
-    state : numpy.ndarray, shape (size,)
-    arc_lengths : numpy.ndarray, shape (k,)
-        Of the wheelsets, roughly, m.
-    limit : float
-        m.
-
-    Returns
-    -------
-    str
-    """
-    worst, pose = 0.0, np.empty((1, 5))
-    for k, body in enumerate(model.bodies.wheelsets):
-        y = state[STATE_SIZE * body + 1]
-        if not model.track.tangent:
-            track_poses(model.track, state[None, :], STATE_SIZE * body, arc_lengths[k], pose)
-            y = pose[0, 1]
-        worst = abs(y) if not abs(y) <= worst else worst
-    if worst <= limit:
-        return ""
-    return f"a wheelset is {1e3 * worst:.0f} mm off the track's centre at t = {t:.6g} s"

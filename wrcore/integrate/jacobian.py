@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.engine import copy_into
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
+from wrcore.integrate.engine import copy_into
+from wrcore.kernels.jit import jit
 
 DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 """Differences: m, rad, m/s and rad/s."""

@@ -13,10 +13,10 @@ SIAM J. Numer. Anal. 30 (1993) 1467-1482.
 
 import math
 
-from wrcore._jit import jit
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, rotation_matrix
 from wrcore.dynamics.constraints import apply_inverse_masses, invert_masses, solve_multipliers, subtract_reactions
 from wrcore.dynamics.joint import MOST_EQUATIONS, evaluate_joints
+from wrcore.kernels.jit import jit
 
 
 @jit(allocates=False)

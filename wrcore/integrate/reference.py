@@ -5,9 +5,9 @@ import time
 import numpy as np
 from scipy import integrate as scipy_integrate
 
-from wrcore.dynamics.integrate import Trajectory, derailment
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
+from wrcore.integrate.trajectory import Trajectory, derailment
 
 SOLVERS = {
     "scipy_rk45": "RK45", "scipy_rk23": "RK23", "scipy_dop853": "DOP853", "scipy_radau": "Radau", "scipy_bdf": "BDF",
@@ -18,7 +18,7 @@ SOLVERS = {
 
 def integrate_by_reference(model, state, times, method, rtol, atol, longest_step, derailed_y, progress=None, halt=None,
                            most_steps=0):  # fmt: skip
-    """Integrate a model with a solver of another library; arguments as for :func:`wrcore.dynamics.integrate.integrate`.
+    """Integrate a model with a solver of another library; arguments as for `integrator.integrate`.
 
     Returns
     -------

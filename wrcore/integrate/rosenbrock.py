@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore._jit import jit
-from wrcore.dynamics.blocks import System, factorise, new_system, solve_stage
-from wrcore.dynamics.engine import (
+from wrcore.dynamics.system import derivatives_at
+from wrcore.integrate.blocks import System, factorise, new_system, solve_stage
+from wrcore.integrate.engine import (
     AGE,
     EVALUATIONS,
     FACTORISATIONS,
@@ -31,8 +31,8 @@ from wrcore.dynamics.engine import (
     judge,
     take_stock,
 )
-from wrcore.dynamics.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian
-from wrcore.dynamics.system import derivatives_at
+from wrcore.integrate.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian
+from wrcore.kernels.jit import jit
 
 CONTACT_REFRESHES = 20
 """Refreshes of the contacts' part of the Jacobian between two of the whole."""

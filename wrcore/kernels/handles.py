@@ -17,7 +17,7 @@ from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, unbox
 
-from wrcore._jit import jit
+from wrcore.kernels.jit import jit
 
 _INDEX = ir.IntType(32)
 

@@ -24,7 +24,7 @@ Which ones do depends on the code around. A kernel that is called, not inlined, 
 it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
 where this showed, goes without the flag so that all copies give the same bits."""
 
-KERNEL_ROOMS = ("geometry", "contact", "creep", "dynamics")
+KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "dynamics", "integrate")
 _KEEP_SECONDS = 14 * 86400
 
 
@@ -44,10 +44,9 @@ def cache_root():
 
 def source_digest():
     """Digest (16 hex digits) of the sources that kernels are made of."""
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    shared = [Path(__file__).with_name(name) for name in ("_jit.py", "_lanes.py", "_references.py")]
-    for path in [*shared, *sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py"))]:
+    for path in sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py")):
         digest.update(path.relative_to(root).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -1,8 +1,8 @@
 """Vector registers in kernels: four or eight float64 side by side, for loops that the compiler does not vectorise well.
 
 A kernel writes ``x = load8(a, row, i)`` and calculates with + - * as with numbers; a number beside lanes counts for all
-of them. Products and sums are fused (`FUSED` of `wrcore._jit`). Processors without such wide registers take several.
-No bounds are checked.
+of them. Products and sums are fused (`FUSED` of `wrcore.kernels.jit`). Processors without such wide registers take
+several. No bounds are checked.
 """
 
 import operator

@@ -7,11 +7,47 @@ nearest speed.
 
 import math
 from importlib.resources import files
+from typing import NamedTuple
 
 import pandas as pd
 
-from wrcore.analysis_accuracy import Choice, kind_of
 from wrcore.errors import InputError
+
+ATOL_PER_RTOL = 1e-3
+"""Absolute tolerance (m, m/s, rad/s) for a relative one of 1."""
+
+
+class Choice(NamedTuple):
+    """One way to run a scene."""
+
+    detection: str
+    patch: str
+    creep: str
+    """Creep law; a table with the 99 % error it is built for, as in ``table 0.01``."""
+    method: str
+    rtol: float
+
+    def overrides(self):
+        """Changes to a scene, as :func:`wrcore.load_scene` takes them."""
+        law, _, tolerance = self.creep.partition(" ")
+        changes = [
+            f"contact.detection={self.detection}",
+            f"contact.patch={self.patch}",
+            f"contact.creep.model={law}",
+            f"integration.method={self.method}",
+            f"integration.rtol={self.rtol:g}",
+            f"integration.atol={ATOL_PER_RTOL * self.rtol:g}",
+        ]
+        return [*changes, f"contact.creep.tolerance={tolerance}"] if tolerance else changes
+
+
+def kind_of(scene):
+    """``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
+    vehicle = scene.vehicle
+    if len(vehicle.body_names) > len(vehicle.wheelset_names):
+        return "vehicle"
+    return "suspended_wheelset" if len(vehicle.elements.pairs) else "free_wheelset"
+
 
 MARGIN = 3.0
 """A choice must have been this much more accurate than asked for: the scene at hand is not the measured one."""
@@ -19,7 +55,7 @@ MARGIN = 3.0
 
 def measured_front():
     """The table that the package carries: kind, speed_m_per_s, the fields of a choice, y_rms_m and real_time_factor."""
-    with files("wrcore").joinpath("data", "accuracy_front.csv").open(encoding="utf-8") as file:
+    with files("wrcore").joinpath("run", "accuracy_front.csv").open(encoding="utf-8") as file:
         return pd.read_csv(file)
 
 
@@ -65,39 +101,3 @@ def choose(scene, accuracy, front=None):
         f" measured for a {kind} at {nearest:g} m/s"
     )
     return choice, reason.replace("_", " ")
-
-
-def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
-    """The fastest measured choice for each accuracy as a table in Markdown, as the README quotes it.
-
-    Parameters
-    ----------
-    front : pandas.DataFrame, optional
-        Measurements; by default those that the package carries.
-    accuracies : sequence of float
-        RMS errors of the lateral position, m; left out are those that nothing reaches and those for which the choice
-        is that of the next smaller one.
-
-    Returns
-    -------
-    str
-    """
-    front = measured_front() if front is None else front
-    head = ("scene", "error below", "detection, creep, method, rtol", "error", "times real time")
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    for (kind, speed), rows in front.groupby(["kind", "speed_m_per_s"], sort=False):
-        last = None
-        for accuracy in sorted(accuracies):
-            enough = rows[rows["y_rms_m"] <= accuracy]
-            if not len(enough):
-                continue
-            row = enough.loc[enough["real_time_factor"].idxmax()]
-            line = (
-                f"{row['detection']}, {row['creep']}, {row['method']}, {row['rtol']:g} |"
-                f" {1e6 * row['y_rms_m']:.2g} µm | {row['real_time_factor']:.3g} |"
-            )
-            scene = f"| {kind.replace('_', ' ')}, {speed:g} m/s | {1e6 * accuracy:g} µm | "
-            if line != last:
-                lines.append(scene + line)
-            last = line
-    return "\n".join(lines)

@@ -5,9 +5,9 @@ from typing import NamedTuple, get_type_hints
 import h5py
 import numpy as np
 
-from wrcore.dynamics.engine import Memory
-from wrcore.dynamics.integrate import Checkpoint
-from wrcore.dynamics.rosenbrock import Linear
+from wrcore.integrate.engine import Memory
+from wrcore.integrate.rosenbrock import Linear
+from wrcore.integrate.trajectory import Checkpoint
 
 
 class _Saved(NamedTuple):

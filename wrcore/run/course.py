@@ -12,13 +12,14 @@ import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.energy import energy_channels
-from wrcore.dynamics.integrate import Checkpoint, Trajectory, integrate
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, workspace
 from wrcore.dynamics.track import track_poses
-from wrcore.run import Run
-from wrcore.scene import Scene, compile_scene
-from wrcore.validity import exceeded
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.trajectory import Checkpoint, Trajectory
+from wrcore.run.run import Run
+from wrcore.run.validity import exceeded
+from wrcore.scene.description import Scene, compile_scene
 
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
@@ -54,7 +55,7 @@ class Course:
     progress : callable, optional
         Wraps the list of patches if a creep table has to be built.
     shared : dict, optional
-        As for :func:`wrcore.scene.compile_scene`.
+        As for :func:`wrcore.scene.description.compile_scene`.
 
     Attributes
     ----------
@@ -94,7 +95,7 @@ class Course:
         progress : callable, optional
             Called now and then with the time reached, s.
         stop : callable, optional
-            A reason to stop, or an empty string: :func:`wrcore.dynamics.integrate.integrate`.
+            A reason to stop, or an empty string: :func:`wrcore.integrate.integrator.integrate`.
 
         Returns
         -------

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from wrcore._jit import cache_root, source_digest
+from wrcore.kernels.jit import cache_root, source_digest
 
 DELAY = 1.0
 """Work that is done within this time shows no bar, s."""

@@ -14,10 +14,10 @@ import h5py
 import numpy as np
 
 from wrcore import __version__
-from wrcore.channels import DESCRIPTIONS, unit_of
-from wrcore.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.errors import InputError
-from wrcore.run import Run
+from wrcore.run.channels import DESCRIPTIONS, unit_of
+from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
+from wrcore.run.run import Run
 
 FORMAT = "wrcore run"
 FORMAT_VERSION = 1

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wrcore.channels import DESCRIPTIONS, unit_of
+import wrcore
+from wrcore.run.channels import DESCRIPTIONS, unit_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from wrcore.dynamics.integrate import Checkpoint
+    from wrcore.integrate.trajectory import Checkpoint
 
 
 class Channels(Mapping[str, np.ndarray]):
@@ -95,7 +96,7 @@ class Run:
         happened.
     end_state : ndarray, shape (size,), or None
         That state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the force
-        elements' own; :func:`wrcore.simulate` takes it as a start.
+        elements' own; :func:`wrcore.run.simulate` takes it as a start.
 
     Examples
     --------
@@ -210,12 +211,8 @@ class Run:
         InputError
             For a channel that the run does not have.
         """
-        from wrcore.figures_run import plot_run
-
-        return plot_run(self, channels)
+        return wrcore.plot_run(self, channels)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the run to a file (HDF5), for :func:`wrcore.results.load_run`."""
-        from wrcore.results import write_run
-
-        write_run(path, self)
+        """Write the run to a file (HDF5), for :func:`wrcore.load_run`."""
+        wrcore.write_run(path, self)

@@ -12,16 +12,16 @@ from typing import Any, Literal
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.course import DERAILED_Y as DERAILED_Y
-from wrcore.course import Course
-from wrcore.course import evaluated as evaluated
 from wrcore.creep.table import show_progress
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import Checkpoint
 from wrcore.errors import InputError
-from wrcore.progress import counted, simulated_time
-from wrcore.run import Run
-from wrcore.scene import Scene, Source, load_scene
+from wrcore.integrate.trajectory import Checkpoint
+from wrcore.run.course import DERAILED_Y as DERAILED_Y
+from wrcore.run.course import Course
+from wrcore.run.course import evaluated as evaluated
+from wrcore.run.progress import counted, simulated_time
+from wrcore.run.run import Run
+from wrcore.scene.description import Scene, Source, load_scene
 
 
 def simulate(
@@ -35,7 +35,7 @@ def simulate(
     Parameters
     ----------
     scene : Scene, path or dict
-        From :func:`wrcore.scene.load_scene`, or what that function takes.
+        From :func:`wrcore.load_scene`, or what that function takes.
     progress : callable or False, optional
         Called now and then with the simulated time reached, s. Left out: a bar where the run takes more than a second
         and somebody watches (a terminal or a notebook, not a log); False: none.
@@ -43,7 +43,7 @@ def simulate(
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
         its time bit by bit as if it had not stopped, or a state at time 0.
     **changes
-        Keys of the scene with other values, as :func:`wrcore.scene.load_scene` takes them.
+        Keys of the scene with other values, as :func:`wrcore.load_scene` takes them.
 
     Returns
     -------

@@ -26,17 +26,17 @@ from typing import Any
 
 import h5py
 
-from wrcore._jit import source_digest
-from wrcore.checkpoints import numbers_of
 from wrcore.contact import reduction
-from wrcore.course import Course, Places
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import METHODS, chosen_method
 from wrcore.errors import InputError
-from wrcore.results import join_runs, read_part, write_going_on, write_run
-from wrcore.run import Run
-from wrcore.scene import Scene
-from wrcore.simulate import check_memory, output_blocks
+from wrcore.integrate.integrator import METHODS, chosen_method
+from wrcore.kernels.jit import source_digest
+from wrcore.run.checkpoints import numbers_of
+from wrcore.run.course import Course, Places
+from wrcore.run.results import join_runs, read_part, write_going_on, write_run
+from wrcore.run.run import Run
+from wrcore.run.simulate import check_memory, output_blocks
+from wrcore.scene.description import Scene
 
 try:
     import fcntl
@@ -118,7 +118,7 @@ def simulate_to(
     Returns
     -------
     run : Run
-        How it ended and what it cost, with the channels of the last block only: :func:`wrcore.results.load_run` reads
+        How it ended and what it cost, with the channels of the last block only: :func:`wrcore.load_run` reads
         those of the file.
     interrupted : int
         Number of the signal that interrupted it, 0 for none.

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from wrcore.checked_yaml import parse_ratio, parse_value, plain_tree, read_yaml, validate
 from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import hertz_table
@@ -26,11 +25,12 @@ from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_ratio, parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track
-from wrcore.initial import initial_state, rest
-from wrcore.initial import static_equilibrium as static_equilibrium
+from wrcore.scene.initial import initial_state, rest
+from wrcore.scene.initial import static_equilibrium as static_equilibrium
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
 

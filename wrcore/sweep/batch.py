@@ -23,15 +23,23 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from wrcore.channels import unit_of
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.system import Equations, Model
 from wrcore.errors import InputError
-from wrcore.progress import counted
-from wrcore.scene import Scene, compile_scene, load_scene
-from wrcore.simulate import DERAILED_Y, output_times
-from wrcore.sweep_measures import COUNTERS, FORCES, MOTION, Motions, lateral_and_yaw, wheel_forces, wheelset_motion
-from wrcore.sweep_plan import Sweep, load_sweep, of_parts
+from wrcore.integrate.integrator import integrate
+from wrcore.run.channels import unit_of
+from wrcore.run.progress import counted
+from wrcore.run.simulate import DERAILED_Y, output_times
+from wrcore.scene.description import Scene, compile_scene, load_scene
+from wrcore.sweep.measures import (
+    COUNTERS,
+    FORCES,
+    MOTION,
+    Motions,
+    lateral_and_yaw,
+    wheel_forces,
+    wheelset_motion,
+)
+from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 
 CHUNK = 200
 """Runs whose motions are held at a time."""
@@ -98,7 +106,7 @@ def run_sweep(
     Parameters
     ----------
     source : str, Path, dict or Sweep
-        As :func:`wrcore.sweep_plan.load_sweep` takes it.
+        As :func:`wrcore.sweep.plan.load_sweep` takes it.
     threads : int
         Runs at the same time; the table does not depend on it.
     progress : callable, optional

@@ -28,13 +28,13 @@ from typing import Any
 
 import numpy as np
 
-from wrcore.analysis import hunting_frequency
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles
-from wrcore.dynamics.integrate import Trajectory
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import track_poses
-from wrcore.simulate import evaluated
+from wrcore.integrate.trajectory import Trajectory
+from wrcore.run.motion import hunting_frequency
+from wrcore.run.simulate import evaluated
 
 LEAST_Q = 1e3
 """Wheels that carry less have no quotient Y/Q, N."""

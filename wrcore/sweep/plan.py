@@ -17,12 +17,12 @@ import numpy as np
 import pandas as pd
 
 from wrcore import __version__
-from wrcore._jit import source_digest
-from wrcore.checked_yaml import read_yaml, validate
-from wrcore.dynamics.integrate import METHODS
 from wrcore.errors import InputError
-from wrcore.scene import Scene, load_scene
-from wrcore.sweep_measures import MEASURES
+from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.integrate.integrator import METHODS
+from wrcore.kernels.jit import source_digest
+from wrcore.scene.description import Scene, load_scene
+from wrcore.sweep.measures import MEASURES
 
 MOST_RUNS = 10_000_000
 """Runs of a sweep."""
@@ -83,9 +83,10 @@ def load_sweep(
     Parameters
     ----------
     source : str, Path or dict
-        Sweep file (schema ``wrcore/schemas/sweep.yaml``) or its content; then paths count from the working directory.
+        Sweep file (schema ``wrcore/scene/schemas/sweep.yaml``) or its content; then paths count from the working
+        directory.
     overrides : sequence of str, or dict
-        Further changes to the scene that hold for all runs, as :func:`wrcore.scene.load_scene` takes them.
+        Further changes to the scene that hold for all runs, as :func:`wrcore.load_scene` takes them.
 
     Returns
     -------

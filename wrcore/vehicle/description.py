@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.checked_yaml import read_yaml, validate
 from wrcore.dynamics.joint import Joint, Joints, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.vehicle.element_checks import check_element
 from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout

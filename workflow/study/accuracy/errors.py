@@ -5,44 +5,17 @@ two independent integrators; their difference says how far the reference itself 
 """
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis import amplitude, hunting_frequency
-from wrcore.analysis_vehicle import wear_number, wheel_forces, wheelsets_of
-from wrcore.scene import load_scene
-from wrcore.simulate import simulate
+from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
+from wrcore.run.accuracy import Choice, kind_of
+from wrcore.run.motion import amplitude, hunting_frequency
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
 
 SIDES = ("left", "right")
-
-ATOL_PER_RTOL = 1e-3
-"""Absolute tolerance (m, m/s, rad/s) for a relative one of 1."""
-
-
-class Choice(NamedTuple):
-    """One way to run a scene."""
-
-    detection: str
-    patch: str
-    creep: str
-    """Creep law; a table with the 99 % error it is built for, as in ``table 0.01``."""
-    method: str
-    rtol: float
-
-    def overrides(self):
-        """Changes to a scene, as :func:`wrcore.scene.load_scene` takes them."""
-        law, _, tolerance = self.creep.partition(" ")
-        changes = [
-            f"contact.detection={self.detection}",
-            f"contact.patch={self.patch}",
-            f"contact.creep.model={law}",
-            f"integration.method={self.method}",
-            f"integration.rtol={self.rtol:g}",
-            f"integration.atol={ATOL_PER_RTOL * self.rtol:g}",
-        ]
-        return [*changes, f"contact.creep.tolerance={tolerance}"] if tolerance else changes
 
 
 def combinations(grids):
@@ -105,6 +78,8 @@ def run_errors(run, reference, until=np.inf):
 
 
 ERRORS = ("y_rms_m", "y_max_m", "force_rms_N", "wear_number_relative", "amplitude_relative", "frequency_relative")
+
+
 COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
 
 
@@ -114,7 +89,7 @@ def reference_runs(source, overrides, reference):
     Parameters
     ----------
     source, overrides
-        Scene, as for :func:`wrcore.scene.load_scene`.
+        Scene, as for :func:`wrcore.load_scene`.
     reference : dict
         creep, as in :class:`Choice`, methods and rtols (two each).
 
@@ -139,21 +114,13 @@ def reference_row(scene, run, twin, until=np.inf):
     return pd.DataFrame([facts | run_errors(twin, run, until) | counters])
 
 
-def kind_of(scene):
-    """``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
-    vehicle = scene.vehicle
-    if len(vehicle.body_names) > len(vehicle.wheelset_names):
-        return "vehicle"
-    return "suspended_wheelset" if len(vehicle.elements.pairs) else "free_wheelset"
-
-
 def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None):
     """Run every choice on a scene.
 
     Parameters
     ----------
     source, overrides
-        Scene, as for :func:`wrcore.scene.load_scene`.
+        Scene, as for :func:`wrcore.load_scene`.
     choices : sequence of Choice
     reference : Run
     until : float

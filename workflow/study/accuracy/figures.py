@@ -1,13 +1,13 @@
 """Figures of speed against error.
 
-Units, colours and style are those of :mod:`wrcore.figures`.
+Units, colours and style are those of :mod:`wrcore.analysis.style`.
 """
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis_accuracy import pareto_front
-from wrcore.figures import ACCENT, _shared_legend, styled
+from study.accuracy.errors import pareto_front
+from wrcore.analysis.style import ACCENT, shared_legend, styled
 
 MODELS = (
     ("spatial, fine table", "#222222", "o"),
@@ -41,7 +41,7 @@ def speed_against_error(tables, finest, doubts=None):
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
-        By title, from :func:`wrcore.analysis_accuracy.study`.
+        By title, from :func:`study.accuracy.errors.study`.
     finest : str
         Creep of the reference, as in the column ``creep``.
     doubts : dict of str to float, optional
@@ -68,5 +68,5 @@ def speed_against_error(tables, finest, doubts=None):
         axes.set_title(title, loc="left")
     for axes in panels[len(tables) :]:
         axes.remove()
-    _shared_legend(figure, panels[:1], fontsize=7, ncols=3)
+    shared_legend(figure, panels[:1], fontsize=7, ncols=3)
     return figure

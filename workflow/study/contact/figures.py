@@ -2,7 +2,7 @@
 detection misses; what the reductions do to the force.
 
 The first ones work on the table of `wrcore.contact.first_touch.first_touch` and on curves of
-`wrcore.contact.conicity.conicity_curve`, the others on tables of `wrcore.analysis_contact`. Units change here and
+`wrcore.contact.conicity.conicity_curve`, the others on tables of `study.contact.tables`. Units change here and
 nowhere before: lengths to mm, angles to mrad, forces to kN.
 """
 
@@ -10,15 +10,10 @@ import numpy as np
 from matplotlib.colors import LogNorm, TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from wrcore.analysis_contact import first_order_law, over_contact_angle
+from study.contact.tables import first_order_law, over_contact_angle
+from wrcore.analysis.style import MM, styled
 from wrcore.contact.conicity import en15302_tolerance
-from wrcore.figures import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.geometry.surface import SIDES
-
-LIFT = 0.020
-"""Height by which the wheel is drawn above the rail, m."""
-
-_LABEL_WIDTH = 3.5  # mm
 
 STYLES = (
     {"color": "#0072B2", "linestyle": "-"},
@@ -27,60 +22,6 @@ STYLES = (
     {"color": "#CC79A7", "linestyle": "-."},
 )
 """Okabe-Ito colours, each with its own line: told apart in grey too."""
-
-
-@styled
-def fig_contact_location(pair, table):
-    """Contact points on wheel and rail, joined by a line for each lateral shift of the wheelset.
-
-    Seen from behind: the left side stands on the left. The wheels are drawn at y = 0, lifted by `LIFT`.
-
-    Parameters
-    ----------
-    pair : WheelsetOnTrack
-    table : pandas.DataFrame
-        From `first_touch`, one row per line; whole millimetres of shift are labelled where there is room.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    figure = Figure(figsize=(7.2, 3.2), layout="constrained")
-    for axes, side in zip(figure.subplots(1, 2), SIDES, strict=True):
-        _location(axes, pair, table, side)
-        axes.set_title(f"{side}, {getattr(pair, side).wheel.name} on {getattr(pair, side).rail.name}", fontsize=9)
-    return figure
-
-
-def _location(axes, pair, table, side):
-    sign, one = SIDES[side], getattr(pair, side)
-    from_wheel, from_rail = pair.half_distance, pair.rail_distance(one)
-    for curve, origin, lift, style in (
-        (one.wheel, from_wheel, LIFT, {"color": WHEEL, "label": "wheel"}),
-        (one.rail, from_rail, 0.0, {"color": RAIL, "label": "rail"}),
-    ):
-        axes.plot(sign * MM * (origin + curve.u), MM * (lift + curve.f), linewidth=1.6, **style)
-    u_wheel, u_rail = table[f"u_wheel_{side}_m"].to_numpy(), table[f"u_rail_{side}_m"].to_numpy()
-    y = sign * MM * np.array([from_wheel + u_wheel, from_rail + u_rail])
-    z = MM * np.array([LIFT + one.wheel(u_wheel), one.rail(u_rail)])
-    axes.plot(y, z, color=ACCENT, linewidth=0.6)
-    _label_shifts(axes, MM * table.y_m.to_numpy(), y[0], z[0])
-    inner, outer = np.nanmin(np.abs(y)) - 12.0, np.nanmax(np.abs(y)) + 12.0
-    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", ylim=(-20, MM * LIFT + 14))
-    axes.set_xlim((outer, inner) if side == "left" else (-inner, -outer))
-    axes.legend(fontsize=7, loc="lower left" if side == "left" else "lower right")
-
-
-def _label_shifts(axes, shifts, across, height):
-    """Write whole millimetres of shift above the wheel, small shifts first; leave out what would overlap."""
-    written = []
-    for k in np.argsort(np.abs(shifts)):
-        whole = abs(shifts[k] - round(shifts[k])) < 1e-6 and np.isfinite(across[k])
-        if whole and all(abs(across[k] - other) > _LABEL_WIDTH for other in written):
-            text = f"{shifts[k]:.0f}".replace("-", "\N{MINUS SIGN}")
-            at = {"textcoords": "offset points", "fontsize": 6, "ha": "center", "clip_on": True}
-            axes.annotate(text, (across[k], height[k]), (0, 3), **at)
-            written.append(across[k])
 
 
 @styled
@@ -163,7 +104,7 @@ def fig_conicity_of_pairs(table):
     Parameters
     ----------
     table : pandas.DataFrame
-        From `wrcore.analysis_contact.conicity_table`.
+        From `wrcore.analysis.contact.conicity_table`.
 
     Returns
     -------
@@ -187,7 +128,7 @@ def fig_location_with_yaw(table):
     Parameters
     ----------
     table : pandas.DataFrame
-        From `wrcore.analysis_contact.location_with_yaw`.
+        From `wrcore.analysis.contact.location_with_yaw`.
 
     Returns
     -------
@@ -211,6 +152,7 @@ def fig_location_with_yaw(table):
 BANDS = ((0.018, 0.140), (0.280, 0.560), (1.080, 1.240))
 """Contact angles on the tread, in the flange root and on the flange, rad; S1002 on UIC60 jumps over the rest."""
 
+
 _CELLS = 16
 
 
@@ -221,7 +163,7 @@ def fig_planar_error(table):
     Parameters
     ----------
     table : pandas.DataFrame
-        From `wrcore.analysis_contact.planar_error_map`. Cells stay empty where no pose has such a contact angle, or
+        From `study.contact.tables.planar_error_map`. Cells stay empty where no pose has such a contact angle, or
         where planar detection has no patch there.
 
     Returns
@@ -299,7 +241,7 @@ def fig_lateral_sweep(sweep):
     Parameters
     ----------
     sweep : pandas.DataFrame
-        From `wrcore.analysis_contact.lateral_sweep`.
+        From `study.contact.tables.lateral_sweep`.
 
     Returns
     -------
@@ -327,7 +269,7 @@ def fig_patch_forces(tables):
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
-        From `wrcore.analysis_contact.force_over_height`, by title of the panel.
+        From `study.contact.tables.force_over_height`, by title of the panel.
 
     Returns
     -------

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from wrcore.analysis_contact import MATERIAL
+from study.contact.tables import MATERIAL
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import (
     ANGLE,

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from wrcore._jit import jit
 from wrcore.contact.detection import find_patches
 from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.reduction import (
@@ -21,6 +20,7 @@ from wrcore.contact.reduction import (
     U_WHEEL,
 )  # fmt: skip
 from wrcore.contact.strip import gap_at, make_pose
+from wrcore.kernels.jit import jit
 
 DENSE_STEP = 2e-5
 """Distance of the dense search's strips, m."""

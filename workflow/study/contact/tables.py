@@ -8,11 +8,10 @@ import math
 import numpy as np
 import pandas as pd
 
-from wrcore._jit import jit
+from wrcore.analysis.contact import pair_geometry as pair_geometry
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.detection import planar_error_bound
 from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import (
@@ -28,15 +27,17 @@ from wrcore.contact.reduction import (
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
+from wrcore.kernels.jit import jit
 
 MATERIAL = {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}
 """Steel as in the reference cases of CONTACT, Pa and -."""
 
-TOUCH = 1e-3
-"""Wheel load at which a wheelset counts as just touching, N: penetration below 1 nm."""
 
 _DESCENT = 2e-5  # m
+
+
+TOUCH = 1e-3
+"""Wheel load at which a wheelset counts as just touching, N: penetration below 1 nm."""
 
 
 def study_pair(settings):
@@ -55,22 +56,6 @@ def study_pair(settings):
     rail = named_profile(settings["rail"], "rail", settings["inclination"])
     sizes = (settings["gauge"], settings["rolling_radius"], settings["half_distance"])
     return WheelsetOnTrack.alike(wheel, rail, *sizes)
-
-
-def pair_geometry(pair):
-    """The same pair, compiled for the contact search.
-
-    Parameters
-    ----------
-    pair : WheelsetOnTrack
-        With equal sides.
-
-    Returns
-    -------
-    ContactGeometry
-    """
-    one = pair.left
-    return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 
 
 def touch_table(pairs, shifts):
@@ -140,9 +125,6 @@ def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
 
 def _radius(geometry, u):
     return geometry.rolling_radius + cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
-
-
-# ---------------------------------------------------------------------------------- planar against spatial
 
 
 def first_order_law(yaw, angle, radius=0.46):
@@ -270,9 +252,6 @@ def over_contact_angle(table, edges, column):
     classes = pd.cut(table.contact_angle_rad, edges, labels=range(len(edges) - 1))
     median = table.groupby([classes, "yaw_rad"], observed=False)[column].median()
     return median.unstack("yaw_rad")
-
-
-# ---------------------------------------------------------------------------------- reductions
 
 
 @jit

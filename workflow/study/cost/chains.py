@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.cost.recorded import Recorded, evaluation
-from wrcore.cost.timing import summary, take_turns
+from study.cost.recorded import Recorded, evaluation
+from study.cost.timing import summary, take_turns
 from wrcore.dynamics.body import euler_parameters
 from wrcore.dynamics.joint import Joint, build_joints
 from wrcore.dynamics.marker import FRAME

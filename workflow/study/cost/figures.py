@@ -1,12 +1,12 @@
 """Figures of cost: how it grows, and which stages of an evaluation it goes to.
 
-They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.figures`.
+They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.analysis.style`.
 """
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from wrcore.figures import styled
+from wrcore.analysis.style import styled
 
 SERIES = (
     {"color": "#0072B2", "marker": "o", "linestyle": "-"},
@@ -23,7 +23,7 @@ def fig_growth(wheelsets, runs, scenes):
     Parameters
     ----------
     wheelsets, runs, scenes : pandas.DataFrame
-        From `wrcore.cost.growth`: ``over_wheelsets``, ``over_runs`` and ``over_scenes``.
+        From `study.cost.growth`: ``over_wheelsets``, ``over_runs`` and ``over_scenes``.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def fig_breakdown(table):
     Parameters
     ----------
     table : pandas.DataFrame
-        From :func:`wrcore.cost.stages.with_limits`.
+        From :func:`study.cost.stages.with_limits`.
 
     Returns
     -------

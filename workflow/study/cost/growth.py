@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wrcore.cost.recorded import evaluation, record
-from wrcore.cost.timing import Contender, summary, take_turns
-from wrcore.dynamics.integrate import integrate
+from study.cost.recorded import evaluation, record
+from study.cost.timing import Contender, summary, take_turns
 from wrcore.dynamics.system import workspace
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import output_times, simulate_many
+from wrcore.integrate.integrator import integrate
+from wrcore.run.simulate import output_times, simulate_many
+from wrcore.scene.description import compile_scene, load_scene
 
 BEYOND_ARITHMETIC = 1.25
 """Time per evaluation and wheelset, over its least value, from which on something else than arithmetic is paid for."""
@@ -50,7 +50,7 @@ def over_wheelsets(title, source, overrides, *, spacing, counts, duration, state
     ----------
     title : str
     source, overrides
-        Scene of one vehicle on tangent, perfect track, as for :func:`wrcore.scene.load_scene`.
+        Scene of one vehicle on tangent, perfect track, as for :func:`wrcore.load_scene`.
     spacing : float
         Between vehicles, m.
     counts : sequence of int

@@ -1,7 +1,7 @@
 """Operations and bytes of one right-hand side, counted: the kernels' own source is run by Python on numbers that count.
 
 Compiled kernels are replaced by the functions they were made from for as long as the count lasts, and the vector
-registers of :mod:`wrcore._lanes` by arrays of eight numbers.
+registers of :mod:`wrcore.kernels.lanes` by arrays of eight numbers.
 """
 
 import math
@@ -196,7 +196,7 @@ def _mathematics(tally):
 
 
 def _registers(tally):
-    """Stand-ins for :mod:`wrcore._lanes`, by name: lanes are arrays of numbers that count one by one."""
+    """Stand-ins for :mod:`wrcore.kernels.lanes`, by name: lanes are arrays of numbers that count one by one."""
 
     def load(rows, start, count):
         tally.add("bytes", rows.size_of_one * count)
@@ -242,7 +242,7 @@ def interpreted(tally):
                 new = value.py_func
             elif value is math:
                 new = mathematics
-            elif name in registers and getattr(value, "__module__", "") == "wrcore._lanes":
+            elif name in registers and getattr(value, "__module__", "") == "wrcore.kernels.lanes":
                 new = registers[name]
             elif name == "rarely_called":
                 new = lambda: None  # noqa: E731

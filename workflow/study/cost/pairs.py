@@ -1,7 +1,7 @@
 """The benchmarks: what is faster than what, and by how much.
 
 Every group of contenders takes turns in one process; compiling and loading kernels is left out (but where it is the
-point, as in ``process``). All functions return rows of :func:`wrcore.cost.timing.compare`.
+point, as in ``process``). All functions return rows of :func:`study.cost.timing.compare`.
 """
 
 import json
@@ -13,17 +13,17 @@ import time
 import numpy as np
 import pandas as pd
 
+from study.cost.recorded import evaluation, record
+from study.cost.search import search_costs
+from study.cost.timing import Bar, Contender, compare, summary, take_turns
 from wrcore.contact.detection import PLANAR, SPATIAL
-from wrcore.cost.recorded import evaluation, record
-from wrcore.cost.search import search_costs
-from wrcore.cost.timing import Bar, Contender, compare, summary, take_turns
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import integrate
-from wrcore.dynamics.reference import integrate_function
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.reference import integrate_function
 from wrcore.plain.wheelset import plain_wheelset
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import output_times
+from wrcore.run.simulate import output_times
+from wrcore.scene.description import compile_scene, load_scene
 
 BOXES = {"in the wheelsets": "false", "bodies on joints": "true"}
 """Settings of ``vehicle.axle_boxes``."""

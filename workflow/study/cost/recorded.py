@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.cost.timing import Contender
+from study.cost.timing import Contender
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.system import Equations, Model, fill_many
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene
+from wrcore.integrate.integrator import integrate
+from wrcore.scene.description import compile_scene
 
 LASTING = 5e-3
 """Processor time of a timed call, s: a thousand times what a call from Python into compiled code costs."""

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from wrcore.checked_yaml import parse_value
-from wrcore.dynamics.integrate import integrate
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import output_times, simulate_many
-from wrcore.sweep_batch import run_sweep
-from wrcore.sweep_plan import load_sweep
+from wrcore.errors.checked_yaml import parse_value
+from wrcore.integrate.integrator import integrate
+from wrcore.run.simulate import output_times, simulate_many
+from wrcore.scene.description import compile_scene, load_scene
+from wrcore.sweep.batch import run_sweep
+from wrcore.sweep.plan import load_sweep
 
 SMOOTH = 0.1
 """Part of rejected steps that a smooth scene may have."""
@@ -25,7 +25,7 @@ def batch_table(source, overrides, speeds, passes, functions=8):
     Parameters
     ----------
     source, overrides
-        Scene, as for :func:`wrcore.scene.load_scene`.
+        Scene, as for :func:`wrcore.load_scene`.
     speeds : sequence of float
         One run each, m/s.
     passes : int

@@ -4,15 +4,15 @@ from functools import partial
 
 import numpy as np
 
-from wrcore._references import Handle
+from study.cost.recorded import lasting
+from study.cost.stages import search_all
+from study.cost.timing import compare
 from wrcore.contact.detection import PLANAR, SPATIAL, axle_direction
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
 from wrcore.contact.statics import height_at_load
-from wrcore.cost.recorded import lasting
-from wrcore.cost.stages import search_all
-from wrcore.cost.timing import compare
 from wrcore.dynamics.wheel import MOTION_COLUMNS
+from wrcore.kernels.handles import Handle
 
 PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.0078), (-0.015, 0.015))}
 """Ranges of lateral position (m) and yaw (rad) of the left wheel."""
@@ -62,7 +62,7 @@ def search_costs(contact, count, passes):
     Returns
     -------
     list of dict
-        Rows of :func:`wrcore.cost.timing.compare`: a group for each place and reduction.
+        Rows of :func:`study.cost.timing.compare`: a group for each place and reduction.
     """
     rows, patches = [], np.zeros((count, MAX_PATCHES, PATCH_COLUMNS))
     for place in PLACES:

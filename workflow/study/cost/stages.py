@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from wrcore._jit import FUSED, jit
-from wrcore._lanes import lanes8, load8, ramp8, total
-from wrcore._references import Handle
+from study.cost.operations import STAGES, count_operations
+from study.cost.recorded import evaluation, lasting, record
+from study.cost.timing import Contender, summary, take_turns
 from wrcore.contact import reduction as columns
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL, find_patches
@@ -21,13 +21,13 @@ from wrcore.contact.geometry import LANES
 from wrcore.contact.normal import damping_factor, hertz_shape_at, inverse_cube_root
 from wrcore.contact.scan import first_zone, make_window, near_blocks, scan
 from wrcore.contact.strip import make_pose
-from wrcore.cost.operations import STAGES, count_operations
-from wrcore.cost.recorded import evaluation, lasting, record
-from wrcore.cost.timing import Contender, summary, take_turns
 from wrcore.creep.laws import creep_force_at
 from wrcore.dynamics.joint import build_joints
 from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import Equations
+from wrcore.kernels.handles import Handle
+from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.lanes import lanes8, load8, ramp8, total
 
 CHAIN = 10**6
 """Fused products in each of the chains that measure their rate."""
@@ -192,7 +192,7 @@ def breakdown(title, scene, states, passes):
     -------
     pandas.DataFrame
         A row per stage and one for the whole: nanoseconds per evaluation (median and quartiles over the passes), share
-        of the whole, and what :func:`wrcore.cost.operations.count_operations` counts.
+        of the whole, and what :func:`study.cost.operations.count_operations` counts.
     """
     recorded = record(scene, scene.data["integration"]["duration"], states)
     model, (motions, patches, counts, creep) = recorded.model, _wheels(recorded)

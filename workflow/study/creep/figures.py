@@ -1,6 +1,6 @@
 """Figures of the creep laws: curves, traction fields, cost against error, error maps, smoothness.
 
-They draw the tables of `wrcore.analysis_creep` and `wrcore.analysis_creep_table`. A law keeps its colour, marker and
+They draw the tables of `study.creep.laws` and `study.creep.smoothness`. A law keeps its colour, marker and
 line in all of them (`LAW_STYLES`). All quantities are nondimensional (unit 1) or over a stated scale; errors are drawn
 in per cent of the friction limit, costs in microseconds.
 """
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from wrcore.figures import ACCENT, styled
+from wrcore.analysis.style import ACCENT, styled
 
 PERCENT = 100.0
 
@@ -69,7 +69,7 @@ def fig_creep_curves(curves):
     Parameters
     ----------
     curves : pandas.DataFrame
-        From `wrcore.analysis_creep.creep_curves`; one model of each family.
+        From `study.creep.laws.creep_curves`; one model of each family.
 
     Returns
     -------
@@ -207,9 +207,9 @@ def fig_creep_cost(laws, contact):
     Parameters
     ----------
     laws : pandas.DataFrame
-        From `wrcore.analysis_creep.laws_table`; the rows against CONTACT on ellipses are drawn.
+        From `study.creep.laws.laws_table`; the rows against CONTACT on ellipses are drawn.
     contact : pandas.DataFrame
-        From `wrcore.analysis_creep.contact_points`.
+        From `study.creep.laws.contact_points`.
 
     Returns
     -------
@@ -265,7 +265,7 @@ def fig_creep_error_map(errors, name):
     Parameters
     ----------
     errors : pandas.DataFrame
-        From `wrcore.analysis_creep_table.error_map`.
+        From `study.creep.smoothness.error_map`.
     name : str
         Name of the table.
 
@@ -351,9 +351,9 @@ def fig_creep_smoothness(lines, table):
     Parameters
     ----------
     lines : pandas.DataFrame
-        From `wrcore.analysis_creep_table.smoothness`; dots are the exact solver.
+        From `study.creep.smoothness.smoothness`; dots are the exact solver.
     table : pandas.DataFrame
-        From `wrcore.analysis_creep_table.smoothness_table`; the variation of F_x's slope at the pole is written in.
+        From `study.creep.smoothness.smoothness_table`; the variation of F_x's slope at the pole is written in.
 
     Returns
     -------

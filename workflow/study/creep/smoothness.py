@@ -1,11 +1,11 @@
 """What one creep table errs over its range, and how smooth it is along lines of creepage.
 
-Units as in `wrcore.analysis_creep`: nondimensional creepages and forces.
+Units as in `study.creep.laws`: nondimensional creepages and forces.
 """
 
 import numpy as np
 
-from wrcore.analysis_creep import law_forces
+from study.creep.laws import law_forces
 from wrcore.creep.axes import creepages_at, scales
 from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at

@@ -1,14 +1,14 @@
 """Figures of stability: root locus over speed, the modes at one speed, limit cycles over speed.
 
-They work on tables of `wrcore.analysis_stability` and `wrcore.analysis_limit_cycles`. Units change here and nowhere
+They work on tables of `wrcore.analysis.stability` and `wrcore.analysis.limit_cycles`. Units change here and nowhere
 before: lengths to mm.
 """
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis_modes import OVERDAMPED
-from wrcore.figures import ACCENT, LINES, MM, styled
+from wrcore.analysis.modes import OVERDAMPED
+from wrcore.analysis.style import ACCENT, LINES, MM, styled
 
 GREY = "0.72"
 
@@ -72,7 +72,7 @@ def fig_modes(table, title):
     Parameters
     ----------
     table : pandas.DataFrame
-        First table of `modes_in_full`; what does not oscillate is left out.
+        First table of `modes`; what does not oscillate is left out.
     title : str
 
     Returns

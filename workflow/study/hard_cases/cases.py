@@ -14,13 +14,13 @@ from scipy.integrate import simpson
 
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
-from wrcore.scene import compile_scene, load_scene
-from wrcore.simulate import DERAILED_Y, output_times
+from wrcore.integrate.integrator import integrate
+from wrcore.run.simulate import DERAILED_Y, output_times
+from wrcore.scene.description import compile_scene, load_scene
 
 COLUMNS = (
     "family", "case", "condition", "vehicle", "detection", "integrator", "outcome", "status", "reason", "simulated_s",

@@ -8,8 +8,8 @@ import pandas as pd
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from wrcore.analysis_contact import lateral_sweep, pair_geometry, study_pair, sweep_jumps
-from wrcore.analysis_hard_cases import (
+from study.contact.tables import lateral_sweep, study_pair, sweep_jumps
+from study.hard_cases.cases import (
     Check,
     computed,
     contacts,
@@ -22,6 +22,7 @@ from wrcore.analysis_hard_cases import (
     wheel_forces,
     with_forces,
 )
+from wrcore.analysis.contact import pair_geometry
 from wrcore.contact import reduction
 from wrcore.contact.normal import damping_factor
 from wrcore.contact.poses import solve_poses
@@ -85,7 +86,7 @@ def impacts(vehicles, name, speeds, detections, methods):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a free wheelset.
+        As :func:`study.hard_cases.cases.prepare` takes them; a free wheelset.
     speeds : sequence of float
         Vertical, m/s.
     detections, methods : sequence of str
@@ -126,7 +127,7 @@ def drops(vehicles, name, height, duration, detections, methods, tolerances):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a free wheelset.
+        As :func:`study.hard_cases.cases.prepare` takes them; a free wheelset.
     height, duration : float
         m and s.
     detections, methods : sequence of str
@@ -185,7 +186,7 @@ def crests(vehicles, speed, length, duration, detections, methods):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     speed, length, duration : float
         m/s, m and s.
     detections, methods : sequence of str
@@ -239,7 +240,7 @@ def pose_sweeps(pairs, load, step, reach, far_step, far):
     Parameters
     ----------
     pairs : dict of str to dict
-        Settings of :func:`wrcore.analysis_contact.study_pair` by name.
+        Settings of :func:`study.contact.tables.study_pair` by name.
     load : float
         N per wheel.
     step, reach : float
@@ -300,7 +301,7 @@ def slow_push(vehicles, name, largest, durations, detections, methods):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+        As :func:`study.hard_cases.cases.prepare` takes them.
     largest : float
         Force to the left, N.
     durations : (float, float)

@@ -1,4 +1,4 @@
-"""Figures of the hard cases, drawn from the curves of `wrcore.analysis_hard_study.run_family`.
+"""Figures of the hard cases, drawn from the curves of `study.hard_cases.study.run_family`.
 
 Units change here and nowhere before. Planar and spatial detection look as in all other figures.
 """
@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.figures import ACCENT, LINES, MM, styled
+from wrcore.analysis.style import ACCENT, LINES, MM, styled
 
 KILO = 1e-3
 

@@ -5,19 +5,10 @@ from itertools import product
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import (
-    Check,
-    contacts,
-    prepare,
-    rows,
-    run_in_parts,
-    sound,
-    wheel_forces,
-    with_forces,
-)
+from study.hard_cases.cases import Check, contacts, prepare, rows, run_in_parts, sound, wheel_forces, with_forces
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.simulate import DERAILED_Y
+from wrcore.run.simulate import DERAILED_Y
 
 RATE = 500.0
 """Outputs per second: 20 mm of track at 10 m/s."""
@@ -140,7 +131,7 @@ def derailments(vehicles, speeds, detections, methods, pushes):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     speeds : sequence of float
         m/s.
     detections, methods : sequence of str
@@ -176,7 +167,7 @@ def nadal(vehicles, name, speed, frictions, detections, turn, push):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+        As :func:`study.hard_cases.cases.prepare` takes them.
     speed : float
         m/s.
     frictions : sequence of float

@@ -5,10 +5,10 @@ from itertools import product
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import Check, computed, contacts, joined, prepare, refused, rows, run, sound
+from study.hard_cases.cases import Check, computed, contacts, joined, prepare, refused, rows, run, sound
 from wrcore.contact import reduction
 from wrcore.creep.laws import LAWS, creep_forces
-from wrcore.scene import load_scene
+from wrcore.scene.description import load_scene
 
 TABLE_ERROR = 0.01
 """Of a creep force, as a fraction of mu N: the tolerance to which creep tables are built."""
@@ -32,7 +32,7 @@ def friction_ladder(vehicles, names, values, laws, duration, detections, unstabl
     Parameters
     ----------
     vehicles, names
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+        As :func:`study.hard_cases.cases.prepare` takes them; several names.
     values : sequence of float
         Friction coefficients.
     laws : sequence of str
@@ -87,7 +87,7 @@ def friction_step(vehicles, names, values, part, detections, methods):
     Parameters
     ----------
     vehicles, names
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+        As :func:`study.hard_cases.cases.prepare` takes them; several names.
     values : sequence of float
         Friction of the parts.
     part : float
@@ -128,7 +128,7 @@ def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; their creep table and material are used.
+        As :func:`study.hard_cases.cases.prepare` takes them; their creep table and material are used.
     ratios : sequence of float
         a/b.
     sizes : sequence of float

@@ -6,16 +6,16 @@ from itertools import product
 import numpy as np
 from scipy.optimize import brentq
 
-from wrcore.analysis_hard_cases import Check, prepare, rows, run, sound
-from wrcore.analysis_stability import LARGEST_REST, straight_ahead
+from study.hard_cases.cases import Check, prepare, rows, run, sound
+from wrcore.analysis.stability import LARGEST_REST, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.constraints import constraint_workspace
-from wrcore.dynamics.integrate import integrate
 from wrcore.dynamics.joint import evaluate_joints
 from wrcore.dynamics.linear import steady_running
 from wrcore.dynamics.system import Equations
-from wrcore.dynamics.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.simulate import output_times
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.run.simulate import output_times
 
 LARGEST_ERROR = 100.0
 """Global error over the tolerance (rtol times the start's y) that a run of a second may have."""
@@ -118,7 +118,7 @@ def stability_map(vehicles, names, speeds, methods, longest):
     Parameters
     ----------
     vehicles, names
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+        As :func:`study.hard_cases.cases.prepare` takes them; several names.
     speeds : sequence of float
         m/s.
     methods : sequence of str
@@ -217,7 +217,7 @@ def baumgarte(vehicles, name, pairs, duration, methods):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; a vehicle with joints.
+        As :func:`study.hard_cases.cases.prepare` takes them; a vehicle with joints.
     pairs : sequence of (float, float)
         alpha and beta, 1/s.
     duration : float

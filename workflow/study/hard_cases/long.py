@@ -7,11 +7,11 @@ from tempfile import TemporaryDirectory
 import h5py
 import numpy as np
 
-from wrcore.analysis_hard_cases import NORM_LIMIT, Check, prepare, rows
+from study.hard_cases.cases import NORM_LIMIT, Check, prepare, rows
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.integrate import Trajectory
-from wrcore.results import load_run
-from wrcore.streaming import simulate_to
+from wrcore.integrate.trajectory import Trajectory
+from wrcore.run.results import load_run
+from wrcore.run.streaming import simulate_to
 
 BLOCKS = 16
 """Blocks that a run is written in."""
@@ -33,7 +33,7 @@ def hunting(vehicles, name, changes, duration, rate=200.0):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     name : str
     changes : dict
         To the scene: the speed of a stable limit cycle.

@@ -4,17 +4,8 @@ from itertools import product
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import (
-    Check,
-    contacts,
-    prepare,
-    rows,
-    run,
-    run_in_parts,
-    sound,
-    with_forces,
-)
-from wrcore.analysis_stability import straight_ahead
+from study.hard_cases.cases import Check, contacts, prepare, rows, run, run_in_parts, sound, with_forces
+from wrcore.analysis.stability import straight_ahead
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.linear import steady_running
@@ -41,7 +32,7 @@ def ladder(vehicles, speeds, methods, duration):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     speeds : sequence of float
         m/s.
     methods : dict of str to float
@@ -80,7 +71,7 @@ def slow_path(vehicles, name, speeds, distance, critical_speed):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+        As :func:`study.hard_cases.cases.prepare` takes them.
     speeds : sequence of float
         Falling, m/s.
     distance : float
@@ -116,7 +107,7 @@ def regularisation(vehicles, name, speeds, least_speeds, distance):
     Parameters
     ----------
     vehicles, name
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them.
+        As :func:`study.hard_cases.cases.prepare` takes them.
     speeds : sequence of float
         m/s.
     least_speeds : sequence of float
@@ -185,7 +176,7 @@ def braking(vehicles, speed, deceleration, rest, least_speeds):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     speed, deceleration : float
         m/s and m/s^2.
     rest : float

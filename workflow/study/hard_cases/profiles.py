@@ -5,11 +5,11 @@ from itertools import product
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import Check, contacts, impulse_error, prepare, refused, rows, run, sound
+from study.hard_cases.cases import Check, contacts, impulse_error, prepare, refused, rows, run, sound
 from wrcore.contact import reduction
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.scene import compile_scene
+from wrcore.scene.description import compile_scene
 
 IMPULSE_ERROR = 1e-3
 """Of the load's impulse: forces sampled at the output rate are integrated to about this."""
@@ -118,7 +118,7 @@ def profiles(vehicles, names, entries, duration, detections, methods):
     Parameters
     ----------
     vehicles, names
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+        As :func:`study.hard_cases.cases.prepare` takes them; several names.
     entries : dict of str to dict
         As for :func:`variants`.
     duration : float

@@ -2,15 +2,8 @@
 
 import pandas as pd
 
-from wrcore import analysis_hard_contact as contact
-from wrcore import analysis_hard_flange as flange
-from wrcore import analysis_hard_friction as friction
-from wrcore import analysis_hard_integration as integration
-from wrcore import analysis_hard_long as long
-from wrcore import analysis_hard_low_speed as low_speed
-from wrcore import analysis_hard_profiles as profiles
-from wrcore import analysis_hard_track as track
-from wrcore.analysis_hard_cases import table
+from study.hard_cases import contact, flange, friction, integration, long, low_speed, profiles, track
+from study.hard_cases.cases import table
 from wrcore.errors import InputError
 
 FAMILIES = {
@@ -46,7 +39,7 @@ def run_family(family, vehicles, settings, progress=None):
     family : str
         One of `FAMILIES`.
     vehicles : dict of str to dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     settings : dict of str to dict
         Arguments of each of the family's functions. ``vehicles`` among them picks some vehicles by name for functions
         that run all they are given.
@@ -56,7 +49,7 @@ def run_family(family, vehicles, settings, progress=None):
     Returns
     -------
     found : pandas.DataFrame
-        Columns of :data:`wrcore.analysis_hard_cases.COLUMNS`.
+        Columns of :data:`study.hard_cases.cases.COLUMNS`.
     curves : dict of str to list of dict
         What figures need, by function.
 

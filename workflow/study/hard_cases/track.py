@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from wrcore.analysis_hard_cases import Check, contacts, impulse_error, prepare, rows, run, sound, wheel_forces
+from study.hard_cases.cases import Check, contacts, impulse_error, prepare, rows, run, sound, wheel_forces
 from wrcore.dynamics.marker import FRAME
 
 CANT_BASE = 1.5
@@ -29,7 +29,7 @@ def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
     Parameters
     ----------
     vehicles : dict
-        As :func:`wrcore.analysis_hard_cases.prepare` takes it.
+        As :func:`study.hard_cases.cases.prepare` takes it.
     speeds : dict of str to sequence of float
         m/s, by vehicle.
     spectra : sequence of (str, int)
@@ -71,7 +71,7 @@ def curve(vehicles, names, radius, cant, lengths, shares, duration, methods, det
     Parameters
     ----------
     vehicles, names
-        As :func:`wrcore.analysis_hard_cases.prepare` takes them; several names.
+        As :func:`study.hard_cases.cases.prepare` takes them; several names.
     radius, cant : float
         m.
     lengths : (float, float, float)

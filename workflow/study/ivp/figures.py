@@ -1,13 +1,13 @@
 """Figures of the benchmarks: error against work, drift of constraints.
 
-They draw the tables of `wrcore.analysis_ivp`. A method keeps its colour and marker in all of them (`METHOD_STYLES`).
+They draw the tables of `study.ivp.runs`. A method keeps its colour and marker in all of them (`METHOD_STYLES`).
 Units change here and nowhere before: lengths to micrometres.
 """
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from wrcore.figures import ACCENT, styled
+from wrcore.analysis.style import ACCENT, styled
 
 MICRO = 1e6
 
@@ -37,7 +37,7 @@ def fig_ivp_work_precision(table, effort, bar):
     Parameters
     ----------
     table : pandas.DataFrame
-        From `wrcore.analysis_ivp.work_precision`; runs that failed are left out.
+        From `study.ivp.runs.work_precision`; runs that failed are left out.
     effort : dict
         Of the reference: ``solver`` and ``evaluations``.
     bar : float
@@ -73,7 +73,7 @@ def fig_ivp_constraints(history):
     Parameters
     ----------
     history : pandas.DataFrame
-        From `wrcore.analysis_ivp.violation_history`.
+        From `study.ivp.runs.violation_history`.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """The Test Set's problem "Wheelset" as a study: how well the constrained equations are solved, and what that costs.
 
-The equations of `wrcore.analysis_ivp_wheelset` are stabilised as everywhere else, by Baumgarte's feedback of Eq. (8),
+The equations of `study.ivp.wheelset` are stabilised as everywhere else, by Baumgarte's feedback of Eq. (8),
 and integrated by an explicit pair in a compiled loop. Besides, each step can be projected onto the constraints, and
 scipy's solvers run for comparison.
 """
@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import RK45, solve_ivp
 
-from wrcore.analysis_ivp_problem import CONTACT, MULTIPLIERS, STATE, UNITS, workspace
-from wrcore.analysis_ivp_wheelset import right_hand_side, run_pair
+from study.ivp.problem import CONTACT, MULTIPLIERS, STATE, UNITS, workspace
+from study.ivp.wheelset import right_hand_side, run_pair
 
 ATOL_OVER_RTOL = 1e-3
 TABLEAUS = {"rk45": (np.hstack([RK45.A, np.zeros((RK45.n_stages, 1))]), RK45.B, RK45.E)}
@@ -30,7 +30,7 @@ class Run(NamedTuple):
     state: np.ndarray
     """(11,)"""
     contact: np.ndarray
-    """(2, 2), as of `wrcore.analysis_ivp_problem.Problem`."""
+    """(2, 2), as of `study.ivp.problem.Problem`."""
     multipliers: np.ndarray
     """(2,), N."""
     violation: np.ndarray

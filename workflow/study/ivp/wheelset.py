@@ -13,7 +13,7 @@ Phi = (g_left, g_right) = 0, and Eq. (8) of the multibody code, with the problem
     M v' = f(q, v, lambda) + D^T lambda,    D v' = gamma - 2 alpha Phi' - beta^2 Phi.
 
 f holds the creep forces, and these the normal forces N = -lambda sqrt(1 + G'^2) with the slope G' of the rail head:
-Newton's method finds lambda. Arrays and their units: `wrcore.analysis_ivp_problem.Work`.
+Newton's method finds lambda. Arrays and their units: `study.ivp.problem.Work`.
 """
 
 import math
@@ -21,7 +21,7 @@ import math
 import numpy as np
 from numba.typed import List
 
-from wrcore._jit import jit
+from wrcore.kernels.jit import jit
 
 _NEWTON = 20
 _CONTACT_STEP = 1e-12  # m, rad; both iterations converge quadratically: after such a step the error is rounding

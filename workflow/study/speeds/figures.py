@@ -1,14 +1,14 @@
 """Figures of vehicles: motion of all wheelsets, guiding forces, and what changes with speed.
 
-Units, colours and the difference between planar and spatial are those of :mod:`wrcore.figures`.
+Units, colours and the difference between planar and spatial are those of :mod:`wrcore.analysis.style`.
 """
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis import SIDES
-from wrcore.analysis_vehicle import quotient, wheel_forces, wheelsets_of
-from wrcore.figures import LINES, MM, _shared_legend, styled
+from wrcore.analysis.motion import SIDES
+from wrcore.analysis.style import LINES, MM, shared_legend, styled
+from wrcore.analysis.wheels import quotient, wheel_forces, wheelsets_of
 
 KN = 1e-3
 
@@ -41,7 +41,7 @@ def lateral_motion(runs):
             axes.set_title(f"{name.replace('_', ' ')}, {title}", loc="left")
             axes.set_ylabel("y / mm")
         panels[-1, column].set_xlabel("time / s")
-    _shared_legend(figure, panels.ravel())
+    shared_legend(figure, panels.ravel())
     return figure
 
 
@@ -73,7 +73,7 @@ def guiding_forces(run, title):
     for axes in panels[-1]:
         axes.set_xlabel("time / s")
     figure.suptitle(title)
-    _shared_legend(figure, panels.ravel())
+    shared_legend(figure, panels.ravel())
     return figure
 
 
@@ -101,7 +101,7 @@ def over_speed(tables, track, quantities):
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
-        By vehicle, from :func:`wrcore.analysis_vehicle.speed_table`.
+        By vehicle, from :func:`study.speeds.tables.speed_table`.
     track : str
         Which of the tables' tracks to show.
     quantities : sequence of (column, factor, label)
@@ -125,5 +125,5 @@ def over_speed(tables, track, quantities):
         axes.set(ylabel=label)
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")
-    _shared_legend(figure, np.ravel(panels), ncols=2)
+    shared_legend(figure, np.ravel(panels), ncols=2)
     return figure

@@ -1,7 +1,7 @@
 """Sweeps over speed: many runs of one vehicle in one process, which share imports, kernels and creep table."""
 
-from wrcore.scene import load_scene
-from wrcore.simulate import simulate_many
+from wrcore.run.simulate import simulate_many
+from wrcore.scene.description import load_scene
 
 DETECTIONS = ("planar", "spatial")
 CHANNELS = "output.channels=[pose, velocity, acceleration, contact]"
@@ -15,7 +15,7 @@ def sweep_speeds(source, overrides, speeds, tracks, progress=None):
     source : str, Path or dict
         Scene.
     overrides : sequence of str
-        Changes to the scene that hold for all runs, as :func:`wrcore.scene.load_scene` takes them.
+        Changes to the scene that hold for all runs, as :func:`wrcore.load_scene` takes them.
     speeds : sequence of float
         m/s.
     tracks : dict of str to sequence of str

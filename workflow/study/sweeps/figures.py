@@ -9,10 +9,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wrcore.channels import unit_of
-from wrcore.figures import _shared_legend, styled
-from wrcore.figures_run import PRINTED
-from wrcore.sweep_batch import UNITS
+from wrcore.analysis.plot_run import PRINTED
+from wrcore.analysis.style import shared_legend, styled
+from wrcore.run.channels import unit_of
+from wrcore.sweep.batch import UNITS
 
 ENDS: dict[str, dict[str, Any]] = {
     "completed": {"color": "#0072B2", "marker": "o", "s": 3, "linewidths": 0, "alpha": 0.5},
@@ -34,7 +34,7 @@ def sweep_scatter(table: pd.DataFrame, keys: list[str], measure: str) -> Figure:
     Parameters
     ----------
     table : pandas.DataFrame
-        From :func:`wrcore.sweep_batch.run_sweep`.
+        From :func:`wrcore.sweep.batch.run_sweep`.
     keys : list of str
         Columns that were varied; words stand side by side.
     measure : str
@@ -55,7 +55,7 @@ def sweep_scatter(table: pd.DataFrame, keys: list[str], measure: str) -> Figure:
         axes.set_axis_off()
     for axes in panels[:, 0]:
         axes.set_ylabel(label)
-    _shared_legend(figure, panels.flat)
+    shared_legend(figure, panels.flat)
     return figure
 
 

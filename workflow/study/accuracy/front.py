@@ -1,0 +1,39 @@
+"""The measured fronts as the README quotes them."""
+
+from wrcore.run.accuracy import measured_front
+
+
+def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
+    """The fastest measured choice for each accuracy as a table in Markdown, as the README quotes it.
+
+    Parameters
+    ----------
+    front : pandas.DataFrame, optional
+        Measurements; by default those that the package carries.
+    accuracies : sequence of float
+        RMS errors of the lateral position, m; left out are those that nothing reaches and those for which the choice
+        is that of the next smaller one.
+
+    Returns
+    -------
+    str
+    """
+    front = measured_front() if front is None else front
+    head = ("scene", "error below", "detection, creep, method, rtol", "error", "times real time")
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for (kind, speed), rows in front.groupby(["kind", "speed_m_per_s"], sort=False):
+        last = None
+        for accuracy in sorted(accuracies):
+            enough = rows[rows["y_rms_m"] <= accuracy]
+            if not len(enough):
+                continue
+            row = enough.loc[enough["real_time_factor"].idxmax()]
+            line = (
+                f"{row['detection']}, {row['creep']}, {row['method']}, {row['rtol']:g} |"
+                f" {1e6 * row['y_rms_m']:.2g} µm | {row['real_time_factor']:.3g} |"
+            )
+            scene = f"| {kind.replace('_', ' ')}, {speed:g} m/s | {1e6 * accuracy:g} µm | "
+            if line != last:
+                lines.append(scene + line)
+            last = line
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Creep laws and tables against the exact solver and CONTACT."""

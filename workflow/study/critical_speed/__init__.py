@@ -1,0 +1,1 @@
+"""Root loci, modes and limit cycles."""

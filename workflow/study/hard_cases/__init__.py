@@ -1,0 +1,1 @@
+"""What every hard case must keep, and where the methods break."""

@@ -1,0 +1,1 @@
+"""The paper's figures, its comparison and its timing table."""

@@ -1,0 +1,224 @@
+"""The paper's tables: motion, timing, rigid contact geometry, and published values beside ours."""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.motion import (
+    SIDES,
+    _patches,
+    difference,
+    first_flange_contact,
+    mirror_defect,
+    prediction_horizon,
+)
+from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.poses import geometry_table as rigid_contact
+from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
+from wrcore.run.simulate import simulate
+
+
+def horizons(cases, bound):
+    """Prediction horizons of the spatial runs that have a tighter twin.
+
+    Parameters
+    ----------
+    cases : dict of str to dict of str to Run
+        Runs by case and by ``spatial``, ``spatial_tight`` (where run) and others.
+    bound : float
+        Agreement in lateral position that is asked for, m.
+
+    Returns
+    -------
+    dict of str to float
+        Horizon by case, s.
+    """
+    paired = {case: runs for case, runs in cases.items() if "spatial_tight" in runs}
+    return {case: prediction_horizon(runs["spatial"], runs["spatial_tight"], bound) for case, runs in paired.items()}
+
+
+def motion_row(run, body="wheelset"):
+    """What one run shows, as a row of a table.
+
+    Parameters
+    ----------
+    run : Run
+    body : str
+        Wheelset to look at.
+
+    Returns
+    -------
+    dict
+        Columns carry their unit. Frequency, wavelength and growth are those before the first flange contact.
+    """
+    flange = first_flange_contact(run, body)
+    early = run.t <= (np.inf if np.isnan(flange) else flange)
+    y = run[body].y_m
+    frequency = hunting_frequency(run.t[early], y[early])
+    return {
+        "status": run.status,
+        "simulated_s": float(run.t[-1]),
+        "first_flange_contact_s": flange,
+        "frequency_Hz": frequency,
+        "wavelength_m": run.scene["speed"] / frequency,
+        "growth_per_s": growth_rate(run.t[early], y[early]),
+        "amplitude_second_half_m": amplitude(y[run.t >= 0.5 * run.t[-1]]),
+        "max_normal_force_N": max(float(np.max(_patches(run[f"{body}/{side}"].N_N))) for side in SIDES),
+    }
+
+
+def motion_table(cases, bound):
+    """One row per case and detection: how the wheelset moves, and how planar and spatial compare.
+
+    Parameters
+    ----------
+    cases : dict of str to dict of str to Run
+        Runs by case and by ``planar``, ``spatial`` and, where run, ``spatial_tight`` (tighter tolerances) and
+        ``spatial_mirrored`` (started on the other side of the track).
+    bound : float
+        Agreement in lateral position that the prediction horizon asks for, m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Frequency and growth up to the first flange contact; the difference between planar and spatial and the mirror
+        defect up to the prediction horizon (over the whole run where there is no twin).
+    """
+    horizon = horizons(cases, bound)
+    rows = []
+    for case, runs in cases.items():
+        until = horizon.get(case, np.inf)
+        rms, largest = difference(runs["planar"], runs["spatial"], until=until)
+        mirrored = runs.get("spatial_mirrored")
+        comparison = {
+            "prediction_horizon_s": horizon.get(case, np.nan),
+            "planar_spatial_rms_m": rms,
+            "planar_spatial_max_m": largest,
+            "mirror_defect_m": mirror_defect(runs["spatial"], mirrored, until) if mirrored else np.nan,
+        }
+        for detection in ("planar", "spatial"):
+            rows.append({"case": case, "detection": detection} | motion_row(runs[detection]) | comparison)
+    return pd.DataFrame(rows)
+
+
+def time_runs(cases, repetitions):
+    """Time planar and spatial runs of scenes, in turn.
+
+    Parameters
+    ----------
+    cases : dict of str to dict of str to Scene
+        Scenes by case and by ``planar`` and ``spatial``.
+    repetitions : int
+        Timed runs of each scene; one more before them warms up compiled kernels and caches.
+
+    Returns
+    -------
+    pandas.DataFrame
+        What `timing_table` takes.
+    """
+    rows = []
+    for case, scenes in cases.items():
+        for repetition in range(repetitions + 1):
+            for detection, scene in scenes.items():
+                run = simulate(scene)
+                counters = {name: run.counters[name] for name in ("wall_s", "rhs_evaluations", "steps", "rejected")}
+                row = {"case": case, "detection": detection, "repetition": repetition, "simulated_s": run.t[-1]}
+                rows.append(row | counters)
+    samples = pd.DataFrame(rows)
+    return samples[samples["repetition"] > 0].reset_index(drop=True)
+
+
+def geometry_table(scene, y):
+    """Rigid contact geometry of a scene's wheelset, see :func:`wrcore.contact.poses.geometry_table`.
+
+    Parameters
+    ----------
+    scene : Scene
+    y : sequence of float
+        Lateral positions of the wheelset, m.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    vehicle = scene.vehicle
+    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
+    return rigid_contact(geometry, y, scene.detection)
+
+
+def timing_table(samples):
+    """Cost per run and per right-hand-side call, and planar over spatial.
+
+    Parameters
+    ----------
+    samples : pandas.DataFrame
+        One row per timed run: case, detection, repetition, simulated_s, wall_s, rhs_evaluations, steps, rejected.
+        Planar and spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per case and detection with the median over the repetitions; the columns ``ratio_per_run`` and
+        ``ratio_per_call`` hold the median of the paired ratios planar / spatial and are equal in both rows.
+    """
+    samples = samples.assign(us_per_call=1e6 * samples["wall_s"] / samples["rhs_evaluations"])
+    columns = ["simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected", "us_per_call"]
+    table = samples.groupby(["case", "detection"], sort=False)[columns].median()
+    table.insert(0, "runs", samples.groupby(["case", "detection"]).size())
+    table["real_time_factor"] = table["simulated_s"] / table["wall_s"]
+    paired = samples.pivot(index=["case", "repetition"], columns="detection", values=["wall_s", "us_per_call"])
+    for name, column in (("ratio_per_run", "wall_s"), ("ratio_per_call", "us_per_call")):
+        ratio = (paired[column]["planar"] / paired[column]["spatial"]).groupby("case").median()
+        table[name] = ratio.reindex(table.index.get_level_values("case")).to_numpy()
+    return table.reset_index()
+
+
+def comparison_table(reference, ours):
+    """Reference values beside ours.
+
+    Parameters
+    ----------
+    reference : pandas.DataFrame
+        Columns quantity, unit, value, tolerance (absolute, empty where a value is only shown), source.
+    ours : dict of str to float
+        Our value by quantity.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The reference with the columns ours and within (yes, no, or empty without a tolerance or a value of ours).
+    """
+    table = reference.copy()
+    table.insert(3, "ours", [ours.get(quantity, np.nan) for quantity in table["quantity"]])
+    gap = (table["ours"] - table["value"]).abs()
+    verdict = np.where(gap <= table["tolerance"], "yes", "no")
+    table["within"] = np.where(gap.isna() | table["tolerance"].isna(), "", verdict)
+    return table
+
+
+def our_values(geometry, motion, timing, case):
+    """Our side of the comparison with published values.
+
+    Parameters
+    ----------
+    geometry, motion, timing : pandas.DataFrame
+        Contact geometry over the lateral position, `motion_table` and `timing_table`.
+    case : str
+        Case that is compared: the paper's.
+
+    Returns
+    -------
+    dict of str to float
+        By the quantity's name in the reference table.
+    """
+    run = motion[(motion["case"] == case) & (motion["detection"] == "spatial")].iloc[0]
+    cost = timing[timing["case"] == case].iloc[0]
+    values = {
+        "time planar / spatial": cost["ratio_per_run"],
+        "hunting frequency": run["frequency_Hz"],
+        "growth rate": run["growth_per_s"],
+        "first flange contact": run["first_flange_contact_s"],
+    }
+    for row in geometry.itertuples():
+        values[f"wheelset lowering at y = {1e3 * row.y_m:g} mm"] = row.lowering_m
+        values[f"rolling radius difference at y = {1e3 * row.y_m:g} mm"] = row.radius_difference_m
+    return values

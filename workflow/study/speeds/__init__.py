@@ -1,0 +1,1 @@
+"""Wheelset and trailer vehicle over speed, planar and spatial."""

@@ -1,0 +1,112 @@
+"""Vehicles over speed: a row for each run, and what the runs cost."""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.wheels import hunting, wheel_table, wheelsets_of
+from wrcore.run.motion import amplitude
+
+
+def speed_row(run, begin=0.5, body="car_body"):
+    """What one run of a sweep over speeds shows.
+
+    Parameters
+    ----------
+    run : Run
+        Output channels pose, contact and, for accelerations, acceleration.
+    begin : float
+        Part of the run after which forces, amplitude and ride count.
+    body : str
+        Body whose accelerations are given; left out where the vehicle has none of this name.
+
+    Returns
+    -------
+    dict
+        Columns carry their unit. Hunting is that of the leading wheelset over the whole run.
+    """
+    leading = wheelsets_of(run)[0]
+    start = begin * run.scene["integration"]["duration"]
+    late = run.t >= min(start, run.t[-1])
+    y = run[leading].y_m
+    frequency, growth, damping = hunting(run.t, y)
+    wheels = wheel_table(run, min(start, run.t[-1]))
+    row = {
+        "speed_m_per_s": run.scene["speed"],
+        "status": run.status,
+        "simulated_s": float(run.t[-1]),
+        "amplitude_m": amplitude(y[late]),
+        "frequency_Hz": frequency,
+        "growth_per_s": growth,
+        "damping_ratio": damping,
+        "Q_min_N": wheels["Q_min_N"].min(),
+        "Q_max_N": wheels["Q_max_N"].max(),
+        "Y_max_N": wheels["Y_max_N"].max(),
+        "Y_over_Q_max": wheels["Y_over_Q_max"].max(),
+        "wear_number_mean_N": wheels["wear_number_mean_N"].mean(),
+    }
+    for axis in "yz":
+        channel = run.groups.get(body, {}).get(f"a{axis}_m_per_s2")
+        row[f"car_body_a{axis}_rms_m_per_s2"] = np.nan if channel is None else np.sqrt(np.mean(channel[late] ** 2))
+        row[f"car_body_a{axis}_max_m_per_s2"] = np.nan if channel is None else np.max(np.abs(channel[late]))
+    counters = {name: run.counters[name] for name in ("wall_s", "rhs_evaluations", "steps", "rejected")}
+    return row | counters
+
+
+def speed_table(runs):
+    """Rows of :func:`speed_row` for runs given as ``{(detection, track): [run, ...]}``, detection and track in front.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    return pd.DataFrame(
+        [
+            {"detection": detection, "track": track} | speed_row(run)
+            for (detection, track), group in runs.items()
+            for run in group
+        ]
+    )
+
+
+def cost_table(tables, job_seconds):
+    """Cost of sweeps over speed, planar against spatial, and what of each job is not integration.
+
+    Parameters
+    ----------
+    tables : dict of str to pandas.DataFrame
+        By vehicle, from :func:`speed_table`.
+    job_seconds : dict of str to float
+        Each vehicle's whole job, from the start of its process to its end, s.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per vehicle, track and detection.
+    """
+    rows = []
+    for vehicle, table in tables.items():
+        work = table["wall_s"].sum()
+        for (track, detection), part in table.groupby(["track", "detection"], sort=False):
+            planar = table[(table["track"] == track) & (table["detection"] == "planar")]
+            calls = part["rhs_evaluations"].sum()
+            us_per_call = 1e6 * part["wall_s"].sum() / calls
+            rows.append(
+                {
+                    "vehicle": vehicle,
+                    "track": track,
+                    "detection": detection,
+                    "runs": len(part),
+                    "simulated_s": part["simulated_s"].sum(),
+                    "wall_s": part["wall_s"].sum(),
+                    "real_time_factor": part["simulated_s"].sum() / part["wall_s"].sum(),
+                    "rhs_evaluations": calls,
+                    "us_per_call": us_per_call,
+                    "planar_over_this_per_call": 1e6
+                    * planar["wall_s"].sum()
+                    / planar["rhs_evaluations"].sum()
+                    / us_per_call,
+                    "job_s": job_seconds[vehicle],
+                    "job_overhead": 1.0 - work / job_seconds[vehicle],
+                }
+            )
+    return pd.DataFrame(rows)

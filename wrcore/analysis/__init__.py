@@ -1,0 +1,1 @@
+"""What anybody asks of their own runs and scenes: motion, wheel forces, modes, critical speeds, contact, plots."""

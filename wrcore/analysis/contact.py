@@ -1,0 +1,57 @@
+"""Contact of a wheelset over its lateral position and yaw, without load: points, angles, radii, conicity."""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.poses import solve_poses
+from wrcore.geometry.track import Track
+
+
+def pair_geometry(pair):
+    """The same pair, compiled for the contact search.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+        With equal sides.
+
+    Returns
+    -------
+    ContactGeometry
+    """
+    one = pair.left
+    return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
+
+
+def contact_table(pair, shifts, yaws=0.0, wheel_load=1e-3, detection="spatial", patch="moment"):
+    """Contact of a wheelset over its lateral position and yaw: all patches of both wheels at a load per wheel.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+        With equal sides.
+    shifts, yaws : array_like
+        Lateral positions (m) and yaw angles (rad) of the wheelset; all combinations.
+    wheel_load : float
+        Vertical load of each wheel, N; the default is a wheelset that just touches.
+    detection : {"planar", "spatial"}
+    patch : {"moment", "maximum"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        y_m, yaw_rad and the columns of :func:`wrcore.contact.poses.solve_poses`, a row per patch.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> wr.contact_table(pair, [0.0, 0.002], wheel_load=5e4)[["y_m", "side", "patch"]].values.tolist()
+    [[0.0, 'left', 1], [0.0, 'right', 1], [0.002, 'left', 1], [0.002, 'right', 1]]
+    """
+    yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
+    poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
+    patches = solve_poses(poses, pair_geometry(pair), wheel_load, detection, patch)
+    placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
+    return placed.rename(columns={"y_m_contact": "y_contact_m"}).drop(columns="pose_id")

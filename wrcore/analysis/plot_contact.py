@@ -1,0 +1,85 @@
+"""Picture of a pair of profiles: where wheel and rail touch as the wheelset moves sideways."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.contact.first_touch import first_touch
+from wrcore.geometry.surface import SIDES
+
+LIFT = 0.020
+"""Height by which the wheel is drawn above the rail, m."""
+
+
+_LABEL_WIDTH = 3.5  # mm
+
+
+@styled
+def fig_contact_location(pair, table):
+    """Contact points on wheel and rail, joined by a line for each lateral shift of the wheelset.
+
+    Seen from behind: the left side stands on the left. The wheels are drawn at y = 0, lifted by `LIFT`.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+    table : pandas.DataFrame
+        From `first_touch`, one row per line; whole millimetres of shift are labelled where there is room.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(7.2, 3.2), layout="constrained")
+    for axes, side in zip(figure.subplots(1, 2), SIDES, strict=True):
+        _location(axes, pair, table, side)
+        axes.set_title(f"{side}, {getattr(pair, side).wheel.name} on {getattr(pair, side).rail.name}", fontsize=9)
+    return figure
+
+
+def _location(axes, pair, table, side):
+    sign, one = SIDES[side], getattr(pair, side)
+    from_wheel, from_rail = pair.half_distance, pair.rail_distance(one)
+    for curve, origin, lift, style in (
+        (one.wheel, from_wheel, LIFT, {"color": WHEEL, "label": "wheel"}),
+        (one.rail, from_rail, 0.0, {"color": RAIL, "label": "rail"}),
+    ):
+        axes.plot(sign * MM * (origin + curve.u), MM * (lift + curve.f), linewidth=1.6, **style)
+    u_wheel, u_rail = table[f"u_wheel_{side}_m"].to_numpy(), table[f"u_rail_{side}_m"].to_numpy()
+    y = sign * MM * np.array([from_wheel + u_wheel, from_rail + u_rail])
+    z = MM * np.array([LIFT + one.wheel(u_wheel), one.rail(u_rail)])
+    axes.plot(y, z, color=ACCENT, linewidth=0.6)
+    _label_shifts(axes, MM * table.y_m.to_numpy(), y[0], z[0])
+    inner, outer = np.nanmin(np.abs(y)) - 12.0, np.nanmax(np.abs(y)) + 12.0
+    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", ylim=(-20, MM * LIFT + 14))
+    axes.set_xlim((outer, inner) if side == "left" else (-inner, -outer))
+    axes.legend(fontsize=7, loc="lower left" if side == "left" else "lower right")
+
+
+def _label_shifts(axes, shifts, across, height):
+    """Write whole millimetres of shift above the wheel, small shifts first; leave out what would overlap."""
+    written = []
+    for k in np.argsort(np.abs(shifts)):
+        whole = abs(shifts[k] - round(shifts[k])) < 1e-6 and np.isfinite(across[k])
+        if whole and all(abs(across[k] - other) > _LABEL_WIDTH for other in written):
+            text = f"{shifts[k]:.0f}".replace("-", "\N{MINUS SIGN}")
+            at = {"textcoords": "offset points", "fontsize": 6, "ha": "center", "clip_on": True}
+            axes.annotate(text, (across[k], height[k]), (0, 3), **at)
+            written.append(across[k])
+
+
+def plot_pair(pair, shifts=None):
+    """Draw a pair of profiles with its contact points as the wheelset moves sideways.
+
+    Parameters
+    ----------
+    pair : WheelsetOnTrack
+    shifts : array_like, shape (n,), optional
+        Lateral positions, m; left out: -6 to 6 mm.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    shifts = 1e-3 * np.arange(-6, 7) if shifts is None else shifts
+    return fig_contact_location(pair, first_touch(pair, shifts))

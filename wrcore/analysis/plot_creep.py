@@ -1,0 +1,53 @@
+"""Picture of creep laws: force over creepage."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wrcore.analysis.style import styled
+from wrcore.creep.cases import creep_force
+
+LOOKS = ("-", (0, (4, 2)), (0, (1, 1)), "-.", (0, (6, 1, 1, 1)), (0, (2, 2)))
+"""One line per law: told apart in grey too."""
+
+
+@styled
+def plot_creep_force(models=("linear", "polach", "fastsim", "table"), a=5e-3, b=5e-3, normal_force=5e4, mu=0.3,
+                     spin=0.5, largest=8e-3):  # fmt: skip
+    """Draw creep laws for one elliptic patch: longitudinal force over xi without spin, lateral force over eta with it.
+
+    Parameters
+    ----------
+    models : str or sequence of str
+        As for :func:`wrcore.creep_force`.
+    a, b : float
+        Semi-axes along and across rolling, m.
+    normal_force : float
+        N.
+    mu : float
+        Friction coefficient.
+    spin : float
+        1/m, in the right panel.
+    largest : float
+        Largest creepage drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    models = [models] if isinstance(models, str) else list(models)
+    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    creepage = np.linspace(0.0, largest, 81)
+    for model, look in zip(models, LOOKS * len(models), strict=False):
+        fx, _, _ = creep_force(model, a, b, normal_force, creepage, 0.0, 0.0, mu)
+        _, fy, _ = creep_force(model, a, b, normal_force, 0.0, creepage, spin, mu)
+        left.plot(1e3 * creepage, -1e-3 * fx, linestyle=look, label=model)
+        right.plot(1e3 * creepage, -1e-3 * fy, linestyle=look)
+    left.set(xlabel="longitudinal creepage xi / 0.1 %", ylabel="force against the creepage / kN")
+    right.set(xlabel=f"lateral creepage eta / 0.1 %, spin {spin:g} 1/m")
+    limit = 1e-3 * mu * normal_force
+    for axes in (left, right):
+        axes.axhline(limit, color="0.6", linewidth=0.8)
+        axes.set_ylim(-0.15 * limit, 1.15 * limit)
+    left.legend()
+    return figure

@@ -1,0 +1,1 @@
+"""Time integration: steppers, their tableaus, Jacobian and block elimination, reference integrators."""

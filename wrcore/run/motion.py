@@ -1,0 +1,70 @@
+"""What a sampled motion shows by itself: zero crossings, frequency, amplitude, growth."""
+
+import numpy as np
+
+
+def zero_crossings(t, y):
+    """Times at which a sampled motion passes through zero, by linear interpolation.
+
+    Parameters
+    ----------
+    t, y : array_like, shape (n,)
+        Times (s) and motion (any unit).
+
+    Returns
+    -------
+    ndarray
+        Times in order, s.
+    """
+    t, y = np.asarray(t), np.asarray(y)
+    before = _sign_changes(y)
+    return t[before] - y[before] * (t[before + 1] - t[before]) / (y[before + 1] - y[before])
+
+
+def _sign_changes(y):
+    """Indices of the samples just before a change of sign."""
+    return np.flatnonzero((y[:-1] < 0) != (y[1:] < 0))
+
+
+def hunting_frequency(t, y):
+    """Frequency of a lateral motion about the track's centre, from its zero crossings.
+
+    Parameters
+    ----------
+    t, y : array_like, shape (n,)
+        Times (s) and lateral positions (m).
+
+    Returns
+    -------
+    float
+        Frequency, Hz; NaN with fewer than three crossings.
+    """
+    when = zero_crossings(t, y)
+    return 0.5 * (when.size - 1) / (when[-1] - when[0]) if when.size > 2 else np.nan
+
+
+def amplitude(y):
+    """Half of the peak-to-peak value of a motion, in its unit."""
+    return 0.5 * float(np.ptp(y)) if np.size(y) else np.nan
+
+
+def growth_rate(t, y):
+    """Exponential growth of an oscillation: slope of the logarithm of its extrema over time.
+
+    Parameters
+    ----------
+    t, y : array_like, shape (n,)
+        Times (s) and motion.
+
+    Returns
+    -------
+    float
+        Rate, 1/s, positive if the motion grows; NaN with fewer than two extrema between zero crossings.
+    """
+    t, y = np.asarray(t), np.asarray(y)
+    edges = _sign_changes(y) + 1
+    tops = [start + int(np.argmax(np.abs(y[start:end]))) for start, end in zip(edges[:-1], edges[1:], strict=True)]
+    tops = [top for top in tops if y[top] != 0.0]
+    if len(tops) < 2:
+        return np.nan
+    return float(np.polyfit(t[tops], np.log(np.abs(y[tops])), 1)[0])

@@ -1,0 +1,1 @@
+"""What a person writes about a scene, checked and filled in, and the compiled model it stands for."""

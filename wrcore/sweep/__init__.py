@@ -1,0 +1,1 @@
+"""Many runs of one scene: the plan, its batches, what is kept of each run."""
