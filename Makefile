@@ -1,4 +1,4 @@
-# make study    set up .venv, run the whole study: results/figures, results/tables, results/report.zip
+# make study    set up .venv, run the whole study: results/<question>, results/report.zip
 # make test     set up .venv, run the smoke workflow and all tests
 # make smoke    the reduced study alone: results/smoke
 # make report   the study's report anew: results/report.zip

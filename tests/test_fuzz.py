@@ -53,7 +53,7 @@ def test_scenes(folder, data):
 def within_schema():
     """Values between the bounds that the schema allows, and at them."""
     found = {"vehicle.axle_boxes": st.booleans(), "rail.inclination": st.sampled_from([0, 0.2, -0.2, "1/20"])}
-    schema = yaml.safe_load((ROOT / "wrcore" / "schemas" / "scene.yaml").read_text())
+    schema = yaml.safe_load((ROOT / "wrcore" / "scene" / "schemas" / "scene.yaml").read_text())
 
     def collect(path, part):
         for key, inner in part.get("properties", {}).items():

@@ -35,6 +35,6 @@ def test_a_sweep_runs_as_slurm_jobs_and_gives_the_same_table(node, tmp_path):
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     jobs = subprocess.run(["squeue", "-h", "-t", "all", "-o", "%T"], env=node, capture_output=True, text=True)
     assert jobs.stdout.split() == ["COMPLETED"] * 3  # two batches and their table
-    table = load_table(tmp_path / "results" / "tables" / "sweeps" / "smoke.csv")
+    table = load_table(tmp_path / "results" / "sweeps" / "smoke.csv")
     alone = run_sweep(ROOT / "config" / "sweeps" / "smoke.yaml")
     pd.testing.assert_frame_equal(table, alone, check_dtype=False)

@@ -47,10 +47,16 @@ def test_nothing_is_left_to_do_after_the_smoke_run(smoke):
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
+def found(folder, name):
+    """The one file of a name among the results of all questions."""
+    (path,) = folder.glob(f"*/{name}")
+    return path
+
+
 @pytest.mark.parametrize("name", FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)
 def test_every_figure_is_there_as_png_and_svg(smoke, name):
-    assert (smoke / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    assert "<svg" in (smoke / "figures" / f"{name}.svg").read_text()[:2000]
+    assert found(smoke, f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in found(smoke, f"{name}.svg").read_text()[:2000]
 
 
 def test_smoke_runs_every_rule_of_the_study(smoke):
@@ -69,21 +75,25 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
     ("change", "again", "kept"),
     [
         (
-            {"cases": {"suspended_v60": {"set": {"integration.duration": 0.6}}}},
+            {"paper": {"cases": {"suspended_v60": {"set": {"integration.duration": 0.6}}}}},
             "suspended_v60: planar and spatial run",
             "wheelset_v20: planar and spatial run",
         ),
         (
-            {"twins": {"rtol": 2.0e-8}},
+            {"paper": {"twins": {"rtol": 2.0e-8}}},
             "wheelset_v20: tighter and mirrored twin",
             "wheelset_v20: planar and spatial run",
         ),
-        ({"timing": {"repetitions": 3}}, "Timing: planar and spatial runs", "wheelset_v20: planar and spatial run"),
-        ({"creep_table": {"tolerance": 0.04}}, "Creep table", "Contact geometry without load"),
-        ({"creep_study": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
-        ({"contact_study": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
-        ({"ivp_wheelset": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
-        ({"figures": {"detection_pose": {"y": 0.006}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
+        (
+            {"paper": {"timing": {"repetitions": 3}}},
+            "Timing: planar and spatial runs",
+            "wheelset_v20: planar and spatial run",
+        ),
+        ({"creep": {"table": {"tolerance": 0.04}}}, "Creep table", "Contact geometry without load"),
+        ({"creep": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
+        ({"contact": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
+        ({"ivp": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
+        ({"paper": {"figures": {"detection_pose": {"y": 0.006}}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
     ],
 )
 def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, change, again, kept):
@@ -95,7 +105,7 @@ def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, change, 
 
 
 def test_runs_carry_their_scene_and_no_machine_path(smoke):
-    for path in sorted((smoke / "runs").glob("*/*.h5")):
+    for path in sorted((smoke / "paper" / "runs").glob("*/*.h5")):
         run = load_run(path)
         assert run.status == "completed"
         assert run.scene["contact"]["detection"] == ("planar" if path.stem == "planar" else "spatial")
@@ -104,20 +114,20 @@ def test_runs_carry_their_scene_and_no_machine_path(smoke):
 
 
 def test_timing_table_has_both_detections_and_their_ratio(smoke):
-    table = pd.read_csv(smoke / "tables" / "timing.csv")
+    table = pd.read_csv(smoke / "paper" / "timing.csv")
     assert table["detection"].tolist() == ["planar", "spatial"]
     assert (table[["wall_s", "rhs_evaluations", "us_per_call", "ratio_per_run", "ratio_per_call"]] > 0).all(axis=None)
 
 
 def test_comparison_is_within_every_tolerance(smoke):
-    table = pd.read_csv(smoke / "tables" / "comparison.csv", keep_default_na=False)
+    table = pd.read_csv(smoke / "paper" / "comparison.csv", keep_default_na=False)
     assert "no" not in table["within"].tolist(), table.to_string()
     assert "yes" in table["within"].tolist()
 
 
 def test_creep_laws_are_compared_in_all_files_against_both_references(smoke):
-    table = pd.read_csv(smoke / "tables" / "creep_laws.csv")
-    settings = yaml.safe_load((ROOT / "config/smoke.yaml").read_text())["creep_study"]
+    table = pd.read_csv(smoke / "creep" / "creep_laws.csv")
+    settings = yaml.safe_load((ROOT / "config/smoke.yaml").read_text())["creep"]
     assert {row["name"] for row in settings["tables"]} < set(table["model"])
     assert (table.groupby(["cases", "against"])["model"].nunique() >= 4 + len(settings["tables"])).all()
     assert len(table.groupby(["cases", "against"])) == 6
@@ -125,36 +135,36 @@ def test_creep_laws_are_compared_in_all_files_against_both_references(smoke):
 
 
 def test_contact_search_of_the_study_finds_everything(smoke):
-    table = pd.read_csv(smoke / "tables" / "contact" / "search.csv")
+    table = pd.read_csv(smoke / "contact" / "search.csv")
     assert len(table) == 4 and (table.wheels_searched > 0).all()
     assert (table[["bad", "missed", "invented", "split"]] == 0).all(axis=None), table.to_string()
 
 
 def test_reductions_of_the_study_are_compared_in_all_cases(smoke):
-    table = pd.read_csv(smoke / "tables" / "contact" / "reductions.csv")
+    table = pd.read_csv(smoke / "contact" / "reductions.csv")
     assert dict(table.groupby("set").cases.first()) == {"A22": 20, "light100N": 44, "light1N": 44, "load10kN": 44}
     assert set(table.reduction) == {"maximum", "moment"}
 
 
 def test_benchmark_of_the_study_meets_its_bar(smoke):
-    table = pd.read_csv(smoke / "tables" / "ivp_work_precision.csv")
-    bar = yaml.safe_load((ROOT / "config/study.yaml").read_text())["ivp_wheelset"]["bar"]
+    table = pd.read_csv(smoke / "ivp" / "ivp_work_precision.csv")
+    bar = yaml.safe_load((ROOT / "config/study.yaml").read_text())["ivp"]["bar"]
     assert bar == 1e-6 and (table.status == "completed").all()
     assert (table.error_x_m[table.rtol <= 1e-6] < bar).all(), table.to_string()
-    assert len(pd.read_csv(smoke / "tables" / "ivp_values.csv")) == 17
+    assert len(pd.read_csv(smoke / "ivp" / "ivp_values.csv")) == 17
 
 
 def test_no_hard_case_of_the_study_fails_without_a_known_limit(smoke):
-    table = pd.read_csv(smoke / "tables" / "stability.csv")
+    table = pd.read_csv(smoke / "hard_cases" / "all.csv")
     assert {"survived", "refused"} == set(table["outcome"])
     assert len(unexplained(table)) == 0, unexplained(table).to_string()
     assert set(table["family"]) >= {"low speed", "contact jumps", "lift-off", "flange", "profiles", "friction", "track"}
 
 
 def test_sweep_of_the_study_has_all_its_runs(smoke):
-    table = pd.read_csv(smoke / "tables" / "sweeps" / "smoke.csv")
+    table = pd.read_csv(smoke / "sweeps" / "smoke.csv")
     assert table["run"].tolist() == list(range(24)) and set(table["status"]) == {"completed"}
-    assert (smoke / "figures" / "sweep_smoke.svg").is_file()
+    assert (smoke / "sweeps" / "sweep_smoke.svg").is_file()
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (ROOT / "notebooks").glob("*.ipynb")))
@@ -176,16 +186,19 @@ def test_report_holds_the_figures(smoke):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"timing": {"repetitions": "five"}}, "timing.repetitions: 'five' is not of type 'integer'"),
-        ({"timing": {"repetition": 5}}, "'repetition' was unexpected"),
-        ({"creep_study": {"shown": "absent"}}, "creep_study.shown: expected a name under tables, got 'absent'"),
-        ({"timing": {"cases": ["absent"]}}, "timing.cases: expected a name under cases, got 'absent'"),
-        ({"twins": {"rtol": "1e-9"}}, "twins.rtol: '1e-9' is not of type 'number'"),
+        ({"paper": {"timing": {"repetitions": "five"}}}, "paper.timing.repetitions: 'five' is not of type 'integer'"),
+        ({"paper": {"timing": {"repetition": 5}}}, "'repetition' was unexpected"),
+        ({"creep": {"shown": "absent"}}, "creep.shown: expected a name under tables, got 'absent'"),
         (
-            {"cases": {"wheelset_v20": {"scene": "absent.yaml"}}},
-            "cases.wheelset_v20: absent.yaml: expected a readable file",
+            {"paper": {"timing": {"cases": ["absent"]}}},
+            "paper.timing.cases: expected a name under paper.cases, got 'absent'",
         ),
-        ({"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}, "wheelset.yaml: sped: unknown key"),
+        ({"paper": {"twins": {"rtol": "1e-9"}}}, "paper.twins.rtol: '1e-9' is not of type 'number'"),
+        (
+            {"paper": {"cases": {"wheelset_v20": {"scene": "absent.yaml"}}}},
+            "paper.cases.wheelset_v20: absent.yaml: expected a readable file",
+        ),
+        ({"paper": {"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}}, "wheelset.yaml: sped: unknown key"),
     ],
 )
 def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):

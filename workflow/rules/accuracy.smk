@@ -1,6 +1,6 @@
 # Speed against error: every combination of model and integrator on a few scenes, one job per scene.
 
-ACCURACY = config["accuracy_study"]
+ACCURACY = config["accuracy"]
 ACCURACY_SCENES = list(ACCURACY["scenes"])
 
 
@@ -33,11 +33,11 @@ rule accuracy_tables:
     log:
         "<logs>/accuracy_tables.log",
     params:
-        nu=config["creep_table"]["nu"],
+        nu=config["creep"]["table"]["nu"],
         creeps=ACCURACY["grids"]["models"]["creep"],
     threads: workflow.cores
     script:
-        "../scripts/accuracy_tables.py"
+        "../scripts/accuracy/accuracy_tables.py"
 
 
 rule accuracy_study:
@@ -60,7 +60,7 @@ rule accuracy_study:
     # all cores: nothing else may run beside what is timed
     threads: workflow.cores
     script:
-        "../scripts/accuracy_study.py"
+        "../scripts/accuracy/accuracy_study.py"
 
 
 rule speed_against_error:
@@ -72,19 +72,19 @@ rule speed_against_error:
         references=expand(rules.accuracy_study.output.reference, measured=ACCURACY_SCENES),
     output:
         report(
-            "<results>/figures/speed_against_error.png",
-            caption="../report/speed_against_error.rst",
+            "<results>/accuracy/speed_against_error.png",
+            caption="../report/accuracy/speed_against_error.rst",
             category="07 Speed against error",
             labels={"figure": "speed against error"},
         ),
-        "<results>/figures/speed_against_error.svg",
+        "<results>/accuracy/speed_against_error.svg",
         report(
-            "<results>/tables/choose_for_accuracy.csv",
-            caption="../report/choose_for_accuracy.rst",
+            "<results>/accuracy/choose_for_accuracy.csv",
+            caption="../report/accuracy/choose_for_accuracy.rst",
             category="07 Speed against error",
             labels={"table": "choose this for that accuracy"},
         ),
-        "<results>/tables/accuracy_front.csv",
+        "<results>/accuracy/accuracy_front.csv",
     log:
         "<logs>/speed_against_error.log",
     params:
@@ -92,4 +92,4 @@ rule speed_against_error:
         finest=ACCURACY["reference"]["creep"],
         accuracies=ACCURACY["accuracies"],
     script:
-        "../scripts/speed_against_error.py"
+        "../scripts/accuracy/speed_against_error.py"

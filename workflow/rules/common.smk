@@ -20,35 +20,35 @@ def check_config():
         meaning = error.schema.get("description", "see workflow/schemas/config.schema.yaml")
         raise WorkflowError(f"configuration: {key}: {error.message} ({meaning})")
     chosen = {
-        "timing.cases": config["timing"]["cases"],
-        "comparison.case": [config["comparison"]["case"]],
-        "figures.contact_points": [config["figures"]["contact_points"]],
+        "paper.timing.cases": config["paper"]["timing"]["cases"],
+        "paper.comparison.case": [config["paper"]["comparison"]["case"]],
+        "paper.figures.contact_points": [config["paper"]["figures"]["contact_points"]],
     }
     for key, names in chosen.items():
-        for name in set(names) - set(config["cases"]):
-            raise WorkflowError(f"configuration: {key}: expected a name under cases, got {name!r}")
-    if config["comparison"]["case"] not in config["timing"]["cases"]:
-        raise WorkflowError("configuration: comparison.case: expected one of timing.cases")
+        for name in set(names) - set(config["paper"]["cases"]):
+            raise WorkflowError(f"configuration: {key}: expected a name under paper.cases, got {name!r}")
+    if config["paper"]["comparison"]["case"] not in config["paper"]["timing"]["cases"]:
+        raise WorkflowError("configuration: paper.comparison.case: expected one of paper.timing.cases")
     speeds = config["speeds"]
     for key in ("released", "disturbed"):
         if speeds[key] not in speeds["tracks"]:
             raise WorkflowError(f"configuration: speeds.{key}: expected a name under speeds.tracks, got {speeds[key]!r}")
     if not set(speeds["shown"]) <= set(speeds["values"]):
         raise WorkflowError("configuration: speeds.shown: expected some of speeds.values")
-    creep = config["creep_study"]
+    creep = config["creep"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
-        raise WorkflowError(f"configuration: creep_study.shown: expected a name under tables, got {creep['shown']!r}")
-    scenes = {f"cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["cases"].items()}
-    for name, entry in config["accuracy_study"]["scenes"].items():
-        scenes[f"accuracy_study.scenes.{name}"] = (entry["scene"], entry["set"])
+        raise WorkflowError(f"configuration: creep.shown: expected a name under tables, got {creep['shown']!r}")
+    scenes = {f"paper.cases.{case}": (entry["scene"], entry["set"]) for case, entry in config["paper"]["cases"].items()}
+    for name, entry in config["accuracy"]["scenes"].items():
+        scenes[f"accuracy.scenes.{name}"] = (entry["scene"], entry["set"])
     for vehicle, entry in config["speeds"]["vehicles"].items():
         for track, there in config["speeds"]["tracks"].items():
             scenes[f"speeds.vehicles.{vehicle} on speeds.tracks.{track}"] = (entry["scene"], entry["set"] | there)
-    for name, entry in config["cost_study"]["scenes"].items():
-        scenes[f"cost_study.scenes.{name}"] = (entry["scene"], entry["set"])
-    for name, entry in config["stability_study"]["vehicles"].items():
-        scenes[f"stability_study.vehicles.{name}"] = (entry["scene"], entry["set"])
-    scenes["contact_geometry"] = (config["contact_geometry"]["scene"], {})
+    for name, entry in config["cost"]["scenes"].items():
+        scenes[f"cost.scenes.{name}"] = (entry["scene"], entry["set"])
+    for name, entry in config["hard_cases"]["vehicles"].items():
+        scenes[f"hard_cases.vehicles.{name}"] = (entry["scene"], entry["set"])
+    scenes["paper.geometry"] = (config["paper"]["geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
             scenes[f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"] = (entry["scene"], changes)
@@ -61,8 +61,8 @@ def check_config():
 
 check_config()
 
-CASES = list(config["cases"])
-WITH_TWINS = [case for case in CASES if config["cases"][case]["twins"]]
+CASES = list(config["paper"]["cases"])
+WITH_TWINS = [case for case in CASES if config["paper"]["cases"][case]["twins"]]
 
 
 wildcard_constraints:
@@ -70,37 +70,43 @@ wildcard_constraints:
 
 
 def sources(*rooms):
-    """Files of wrcore's rooms. A rule lists them as inputs, else an edit there would go unnoticed."""
-    files = ["wrcore/__init__.py", "wrcore/_jit.py", "wrcore/errors.py"]
+    """Files of rooms (``dynamics``, ``study/contact``) or of single modules (``analysis/motion``).
+
+    A rule lists them as inputs, else an edit there would go unnoticed.
+    """
+    files = ["wrcore/__init__.py", *map(str, sorted(Path("wrcore/errors").glob("*.py")))]
     for room in rooms:
-        files += sorted(str(p) for p in Path("wrcore").glob(f"{room}/*") if p.is_file()) or [f"wrcore/{room}.py"]
+        place = Path("workflow" if room.startswith("study/") else "wrcore") / room
+        inside = [p for p in place.rglob("*") if p.suffix in (".py", ".yaml", ".csv")]
+        files += sorted(map(str, inside)) or [f"{place}.py"]
     return files
 
 
-SCENE = ("vehicle", "schemas", "checked_yaml", "initial", "scene")
-RUN = ("course", "validity", "simulate", "run", "channels", "checkpoints", "results")
+CONTACT = ("kernels", "geometry", "contact")
+SCENE = ("vehicle", "scene")
+RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
+VEHICLE = ("analysis/motion", "analysis/wheels")
+STYLE = "analysis/style"
 CORE = {
-    "creep": sources("creep"),
-    "creep_study": sources("creep", "analysis_creep"),
-    "creep_figures": sources("creep", "analysis_creep", "analysis_creep_table", "figures", "figures_creep"),
-    "geometry": sources("geometry", "contact", *SCENE),
-    "contact_search": sources("geometry", "contact", "analysis_contact", "analysis_contact_search"),
-    "contact_figures": sources(
-        "geometry", "contact", "analysis_contact", "analysis_contact_reference", "figures", "figures_contact"
-    ),
-    "simulation": sources("geometry", "contact", "creep", "dynamics", *SCENE, *RUN),
-    "vehicle": sources("analysis", "analysis_vehicle", "sweep", *RUN),
-    "vehicle_figures": sources(*RUN, "analysis", "analysis_vehicle", "figures", "figures_vehicle"),
-    "accuracy": sources("analysis", "analysis_vehicle", "analysis_accuracy"),
-    "accuracy_figures": sources("analysis", "analysis_vehicle", "analysis_accuracy", "figures", "figures_accuracy"),
-    "analysis": sources(*RUN, "analysis"),
-    "figures": sources("geometry", "contact", *SCENE, *RUN, "analysis", "figures"),
+    "creep": sources("kernels", "creep"),
+    "creep_study": sources("kernels", "creep", "study/creep/laws"),
+    "creep_figures": sources("kernels", "creep", "study/creep", STYLE),
+    "geometry": sources(*CONTACT, *SCENE, "study/paper/tables"),
+    "contact_search": sources(*CONTACT, "analysis/contact", "study/contact/tables", "study/contact/search"),
+    "contact_figures": sources(*CONTACT, "analysis/contact", "analysis/plot_contact", STYLE, "study/contact"),
+    "simulation": sources(*RUN),
+    "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
+    "vehicle_figures": sources("run", *VEHICLE, STYLE, "study/speeds"),
+    "accuracy": sources(*VEHICLE, "study/accuracy/errors"),
+    "accuracy_figures": sources("run/accuracy", *VEHICLE, STYLE, "study/accuracy"),
+    "paper": sources("run", "analysis/motion", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", STYLE, "study/paper"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 
 
 def case_scene(wildcards):
-    return config["cases"][wildcards.case]["scene"]
+    return config["paper"]["cases"][wildcards.case]["scene"]
 
 
 def changes(entries):
@@ -109,7 +115,7 @@ def changes(entries):
 
 
 def overrides(case):
-    return changes(config["cases"][case]["set"])
+    return changes(config["paper"]["cases"][case]["set"])
 
 
 # Functions of the wildcards only: Snakemake does not compare params that depend on inputs with those of the last run.

@@ -1,7 +1,7 @@
 # Contact geometry: pairs of profiles, planar against spatial detection, reductions against CONTACT, the search's bar.
 # CONTACT's cases are read where the tests keep them: one copy, whose provenance stands in its first lines.
 
-CONTACT = config["contact_study"]
+CONTACT = config["contact"]
 CONTACT_PAIR = list(CONTACT["pairs"].values())[0]
 CONTACT_PAIR_FIGURES = ["location", "radius_difference", "angle", "conicity", "location_with_yaw"]
 
@@ -12,40 +12,40 @@ rule contact_pairs:
     input:
         core=CORE["contact_figures"],
     output:
-        touch="<results>/tables/contact/touch.csv",
-        conicity="<results>/tables/contact/conicity.csv",
-        yaw="<results>/tables/contact/location_with_yaw.csv",
+        touch="<results>/contact/touch.csv",
+        conicity="<results>/contact/conicity.csv",
+        yaw="<results>/contact/location_with_yaw.csv",
         location=report(
-            "<results>/figures/contact_location.png",
-            caption="../report/contact_location.rst",
+            "<results>/contact/contact_location.png",
+            caption="../report/contact/contact_location.rst",
             category="03 Contact geometry",
             labels={"figure": "contact points"},
         ),
         radius=report(
-            "<results>/figures/contact_radius_difference.png",
-            caption="../report/contact_radius_difference.rst",
+            "<results>/contact/contact_radius_difference.png",
+            caption="../report/contact/contact_radius_difference.rst",
             category="03 Contact geometry",
             labels={"figure": "rolling radius difference"},
         ),
         angle=report(
-            "<results>/figures/contact_angle.png",
-            caption="../report/contact_angle.rst",
+            "<results>/contact/contact_angle.png",
+            caption="../report/contact/contact_angle.rst",
             category="03 Contact geometry",
             labels={"figure": "contact angle"},
         ),
         conicity_figure=report(
-            "<results>/figures/contact_conicity.png",
-            caption="../report/contact_conicity.rst",
+            "<results>/contact/contact_conicity.png",
+            caption="../report/contact/contact_conicity.rst",
             category="03 Contact geometry",
             labels={"figure": "equivalent conicity"},
         ),
         yaw_figure=report(
-            "<results>/figures/contact_location_with_yaw.png",
-            caption="../report/contact_location_with_yaw.rst",
+            "<results>/contact/contact_location_with_yaw.png",
+            caption="../report/contact/contact_location_with_yaw.rst",
             category="03 Contact geometry",
             labels={"figure": "contact points with yaw"},
         ),
-        svg=expand("<results>/figures/contact_{name}.svg", name=CONTACT_PAIR_FIGURES),
+        svg=expand("<results>/contact/contact_{name}.svg", name=CONTACT_PAIR_FIGURES),
     log:
         "<logs>/contact_pairs.log",
     params:
@@ -54,7 +54,7 @@ rule contact_pairs:
         yaws=CONTACT["yaws"],
         amplitudes=CONTACT["amplitudes"],
     script:
-        "../scripts/contact_pairs.py"
+        "../scripts/contact/contact_pairs.py"
 
 
 rule contact_planar_error:
@@ -63,21 +63,21 @@ rule contact_planar_error:
     input:
         core=CORE["contact_figures"],
     output:
-        table="<results>/tables/contact/planar_error.csv",
+        table="<results>/contact/planar_error.csv",
         figure=report(
-            "<results>/figures/contact_planar_error.png",
-            caption="../report/contact_planar_error.rst",
+            "<results>/contact/contact_planar_error.png",
+            caption="../report/contact/contact_planar_error.rst",
             category="03 Contact geometry",
             labels={"figure": "planar against spatial"},
         ),
-        svg="<results>/figures/contact_planar_error.svg",
+        svg="<results>/contact/contact_planar_error.svg",
     log:
         "<logs>/contact_planar_error.log",
     params:
         pair=CONTACT_PAIR,
         settings=CONTACT["planar_error"],
     script:
-        "../scripts/contact_planar_error.py"
+        "../scripts/contact/contact_planar_error.py"
 
 
 rule contact_reductions:
@@ -87,35 +87,35 @@ rule contact_reductions:
         core=CORE["contact_figures"],
         reference=CONTACT["reductions"]["reference"],
     output:
-        cases="<results>/tables/contact/reductions_cases.csv",
+        cases="<results>/contact/reductions_cases.csv",
         summary=report(
-            "<results>/tables/contact/reductions.csv",
-            caption="../report/contact_reductions.rst",
+            "<results>/contact/reductions.csv",
+            caption="../report/contact/contact_reductions.rst",
             category="03 Contact geometry",
             labels={"table": "reductions against CONTACT"},
         ),
-        jumps="<results>/tables/contact/force_steps.csv",
-        patches="<results>/tables/contact/patch_forces.csv",
+        jumps="<results>/contact/force_steps.csv",
+        patches="<results>/contact/patch_forces.csv",
         sweep_figure=report(
-            "<results>/figures/contact_force_sweep.png",
-            caption="../report/contact_force_sweep.rst",
+            "<results>/contact/contact_force_sweep.png",
+            caption="../report/contact/contact_force_sweep.rst",
             category="03 Contact geometry",
             labels={"figure": "force in a lateral sweep"},
         ),
         patch_figure=report(
-            "<results>/figures/contact_patch_forces.png",
-            caption="../report/contact_patch_forces.rst",
+            "<results>/contact/contact_patch_forces.png",
+            caption="../report/contact/contact_patch_forces.rst",
             category="03 Contact geometry",
             labels={"figure": "two patches"},
         ),
-        svg=expand("<results>/figures/contact_{name}.svg", name=["force_sweep", "patch_forces"]),
+        svg=expand("<results>/contact/contact_{name}.svg", name=["force_sweep", "patch_forces"]),
     log:
         "<logs>/contact_reductions.log",
     params:
         pair=CONTACT_PAIR,
         settings=CONTACT["reductions"],
     script:
-        "../scripts/contact_reductions.py"
+        "../scripts/contact/contact_reductions.py"
 
 
 rule contact_search:
@@ -125,8 +125,8 @@ rule contact_search:
         core=CORE["contact_search"],
     output:
         report(
-            "<results>/tables/contact/search.csv",
-            caption="../report/contact_search.rst",
+            "<results>/contact/search.csv",
+            caption="../report/contact/contact_search.rst",
             category="03 Contact geometry",
             labels={"table": "search against dense search"},
         ),
@@ -138,7 +138,7 @@ rule contact_search:
         pair=CONTACT_PAIR,
         settings=CONTACT["search"],
     script:
-        "../scripts/contact_search.py"
+        "../scripts/contact/contact_search.py"
 
 
 rule contact_study:

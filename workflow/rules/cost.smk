@@ -1,7 +1,7 @@
 # What things cost: pairs timed in turn, stages of one evaluation, growth, batches, rejected steps.
 
-COST = config["cost_study"]
-CORE["cost"] = CORE["simulation"] + sources("plain", "cost", "sweep_batch", "sweep_measures", "sweep_plan")
+COST = config["cost"]
+CORE["cost"] = CORE["simulation"] + sources("plain", "sweep", "study/cost")
 COST_SCENES = {name: (entry["title"], entry["scene"], changes(entry["set"])) for name, entry in COST["scenes"].items()}
 
 
@@ -13,14 +13,14 @@ rule cost_pairs:
         scenes=SCENES,
     output:
         pairs=report(
-            "<results>/tables/benchmarks.csv",
-            caption="../report/benchmarks.rst",
+            "<results>/cost/benchmarks.csv",
+            caption="../report/cost/benchmarks.rst",
             category="08 Cost",
             labels={"table": "benchmarks"},
         ),
         machine=report(
-            "<results>/tables/benchmark_machine.csv",
-            caption="../report/benchmark_machine.rst",
+            "<results>/cost/benchmark_machine.csv",
+            caption="../report/cost/benchmark_machine.rst",
             category="08 Cost",
             labels={"table": "machine"},
         ),
@@ -34,7 +34,7 @@ rule cost_pairs:
     # all cores: nothing else may run beside what is timed
     threads: workflow.cores
     script:
-        "../scripts/cost_pairs.py"
+        "../scripts/cost/cost_pairs.py"
 
 
 rule cost_growth:
@@ -45,32 +45,32 @@ rule cost_growth:
         scenes=SCENES,
     output:
         wheelsets=report(
-            "<results>/tables/growth_wheelsets.csv",
-            caption="../report/growth_wheelsets.rst",
+            "<results>/cost/growth_wheelsets.csv",
+            caption="../report/cost/growth_wheelsets.rst",
             category="08 Cost",
             labels={"table": "growth with wheelsets"},
         ),
         runs=report(
-            "<results>/tables/growth_runs.csv",
-            caption="../report/growth_runs.rst",
+            "<results>/cost/growth_runs.csv",
+            caption="../report/cost/growth_runs.rst",
             category="08 Cost",
             labels={"table": "growth with duration and tolerance"},
         ),
         simultaneous=report(
-            "<results>/tables/growth_scenes.csv",
-            caption="../report/growth_scenes.rst",
+            "<results>/cost/growth_scenes.csv",
+            caption="../report/cost/growth_scenes.rst",
             category="08 Cost",
             labels={"table": "scenes at the same time"},
         ),
         chains=report(
-            "<results>/tables/growth_chains.csv",
-            caption="../report/growth_chains.rst",
+            "<results>/cost/growth_chains.csv",
+            caption="../report/cost/growth_chains.rst",
             category="08 Cost",
             labels={"table": "growth with joints"},
         ),
         findings=report(
-            "<results>/tables/growth_memory.csv",
-            caption="../report/growth_memory.rst",
+            "<results>/cost/growth_memory.csv",
+            caption="../report/cost/growth_memory.rst",
             category="08 Cost",
             labels={"table": "arithmetic or memory"},
         ),
@@ -83,57 +83,57 @@ rule cost_growth:
         settings=COST["growth"],
     threads: workflow.cores
     script:
-        "../scripts/cost_growth.py"
+        "../scripts/cost/cost_growth.py"
 
 
 rule fig_growth:
     message:
         "Figure: growth of cost"
     input:
-        core=CORE["cost"] + sources("figures", "figures_cost"),
+        core=CORE["cost"] + sources(STYLE),
         wheelsets=rules.cost_growth.output.wheelsets,
         runs=rules.cost_growth.output.runs,
         simultaneous=rules.cost_growth.output.simultaneous,
     output:
         png=report(
-            "<results>/figures/growth.png",
-            caption="../report/growth.rst",
+            "<results>/cost/growth.png",
+            caption="../report/cost/growth.rst",
             category="08 Cost",
             labels={"figure": "growth"},
         ),
-        svg="<results>/figures/growth.svg",
+        svg="<results>/cost/growth.svg",
     log:
         "<logs>/fig_growth.log",
     script:
-        "../scripts/fig_growth.py"
+        "../scripts/cost/fig_growth.py"
 
 
 rule cost_stages:
     message:
         "Time, operations and bytes of one right-hand side by stage"
     input:
-        core=CORE["cost"] + sources("figures", "figures_cost"),
+        core=CORE["cost"] + sources(STYLE),
         scenes=SCENES,
     output:
         stages=report(
-            "<results>/tables/cost_breakdown.csv",
-            caption="../report/cost_breakdown.rst",
+            "<results>/cost/cost_breakdown.csv",
+            caption="../report/cost/cost_breakdown.rst",
             category="08 Cost",
             labels={"table": "stages of a right-hand side"},
         ),
         limits=report(
-            "<results>/tables/machine_limits.csv",
-            caption="../report/machine_limits.rst",
+            "<results>/cost/machine_limits.csv",
+            caption="../report/cost/machine_limits.rst",
             category="08 Cost",
             labels={"table": "limits of the machine"},
         ),
         png=report(
-            "<results>/figures/cost_breakdown.png",
-            caption="../report/cost_breakdown.rst",
+            "<results>/cost/cost_breakdown.png",
+            caption="../report/cost/cost_breakdown.rst",
             category="08 Cost",
             labels={"figure": "stages of a right-hand side"},
         ),
-        svg="<results>/figures/cost_breakdown.svg",
+        svg="<results>/cost/cost_breakdown.svg",
     log:
         "<logs>/cost_stages.log",
     benchmark:
@@ -143,7 +143,7 @@ rule cost_stages:
         settings=COST["stages"],
     threads: workflow.cores
     script:
-        "../scripts/cost_stages.py"
+        "../scripts/cost/cost_stages.py"
 
 
 rule cost_runs:
@@ -154,14 +154,14 @@ rule cost_runs:
         scenes=SCENES,
     output:
         batch=report(
-            "<results>/tables/batch.csv",
-            caption="../report/batch.rst",
+            "<results>/cost/batch.csv",
+            caption="../report/cost/batch.rst",
             category="08 Cost",
             labels={"table": "a batch in one process"},
         ),
         rejections=report(
-            "<results>/tables/rejected_steps.csv",
-            caption="../report/rejected_steps.rst",
+            "<results>/cost/rejected_steps.csv",
+            caption="../report/cost/rejected_steps.rst",
             category="08 Cost",
             labels={"table": "rejected steps"},
         ),
@@ -175,7 +175,7 @@ rule cost_runs:
         rejections=COST["rejections"],
     threads: workflow.cores
     script:
-        "../scripts/cost_runs.py"
+        "../scripts/cost/cost_runs.py"
 
 
 rule cost_study:

@@ -1,7 +1,7 @@
 # Creep laws and creep tables against the exact solver and against CONTACT: errors, costs, figures.
 # CONTACT's cases are read where the tests keep them: one copy, whose provenance stands in its first line.
 
-CREEP = config["creep_study"]
+CREEP = config["creep"]
 CREEP_TABLES = {table["name"]: table for table in CREEP["tables"]}
 CREEP_REFERENCE = expand(
     "{folder}/{file}.csv",
@@ -18,14 +18,31 @@ def creep_table_settings(wildcards):
     return {"nu": CREEP["nu"], **CREEP_TABLES[wildcards.table]}
 
 
+rule creep_table:
+    message:
+        "Creep table by exact rolling contact"
+    input:
+        core=CORE["creep"],
+    output:
+        "<results>/creep/creep.h5",
+    log:
+        "<logs>/creep_table.log",
+    benchmark:
+        "<benchmarks>/creep_table.tsv"
+    params:
+        settings=config["creep"]["table"],
+    script:
+        "../scripts/creep/creep_table.py"
+
+
 rule creep_study_table:
     message:
         "Creep table {wildcards.table}"
     input:
         core=CORE["creep_study"],
     output:
-        table="<results>/tables/creep/{table}.h5",
-        cost="<results>/tables/creep/{table}.csv",
+        table="<results>/creep/{table}.h5",
+        cost="<results>/creep/{table}.csv",
     log:
         "<logs>/creep_study_table/{table}.log",
     benchmark:
@@ -33,7 +50,7 @@ rule creep_study_table:
     params:
         settings=creep_table_settings,
     script:
-        "../scripts/creep_study_table.py"
+        "../scripts/creep/creep_study_table.py"
 
 
 rule creep_errors:
@@ -44,7 +61,7 @@ rule creep_errors:
         reference=CREEP_REFERENCE,
         tables=expand(rules.creep_study_table.output.table, table=CREEP_TABLES),
     output:
-        "<results>/tables/creep/errors.csv",
+        "<results>/creep/errors.csv",
     log:
         "<logs>/creep_errors.log",
     benchmark:
@@ -55,7 +72,7 @@ rule creep_errors:
         grids=CREEP["fastsim_grids"],
         levels=CREEP["levels"],
     script:
-        "../scripts/creep_errors.py"
+        "../scripts/creep/creep_errors.py"
 
 
 rule creep_costs:
@@ -66,7 +83,7 @@ rule creep_costs:
         reference=CREEP_REFERENCE,
         tables=expand(rules.creep_study_table.output.table, table=CREEP_TABLES),
     output:
-        "<results>/tables/creep/cost_samples.csv",
+        "<results>/creep/cost_samples.csv",
     log:
         "<logs>/creep_costs.log",
     benchmark:
@@ -81,7 +98,7 @@ rule creep_costs:
     # all cores: nothing else may run beside it
     threads: workflow.cores
     script:
-        "../scripts/creep_costs.py"
+        "../scripts/creep/creep_costs.py"
 
 
 rule creep_laws:
@@ -94,16 +111,16 @@ rule creep_laws:
         tables=expand(rules.creep_study_table.output.cost, table=CREEP_TABLES),
     output:
         report(
-            "<results>/tables/creep_laws.csv",
-            caption="../report/creep_laws.rst",
+            "<results>/creep/creep_laws.csv",
+            caption="../report/creep/creep_laws.rst",
             category="04 Creep forces",
             labels={"table": "laws, error and cost"},
         ),
-        "<results>/tables/creep_laws.md",
+        "<results>/creep/creep_laws.md",
     log:
         "<logs>/creep_laws.log",
     script:
-        "../scripts/creep_laws.py"
+        "../scripts/creep/creep_laws.py"
 
 
 rule fig_creep_curves:
@@ -114,20 +131,20 @@ rule fig_creep_curves:
         table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
     output:
         report(
-            "<results>/figures/creep_curves.png",
-            caption="../report/creep_curves.rst",
+            "<results>/creep/creep_curves.png",
+            caption="../report/creep/creep_curves.rst",
             category="04 Creep forces",
             labels={"figure": "curves"},
         ),
-        "<results>/figures/creep_curves.svg",
-        "<results>/tables/creep/curves.csv",
+        "<results>/creep/creep_curves.svg",
+        "<results>/creep/curves.csv",
     log:
         "<logs>/fig_creep_curves.log",
     params:
         nu=CREEP["nu"],
         **CREEP["curves"],
     script:
-        "../scripts/fig_creep_curves.py"
+        "../scripts/creep/fig_creep_curves.py"
 
 
 rule fig_creep_traction:
@@ -137,19 +154,19 @@ rule fig_creep_traction:
         core=CORE["creep_figures"],
     output:
         report(
-            "<results>/figures/creep_traction.png",
-            caption="../report/creep_traction.rst",
+            "<results>/creep/creep_traction.png",
+            caption="../report/creep/creep_traction.rst",
             category="04 Creep forces",
             labels={"figure": "traction"},
         ),
-        "<results>/figures/creep_traction.svg",
+        "<results>/creep/creep_traction.svg",
     log:
         "<logs>/fig_creep_traction.log",
     params:
         nu=CREEP["nu"],
         **CREEP["traction"],
     script:
-        "../scripts/fig_creep_traction.py"
+        "../scripts/creep/fig_creep_traction.py"
 
 
 rule fig_creep_cost:
@@ -161,18 +178,18 @@ rule fig_creep_cost:
         laws=rules.creep_laws.output[0],
     output:
         report(
-            "<results>/figures/creep_cost.png",
-            caption="../report/creep_cost.rst",
+            "<results>/creep/creep_cost.png",
+            caption="../report/creep/creep_cost.rst",
             category="04 Creep forces",
             labels={"figure": "cost against error"},
         ),
-        "<results>/figures/creep_cost.svg",
+        "<results>/creep/creep_cost.svg",
     log:
         "<logs>/fig_creep_cost.log",
     params:
         reference=CREEP["reference"],
     script:
-        "../scripts/fig_creep_cost.py"
+        "../scripts/creep/fig_creep_cost.py"
 
 
 rule fig_creep_error_map:
@@ -183,13 +200,13 @@ rule fig_creep_error_map:
         table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
     output:
         report(
-            "<results>/figures/creep_error_map.png",
-            caption="../report/creep_error_map.rst",
+            "<results>/creep/creep_error_map.png",
+            caption="../report/creep/creep_error_map.rst",
             category="04 Creep forces",
             labels={"figure": "error of the table"},
         ),
-        "<results>/figures/creep_error_map.svg",
-        "<results>/tables/creep/error_map.csv",
+        "<results>/creep/creep_error_map.svg",
+        "<results>/creep/error_map.csv",
     log:
         "<logs>/fig_creep_error_map.log",
     benchmark:
@@ -198,7 +215,7 @@ rule fig_creep_error_map:
         name=CREEP["shown"],
         **CREEP["error_map"],
     script:
-        "../scripts/fig_creep_error_map.py"
+        "../scripts/creep/fig_creep_error_map.py"
 
 
 rule fig_creep_smoothness:
@@ -209,19 +226,19 @@ rule fig_creep_smoothness:
         table=expand(rules.creep_study_table.output.table, table=CREEP["shown"]),
     output:
         report(
-            "<results>/figures/creep_smoothness.png",
-            caption="../report/creep_smoothness.rst",
+            "<results>/creep/creep_smoothness.png",
+            caption="../report/creep/creep_smoothness.rst",
             category="04 Creep forces",
             labels={"figure": "smoothness of the table"},
         ),
-        "<results>/figures/creep_smoothness.svg",
-        "<results>/tables/creep/smoothness.csv",
+        "<results>/creep/creep_smoothness.svg",
+        "<results>/creep/smoothness.csv",
     log:
         "<logs>/fig_creep_smoothness.log",
     params:
         **CREEP["smoothness"],
     script:
-        "../scripts/fig_creep_smoothness.py"
+        "../scripts/creep/fig_creep_smoothness.py"
 
 
 rule creep_study:

@@ -2,8 +2,10 @@
 
 CRITICAL = config["critical_speed"]
 HUNTING = list(CRITICAL["vehicles"])
-CORE["stability"] = CORE["simulation"] + sources("analysis", "analysis_modes", "analysis_stability", "analysis_limit_cycles")
-CORE["stability_figures"] = CORE["stability"] + sources("figures", "figures_stability")
+CORE["critical_speed"] = CORE["simulation"] + sources(
+    "analysis/motion", "analysis/modes", "analysis/stability", "analysis/limit_cycles"
+)  # fmt: skip
+CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(STYLE, "study/critical_speed")
 
 
 wildcard_constraints:
@@ -22,15 +24,15 @@ rule root_locus:
     message:
         "{wildcards.vehicle}: modes over speed, linear critical speeds"
     input:
-        core=CORE["stability"],
+        core=CORE["critical_speed"],
         scenes=SCENES,
         scene=critical_scene,
         table=rules.creep_table.output,
     output:
-        locus="<results>/tables/stability/{vehicle}_modes.csv",
-        linear="<results>/tables/stability/{vehicle}_linear.csv",
-        shown="<results>/tables/stability/{vehicle}_energies.csv",
-        shapes="<results>/tables/stability/{vehicle}_shapes.csv",
+        locus="<results>/critical_speed/{vehicle}_modes.csv",
+        linear="<results>/critical_speed/{vehicle}_linear.csv",
+        shown="<results>/critical_speed/{vehicle}_energies.csv",
+        shapes="<results>/critical_speed/{vehicle}_shapes.csv",
     log:
         "<logs>/root_locus/{vehicle}.log",
     benchmark:
@@ -40,19 +42,19 @@ rule root_locus:
         shown=CRITICAL["shown"],
         variants={name: changes(entry) for name, entry in CRITICAL["variants"].items()},
     script:
-        "../scripts/root_locus.py"
+        "../scripts/critical_speed/root_locus.py"
 
 
 rule limit_cycles:
     message:
         "{wildcards.vehicle}, {wildcards.detection}: limit cycles over speed"
     input:
-        core=CORE["stability"],
+        core=CORE["critical_speed"],
         scenes=SCENES,
         scene=critical_scene,
         table=rules.creep_table.output,
     output:
-        "<results>/tables/stability/{vehicle}_{detection}_limit_cycles.csv",
+        "<results>/critical_speed/{vehicle}_{detection}_limit_cycles.csv",
     log:
         "<logs>/limit_cycles/{vehicle}_{detection}.log",
     benchmark:
@@ -61,72 +63,72 @@ rule limit_cycles:
         speeds=cycle_speeds,
         settings=CRITICAL["limit_cycles"],
     script:
-        "../scripts/limit_cycles.py"
+        "../scripts/critical_speed/limit_cycles.py"
 
 
 rule critical_speeds:
     message:
         "Critical speeds: root locus, limit cycles, table"
     input:
-        core=CORE["stability_figures"],
+        core=CORE["critical_speed_figures"],
         loci=expand(rules.root_locus.output.locus, vehicle=HUNTING),
         linear=expand(rules.root_locus.output.linear, vehicle=HUNTING),
         cycles=expand(rules.limit_cycles.output, vehicle=HUNTING, detection=["planar", "spatial"]),
     output:
         table=report(
-            "<results>/tables/critical_speeds.csv",
-            caption="../report/critical_speeds.rst",
+            "<results>/critical_speed/critical_speeds.csv",
+            caption="../report/critical_speed/critical_speeds.rst",
             category="06 Hunting: critical speeds",
             labels={"table": "critical speeds"},
         ),
         variants=report(
-            "<results>/tables/critical_speed_variants.csv",
-            caption="../report/critical_speed_variants.rst",
+            "<results>/critical_speed/critical_speed_variants.csv",
+            caption="../report/critical_speed/critical_speed_variants.rst",
             category="06 Hunting: critical speeds",
             labels={"table": "what the critical speed depends on"},
         ),
         locus=report(
-            "<results>/figures/root_locus.png",
-            caption="../report/root_locus.rst",
+            "<results>/critical_speed/root_locus.png",
+            caption="../report/critical_speed/root_locus.rst",
             category="06 Hunting: critical speeds",
             labels={"figure": "root locus"},
         ),
         cycles=report(
-            "<results>/figures/limit_cycles.png",
-            caption="../report/limit_cycles.rst",
+            "<results>/critical_speed/limit_cycles.png",
+            caption="../report/critical_speed/limit_cycles.rst",
             category="06 Hunting: critical speeds",
             labels={"figure": "limit cycles"},
         ),
-        svg=expand("<results>/figures/{name}.svg", name=["root_locus", "limit_cycles"]),
+        svg=expand("<results>/critical_speed/{name}.svg", name=["root_locus", "limit_cycles"]),
     log:
         "<logs>/critical_speeds.log",
     params:
         titles={name: entry["title"] for name, entry in CRITICAL["vehicles"].items()},
         disturbance=CRITICAL["limit_cycles"]["settling"]["disturbance"],
     script:
-        "../scripts/critical_speeds.py"
+        "../scripts/critical_speed/critical_speeds.py"
 
 
 rule fig_modes:
     message:
         "Modes of the {wildcards.vehicle}"
     input:
-        core=CORE["stability_figures"],
+        core=CORE["critical_speed_figures"],
         modes=rules.root_locus.output.shown,
     output:
         report(
-            "<results>/figures/modes_{vehicle}.png",
-            caption="../report/modes.rst",
+            "<results>/critical_speed/modes_{vehicle}.png",
+            caption="../report/critical_speed/modes.rst",
             category="06 Hunting: critical speeds",
             labels={"figure": "modes", "vehicle": "{vehicle}"},
         ),
-        "<results>/figures/modes_{vehicle}.svg",
+        "<results>/critical_speed/modes_{vehicle}.svg",
     log:
         "<logs>/fig_modes/{vehicle}.log",
     params:
         speed=CRITICAL["shown"],
     script:
-        "../scripts/fig_modes.py"
+        "../scripts/critical_speed/fig_modes.py"
 
 
 rule critical_speed_study:

@@ -1,72 +1,33 @@
-# Tables, the notebook and the report.
+# The notebooks, the study as a whole, and its report.
+
+NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb") if p.stem != "first_light")
+CORE["notebooks"] = sources("", "study/")
 
 
-rule motion_table:
+wildcard_constraints:
+    notebook="|".join(NOTEBOOKS),
+
+
+rule notebook:
     message:
-        "Table: motion"
+        "Notebook: {wildcards.notebook}"
     input:
-        core=CORE["analysis"],
-        planar=expand(rules.simulate.output.planar, case=CASES),
-        spatial=expand(rules.simulate.output.spatial, case=CASES),
-        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
-        mirrored=expand(rules.simulate_twins.output.mirrored, case=WITH_TWINS),
+        core=CORE["notebooks"],
+        scenes=SCENES,
+        notebook="notebooks/{notebook}.ipynb",
     output:
-        report(
-            "<results>/tables/motion.csv",
-            caption="../report/motion.rst",
-            category="02 The paper's figures",
-            labels={"table": "motion"},
-        ),
+        "<results>/notebooks/{notebook}.ipynb",
     log:
-        "<logs>/motion_table.log",
-    params:
-        bound=config["twins"]["bound"],
+        "<logs>/notebooks/{notebook}.log",
+    benchmark:
+        "<benchmarks>/notebooks/{notebook}.tsv"
     script:
-        "../scripts/motion_table.py"
+        "../scripts/report/notebook.py"
 
 
-rule timing_table:
-    message:
-        "Table: timing"
+rule notebooks:
     input:
-        core=CORE["analysis"],
-        samples=rules.time_runs.output,
-    output:
-        report(
-            "<results>/tables/timing.csv",
-            caption="../report/timing.rst",
-            category="08 Cost",
-            labels={"table": "timing"},
-        ),
-    log:
-        "<logs>/timing_table.log",
-    script:
-        "../scripts/timing_table.py"
-
-
-rule comparison_table:
-    message:
-        "Table: published values beside ours"
-    input:
-        core=CORE["analysis"],
-        reference="reports/reference_values.csv",
-        geometry=rules.contact_geometry.output,
-        motion=rules.motion_table.output,
-        timing=rules.timing_table.output,
-    output:
-        report(
-            "<results>/tables/comparison.csv",
-            caption="../report/comparison.rst",
-            category="01 The paper's values and ours",
-            labels={"table": "comparison"},
-        ),
-        "<results>/tables/comparison.md",
-    log:
-        "<logs>/comparison_table.log",
-    params:
-        case=config["comparison"]["case"],
-    script:
-        "../scripts/comparison_table.py"
+        expand(rules.notebook.output, notebook=NOTEBOOKS),
 
 
 rule first_light_notebook:
@@ -82,7 +43,7 @@ rule first_light_notebook:
     log:
         "<logs>/first_light_notebook.log",
     script:
-        "../scripts/first_light_notebook.py"
+        "../scripts/report/first_light_notebook.py"
 
 
 rule study:
@@ -101,7 +62,7 @@ rule study:
         rules.creep_study.input,
         rules.contact_study.input,
         rules.critical_speed_study.input,
-        rules.stability_study.input,
+        rules.hard_cases_study.input,
         rules.sweeps.input,
         rules.ivp_study.input,
         rules.speeds_study.input,
@@ -114,7 +75,7 @@ rule report_archive:
         "Report: {output}"
     input:
         rules.study.input,
-        captions=expand("workflow/report/{name}", name=sorted(p.name for p in (HERE / "workflow/report").glob("*.rst"))),
+        captions=sorted(str(p.relative_to(HERE)) for p in (HERE / "workflow/report").rglob("*.rst")),
     output:
         "<results>/report.zip",
     log:
@@ -122,4 +83,4 @@ rule report_archive:
     params:
         config=config,
     script:
-        "../scripts/report_archive.py"
+        "../scripts/report/report_archive.py"

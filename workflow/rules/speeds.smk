@@ -45,7 +45,7 @@ rule sweep_speeds:
         tracks={track: changes(entry) for track, entry in SPEEDS["tracks"].items()},
         shown=SHOWN,
     script:
-        "../scripts/sweep_speeds.py"
+        "../scripts/speeds/sweep_speeds.py"
 
 
 rule vehicle_lateral_motion:
@@ -60,18 +60,18 @@ rule vehicle_lateral_motion:
         ],
     output:
         report(
-            "<results>/figures/vehicle_lateral_motion_{vehicle}.png",
-            caption="../report/vehicle_lateral_motion.rst",
+            "<results>/speeds/vehicle_lateral_motion_{vehicle}.png",
+            caption="../report/speeds/vehicle_lateral_motion.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"figure": "lateral motion", "vehicle": "{vehicle}"},
         ),
-        "<results>/figures/vehicle_lateral_motion_{vehicle}.svg",
+        "<results>/speeds/vehicle_lateral_motion_{vehicle}.svg",
     log:
         "<logs>/vehicle_lateral_motion/{vehicle}.log",
     params:
         speeds=SPEEDS["shown"],
     script:
-        "../scripts/vehicle_lateral_motion.py"
+        "../scripts/speeds/vehicle_lateral_motion.py"
 
 
 rule vehicle_guiding_forces:
@@ -82,22 +82,22 @@ rule vehicle_guiding_forces:
         run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
     output:
         report(
-            "<results>/figures/vehicle_guiding_forces_{vehicle}.png",
-            caption="../report/vehicle_guiding_forces.rst",
+            "<results>/speeds/vehicle_guiding_forces_{vehicle}.png",
+            caption="../report/speeds/vehicle_guiding_forces.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"figure": "guiding forces", "vehicle": "{vehicle}"},
         ),
-        "<results>/figures/vehicle_guiding_forces_{vehicle}.svg",
+        "<results>/speeds/vehicle_guiding_forces_{vehicle}.svg",
         report(
-            "<results>/tables/vehicle_wheels_{vehicle}.csv",
-            caption="../report/vehicle_wheels.rst",
+            "<results>/speeds/vehicle_wheels_{vehicle}.csv",
+            caption="../report/speeds/vehicle_wheels.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"table": "wheels", "vehicle": "{vehicle}"},
         ),
     log:
         "<logs>/vehicle_guiding_forces/{vehicle}.log",
     script:
-        "../scripts/vehicle_guiding_forces.py"
+        "../scripts/speeds/vehicle_guiding_forces.py"
 
 
 rule vehicle_over_speed:
@@ -109,22 +109,22 @@ rule vehicle_over_speed:
         benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
     output:
         report(
-            "<results>/figures/vehicle_hunting.png",
-            caption="../report/vehicle_hunting.rst",
+            "<results>/speeds/vehicle_hunting.png",
+            caption="../report/speeds/vehicle_hunting.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"figure": "hunting over speed"},
         ),
-        "<results>/figures/vehicle_hunting.svg",
+        "<results>/speeds/vehicle_hunting.svg",
         report(
-            "<results>/figures/vehicle_response.png",
-            caption="../report/vehicle_response.rst",
+            "<results>/speeds/vehicle_response.png",
+            caption="../report/speeds/vehicle_response.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"figure": "response over speed"},
         ),
-        "<results>/figures/vehicle_response.svg",
+        "<results>/speeds/vehicle_response.svg",
         report(
-            "<results>/tables/vehicle_timing.csv",
-            caption="../report/vehicle_timing.rst",
+            "<results>/speeds/vehicle_timing.csv",
+            caption="../report/speeds/vehicle_timing.rst",
             category="08 Cost",
             labels={"table": "timing over vehicles"},
         ),
@@ -135,26 +135,26 @@ rule vehicle_over_speed:
         released=SPEEDS["released"],
         disturbed=SPEEDS["disturbed"],
     script:
-        "../scripts/vehicle_over_speed.py"
+        "../scripts/speeds/vehicle_over_speed.py"
 
 
 rule vehicle_values:
     message:
         "Page: vehicle values and their sources"
     input:
-        core="wrcore/vehicle_page.py",
+        core="workflow/study/speeds/vehicle_page.py",
         vehicles=sorted(str(path.relative_to(HERE)) for path in HERE.glob("config/vehicles/*.yaml")),
     output:
         report(
-            "<results>/tables/vehicle_values.html",
-            caption="../report/vehicle_values.rst",
+            "<results>/speeds/vehicle_values.html",
+            caption="../report/speeds/vehicle_values.rst",
             category="05 Wheelset and trailer vehicle",
             labels={"table": "values and their sources"},
         ),
     log:
         "<logs>/vehicle_values.log",
     script:
-        "../scripts/vehicle_values.py"
+        "../scripts/speeds/vehicle_values.py"
 
 
 rule speeds_study:

@@ -198,7 +198,7 @@ def benchmark_table(scenes, settings):
     scenes : dict of str to (str, str, list of str)
         Title, scene file and changes by name.
     settings : dict
-        Key ``cost_study.pairs`` of the configuration.
+        Key ``cost.pairs`` of the configuration.
 
     Returns
     -------

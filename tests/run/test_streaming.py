@@ -1,0 +1,212 @@
+"""Runs written as they go: blocks, kills, signals and a second process change nothing in the result."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import tracemalloc
+from contextlib import nullcontext
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.cli import main
+from wrcore.errors import InputError
+from wrcore.run.results import load_run
+from wrcore.run.simulate import output_blocks, output_times, simulate
+from wrcore.run.streaming import Parts, simulate_to
+from wrcore.scene.description import load_scene
+
+HUNTING = {"speed": 60.0, "integration.duration": 4.0, "contact.creep.model": "she"}
+CURVE = HUNTING | {
+    "integration.duration": 2.0, "output.channels": ["pose", "velocity", "acceleration", "contact", "energy"],
+    "track.path": [{"tangent": 20.0}, {"transition": 40.0}, {"curve": 200.0, "radius": 600.0, "cant": 0.1}],
+    "track.irregularity": {"spectrum": {"level": "low", "seed": 1, "length": 300.0}},
+}  # fmt: skip
+
+
+def scene_of(changes):
+    return load_scene(SCENES / "suspended_wheelset.yaml", changes)
+
+
+def assert_same(run, other):
+    """Every channel bit for bit, and every counter that is no time."""
+    assert (run.status, run.reason) == (other.status, other.reason)
+    assert np.array_equal(run.t, other.t) and set(run.groups) == set(other.groups)
+    for group, channels in other.groups.items():
+        for name, values in channels.items():
+            assert np.array_equal(run.groups[group][name], values, equal_nan=True), (group, name)
+    assert np.array_equal(run.end_state, other.end_state) and run.end_t == other.end_t
+    times = ("wall_s", "compile_s")
+    assert {k: v for k, v in run.counters.items() if k not in times} == {
+        k: v for k, v in other.counters.items() if k not in times
+    }
+
+
+@pytest.mark.parametrize("changes", [HUNTING, CURVE, HUNTING | {"integration.method": "ros34pw2"}])
+def test_blocks_do_not_change_a_bit(tmp_path, changes):
+    scene = scene_of(changes)
+    run, interrupted = simulate_to(scene, tmp_path / "run.h5", block=97)
+    assert run.status == "completed" and not interrupted
+    assert_same(load_run(tmp_path / "run.h5"), simulate(scene))
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_checkpoint_from_a_file_goes_on_bit_by_bit(tmp_path):
+    for method in ("tsit5", "ros34pw2"):
+        whole = simulate(scene_of(HUNTING | {"integration.method": method}))
+        half = scene_of(HUNTING | {"integration.method": method, "integration.duration": 2.0})
+        simulate_to(half, tmp_path / "half.h5", block=97)
+        rest = simulate(half, start=load_run(tmp_path / "half.h5").end)
+        assert np.array_equal(rest["wheelset"].y_m, whole["wheelset"].y_m[whole.t >= 2.0])
+
+
+def test_a_run_that_ends_before_its_time_keeps_its_last_valid_state(tmp_path):
+    changes = {"speed": 40.0, "integration.duration": 20.0, "contact.creep.model": "linear", "contact.friction": 1.0}
+    scene = load_scene(SCENES / "wheelset.yaml", changes | {"wheel.profile": "cone:1/20", "rail.profile": "circle:0.3"})
+    for block in (100_000, 53):
+        simulate_to(scene, tmp_path / "run.h5", block=block)
+        run = load_run(tmp_path / "run.h5")
+        assert run.status == "derailed" and "off the track's centre" in run.reason
+        assert run.t[-1] <= run.end_t <= run.t[-1] + 1.0 / 200.0 and run.end_t < 20.0
+        assert np.isfinite(run.end_state).all() and abs(run.end_state[1]) == pytest.approx(0.05, abs=0.01)
+
+
+KILLED = """
+import sys
+from tests.run.test_streaming import HUNTING, scene_of
+from wrcore.run.streaming import simulate_to
+simulate_to(scene_of(HUNTING | {"integration.duration": 20.0}), sys.argv[1], block=200)
+"""
+
+
+def test_a_killed_run_goes_on_bit_by_bit(tmp_path):
+    out, parts = tmp_path / "run.h5", tmp_path / ".run.h5.parts"
+    process = subprocess.Popen([sys.executable, "-c", KILLED, str(out)], cwd=SCENES.parent.parent)
+    while len(list(parts.glob("0*.h5"))) < 3:
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    assert not out.exists()
+    kept, said = len(list(parts.glob("0*.h5"))), []
+    scene = scene_of(HUNTING | {"integration.duration": 20.0})
+    simulate_to(scene, out, say=said.append, block=333)
+    assert said == [f"goes on at t = {kept:g} s, where it was interrupted"] and kept < 20  # 200 outputs are 1 s
+    assert_same(load_run(out), simulate(scene))
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+def interrupt_at(t, number):
+    """A progress that sends this process a signal when the time is reached, once."""
+    sent = []
+
+    def advance(reached):
+        if reached >= t and not sent:
+            sent.append(os.kill(os.getpid(), number))
+
+    return advance
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("block", [10_000, 97])
+def test_a_signal_keeps_what_was_reached_and_the_run_goes_on(tmp_path, number, block):
+    scene, out = scene_of(HUNTING), tmp_path / "run.h5"
+    before = signal.getsignal(number)
+    run, caught = simulate_to(scene, out, interrupt_at(1.5, number), block=block)
+    assert caught == number and signal.getsignal(number) is before
+    kept = load_run(out)
+    assert kept.status == "stalled" and kept.reason.startswith("interrupted (SIG")
+    assert 1.5 <= kept.t[-1] < 4.0 and kept.t[-1] <= kept.end_t
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+    simulate_to(scene, out, block=block)
+    assert_same(load_run(out), simulate(scene))
+
+
+def test_pauses_for_checkpoints_do_not_change_a_bit(tmp_path):
+    scene = scene_of(HUNTING)
+    simulate_to(scene, tmp_path / "run.h5", checkpoint_s=0.0)  # after every chunk of steps
+    assert_same(load_run(tmp_path / "run.h5"), simulate(scene))
+
+
+def test_an_interrupted_run_of_something_else_is_not_gone_on_with(tmp_path):
+    out, said = tmp_path / "run.h5", []
+    simulate_to(scene_of(HUNTING), out, interrupt_at(1.5, signal.SIGINT), block=97)
+    for changes, resume in ((HUNTING | {"speed": 61.0}, True), (HUNTING, False)):
+        (tmp_path / "copy.h5").write_bytes(out.read_bytes())
+        scene = scene_of(changes)
+        simulate_to(scene, tmp_path / "copy.h5", resume=resume, say=said.append)
+        assert_same(load_run(tmp_path / "copy.h5"), simulate(scene))
+    simulate_to(scene_of(HUNTING), out)  # goes on
+    simulate_to(scene_of(HUNTING), out, say=said.append)  # is complete: it is run again
+    assert not said
+
+
+def test_only_one_process_writes_a_file(tmp_path):
+    out = tmp_path / "run.h5"
+    (tmp_path / ".run.h5.parts").mkdir()
+    with Parts(out, ""):
+        with pytest.raises(InputError, match="no other process"):
+            simulate_to(scene_of(HUNTING), out)
+    simulate_to(scene_of(HUNTING), out)
+    assert load_run(out).status == "completed"
+
+
+def test_memory_does_not_grow_with_duration(tmp_path):
+    peaks = []
+    for duration in (5.0, 5.0, 40.0):  # the first one loads what every run needs
+        scene = scene_of(HUNTING | {"integration.duration": duration})
+        tracemalloc.start()
+        simulate_to(scene, tmp_path / "run.h5", block=500)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    channels = 40.0 * 200 * (2 * 3 * 17 + 11) * 8  # bytes of the longer run
+    assert peaks[2] < 1.3 * peaks[1] and peaks[2] - peaks[1] < 0.1 * channels
+
+
+def test_the_command_tells_how_a_run_ended(tmp_path, capsys):
+    sets = ["--set", "contact.creep.model=she", "--set", "integration.most_steps=50"]
+    out = tmp_path / "run.h5"
+    assert main(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out), "--json"]) == 1
+    summary = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert summary["status"] == "stalled" and "most_steps" in summary["reason"]
+    run = load_run(out)
+    assert (run.status, run.reason) == (summary["status"], summary["reason"])
+    assert run.counters["steps"] + run.counters["rejected"] == 50
+
+
+def test_the_command_is_interrupted_and_goes_on(tmp_path, capsys, monkeypatch):
+    out = tmp_path / "run.h5"
+    sets = [f"--set={key}={value}" for key, value in HUNTING.items()]
+    command = ["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)]
+    with monkeypatch.context() as patch:
+        patch.setattr("wrcore.run.progress.simulated_time", lambda _: nullcontext(interrupt_at(1.5, signal.SIGTERM)))
+        assert main(command) == 128 + signal.SIGTERM
+    assert "stalled: interrupted (SIGTERM)" in capsys.readouterr().out
+    kept = out.read_bytes()
+    assert main(command) == 0 and "goes on at t" in capsys.readouterr().out
+    out.write_bytes(kept)
+    assert main([*command, "--no-resume"]) == 0 and "goes on" not in capsys.readouterr().out
+    assert_same(load_run(out), simulate(scene_of(HUNTING)))
+
+
+def test_last_valid_state_in_the_file_says_what_it_is(tmp_path):
+    simulate_to(scene_of(HUNTING), tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["end/state"].shape == (13,) and file["end/t"][()] == 4.0
+        assert "per body" in file["end/state"].attrs["description"] and file["end/t"].attrs["units"] == "s"
+
+
+@pytest.mark.parametrize(
+    ("begin", "duration", "rate"), [(0.0, 1.0, 200.0), (0.0, 1.003, 200.0), (0.7, 2.0, 3.0), (0.0, 1e-6, 1e-3)]
+)
+def test_output_blocks_are_the_output_times(begin, duration, rate):
+    whole = output_times(begin, duration, rate)
+    assert whole[0] == begin and whole[-1] == begin + duration and (np.diff(whole) > 0.0).all()
+    for size in (1, 7, 1000):
+        blocks = list(output_blocks(begin, duration, rate, size))
+        assert np.array_equal(np.concatenate(blocks), whole) and all(map(len, blocks))
