@@ -4,15 +4,14 @@
 ``lanes``    four or eight float64 side by side in kernels
 ``handles``  models behind a pointer, kernels behind an address
 
-What this room relies on beyond numba's documented interface; ``tests/kernels/test_internals.py`` says at once when a
-release of numba moves it, and ``pyproject.toml`` admits no release that was not tested:
+What this room relies on beyond numba's documented interface. ``tests/kernels/test_internals.py`` says at once when a
+release of numba has moved some of it, and ``pyproject.toml`` admits no release that was not tested.
 
-====================================================  ===============================================================
-``njit(_nrt=False)``                                  `jit`: no reference counts in kernels that create no arrays
-``forceinline``, ``fastmath`` as a set                `jit`: LLVM's ``alwaysinline``; the flags one by one
-``numba.config.CACHE_DIR`` while decorating           `jit`: a cache folder of one's own
-``numba.core.cgutils``, ``context.make_array``        `lanes`, `handles`: lowering of an intrinsic, layout of an array
-``infer_global``, ``lower_builtin``                   `lanes`: operators of a type of one's own
-``numba._dispatcher.compute_fingerprint``             `handles`: types of a model's fields without unpacking it
-====================================================  ===============================================================
+jit       ``njit(_nrt=False)``: no reference counts in kernels that create no arrays; ``forceinline``;
+          ``numba.config.CACHE_DIR`` read while a function is decorated
+lanes     ``intrinsic`` and ``register_model`` for a type of one's own, its operators by ``infer_global`` and
+          ``lower_builtin``; ``cgutils.get_or_insert_function``, ``unpack_tuple``; ``context.make_array``
+handles   ``compute_fingerprint`` of a named tuple as the key of its layout; ``AttributeTemplate``, ``infer_getattr``,
+          ``lower_getattr_generic`` for fields behind a pointer; ``NativeValue``; ``cpu_target``'s sizes of types;
+          ``overloads[...].library.get_pointer_to_function`` and the calling convention (``context.call_conv``)
 """

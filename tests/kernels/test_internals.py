@@ -1,0 +1,53 @@
+"""What the kernels' room relies on beyond numba's documented interface (its page: ``wrcore/kernels/__init__.py``)."""
+
+import importlib
+import re
+
+import numba
+import numpy as np
+import pytest
+from packaging.specifiers import SpecifierSet
+
+import wrcore.kernels
+from tests.conftest import ROOT
+from wrcore.kernels.handles import Handle, Kernel
+from wrcore.kernels.jit import jit
+
+INTERNALS = (
+    "numba._dispatcher.compute_fingerprint", "numba.core.cgutils.get_or_insert_function",
+    "numba.core.cgutils.unpack_tuple", "numba.core.imputils.lower_builtin",
+    "numba.core.imputils.lower_getattr_generic", "numba.core.registry.cpu_target",
+    "numba.core.typing.templates.infer_global", "numba.core.typing.templates.infer_getattr",
+    "numba.core.typing.templates.AttributeTemplate", "numba.extending.intrinsic", "numba.extending.NativeValue",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INTERNALS)
+def test_an_internal_is_where_it_was(name):
+    module, _, attribute = name.rpartition(".")
+    assert hasattr(importlib.import_module(module), attribute), f"numba {numba.__version__} has moved {name}"
+    assert attribute in wrcore.kernels.__doc__
+
+
+def test_kernels_without_references_allocate_no_counter():
+    @jit(allocates=False, cache=False)
+    def first(values):
+        return values[0]
+
+    assert first(np.array([2.0])) == 2.0
+    (compiled,) = first.overloads.values()
+    assert "NRT_incref" not in compiled.library.get_llvm_str()
+
+
+def test_a_kernel_has_an_address_and_a_handle_a_type():
+    @jit(allocates=False, cache=False)
+    def fill(values):
+        values[0] = 1.0
+
+    assert Kernel(fill, np.zeros(1)).address > 0
+    assert "Reference" in str(Handle((np.zeros(1), 1.0))._numba_type_)
+
+
+def test_the_release_of_numba_is_one_that_was_tested():
+    bounds = re.search(r'"numba(.*?)"', (ROOT / "pyproject.toml").read_text())[1]
+    assert "<" in bounds and SpecifierSet(bounds).contains(numba.__version__)

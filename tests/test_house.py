@@ -1,0 +1,130 @@
+"""The house: a room of the core imports only from rooms before it, no circle of files, nothing from the study."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+ROOMS = (
+    "errors", "kernels", "geometry", "contact", "creep", "dynamics", "integrate", "vehicle", "scene", "run", "sweep",
+    "analysis", "plain", "cli",
+)  # fmt: skip
+"""In the order of the data; ``wrcore/__init__.py`` is the door to all of them."""
+
+STUDY = ("study", "workflow", "snakemake", "tests")
+
+
+def imports(tree):
+    """Modules that a file imports, with lines; what only a type checker reads is left out."""
+    checked = [n for n in ast.walk(tree) if isinstance(n, ast.If) and getattr(n.test, "id", "") == "TYPE_CHECKING"]
+    skipped = {id(inner) for block in checked for inner in ast.walk(block)}
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from ((f"{node.module}.{alias.name}", node.lineno) for alias in node.names)
+
+
+def module_of(path, root):
+    return ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+
+
+def room_of(module):
+    return module.split(".")[1] if module.count(".") else ""
+
+
+def graph(root):
+    """Files of the core under a root by module, each with the modules of the core that it imports."""
+    trees = {module_of(p, root): ast.parse(p.read_text("utf-8")) for p in sorted((root / "wrcore").rglob("*.py"))}
+    edges = {}
+    for module, tree in trees.items():
+        edges[module] = []
+        for name, line in imports(tree):
+            target = name if name in trees else name.rpartition(".")[0]
+            edges[module].append((target if target in trees else name, line))
+    return edges
+
+
+def breaches(root):
+    """One line per import that the house forbids."""
+    edges, found = graph(root), []
+    for module, targets in edges.items():
+        for target, line in targets:
+            top, mine, other = target.split(".")[0], room_of(module), room_of(target)
+            if top in STUDY:
+                found.append(f"{module}:{line}: the core imports {target}")
+            if top == "wrcore" and mine in ROOMS and other in ROOMS and ROOMS.index(other) > ROOMS.index(mine):
+                found.append(f"{module}:{line}: {mine} imports {target}, a room after it")
+            if top == "wrcore" and other and other not in ROOMS:
+                found.append(f"{module}:{line}: {target} is no room")
+    return found + [f"circle: {' - '.join(circle)}" for circle in circles(edges)]
+
+
+def circles(edges):
+    """Circles of files, each once; the door ``wrcore`` itself holds no imports that run."""
+    inner = {m: [t for t, _ in targets if t in edges and t not in ("wrcore", m)] for m, targets in edges.items()}
+    found, done = [], set()
+
+    def walk(module, path):
+        if module in path:
+            found.append(path[path.index(module) :] + [module])
+        elif module not in done:
+            for target in inner[module]:
+                walk(target, [*path, module])
+            done.add(module)
+
+    for module in inner:
+        walk(module, [])
+    return found
+
+
+def test_rooms_stand_in_the_order_of_the_data():
+    assert breaches(ROOT) == []
+
+
+def test_the_core_shows_its_rooms_and_nothing_else():
+    entries = {p.name for p in (ROOT / "wrcore").iterdir()} - {"__pycache__"}
+    assert {name.removesuffix(".py") for name in entries} == {*ROOMS, "__init__", "py.typed"}
+
+
+def test_every_question_has_its_drawers():
+    """Study package, rules, scripts and captions share the names; sections of the configuration too."""
+    questions = {p.name for p in (ROOT / "workflow/study").iterdir() if p.is_dir()} - {"__pycache__"}
+    assert {p.stem for p in (ROOT / "workflow/rules").glob("*.smk")} == questions | {"common"}
+    assert {p.name for p in (ROOT / "workflow/scripts").iterdir()} == questions
+    assert {p.name for p in (ROOT / "workflow/report").iterdir() if p.is_dir()} == questions - {"report"}
+    sections = {
+        line.split(":")[0] for line in (ROOT / "config/study.yaml").read_text().splitlines() if line[:1].isalpha()
+    }
+    assert sections == questions - {"report"}
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "expected"),
+    [
+        ("run/course.py", "from wrcore.analysis import wheels", "run imports wrcore.analysis"),
+        ("geometry/path.py", "def f():\n    import wrcore.contact.scan", "geometry imports wrcore.contact.scan"),
+        ("creep/laws.py", "from study.creep import laws", "the core imports study.creep"),
+        (
+            "kernels/jit.py",
+            "from wrcore.kernels.lanes import total",
+            "circle: wrcore.kernels.jit - wrcore.kernels.lanes",
+        ),
+        ("hallway.py", "from wrcore.hallway import x", "wrcore.hallway is no room"),
+    ],
+)
+def test_a_planted_breach_is_found(tmp_path, file, line, expected):
+    for path in (ROOT / "wrcore").rglob("*.py"):
+        copy = tmp_path / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(path.read_text("utf-8"))
+    if "circle" in expected:
+        lanes = tmp_path / "wrcore/kernels/lanes.py"
+        lanes.write_text(lanes.read_text() + "\nfrom wrcore.kernels.jit import jit\n")
+    with Path(tmp_path / "wrcore" / file).open("a") as target:
+        target.write("\n" + line + "\n")
+    assert any(expected in breach for breach in breaches(tmp_path)), breaches(tmp_path)
