@@ -1,7 +1,9 @@
 """The smoke workflow, by the command that a user types: every rule runs, and then nothing is left to do."""
 
 import json
+import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -102,6 +104,38 @@ def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, change, 
     assert plan.returncode == 0
     assert again in plan.stdout
     assert kept not in plan.stdout
+
+
+@pytest.fixture(scope="module")
+def checkout(smoke, tmp_path_factory):
+    """A copy of the checkout after the smoke run, whose sources can be edited while others use the real ones."""
+    copy = tmp_path_factory.mktemp("checkout")
+    for name in ("config", "notebooks", "profiles", "reports", "results", "tests", "workflow", "wrcore", ".snakemake"):
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "log", "auxiliary"))
+    shutil.copy2(ROOT / "Snakefile", copy)
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("edited", "again", "kept"),
+    [
+        ("wrcore/creep/laws.py", {"creep_table", "creep_laws", "simulate", "limit_cycles"}, {"contact_pairs", "fig_ivp"}),
+        ("wrcore/analysis/motion.py", {"motion_table", "sweep_speeds", "accuracy_study"}, {"simulate", "creep_table"}),
+        ("workflow/study/paper/figures.py", {"fig1_parametrisation", "fig4_lateral_position"}, {"simulate", "motion_table"}),
+    ],
+)  # fmt: skip
+def test_an_edit_runs_again_what_stands_on_it(checkout, edited, again, kept):
+    source = checkout / edited
+    before = source.stat(), source.read_text("utf-8")
+    source.write_text(before[1] + "\n# edited\n", "utf-8")
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", "-n", "--configfile", "config/smoke.yaml"]
+    plan = subprocess.run(command, cwd=checkout, capture_output=True, text=True)
+    source.write_text(before[1], "utf-8")
+    os.utime(source, ns=(before[0].st_atime_ns, before[0].st_mtime_ns))
+    assert plan.returncode == 0, plan.stderr
+    rules = set(re.findall(r"^rule (\w+):|^(\w+) +\d+$", plan.stdout, re.MULTILINE))
+    planned = {name for pair in rules for name in pair if name}
+    assert again <= planned and not kept & planned, planned
 
 
 def test_runs_carry_their_scene_and_no_machine_path(smoke):

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.critical_speed.tables import critical_table
 from tests.conftest import SCENES
 from wrcore.analysis import limit_cycles as analysis_limit_cycles
 from wrcore.analysis.limit_cycles import (
     Settling,
-    critical_table,
     falling_branch,
     limit_cycles,
     nonlinear_critical_speed,

@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES
 from wrcore.contact.detection import axle_direction, detect, find_patches, planar_error_bound
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.poses import geometry_table, solve_poses
+from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS, PENETRATION
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import gap_at, make_pose

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
+from tests.dynamics.full_equations import full_equations
+from tests.dynamics.projection import project_positions, project_velocities
 from tests.dynamics.test_joint import ON_AXLE, jointed
 from tests.dynamics.test_system import body_state, contact, run  # noqa: F401 (a fixture)
 from wrcore.dynamics.body import STATE_SIZE, euler_parameters, matrix_of
-from wrcore.dynamics.full_equations import full_equations
 from wrcore.dynamics.joint import Joint, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations, workspace
-from wrcore.integrate.projection import project_positions, project_velocities
 
 
 def some_markers(rng):

@@ -227,27 +227,3 @@ def nonlinear_critical_speed(table):
         "uncertainty_m_per_s": slowest["speed_m_per_s"] - below,
         "amplitude_m": slowest["amplitude_m"], "cycle_frequency_Hz": slowest["frequency_Hz"],
     }  # fmt: skip
-
-
-def critical_table(linear, cycles):
-    """Linear and nonlinear critical speeds.
-
-    Parameters
-    ----------
-    linear : dict of str to pandas.DataFrame
-        Tables of `wrcore.analysis.stability.critical_speeds` by vehicle; the variants ``planar`` and ``spatial`` count.
-    cycles : dict of str to pandas.DataFrame
-        Tables of :func:`limit_cycles` with a column detection, by the same vehicles.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per vehicle and detection.
-    """
-    rows = []
-    for vehicle, table in linear.items():
-        for detection in ("planar", "spatial"):
-            found = table[table["variant"] == detection].iloc[0].drop("variant").to_dict()
-            part = cycles[vehicle][cycles[vehicle]["detection"] == detection]
-            rows.append({"vehicle": vehicle, "detection": detection, **found, **nonlinear_critical_speed(part)})
-    return pd.DataFrame(rows).rename(columns={"critical_speed_m_per_s": "linear_critical_speed_m_per_s"})

@@ -5,7 +5,7 @@ import sys
 import pandas as pd
 
 from study.critical_speed.figures import fig_limit_cycles, fig_root_locus
-from wrcore.analysis.limit_cycles import critical_table
+from study.critical_speed.tables import critical_table
 from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -12,7 +12,9 @@ from wrcore.analysis.motion import (
     prediction_horizon,
 )
 from wrcore.contact.geometry import contact_geometry
-from wrcore.contact.poses import geometry_table as rigid_contact
+from wrcore.contact.poses import solve_poses
+from wrcore.contact.strip import cubic_at
+from wrcore.geometry.surface import SIDES as SIGNS
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 from wrcore.run.simulate import simulate
 
@@ -127,8 +129,53 @@ def time_runs(cases, repetitions):
     return samples[samples["repetition"] > 0].reset_index(drop=True)
 
 
+RIGID_LOAD = 1e-3
+"""Wheel load at which the wheelset counts as rigid, N: the approach is then below a nanometre."""
+
+
+def rigid_contact(geometry, shifts, detection="planar"):
+    """Rigid contact geometry of a wheelset without load and yaw, with roll: what a conicity study starts from.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    shifts : array_like, shape (n,)
+        Lateral positions of the wheelset, m (positive to the left).
+    detection : {"planar", "spatial"}
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns y_m, roll_rad, lowering_m (of the wheelset's centre below the nominal radius), radius_difference_m
+        (left less right) and, per side, u_wheel, u_rail (m) and contact angle (rad) of the most loaded patch.
+    """
+    poses = pd.DataFrame(
+        {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
+    )
+    touching = solve_poses(poses, geometry, RIGID_LOAD, detection, "maximum")
+    patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
+    table = pd.DataFrame({"y_m": shifts})
+    for side in SIGNS:
+        rows = patches.xs(side, level="side").reindex(range(len(shifts)))
+        for name in ("u_wheel_m", "u_rail_m", "contact_angle_rad"):
+            table[f"{side}_{name}"] = rows[name].to_numpy()
+    table.insert(1, "roll_rad", rows["roll_rad"].to_numpy())
+    table.insert(2, "lowering_m", geometry.rolling_radius - rows["z_wheelset_m"].to_numpy())
+    left, right = (
+        np.array(
+            [
+                cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)[0]
+                for u in table[f"{side}_u_wheel_m"]
+            ]
+        )
+        for side in SIGNS
+    )
+    table.insert(3, "radius_difference_m", left - right)
+    return table
+
+
 def geometry_table(scene, y):
-    """Rigid contact geometry of a scene's wheelset, see :func:`wrcore.contact.poses.geometry_table`.
+    """Rigid contact geometry of a scene's wheelset, see :func:`rigid_contact`.
 
     Parameters
     ----------
