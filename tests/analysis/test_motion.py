@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from synthetic import hunting_run
 
+from study.paper import tables
 from study.paper.tables import (
     comparison_table,
     geometry_table,
@@ -135,7 +136,7 @@ def test_time_runs_drops_the_warm_up_and_takes_planar_and_spatial_in_turn(monkey
         order.append(scene)
         return hunting_run(wall_s=next(walls))
 
-    monkeypatch.setattr(analysis, "simulate", fake)
+    monkeypatch.setattr(tables, "simulate", fake)
     samples = time_runs({"free": {"planar": "p", "spatial": "s"}}, repetitions=2)
     assert order == ["p", "s"] * 3
     assert samples["wall_s"].tolist() == [1.0, 2.0, 3.0, 4.0]

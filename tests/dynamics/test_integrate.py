@@ -109,20 +109,6 @@ def test_order_on_the_suspended_wheelset(wheelset, method):
     assert orders(errors).max() > ORDERS[method] - 0.4
 
 
-def test_rodas4_keeps_its_order_on_irregular_track():
-    """The vehicle at 20 m/s: fourfold error per halving if columns of the Jacobian did not belong to one motion."""
-    rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 200, begin: 5}}"
-    model, start = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", ["speed=20", rough]))
-    exact = integrate(model, start, [0.0, 1.5], "tsit5", 1e-10, 1e-13).states[-1]
-    places = [13 * body + 1 for body in model.bodies.wheelsets]
-    errors = [
-        np.abs(integrate(model, start, [0.0, 1.5], "rodas4", step=h).states[-1] - exact)[places].max()
-        for h in (2e-3, 1e-3)
-    ]
-    assert errors[0] < 1e-7
-    assert orders(errors)[-1] > 3.5
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_dense_output_is_as_good_as_its_order(contact, method):  # noqa: F811
     """Errors between the steps fall at least as h^4 (the interpolants are of third order or higher) on springs."""
