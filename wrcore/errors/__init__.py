@@ -1,4 +1,6 @@
-"""The one error that a user can cause."""
+"""The one error that a user can cause, and the check of a single number that raises it."""
+
+from numbers import Real
 
 
 class InputError(ValueError):
@@ -21,3 +23,25 @@ class InputError(ValueError):
     def __init__(self, source, field, expected):
         self.source, self.field, self.expected = str(source), str(field), str(expected)
         super().__init__(": ".join(" ".join(part.split()) for part in (self.source, self.field, self.expected) if part))
+
+
+def check_number(value, low, high, source, field, unit=""):
+    """Refuse what is no number from ``low`` to ``high``: NaN, text, another unit.
+
+    Parameters
+    ----------
+    value : object
+    low, high : float
+        Bounds, both allowed.
+    source, field : str
+        As for :class:`InputError`.
+    unit : str
+        Of the bounds.
+
+    Returns
+    -------
+    float
+    """
+    if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
+        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {value!r}")
+    return float(value)

@@ -1,10 +1,17 @@
 """CSV tables read with one clear line for whatever is wrong."""
 
+import csv
+import io
+import warnings
+
 from wrcore.errors import InputError
 
 
 def read_csv_table(path, text):
     """Read a CSV file with a header line; lines that begin with # are comments.
+
+    Columns are separated by commas, semicolons or tabs, as the header is; line ends and a byte order mark are those of
+    any editor.
 
     Parameters
     ----------
@@ -19,13 +26,30 @@ def read_csv_table(path, text):
     Raises
     ------
     InputError
-        If the file cannot be read as a table.
+        If the file cannot be read as a table, or a row has more cells than the header.
     """
     import pandas as pd
 
     try:
-        return pd.read_csv(path, dtype={text: str}, skipinitialspace=True, comment="#")
+        with open(path, encoding="utf-8-sig") as file:
+            content = file.read()
+        header = next((line for line in content.splitlines() if line.split("#")[0].strip()), "")
+        separator = next((mark for mark in ",;\t" if mark in header), ",")
+        names = [name.strip() for name in next(csv.reader([header], delimiter=separator, skipinitialspace=True), [])]
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)  # cells that the header has no name for
+            frame = pd.read_csv(
+                io.StringIO(content), sep=separator, names=names, header=0, index_col=False, dtype={text: str},
+                skipinitialspace=True, comment="#",
+            )  # fmt: skip
     except OSError as error:
         raise InputError(path, "", f"expected a CSV file with a header line: {error.strerror}") from None
-    except ValueError as error:  # pandas' parser errors and UnicodeDecodeError are ValueErrors
+    except UnicodeDecodeError:
+        raise InputError(path, "", "expected a UTF-8 text file") from None
+    except pd.errors.ParserWarning:
+        raise InputError(path, "", f"expected {len(names)} cells in each row, as in the header, got more") from None
+    except (ValueError, csv.Error) as error:  # pandas' parser errors are ValueErrors
         raise InputError(path, "", f"expected a CSV file with a header line: {error}") from None
+    if text in frame:
+        frame[text] = frame[text].str.strip()
+    return frame

@@ -5,40 +5,79 @@ import math
 import re
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
+from itertools import islice
 
 import jsonschema
 import yaml
 
 from wrcore.errors import InputError
 
-MERGE = "tag:yaml.org,2002:merge"
-"""``<<: *anchor`` takes over the keys of another mapping; those written beside it win."""
+MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
+"""A longer document, one with more values, or nested deeper, is none that a person wrote."""
+
+_TAG = "tag:yaml.org,2002:"
+_LIBYAML = yaml.__with_libyaml__
 
 
-MOST_VALUES, DEEPEST = 200_000, 50
-"""A document with more values, or nested deeper, is none that a person wrote."""
+class _Loader(yaml.CSafeLoader if _LIBYAML else yaml.SafeLoader):
+    """Safe loader that refuses repeated keys and takes for a number only what everybody reads as the same one.
+
+    1e6, 1E-6 and 1.0E6 are numbers; 60E1 and 54E1 are rails; 020 (octal in YAML 1.1), 1:30 (base 60), 1_000, 0x10 and
+    dates stay text.
+    """
+
+    yaml_implicit_resolvers = {
+        first: [
+            (tag, pattern) for tag, pattern in known if tag not in (f"{_TAG}int", f"{_TAG}float", f"{_TAG}timestamp")
+        ]
+        for first, known in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
 
-class _Loader(yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader):
-    """Safe loader that refuses repeated keys and reads 1e-6 as a number."""
+_NUMBERS = {
+    "int": r"[-+]?(?:0|[1-9][0-9]*)",
+    "float": r"[-+]?(?:(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[0-9]+(?:e[-+]?|E[-+])[0-9]+|\.inf)|\.nan",
+}
+for _name, _pattern in _NUMBERS.items():
+    _Loader.add_implicit_resolver(_TAG + _name, re.compile(f"^(?:{_pattern})$"), list("-+0123456789."))
 
 
 def _mapping(loader, node, deep=False):
-    keys = [loader.construct_object(key, deep=True) for key, _ in node.value if key.tag != MERGE]
-    for i, key in enumerate(keys):
-        if key in keys[:i]:
-            raise yaml.constructor.ConstructorError(None, None, f"the key {key!r} is given twice", node.start_mark)
+    seen = set()
+    for key, _ in node.value:
+        if key.tag != f"{_TAG}merge":  # the keys of << *anchor give way to those written beside it
+            name = loader.construct_object(key, deep=True)
+            if name in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"the key {name!r} is given twice", node.start_mark)
+            seen.add(name)
     return loader.construct_mapping(node, deep)
 
 
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    # 1e6, 1E-6 and 1.0E6 are numbers; 60E1 and 54E1 are rails
-    re.compile(r"^[-+]?(?:[0-9]+(?:e[-+]?|E[-+])|(?:[0-9]+\.[0-9]*|\.[0-9]+)[eE][-+]?)[0-9]+$"),
-    list("-+0123456789."),
-)
+
+
+def _load(text):
+    """The document, after a look at its events: the parser would follow any depth, and aliases, wherever they lead."""
+    sizes, above, size = {}, [], 0  # values that an anchor stands for, and of the collections around the present one
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader if _LIBYAML else yaml.SafeLoader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            above.append((event.anchor, size))
+            size = 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = above.pop()
+            sizes[anchor] = size
+            size += before
+        elif isinstance(event, yaml.AliasEvent):
+            size += sizes.get(event.anchor, 1 if event.anchor not in dict(above) else math.inf)
+        elif isinstance(event, yaml.ScalarEvent):
+            sizes[event.anchor] = 1
+            size += 1
+        if len(above) > DEEPEST or size > MOST_VALUES:
+            raise yaml.constructor.ConstructorError(None, None, _LIMITS, event.start_mark)
+    return yaml.load(text, Loader=_Loader)
+
+
+_LIMITS = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and none inside itself"
 
 
 def read_yaml(path):
@@ -57,16 +96,25 @@ def read_yaml(path):
     InputError
         If the file is missing, not UTF-8, not YAML, repeats a key or holds no mapping.
     """
+    text = ""
     try:
-        data = yaml.load(Path(path).read_text(encoding="utf-8"), Loader=_Loader)
+        with open(path, encoding="utf-8-sig") as file:
+            text = file.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise InputError(path, "", f"expected a file of at most {MOST_BYTES // 10**6} MB")
+        data = _load(text)
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(path, "", f"expected a readable file: {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(path, "", "expected a UTF-8 text file") from None
     except Exception as error:  # besides its own errors, PyYAML lets through whatever its constructors stumble over
         mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}" if mark else ""
-        raise InputError(path, where, f"expected YAML: {getattr(error, 'problem', None) or error}") from None
+        where, problem = f"line {mark.line + 1}" if mark else "", getattr(error, "problem", None) or error
+        if mark and "\t" in "".join(text.splitlines()[mark.line : mark.line + 1]):
+            problem = f"{problem}; this line has a tab, where YAML is indented by blanks"
+        raise InputError(path, where, f"expected YAML: {problem}") from None
     if not isinstance(data, dict):
         raise InputError(path, "", f"expected a mapping of keys, got {type(data).__name__}")
     return data
@@ -75,7 +123,7 @@ def read_yaml(path):
 def parse_value(text):
     """One value as written on a command line (``--set key=value``), by YAML's rules."""
     try:
-        return yaml.load(text, Loader=_Loader)
+        return _load(text)
     except Exception:  # as in read_yaml
         return text
 
@@ -130,7 +178,8 @@ def validate(data, schema_name, source):
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
-    errors = sorted(jsonschema.Draft202012Validator(schema).iter_errors(data), key=lambda e: (len(e.path), str(e.path)))
+    found = islice(jsonschema.Draft202012Validator(schema).iter_errors(data), 1000)
+    errors = sorted(found, key=lambda e: (len(e.path), str(e.path)))
     if errors:
         field, expected = _explain(errors[0], schema)
         raise InputError(source, field, expected)
@@ -165,8 +214,7 @@ def plain_tree(data, source):
         left -= 1
         if isinstance(value, dict | list | tuple):
             if left < 0 or id(value) in above or len(above) > DEEPEST:
-                expected = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and none inside itself"
-                raise InputError(source, ".".join(path[:3]), expected)
+                raise InputError(source, ".".join(path[:3]), _LIMITS)
             above = {*above, id(value)}
         if isinstance(value, list | tuple):
             return [copied(item, (*path, str(k)), above) for k, item in enumerate(value)]
