@@ -218,13 +218,13 @@ def test_creep_tables(folder, content):
     simulate_text(folder, yaml.dump(scene))
 
 
-PAIR = ["--wheel", "S1002", "--rail", "UIC60-MBench"]
+PAIR = ["--wheel", "S1002", "--rail", "UIC60-MBench", "--inclination", "1/40"]
 FILES = {
     "scene": ["simulate", "FILE"],
     "poses": ["contact", "--poses", "FILE", *PAIR, "--wheel-load", "1e4", "--out", "OUT"],
     "cases": ["creep", "--cases", "FILE", "--model", "she", "--out", "OUT"],
     "table": ["table", "info", "FILE"],
-    "wheel": ["conicity", "--wheel", "FILE", "--rail", "UIC60-MBench", "--out", "OUT"],
+    "wheel": ["conicity", "--wheel", "FILE", "--rail", "UIC60-MBench", "--inclination", "1/40", "--out", "OUT"],
     "creep_table": ["creep", "--cases", "CASES", "--table", "FILE", "--out", "OUT"],
 }  # fmt: skip
 
@@ -240,9 +240,9 @@ def test_files_that_cannot_be_read(tmp_path, arguments, kind):
     closed.chmod(0)
     path = {
         "absent": tmp_path / "absent.csv", "folder": tmp_path, "below_a_file": tmp_path / "cases.csv" / "x.csv",
-        "too_long": tmp_path / ("x" * 300), "closed": closed,
+        "too_long": tmp_path / f"{'x' * 300}.csv", "closed": closed,
     }.get(kind, tmp_path / "file.csv")  # fmt: skip
-    out = tmp_path / "out" / "result"
+    out = tmp_path / "out" / "result.csv"
     names = {"FILE": path, "OUT": out, "CASES": tmp_path / "cases.csv"}
     assert check_command([names.get(word, word) for word in arguments], tmp_path / "out", out) == 2
 
@@ -259,11 +259,13 @@ def test_results_that_cannot_be_written(tmp_path, command, kind):
         "table": ["build"],
     }  # fmt: skip
     out = {
-        "folder": tmp_path, "absent_folder": tmp_path / "absent" / "x", "below_a_file": tmp_path / "cases.csv" / "x",
-        "too_long": tmp_path / ("x" * 300), "closed_system": "/proc/x",
+        "folder": tmp_path / "folder", "absent_folder": tmp_path / "absent" / "x", "closed_system": "/proc/x",
+        "below_a_file": tmp_path / "cases.csv" / "x", "too_long": tmp_path / ("x" * 300),
     }  # fmt: skip
+    ending = ".h5" if command in ("simulate", "table") else ".csv"
+    (tmp_path / f"folder{ending}").mkdir()
     before = sorted(tmp_path.iterdir())
-    status, printed, err = run_command([command, *arguments[command], "--out", out[kind]])
+    status, printed, err = run_command([command, *arguments[command], "--out", f"{out[kind]}{ending}"])
     assert (status, printed) == (2, "") and err.count("\n") == 1 and "--out" in err, err
     assert sorted(tmp_path.iterdir()) == before
 

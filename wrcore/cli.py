@@ -93,7 +93,7 @@ def _add_contact(commands):
     command.add_argument("--poses", required=True, metavar="IN.csv")
     command.add_argument("--wheel", required=True, metavar="NAME|FILE")
     command.add_argument("--rail", required=True, metavar="NAME|FILE")
-    command.add_argument("--inclination", default="0", metavar="1/40", help="of a named rail")
+    command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
     command.add_argument("--gauge", type=float, default=1.435, metavar="m")
     command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m")
     command.add_argument("--tape-circle-half-distance", type=float, default=0.75, metavar="m")
@@ -113,11 +113,14 @@ def _add_conicity(commands):
     command.add_argument("--right-wheel", metavar="NAME|FILE", help="where it differs from --wheel")
     command.add_argument("--right-rolling-radius", type=float, metavar="m", help="where it differs")
     command.add_argument("--unit", choices=("m", "mm"), help="of profile files without a header")
-    command.add_argument("--inclination", default="0", metavar="1/40", help="of a named rail")
+    command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
     command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="14 mm below the rails' tops")
     command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m")
     command.add_argument("--tape-circle-half-distance", type=float, default=0.75, metavar="m")
-    command.add_argument("--roll", action=argparse.BooleanOptionalAction, default=True, help="solve the roll angle")
+    command.add_argument(
+        "--roll", action=argparse.BooleanOptionalAction, default=False,
+        help="let the wheelset roll so that both wheels touch; the standard does not",
+    )  # fmt: skip
     command.add_argument("--amplitudes-from", type=float, default=0.001, metavar="m")
     command.add_argument("--to", type=float, default=0.008, metavar="m")
     command.add_argument("--step", type=float, default=0.001, metavar="m", help="of the amplitudes")
@@ -141,7 +144,7 @@ def _add_table(commands):
     build = actions.add_parser("build", help="refine until a random check meets the tolerance")
     build.add_argument("--nu", type=float, default=0.28, help="Poisson's ratio")
     build.add_argument("--planes", choices=("ellipse", "sdec"), default="ellipse")
-    build.add_argument("--tolerance", type=float, default=0.01, help="99 %% error as a fraction of mu N")
+    build.add_argument("--tolerance", type=float, help="99 %% error as a fraction of mu N")
     build.add_argument("--out", required=True, metavar="FILE")
     build.set_defaults(run=_table_build)
     info = actions.add_parser("info", help="what a table holds and how accurate it is")
@@ -155,8 +158,13 @@ def _positive(value, option):
     return value
 
 
-def _output(path):
-    """Refuse an output path that cannot be written before any work starts."""
+HDF5 = (".h5", ".hdf5")
+
+
+def _output(path, endings=(".csv",)):
+    """Refuse an output path that cannot be written, or is of another kind, before any work starts."""
+    if Path(path).suffix.lower() not in endings:
+        raise InputError("--out", path, f"expected a name that ends in {' or '.join(endings)}")
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or os.path.isdir(path):
         raise InputError("--out", path, "expected a file in an existing folder")
     part = f"{path}.part{os.getpid()}"  # permissions do not tell whether a disk is full or a name is too long
@@ -166,6 +174,22 @@ def _output(path):
     except OSError as error:
         raise InputError("--out", path, f"expected a file that can be written: {error.strerror}") from None
     return Path(path)
+
+
+def _refuse_others(path, attribute, wanted):
+    """Refuse to write over an HDF5 file whose attribute (of a scene: its name) says that it is something else."""
+    if path.suffix.lower() not in HDF5 or not path.exists():
+        return
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            found = str(file.attrs.get(attribute, "something else"))
+        found = json.loads(found)["name"] if attribute == "scene" else found
+    except (OSError, ValueError, KeyError, TypeError):
+        found = "something else" if h5py.is_hdf5(path) else wanted  # what no program can read may go
+    if found != wanted:
+        raise InputError("--out", path, f"expected no file, or one of {wanted!r}; this one is of {found!r}: remove it")
 
 
 def _write_csv(frame, path):
@@ -183,7 +207,7 @@ def _simulate(options):
     from wrcore.run.streaming import simulate_to
     from wrcore.scene.description import load_scene
 
-    out = _output(options.out) if options.out else None
+    out = _output(options.out, HDF5) if options.out else None
     scene, record = load_scene(options.scene, options.overrides), {}
     if options.accuracy is not None:
         from wrcore.run.accuracy import choose
@@ -193,6 +217,8 @@ def _simulate(options):
         scene = load_scene(options.scene, [*choice.overrides(), *options.overrides])
         record = {"accuracy_m": options.accuracy, "accuracy_reason": reason}
         print(f"{scene.data['name']}: {reason}")
+    if out:
+        _refuse_others(out, "scene", scene.data["name"])
     with simulated_time(scene.data["integration"]["duration"]) as advance:
         say = partial(print, f"{scene.data['name']}:")
         run, interrupted = simulate_to(scene, out, advance, options.resume, say, record=record)
@@ -232,14 +258,15 @@ def _sweep(options):
     from wrcore.sweep.batch import gather, load_table, run_rows, sweep_to_file, write_table
     from wrcore.sweep.plan import load_sweep
 
-    out = _output(options.out)
+    out = _output(options.out, (".csv", ".h5"))
+    _refuse_others(out, "format", "wrcore sweep")
     if not 1 <= options.threads <= 1000:
         raise InputError("wrcore sweep", "--threads", f"expected 1 to 1000, got {options.threads}")
     sweep, started = load_sweep(options.sweep), time.perf_counter()
     if options.gather:
-        gather(options.gather, out)
+        gather(sweep, options.gather, out)
     elif options.batch:
-        write_table(out, run_rows(sweep, sweep.rows(*_batch(options.batch, len(sweep.runs))), options.threads))
+        write_table(out, run_rows(sweep, sweep.rows(*_batch(options.batch, len(sweep.runs))), options.threads), sweep)
     else:
         sweep_to_file(sweep, out, options.threads)
     table = load_table(out)
@@ -266,10 +293,6 @@ def _contact(options):
     from wrcore.geometry.track import Track
 
     out = _output(options.out)
-    for option in ("wheel_load", "gauge", "rolling_radius", "tape_circle_half_distance", "shear_modulus"):
-        _positive(getattr(options, option), f"--{option.replace('_', '-')}")
-    if not 0.0 <= options.poisson_ratio <= 0.5:
-        raise InputError("wrcore contact", "--poisson-ratio", f"expected 0 to 0.5, got {options.poisson_ratio}")
     poses = read_poses(options.poses)
     wheel = named_profile(options.wheel, "wheel")
     rail = named_profile(options.rail, "rail", _ratio(options.inclination))
@@ -280,6 +303,8 @@ def _contact(options):
         poses, geometry, options.wheel_load, options.detection, options.patch, options.shear_modulus,
         options.poisson_ratio,
     )  # fmt: skip
+    if table.empty:
+        raise InputError(options.poses, "", "expected a pose in which a wheel touches its rail, got none")
     _write_csv(table, out)
     missing = len(set(poses.pose_id) - set(table.pose_id))
     print(f"{len(poses)} poses, {len(table)} patches{f', {missing} poses without contact' if missing else ''}: {out}")
@@ -299,7 +324,10 @@ def _conicity(options):
         raise InputError("wrcore conicity", "--amplitudes-from", "expected 0 < from <= to <= 0.05 m and a step > 0")
     amplitudes = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
     pair = _wheelset_on_track(options)
-    _write_csv(conicity_curve(pair, amplitudes, options.roll), out)
+    curve = conicity_curve(pair, amplitudes, options.roll)
+    if curve["equivalent_conicity"].isna().all():
+        raise InputError("wrcore conicity", "--to", "expected an amplitude at which the wheelset swings, got none")
+    _write_csv(curve, out)
     if table_out:
         shifts = 1e-4 * np.arange(-round(last / 1e-4) - 20, round(last / 1e-4) + 21)
         _write_csv(first_touch(pair, shifts, options.roll), table_out)
@@ -328,9 +356,11 @@ def _profile(options, spec, kind):
 
 
 def _ratio(text):
-    """A ratio such as 1/40."""
+    """A ratio such as 1/40; None where none is given."""
     from wrcore.errors.checked_yaml import parse_ratio
 
+    if text is None:
+        return None
     ratio = parse_ratio(text)
     if not abs(ratio) <= 0.2:
         raise InputError("wrcore", "--inclination", f"expected a ratio such as 1/40, within 1/5, got {text!r}")
@@ -351,10 +381,12 @@ def _creep(options):
 
 
 def _table_build(options):
-    from wrcore.creep.table import build_table, show_progress, write_table
+    from wrcore.creep.table import DEFAULT_TOLERANCE, build_table, show_progress, write_table
 
-    out = _output(options.out)
-    table = build_table(options.nu, options.planes, options.tolerance, show_progress)
+    out = _output(options.out, HDF5)
+    _refuse_others(out, "schema", "wrcore creep table 1")
+    tolerance = DEFAULT_TOLERANCE if options.tolerance is None else options.tolerance
+    table = build_table(options.nu, options.planes, tolerance, show_progress)
     write_table(out, table)
     return _print_table(table)
 

@@ -135,6 +135,20 @@ def test_command_runs_a_whole_sweep_and_parts_of_it(tmp_path, capsys):
         assert main([*base, part, "--batch", f"{i}/2"]) == 0
     assert main([*base, str(tmp_path / "gathered.csv"), "--gather", *reversed(parts)]) == 0
     assert (tmp_path / "gathered.csv").read_text() == (tmp_path / "whole.csv").read_text()
+    capsys.readouterr()
+    for wrong, says in ((parts[:1], "in none, run 3 first"), ([*parts, parts[0]], "run 0: expected each run once")):
+        assert main([*base, str(tmp_path / "x.csv"), "--gather", *wrong]) == 2
+        assert says in capsys.readouterr().err
+    for place, other in ((2, small(set={"speed": 21})), (1, None)):  # of another scene; damaged
+        spoiled = tmp_path / f"spoiled{place}.csv"
+        spoiled.write_text((tmp_path / "part1.csv").read_text().replace("0.", "1.", 1))
+        if other:
+            (tmp_path / "other.yaml").write_text(yaml.safe_dump(other))
+            assert main(["sweep", str(tmp_path / "other.yaml"), "--out", str(spoiled), "--batch", "1/2"]) == 0
+            capsys.readouterr()
+        assert main([*base, str(tmp_path / "x.csv"), "--gather", str(spoiled), parts[1]]) == 2
+        assert "expected a whole part of this sweep" in capsys.readouterr().err
+    assert not (tmp_path / "x.csv").exists()
     assert main([*base, str(tmp_path / "x.csv"), "--batch", "3/2"]) == 2
     assert "--batch: expected i/n with 1 <= i <= n <= 6 runs, got '3/2'" in capsys.readouterr().err
 
@@ -195,6 +209,33 @@ def test_wrong_sweeps_are_refused_with_one_line(changes, expected):
     with pytest.raises(InputError, match=expected) as caught:
         wr.load_sweep(small(**changes))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5"])
+def test_a_damaged_batch_of_an_interrupted_sweep_is_run_again(tmp_path, ending):
+    sweep, part = wr.load_sweep(small()), tmp_path / f"part.{ending}"
+    sweep_batch.write_table(part, table := sweep_batch.run_rows(sweep, sweep.rows(0)), sweep)
+    pd.testing.assert_frame_equal(sweep_batch.load_part(sweep, part), table, check_dtype=False)
+    part.write_bytes(part.read_bytes()[:-3])
+    with pytest.raises(InputError):
+        sweep_batch.load_part(sweep, part)
+    folder = tmp_path / f".table.csv.{sweep.digest()}"
+    folder.mkdir()
+    (folder / "0000.csv").write_text("run,speed\n0,")
+    sweep_batch.sweep_to_file(sweep, tmp_path / "table.csv")
+    pd.testing.assert_frame_equal(sweep_batch.load_table(tmp_path / "table.csv"), wr.run_sweep(sweep))
+
+
+def test_a_table_does_not_go_over_something_else(tmp_path, capsys):
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(small()))
+    wr.write_run(tmp_path / "run.h5", wr.simulate(SCENES / "wheelset.yaml", integration__duration=0.01))
+    before = (tmp_path / "run.h5").read_bytes()
+    for name, says in (("run.h5", "expected no file, or one of 'wrcore sweep'"), ("table.txt", "ends in .csv or .h5")):
+        assert main(["sweep", str(tmp_path / "small.yaml"), "--out", str(tmp_path / name)]) == 2
+        assert says in capsys.readouterr().err
+    scene = ["simulate", str(SCENES / "suspended_wheelset.yaml"), "--out", str(tmp_path / "run.h5")]
+    assert main(scene) == 2 and "this one is of 'wheelset'" in capsys.readouterr().err
+    assert (tmp_path / "run.h5").read_bytes() == before
 
 
 def test_a_table_of_another_kind_is_refused(tmp_path):

@@ -59,6 +59,7 @@ rule sweep_table:
         "Sweep {wildcards.sweep}: table and figure"
     input:
         core=CORE["sweeps_figures"],
+        sweep=sweep_file,
         batches=sweep_batches,
     output:
         table="<results>/sweeps/{sweep}.csv",

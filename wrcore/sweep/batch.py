@@ -7,6 +7,8 @@ equilibrium. A run then costs its integration and a few tenths of a millisecond.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import io
 import json
 import os
 import shutil
@@ -40,6 +42,8 @@ from wrcore.sweep.measures import (
     wheelset_motion,
 )
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
+
+_SEALED = "# seal of this part: "
 
 CHUNK = 200
 """Runs whose motions are held at a time."""
@@ -268,43 +272,89 @@ def sweep_to_file(
     folder = path.with_name(f".{path.name}.{sweep.digest()}")
     parts = [folder / f"{batch:04d}.csv" for batch in range(sweep.batches)]
     for batch, part in enumerate(parts):
-        if not part.exists():
-            write_table(part, run_rows(sweep, sweep.rows(batch), threads, progress))
-    gather(parts, path)
+        if not _whole(sweep, part):
+            write_table(part, run_rows(sweep, sweep.rows(batch), threads, progress), sweep)
+    gather(sweep, parts, path)
     shutil.rmtree(folder)
 
 
-def gather(parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
-    """One table from those of all batches, in the order of the runs."""
-    table = pd.concat([load_table(part) for part in parts], ignore_index=True)
-    write_table(path, table.sort_values("run", ignore_index=True))
+def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
+    """One table from those of all batches, in the order of the runs.
+
+    Raises
+    ------
+    InputError
+        Parts that are damaged, of another sweep or of other sources, runs that are missing or there twice.
+    """
+    tables, owners = [], {}
+    for part in parts:
+        tables.append(load_part(sweep, part))
+        for run in tables[-1]["run"]:
+            if run in owners:
+                raise InputError(part, f"run {run}", f"expected each run once, but {owners[run]} has it, too")
+            owners[run] = part
+    missing = [run for run in sweep.runs.index if run not in owners]
+    if missing:
+        expected = f"expected parts with all {len(sweep.runs)} runs"
+        raise InputError(sweep.source, "", f"{expected}, but {len(missing)} are in none, run {missing[0]} first")
+    write_table(path, pd.concat(tables).sort_values("run", ignore_index=True))
 
 
-def write_table(path: str | PathLike[str], table: pd.DataFrame) -> None:
+def load_part(sweep: Sweep, path: str | PathLike[str]) -> pd.DataFrame:
+    """Read a part of a sweep's table whose seal says that it is whole and of this sweep; else InputError."""
+    table, text, seal = _read(Path(path))
+    if seal != _seal(sweep, text):
+        expected = "expected a whole part of this sweep, as 'wrcore sweep --batch' writes it with the same sources"
+        raise InputError(path, "", expected)
+    return table
+
+
+def _whole(sweep: Sweep, part: Path) -> bool:
+    try:
+        return len(load_part(sweep, part)) > 0
+    except InputError:
+        return False
+
+
+def _seal(sweep: Sweep, text: str) -> str:
+    """Digest of what a part holds and of what it depends on."""
+    return hashlib.sha256(f"{sweep.digest()} {text}".encode()).hexdigest()
+
+
+def _text(table: pd.DataFrame) -> str:
+    return table.to_csv(index=False, lineterminator="\n")
+
+
+def write_table(path: str | PathLike[str], table: pd.DataFrame, part_of: Sweep | None = None) -> None:
     """Write a sweep's table: CSV, or HDF5 with a dataset and its unit per column where the name ends in ``.h5``.
 
-    The file appears under its name only when it is complete.
+    The file appears under its name only when it is complete. A part ends with its seal: a comment, or an attribute.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    if path.suffix == ".h5":
+        table = table.astype({name: str for name, column in table.items() if column.dtype.kind not in "biuf"})
+    text = _text(table)
+    seal = "" if part_of is None else _seal(part_of, text)
     try:
         if path.suffix == ".h5":
-            _write_hdf5(part, table)
+            _write_hdf5(part, table, seal)
         else:
-            table.to_csv(part, index=False)
+            part.write_text(text + (seal and f"{_SEALED}{seal}\n"), encoding="utf-8")
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
 
 
-def _write_hdf5(path: Path, table: pd.DataFrame) -> None:
+def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
     with h5py.File(path, "w", track_order=True) as file:
         file.attrs["format"] = "wrcore sweep"
+        file.attrs["seal"] = seal
         for name in table.columns:
             values = table[name].to_numpy()
             if values.dtype.kind not in "biuf":
-                values = np.array([str(value) for value in values], dtype=h5py.string_dtype())
+                values = values.astype(h5py.string_dtype())
             dataset = file.create_dataset(name, data=values)
             dataset.attrs["units"] = UNITS.get(name) or unit_of(name)
 
@@ -317,14 +367,22 @@ def load_table(path: str | PathLike[str]) -> pd.DataFrame:
     InputError
         If there is no such file or it is of another kind.
     """
-    path = Path(path)
+    return _read(Path(path))[0]
+
+
+def _read(path: Path) -> tuple[pd.DataFrame, str, str]:
+    """A table, its text and its seal, which is empty where it has none."""
     try:
         if path.suffix != ".h5":
-            return pd.read_csv(path)
+            text, _, seal = path.read_text(encoding="utf-8-sig").partition(_SEALED)
+            return pd.read_csv(io.StringIO(text)), text, seal.strip()
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != "wrcore sweep":
                 raise InputError(path, "attribute format", "expected 'wrcore sweep'")
             columns = {name: item.asstr()[()] if item.dtype.kind == "O" else item[()] for name, item in file.items()}
-    except (OSError, pd.errors.ParserError, UnicodeDecodeError) as error:
+            table = pd.DataFrame(columns)
+            return table, _text(table), str(file.attrs.get("seal", ""))
+    except InputError:
+        raise
+    except Exception as error:  # a damaged file fails in as many ways as h5py and pandas have
         raise InputError(path, "", f"expected a sweep's table (CSV or HDF5), got: {error}") from None
-    return pd.DataFrame(columns)

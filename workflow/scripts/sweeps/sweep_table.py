@@ -5,8 +5,9 @@ import sys
 from study.sweeps.figures import sweep_scatter
 from wrcore.analysis.style import save_figure
 from wrcore.sweep.batch import gather, load_table
+from wrcore.sweep.plan import load_sweep
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-gather(snakemake.input.batches, snakemake.output.table)
+gather(load_sweep(snakemake.input.sweep), snakemake.input.batches, snakemake.output.table)
 figure = sweep_scatter(load_table(snakemake.output.table), snakemake.params.varied, snakemake.params.shown)
 save_figure(figure, snakemake.output.figure, snakemake.output.svg)
