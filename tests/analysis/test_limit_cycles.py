@@ -127,6 +127,17 @@ def test_a_derailed_vehicle_is_not_on_a_limit_cycle(oscillator, suspended, monke
     assert falling_branch(*suspended, [46.0], Settling(), [0.012], 0.1)["status"].item() == "derailed"
 
 
+def test_the_falling_branch_goes_on_below_speeds_at_which_everything_derails(oscillator, suspended, monkeypatch):
+    run = analysis_limit_cycles._run
+    monkeypatch.setattr(
+        analysis_limit_cycles, "_run",
+        lambda model, state, settling: (*run(model, state, settling)[:3], model.speed < 50.0),
+    )  # fmt: skip
+    table = falling_branch(*suspended, [46.0, 48.0, 52.0], Settling(longest=200.0), [0.005], 5.0)
+    assert list(table["status"]) == ["derailed", "limit cycle", "limit cycle"]
+    assert list(table["speed_m_per_s"]) == [52.0, 48.0, 46.0]
+
+
 def test_critical_table():
     """Linear and nonlinear critical speeds of both detections side by side; nothing found stays empty."""
     linear = pd.DataFrame({"variant": ["planar", "spatial"], "critical_speed_m_per_s": [58.1, 58.0], "mode": "hunting"})

@@ -143,9 +143,10 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     Returns
     -------
     pandas.DataFrame
-        Rows of :func:`settle_motion`, fastest first; the last one is the fastest motion that is none of `CYCLES`.
+        Rows of :func:`settle_motion`, fastest first; the last one is the fastest motion that comes to rest. Where every
+        disturbance derails, the next lower speed is tried.
     """
-    rows, carried, below, queue = [], None, None, list(speeds)
+    rows, lost, carried, below, queue = [], [], None, None, list(speeds)
     while queue:
         there, straight = at_speed(model, state, queue.pop())
         tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
@@ -155,11 +156,14 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
         if row["status"] in CYCLES:
             rows.append(row)
             carried = there, end
+        elif row["status"] == "derailed":
+            lost.append(row)
         else:
             below, queue = row, []
         if below and rows and rows[-1]["speed_m_per_s"] - below["speed_m_per_s"] > resolution:
             queue = [0.5 * (rows[-1]["speed_m_per_s"] + below["speed_m_per_s"])]
-    return pd.DataFrame(rows + [below] * (below is not None))
+    table = pd.DataFrame([*lost, *rows, *([below] if below else [])])
+    return table.sort_values("speed_m_per_s", ascending=False, ignore_index=True)
 
 
 def rising_branch(model, state, speeds, settling):

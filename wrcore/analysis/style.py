@@ -74,6 +74,13 @@ def save_figure(figure, *paths):
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
+def derailed_at(axes, speeds, color):
+    """Crosses at the upper edge of a panel, at the speeds (m/s) of runs that derailed."""
+    if len(speeds):
+        look = {"marker": "x", "linestyle": "", "color": color, "transform": axes.get_xaxis_transform()}
+        axes.plot(speeds, [0.97] * len(speeds), label="derailed", **look)
+
+
 def shared_legend(figure, panels, **kwargs):
     """One legend above all panels, each label once."""
     entries = {}

@@ -63,15 +63,19 @@ def test_modes_are_labelled_and_their_energies_written_in_per_cent():
 
 def test_limit_cycles_show_both_branches_in_mm(over_speed):
     rows = [
-        ("planar", "falling", 60.0, 6e-3), ("planar", "falling", 50.0, 5e-3), ("planar", "rising", 50.0, 0.0),
-        ("spatial", "falling", 60.0, 6.1e-3), ("spatial", "rising", 60.0, 2e-3), ("spatial", "rising", 70.0, np.nan),
+        ("planar", "falling", 60.0, 6e-3, "limit cycle"), ("planar", "falling", 50.0, 5e-3, "limit cycle"),
+        ("planar", "falling", 55.0, 9e-3, "irregular"), ("planar", "rising", 50.0, 0.0, "at rest"),
+        ("spatial", "falling", 60.0, 6.1e-3, "limit cycle"), ("spatial", "rising", 60.0, 2e-3, "growing"),
+        ("spatial", "rising", 70.0, np.nan, "derailed"),
     ]  # fmt: skip
-    table = pd.DataFrame(rows, columns=["detection", "branch", "speed_m_per_s", "amplitude_m"])
+    table = pd.DataFrame(rows, columns=["detection", "branch", "speed_m_per_s", "amplitude_m", "status"])
     figure = fig_limit_cycles({"wheelset": table}, {"wheelset": over_speed[1]})
     (axes,) = figure.axes
     lines = {line.get_label(): line for line in axes.lines}
-    np.testing.assert_allclose(lines["falling speed, planar"].get_xdata(), [50.0, 60.0])
-    np.testing.assert_allclose(lines["falling speed, planar"].get_ydata(), [5.0, 6.0])
+    np.testing.assert_allclose(lines["falling speed, planar"].get_xdata(), [50.0, 55.0, 60.0])
+    np.testing.assert_allclose(lines["falling speed, planar"].get_ydata(), [5.0, np.nan, 6.0])  # a gap, no bridge
+    stars = [line for line in axes.lines if line.get_marker() == "*" and len(line.get_xdata())]
+    assert [(*line.get_xdata(), *line.get_ydata(), line.get_linestyle()) for line in stars] == [(55.0, 9.0, "None")]
     assert lines["rising speed, spatial"].get_markerfacecolor() == "white"
     assert [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())] == [70.0]
     assert axes.get_ylabel() == "amplitude of y / mm"

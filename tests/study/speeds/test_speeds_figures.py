@@ -59,3 +59,25 @@ def test_over_speed_draws_a_line_per_vehicle_and_detection(runs, quantities):
     assert [len(axes.lines) for axes in figure.axes] == [4] * len(quantities)
     assert "speed / (m/s)" in labels(figure)
     assert {label for _, _, label in quantities} <= set(labels(figure))
+
+
+def test_a_run_that_derailed_early_has_no_late_part(runs):
+    run = copy.deepcopy(runs["spatial"])
+    whole, run.status = speed_row(run), "derailed"
+    row = speed_row(run)
+    assert row["status"] == "derailed" and whole["Q_min_N"] > 0.0 and whole.keys() == row.keys()
+    late = [name for name in row if name.startswith(("Q_", "Y_", "wear", "car_body")) or name == "amplitude_m"]
+    assert len(late) == 10 and np.isnan([row[name] for name in late]).all()
+    assert row["frequency_Hz"] == whole["frequency_Hz"] and row["simulated_s"] == whole["simulated_s"]
+
+
+def test_derailed_runs_are_crosses_and_gaps(runs):
+    row = speed_row(runs["spatial"]) | {"detection": "spatial", "track": "released", "amplitude_m": 5e-3}
+    rows = [
+        row | {"speed_m_per_s": speed, "status": "derailed" if speed == 40.0 else "completed"}
+        for speed in (20.0, 40.0, 60.0)
+    ]
+    axes = over_speed({"wheelset": pd.DataFrame(rows)}, "released", HUNTING).axes[0]
+    line, crosses = axes.lines
+    np.testing.assert_allclose(line.get_ydata(), [5.0, np.nan, 5.0])
+    assert list(crosses.get_xdata()) == [40.0] and crosses.get_marker() == "x"

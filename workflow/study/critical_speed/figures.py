@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wrcore.analysis.modes import OVERDAMPED
-from wrcore.analysis.style import ACCENT, LINES, MM, styled
+from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
 
 GREY = "0.72"
 
@@ -106,6 +106,8 @@ def fig_modes(table, title):
 def fig_limit_cycles(tables, linear):
     """Amplitude of wheelsets over speed: what a large and what a small disturbance leave.
 
+    Irregular motions are stars that no line joins, motions that end beside the rails are crosses at the top.
+
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
@@ -127,15 +129,16 @@ def fig_limit_cycles(tables, linear):
                 "markerfacecolor": LINES[detection]["color"] if filled else "white", "linewidth": 0.9,
                 "zorder": 2 if planar else 3,
             }  # fmt: skip
-            axes.plot(rows["speed_m_per_s"], MM * rows["amplitude_m"], label=f"{branch} speed, {detection}", **look)
-            derailed = rows[rows["amplitude_m"].isna()]["speed_m_per_s"]
-            cross = {"marker": "x", "color": look["color"], "linestyle": "", "transform": axes.get_xaxis_transform()}
-            axes.plot(derailed, np.full(len(derailed), 0.97), **cross)
+            speeds, amplitudes = rows["speed_m_per_s"], MM * rows["amplitude_m"]
+            irregular = rows["status"] == "irregular"
+            axes.plot(speeds, amplitudes.where(~irregular), label=f"{branch} speed, {detection}", **look)
+            star = {"marker": "*", "markersize": 7.0, "linestyle": "", "label": "irregular motion"}
+            axes.plot(speeds[irregular], amplitudes[irregular], **{**look, **star})
+            derailed_at(axes, speeds[rows["status"] == "derailed"], look["color"])
         look = {"color": ACCENT, "linewidth": 0.9, "linestyle": "-.", "label": "linear critical speed"}
         axes.axvline(_critical(linear[title]), **look)
         axes.set(ylabel="amplitude of y / mm", ylim=(-0.2, None))
         axes.set_title(title, loc="left")
     panels[-1].set_xlabel("speed / (m/s)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=8)
+    shared_legend(figure, panels, ncols=3, fontsize=8)
     return figure

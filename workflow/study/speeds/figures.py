@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wrcore.analysis.motion import SIDES
-from wrcore.analysis.style import LINES, MM, shared_legend, styled
+from wrcore.analysis.style import LINES, MM, derailed_at, shared_legend, styled
 from wrcore.analysis.wheels import quotient, wheel_forces, wheelsets_of
 
 KN = 1e-3
@@ -96,7 +96,7 @@ RESPONSE = (
 
 @styled
 def over_speed(tables, track, quantities):
-    """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are left out.
+    """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are crosses at the top.
 
     Parameters
     ----------
@@ -117,11 +117,12 @@ def over_speed(tables, track, quantities):
     for axes, (column, factor, label) in zip(np.ravel(panels), quantities, strict=True):
         for marker, (vehicle, table) in zip(VEHICLES, tables.items(), strict=False):
             for detection, line in LINES.items():
-                done = (table["status"] == "completed") & (table["track"] == track)
-                part = table[done & (table["detection"] == detection)]
-                if part[column].notna().any():
+                part = table[(table["track"] == track) & (table["detection"] == detection)]
+                values = factor * part[column].where(part["status"] == "completed")  # a gap is not bridged
+                if values.notna().any():
                     style = {**line, **marker, "markevery": 2}
-                    axes.plot(part["speed_m_per_s"], factor * part[column], label=f"{vehicle}, {detection}", **style)
+                    axes.plot(part["speed_m_per_s"], values, label=f"{vehicle}, {detection}", **style)
+                derailed_at(axes, part.loc[part["status"] == "derailed", "speed_m_per_s"], line["color"])
         axes.set(ylabel=label)
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")

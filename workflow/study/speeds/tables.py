@@ -6,6 +6,9 @@ import pandas as pd
 from wrcore.analysis.wheels import hunting, wheel_table, wheelsets_of
 from wrcore.run.motion import amplitude
 
+OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "growth_per_s", "damping_ratio"}
+"""Columns that a run has, too, which ended early."""
+
 
 def speed_row(run, begin=0.5, body="car_body"):
     """What one run of a sweep over speeds shows.
@@ -22,14 +25,15 @@ def speed_row(run, begin=0.5, body="car_body"):
     Returns
     -------
     dict
-        Columns carry their unit. Hunting is that of the leading wheelset over the whole run.
+        Columns carry their unit. Hunting is that of the leading wheelset over the whole run. A run that did not reach
+        its end (``status``) has no late part: what would be measured there is NaN.
     """
-    leading = wheelsets_of(run)[0]
-    start = begin * run.scene["integration"]["duration"]
-    late = run.t >= min(start, run.t[-1])
+    leading, whole = wheelsets_of(run)[0], run.status == "completed"
+    start = begin * run.scene["integration"]["duration"] if whole else 0.0
+    late = run.t >= start
     y = run[leading].y_m
     frequency, growth, damping = hunting(run.t, y)
-    wheels = wheel_table(run, min(start, run.t[-1]))
+    wheels = wheel_table(run, start)
     row = {
         "speed_m_per_s": run.scene["speed"],
         "status": run.status,
@@ -48,6 +52,8 @@ def speed_row(run, begin=0.5, body="car_body"):
         channel = run.groups.get(body, {}).get(f"a{axis}_m_per_s2")
         row[f"car_body_a{axis}_rms_m_per_s2"] = np.nan if channel is None else np.sqrt(np.mean(channel[late] ** 2))
         row[f"car_body_a{axis}_max_m_per_s2"] = np.nan if channel is None else np.max(np.abs(channel[late]))
+    if not whole:
+        row |= dict.fromkeys(row.keys() - OF_WHOLE_RUNS, np.nan)
     counters = {name: run.counters[name] for name in ("wall_s", "rhs_evaluations", "steps", "rejected")}
     return row | counters
 
