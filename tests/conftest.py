@@ -57,7 +57,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def no_new_tables():
     """A spoiled material would have a creep table built, which takes its time: only the one at hand is given."""
-    table = description.ensure_table(0.28, "ellipse", 0.01)
+    table = description.ensure_table()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(description, "ensure_table", lambda *_: table)
         yield table

@@ -172,7 +172,7 @@ def test_a_polynomial_is_published_in_mm():
 
 def test_the_curve_ends_at_a_vertical_face():
     """A 1:20 side face (slope 20) is outside the curve; the R13 corner ends at slope 10."""
-    rail = named_profile("54E1", "rail")
+    rail = named_profile("54E1", "rail", 0)
     assert np.abs(rail.df).max() <= 10.0
     assert np.abs(rail.df).max() > 5.0
 

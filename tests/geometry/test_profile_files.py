@@ -112,7 +112,7 @@ def test_a_path_alone_and_a_name_are_the_same_entrance(tmp_path):
 
 
 def test_a_point_file_is_inclined_only_on_request(tmp_path):
-    upright, inclined = named_profile("60E1", "rail"), named_profile("60E1", "rail", 1 / 40)
+    upright, inclined = named_profile("60E1", "rail", 0), named_profile("60E1", "rail", 1 / 40)
     path = str(write(tmp_path, "rail.csv", "u_mm,f_mm\n" + columns(upright.u, upright.f)))
     inside = np.linspace(-0.030, 0.020, 101)
     as_is = named_profile(path, "rail", 1 / 40)

@@ -123,7 +123,7 @@ def test_rail_sections_are_continuous_and_tangent(name):
 
 
 def test_upright_rail_is_symmetric():
-    rail = named_profile("60E1", "rail")
+    rail = named_profile("60E1", "rail", 0)
     u = np.linspace(0.0, 0.034, 171)
     assert np.allclose(rail(u), rail(-u), rtol=0.0, atol=1e-15)
 
@@ -187,7 +187,7 @@ def test_uic60_agrees_with_the_benchmark_file_within_0_2_um():
 def test_60e1_and_the_benchmark_rail_differ_by_up_to_0_04_mm():
     """FACTS 1.2: up to 0.040 mm in z, upright."""
     u = np.linspace(-0.0345, 0.0345, 691)
-    difference = named_profile("60E1", "rail")(u) - named_profile("UIC60-MBench", "rail")(u)
+    difference = named_profile("60E1", "rail", 0)(u) - named_profile("UIC60-MBench", "rail", 0)(u)
     assert np.max(np.abs(difference[np.abs(u) < 0.031])) == pytest.approx(0.04e-3, abs=0.01e-3)
 
 
@@ -301,7 +301,22 @@ def test_a_bad_name_is_one_clear_line(spec, kind, says):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("inclination", [40, float("nan"), "1/40", None])
+@pytest.mark.parametrize("inclination", [40, float("nan"), "1/40"])
 def test_a_bad_inclination_is_refused(inclination):
     with pytest.raises(InputError, match="ratio like 1/40"):
         named_profile("60E1", "rail", inclination)
+
+
+def test_a_named_rail_has_no_silent_inclination(tmp_path):
+    """0.135 instead of 0.356: what an inclination of 1/40 or none makes of the conicity at 1 mm."""
+    with pytest.raises(InputError, match="inclination: expected a ratio for 60E1, such as 1/40"):
+        named_profile("60E1", "rail")
+    path = str(tmp_path / "rail.csv")
+    (tmp_path / "rail.csv").write_text(
+        "u_m,f_m\n" + "".join(f"{u},{-5 * u * u}\n" for u in np.linspace(-0.03, 0.03, 61))
+    )
+    with pytest.raises(InputError, match="inclination: expected a ratio for"):
+        named_profile({"points": path, "inclined": False}, "rail")
+    assert named_profile(path, "rail").gauge_offset(1e-4) == pytest.approx(
+        named_profile(path, "rail", 0.02).gauge_offset(1e-4)
+    )

@@ -154,7 +154,8 @@ def test_contact_command_solves_poses(tmp_path, capsys):
 def test_bad_poses_are_refused(tmp_path, capsys, text, expected):
     poses, out = tmp_path / "poses.csv", tmp_path / "out.csv"
     poses.write_text(text)
-    options = ["--wheel", "S1002", "--rail", "UIC60-MBench", "--wheel-load", "10000", "--out", str(out)]
+    options = ["--wheel", "S1002", "--rail", "UIC60-MBench", "--inclination", "1/40", "--wheel-load", "10000"]
+    options += ["--out", str(out)]
     assert main(["contact", "--poses", str(poses), *options]) == 2
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1 and "poses.csv" in printed and expected in printed

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.stability import at_speed, straight_ahead
+from wrcore.analysis.stability import at_speed, rising, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.integrator import integrate
 from wrcore.run.motion import hunting_frequency
@@ -196,7 +196,7 @@ def limit_cycles(scene, speeds, settling, disturbances, resolution):
     pandas.DataFrame
         Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
     """
-    model, state = straight_ahead(scene)
+    speeds, (model, state) = rising(speeds), straight_ahead(scene)
     tables = {
         "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),
         "rising": rising_branch(model, state, speeds, settling),

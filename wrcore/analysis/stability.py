@@ -7,12 +7,20 @@ from scipy.optimize import brentq
 from wrcore.analysis.modes import NEUTRAL, energy_table, linear_modes, shape_table
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.linear import steady_running
-from wrcore.errors import InputError
+from wrcore.errors import InputError, check_number
 from wrcore.scene.description import compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
 """Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
 nothing balances, is a quarter of it."""
+
+
+def rising(speeds):
+    """Speeds in m/s as a list; InputError if there are none, they do not rise, or one is none of a vehicle."""
+    speeds = [check_number(speed, 1e-6, 150.0, "speeds", "", "m/s") for speed in speeds]
+    if not speeds or np.any(np.diff(speeds) <= 0.0):
+        raise InputError("speeds", "", f"expected one or more that rise, got {len(speeds)}")
+    return speeds
 
 
 def straight_ahead(scene):
@@ -105,6 +113,7 @@ def modes(scene, speed):
     shapes : pandas.DataFrame
         From `shape_table`.
     """
+    (speed,) = rising([speed])
     table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
     full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
     return full, shape_table(scene.vehicle, table, shapes)
@@ -195,6 +204,7 @@ def loci(scenes, speeds):
     pandas.DataFrame
         Tables of :func:`root_locus` after a column detection.
     """
+    speeds = rising(speeds)
     tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}
     return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
 
@@ -214,7 +224,7 @@ def critical_speeds(scenes, speeds):
     pandas.DataFrame
         Rows of :func:`critical_speed` after a column variant.
     """
-    rows = []
+    rows, speeds = [], rising(speeds)
     for variant, scene in scenes.items():
         rows.append({"variant": variant, **critical_speed(scene.vehicle, *straight_ahead(scene), speeds)})
     return pd.DataFrame(rows)

@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.contact.geometry import HALF_DISTANCES, RADII
+from wrcore.errors import InputError, check_number
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.track import GAUGE_DEPTH
+from wrcore.geometry.track import GAUGE_DEPTH, GAUGES
 from wrcore.kernels.jit import FAST, jit
 
 SCAN_STEP = 1e-4
@@ -51,8 +52,7 @@ class WheelOnRail:
         if (self.wheel.kind, self.rail.kind) != ("wheel", "rail"):
             got = f"{self.wheel.kind} and {self.rail.kind}"
             raise InputError(self.wheel.name, "kind", f"expected a wheel and a rail, got {got}")
-        if not 0.0 < self.rolling_radius < math.inf:
-            raise InputError("wheel", "rolling_radius", f"expected a radius in m, got {self.rolling_radius!r}")
+        check_number(self.rolling_radius, *RADII, "wheel", "rolling_radius", "m")
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,8 @@ class WheelsetOnTrack:
     gauge_depth: float = GAUGE_DEPTH
 
     def __post_init__(self):
-        for name in ("half_distance", "gauge", "gauge_depth"):
-            if not 0.0 < getattr(self, name) < 10.0:
-                raise InputError("track", name, f"expected a length in m, got {getattr(self, name)!r}")
+        for name, bounds in (("half_distance", HALF_DISTANCES), ("gauge", GAUGES), ("gauge_depth", (1e-6, 0.1))):
+            check_number(getattr(self, name), *bounds, "track", name, "m")
         for side in (self.left, self.right):
             if math.isnan(side.rail.gauge_offset(self.gauge_depth)):
                 raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")

@@ -7,7 +7,7 @@ import numpy as np
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
-from wrcore.errors import InputError
+from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.surface import SIDES
 
@@ -46,6 +46,8 @@ def read_poses(path):
     for name in frame.columns:  # other columns are left alone, but not a pose in another unit or spelling
         if name not in known and str(name).split("_")[0].strip().lower() in ("y", "yaw", "roll", "z"):
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
+    if frame.empty:
+        raise InputError(path, "", "expected at least one pose, got none")
     for name, limit in (("y_m", 0.1), ("yaw_rad", 0.5), ("roll_rad", 0.5), ("z_m", 2.0)):
         if name not in frame:
             frame[name] = np.nan
@@ -56,7 +58,9 @@ def read_poses(path):
         if bad.any():
             row = int(np.argmax(bad.to_numpy()))
             raise InputError(
-                path, f"{name}, row {row + 1}", f"expected a number within {limit:g}, got {frame[name].iloc[row]!r}"
+                path,
+                f"{name}, row {row + 1}",
+                f"expected a number within {limit:g}, got {str(frame[name].iloc[row])!r}",
             )
         frame[name] = values
     return frame
@@ -74,7 +78,7 @@ def solve_poses(
         ``wheel_load`` vertically. Roll given, z not: each side is solved by itself. z given, roll not: roll is zero.
     geometry : ContactGeometry
     wheel_load : float
-        Vertical load per wheel, N, > 0.
+        Vertical load per wheel, N, above 0 and up to 1e6.
     detection : {"planar", "spatial"}
     reduction : {"maximum", "moment"}
     shear_modulus, poisson_ratio : float
@@ -84,9 +88,17 @@ def solve_poses(
     -------
     pandas.DataFrame
         One row per patch; a wheel without contact has none. A pose without equilibrium gives no rows.
+
+    Raises
+    ------
+    InputError
+        For an unknown choice, or a number in another unit.
     """
     import pandas as pd
 
+    check_number(wheel_load, 1e-9, 1e6, "contact", "wheel_load", "N")
+    check_number(shear_modulus, 1e9, 1e12, "contact", "shear_modulus", "Pa")
+    check_number(poisson_ratio, 0.0, 0.5, "contact", "poisson_ratio")
     hertz, modulus, spatial = hertz_table(), contact_modulus(shear_modulus, poisson_ratio), detection == "spatial"
     if detection not in ("planar", "spatial"):
         raise InputError("detection", "", f"expected planar or spatial, got {detection!r}")

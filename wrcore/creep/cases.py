@@ -31,6 +31,8 @@ def read_cases(path):
         If the file cannot be read as a table.
     """
     frame = read_csv_table(path, "case_id")
+    if frame.empty:
+        raise InputError(path, "", "expected at least one case, got none")
     frame.attrs["source"] = str(path)
     return frame
 

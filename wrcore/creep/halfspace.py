@@ -28,12 +28,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.creep.operator import make_operator, panel_counts
+from wrcore.errors import InputError, check_number
 from wrcore.kernels.jit import jit
 
 DEFAULT_LEVEL = 22
 TOLERANCE = 1e-3
 MAX_ITERATIONS = 200
 BATCH = 256
+_LARGEST_PSI = 1.0 - 1e-6
 FAST = 100.0
 
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
@@ -306,7 +308,12 @@ class RollingContact:
     nu : float
         Poisson's ratio of both bodies, 0 to 0.5.
     level : int
-        About ``level**2`` panels.
+        About ``level**2`` panels, 4 to 100.
+
+    Raises
+    ------
+    InputError
+        If one of these, or a creepage of a case, is no such number.
 
     Examples
     --------
@@ -317,8 +324,11 @@ class RollingContact:
     """
 
     def __init__(self, g, psi=0.0, nu=0.28, level=DEFAULT_LEVEL):
-        self.g, self.psi, self.nu, self.level = float(g), float(psi), float(nu), level
-        self.n, self.ny = panel_counts(self.g, level)
+        self.g = check_number(g, 1e-6, 1e6, "RollingContact", "g")
+        self.psi = check_number(psi, -_LARGEST_PSI, _LARGEST_PSI, "RollingContact", "psi")
+        self.nu = check_number(nu, 0.0, 0.5, "RollingContact", "nu")
+        self.level = int(check_number(level, 4, 100, "RollingContact", "level"))
+        self.n, self.ny = panel_counts(self.g, self.level)
         self.operator = make_operator(self.g, self.psi, self.nu, self.n, self.ny)
 
     def solve(self, ux, uy, phi, tolerance=TOLERANCE):
@@ -342,6 +352,7 @@ class RollingContact:
 
     def solve_many(self, creepages, tolerance=TOLERANCE):
         """Creep forces (K, 3) and iteration counts (K,) for creepages (K, 3); a negative count did not converge."""
+        creepages = _rows(*np.transpose(creepages))
         results, iterations, empty = np.empty((len(creepages), 3)), np.empty(len(creepages), np.int64), _no_rows()
         solve_rows(self.operator, creepages, tolerance, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
         return results, iterations
@@ -371,7 +382,10 @@ class RollingContact:
 
 
 def _rows(ux, uy, phi):
-    return np.ascontiguousarray(np.stack(np.broadcast_arrays(ux, uy, phi), axis=-1).reshape(-1, 3), dtype=float)
+    rows = np.ascontiguousarray(np.stack(np.broadcast_arrays(ux, uy, phi), axis=-1).reshape(-1, 3), dtype=float)
+    if not np.isfinite(rows).all():
+        raise InputError("RollingContact", "creepages", "expected finite numbers")
+    return rows
 
 
 def _no_rows():

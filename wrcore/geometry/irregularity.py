@@ -116,6 +116,12 @@ def irregularity_data(start, step, values):
     return IrregularityData(coefficients, float(start - _PADDING * step), float(step))
 
 
+def irregularity_end(data):
+    """Arc length of the last sample, m: beyond it rails are perfect again; infinite without an irregularity."""
+    cells = len(data.coefficients)
+    return data.start + data.step * (cells - _PADDING) if cells else math.inf
+
+
 def combine(alignment, level, cross_level, gauge):
     """Channels (n, 4) from the means of both rails, cross level (left minus right) and change of gauge, all (n,), m."""
     return np.stack(

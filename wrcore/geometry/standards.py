@@ -154,7 +154,7 @@ def cone_sections(slope):
     return (Line(low, slope * low, high, slope * high),)
 
 
-def named_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
+def named_profile(spec, kind, inclination=None, window=WINDOW, spacing=SPACING):
     """Profile by name, analytic form or file.
 
     Parameters
@@ -165,9 +165,9 @@ def named_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
         "smoothing": 1e-6}`` of which only ``points`` is required. Files: `wrcore.geometry.profile_files`.
     kind : {"wheel", "rail"}
         What the profile is used for.
-    inclination : float
-        Of the rail, for instance 1/40. Applied to named rails and to point files with ``inclined: False``; a point
-        file is otherwise taken as lying in its track pose already.
+    inclination : float, optional
+        Of the rail, for instance 1/40; 0 stands upright. Named rails and point files with ``inclined: False`` need one;
+        other point files lie in their track pose already.
     window : float
         Averaging length of the curvature, m.
     spacing : float
@@ -180,12 +180,17 @@ def named_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     Raises
     ------
     InputError
-        Unknown name, a wheel used as a rail (or the reverse), or a faulty file.
+        Unknown name, a wheel used as a rail (or the reverse), a rail without an inclination, or a faulty file.
     """
     if kind not in ("wheel", "rail"):
         raise ValueError(f"kind must be 'wheel' or 'rail', got {kind!r}")
-    if not (isinstance(inclination, (int, float)) and abs(inclination) <= 0.2):
+    if inclination is not None and not (isinstance(inclination, (int, float)) and abs(inclination) <= 0.2):
         raise InputError(kind, "inclination", f"expected a ratio like 1/40 (at most 0.2), got {inclination!r}")
+    upright = isinstance(spec, dict) and spec.get("inclined") is False
+    if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
+        name = spec["points"] if upright and "points" in spec else spec
+        raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
+    inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}
     if isinstance(spec, (dict, Path)) or _is_file(spec):
         return profile_files.read_profile(spec, kind, inclination, **options)

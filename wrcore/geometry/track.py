@@ -18,6 +18,9 @@ from wrcore.geometry.irregularity import (
 )
 from wrcore.geometry.path import PathData, path_data, tangent_path
 
+GAUGES = 0.5, 2.0
+"""Gauges of which there are tracks, m; others are taken for another unit."""
+
 GAUGE_DEPTH = 0.014
 """Height below the rail top at which the gauge is measured, m (Manchester contact benchmark)."""
 

@@ -15,6 +15,7 @@ from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, workspace
 from wrcore.dynamics.track import track_poses
+from wrcore.geometry.irregularity import irregularity_end
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.run import Run
@@ -155,7 +156,9 @@ class Course:
         if energies is not None:
             groups["energy"] = energies
         standing = poses[:, wheelsets]
-        return groups, exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
+        beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
+        limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
+        return groups, limits | {"beyond_irregularity": int(beyond)}
 
     def _workspace(self):
         work = workspace(self.model)

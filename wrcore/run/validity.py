@@ -5,6 +5,7 @@
 `conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
 `profile_edge`         patches that reach beyond the end of a profile
 `search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
+`beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
 =====================  ================================================================================================
 
 A patch of an output time counts once; counters of what happens between outputs (creep look-ups out of the table's
@@ -37,6 +38,7 @@ LIMITS = {
     "search_fallback": "wheels searched strip by strip",
     "table_out_of_range": "creep look-ups out of the table's range",
     "step_collapses": "collapses of the step size",
+    "beyond_irregularity": "wheelsets past the end of the irregularity",
 }
 """Counters of a run, as a person reads them."""
 

@@ -19,7 +19,7 @@ from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data
-from wrcore.creep.table import ensure_table, load_table
+from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, load_table
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
@@ -127,8 +127,9 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     parameters = _find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
-    wheel = _profile(data, "wheel", folder, source, 0.0)
-    rail = _profile(data, "rail", folder, source, _ratio(data["rail"]["inclination"], source, "rail.inclination"))
+    wheel = _profile(data, "wheel", folder, source)
+    rail = _profile(data, "rail", folder, source, _ratio(data["rail"].get("inclination"), source, "rail.inclination"))
+    data["contact"]["creep"].setdefault("tolerance", DEFAULT_TOLERANCE)
     if "table" in data["contact"]["creep"]:
         table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
         data["contact"]["creep"]["table"] = str(table)
@@ -182,7 +183,9 @@ def _with_points(track, folder, source):
 
 
 def _ratio(value, source, field):
-    """Inclination as a ratio: a number or a fraction such as '1/40'."""
+    """Inclination as a ratio: a number or a fraction such as '1/40'; None where none is given."""
+    if value is None:
+        return None
     ratio = parse_ratio(value)
     if math.isnan(ratio):
         raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}")
@@ -191,7 +194,7 @@ def _ratio(value, source, field):
     return ratio
 
 
-def _profile(data, kind, folder, source, inclination):
+def _profile(data, kind, folder, source, inclination=None):
     """The scene's wheel or rail profile; files count from the scene's folder."""
     spec = data[kind]["profile"]
     field = f"{kind}.profile"
@@ -203,7 +206,8 @@ def _profile(data, kind, folder, source, inclination):
         return named_profile(spec, kind, inclination)
     except InputError as error:
         if error.source in (kind, "profile"):  # not a fault inside a file: name the scene
-            raise InputError(source, field, error.expected) from None
+            named = f"{kind}.inclination" if error.field == "inclination" else field
+            raise InputError(source, named, error.expected) from None
         raise
 
 

@@ -11,8 +11,11 @@ from wrcore.scene.description import load_scene
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 source, params, output = snakemake.input.scene, snakemake.params, snakemake.output
 table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
-overrides = [f"contact.creep.table={table}", "initial.y=0.0"]
-scenes = {name: load_scene(source, [*overrides, *changes]) for name, changes in params.variants.items()}
+scenes = {}
+for name, changes in params.variants.items():
+    own = any(change.startswith("contact.creep.tolerance=") for change in changes)
+    shared = [] if own else [f"contact.creep.table={table}"]
+    scenes[name] = load_scene(source, [*shared, "initial.y=0.0", *changes])
 speeds = np.linspace(**params.speeds)
 locus = loci({name: scenes[name] for name in ("planar", "spatial")}, speeds)
 linear = critical_speeds(scenes, speeds)
