@@ -288,7 +288,7 @@ def random_scene(draw):
         return float(np.exp(draw.uniform(np.log(low), np.log(high))))
 
     source = SCENES / f"{draw.choice(('wheelset', 'suspended_wheelset', 'suspended_wheelset', 'trailer_vehicle'))}.yaml"
-    law = draw.choice(("table", "table", "she", "polach", "linear", "fastsim"))
+    law = draw.choice((*3 * ("table",), *2 * ("she", "polach", "linear"), "fastsim"))
     changes = {
         "speed": log(3.0, 120.0), "initial.y": draw.uniform(-0.012, 0.012), "initial.yaw": draw.uniform(-0.02, 0.02),
         "wheel.profile": draw.choice(("S1002", "S1002", "cone:1/20")),
