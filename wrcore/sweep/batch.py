@@ -286,7 +286,8 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
     InputError
         Parts that are damaged, of another sweep or of other sources, runs that are missing or there twice.
     """
-    tables, owners = [], {}
+    tables: list[pd.DataFrame] = []
+    owners: dict[int, str | PathLike[str]] = {}
     for part in parts:
         tables.append(load_part(sweep, part))
         for run in tables[-1]["run"]:
