@@ -41,7 +41,8 @@ def simulate(
         and somebody watches (a terminal or a notebook, not a log); False: none.
     start : Checkpoint or ndarray, shape (size,), optional
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
-        its time bit by bit as if it had not stopped, or a state at time 0.
+        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit), or a
+        state at time 0. The scene's ``initial`` does not count then.
     **changes
         Keys of the scene with other values, as :func:`wrcore.load_scene` takes them.
 
@@ -63,6 +64,8 @@ def simulate(
     >>> float(run["wheelset"].y_m[0])  # m
     0.002
     """
+    if start is not None and any(key.partition("__")[0].partition(".")[0] == "initial" for key in changes):
+        raise InputError("simulate", "initial", "expected either this or a start")
     if changes or not isinstance(scene, Scene):
         scene = load_scene(scene, **changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
