@@ -148,15 +148,14 @@ def _check_bytes(path):
 
 def _check_content(file, size):
     """ValueError where reading would leave the file, or read more than it holds."""
-    foreign, items = [], []
+    foreign, items, stored = [], [], 0
     file.visititems_links(lambda name, link: foreign.append(name) if not isinstance(link, h5py.HardLink) else None)
     if foreign:
         raise ValueError(f"a link that leads elsewhere: {foreign[0]}")
     file.visititems(lambda name, item: items.append((name, item)))
-    stored = 0
     for name, item in items:
         if isinstance(item, h5py.Dataset):
-            fault = _fault(item)
+            fault = _fault(item.id)
             if fault:
                 raise ValueError(f"{fault}: {name}")
             stored += item.id.get_storage_size()
@@ -168,15 +167,17 @@ def _check_content(file, size):
 
 def _fault(dataset):
     """What keeps a dataset from being read; empty if nothing does. What it is stored as comes first."""
-    made, layouts = dataset.id.get_create_plist(), (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED)
-    if made.get_layout() not in layouts or made.get_external_count():
+    made = dataset.get_create_plist()
+    layout = made.get_layout()
+    if layout not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED) or made.get_external_count():
         return "a dataset stored elsewhere"
     if not {made.get_filter(k)[0] for k in range(made.get_nfilters())} <= FILTERS:
         return "a dataset with an unknown filter"
-    if dataset.dtype.kind not in "fiub" and h5py.check_string_dtype(dataset.dtype) is None or dataset.shape is None:
+    kind, shape = dataset.dtype, dataset.shape
+    if kind.kind not in "fiub" and h5py.check_string_dtype(kind) is None or shape is None:
         return "a dataset that holds neither numbers nor text"
-    if math.prod(dataset.chunks or ()) * dataset.dtype.itemsize > LARGEST_CHUNK:
+    if layout == h5py.h5d.CHUNKED and math.prod(made.get_chunk()) * kind.itemsize > LARGEST_CHUNK:
         return "a dataset in huge chunks"
-    if math.prod(dataset.shape) * dataset.dtype.itemsize > MOST_DEFLATED * dataset.id.get_storage_size():
+    if math.prod(shape) * kind.itemsize > MOST_DEFLATED * dataset.get_storage_size():
         return "a dataset larger than what is stored"
     return ""

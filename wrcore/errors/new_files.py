@@ -59,6 +59,14 @@ def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
         part.unlink(missing_ok=True)
 
 
+def try_out(path: str | os.PathLike[str]) -> None:
+    """OSError where nothing can be written under a name, or under the longest that is derived from it."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.parts.{secrets.token_hex(4)}.part")
+    part.open("xb").close()
+    part.unlink()
+
+
 def locked(descriptor: int) -> bool:
     """Lock an open file or folder for this process, which ends the lock however it ends; False if it has one."""
     try:

@@ -67,8 +67,8 @@ def simulate(
     if start is None:
         expected = "expected a checkpoint, a state or 'initial', got None, as a run has that no run can go on from"
         raise InputError("simulate", "start", f"{expected}; it may have an end_state")
-    anew = isinstance(start, str) and start == "initial"
-    if not anew and any(key.partition("__")[0].partition(".")[0] == "initial" for key in changes):
+    begin_at: Any = None if isinstance(start, str) and start == "initial" else start
+    if begin_at is not None and any(key.partition("__")[0].partition(".")[0] == "initial" for key in changes):
         raise InputError("simulate", "initial", "expected either this or a start")
     if changes or not isinstance(scene, Scene):
         scene = load_scene(scene, **changes)
@@ -76,7 +76,7 @@ def simulate(
     begin = start.t if isinstance(start, Checkpoint) else 0.0
     check_memory(scene)
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
-        course = Course(scene, None if anew else start, show_progress if progress is None else None)
+        course = Course(scene, begin_at, show_progress if progress is None else None)
         return course.advance(output_times(begin, settings["duration"], rate), advance)
 
 
