@@ -279,5 +279,5 @@ def test_a_disk_that_fills_up_is_one_line(folder, monkeypatch):
 
     monkeypatch.setattr("wrcore.run.results._write_attributes", full)
     status, _, err = run_command(["simulate", folder / "scene.yaml", "--out", out])
-    assert status == 2 and err == "wrcore: No space left on device\n"
+    assert status == 2 and err == f"wrcore: {out}: No space left on device\n"
     assert not list((folder / "out").iterdir())

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from wrcore import __version__
 from wrcore.errors import InputError
+from wrcore.errors.new_files import appearing, try_out
 
 
 class _Parser(argparse.ArgumentParser):
@@ -167,10 +168,8 @@ def _output(path, endings=(".csv",)):
         raise InputError("--out", path, f"expected a name that ends in {' or '.join(endings)}")
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or os.path.isdir(path):
         raise InputError("--out", path, "expected a file in an existing folder")
-    part = f"{path}.part{os.getpid()}"  # permissions do not tell whether a disk is full or a name is too long
-    try:
-        open(part, "xb").close()
-        os.unlink(part)
+    try:  # permissions do not tell whether a disk is full or a name is too long
+        try_out(path)
     except OSError as error:
         raise InputError("--out", path, f"expected a file that can be written: {error.strerror}") from None
     return Path(path)
@@ -193,13 +192,9 @@ def _refuse_others(path, attribute, wanted):
 
 
 def _write_csv(frame, path):
-    """Write a table to a temporary name and rename it: never half a file."""
-    temporary = path.with_name(f"{path.name}.part{os.getpid()}")
-    try:
-        frame.to_csv(temporary, index=False, float_format="%.12g")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    """Write a table: never half a file."""
+    with appearing(path) as file:
+        frame.to_csv(file, index=False, float_format="%.12g")
 
 
 def _simulate(options):

@@ -156,6 +156,110 @@ def test_only_one_process_writes_a_file(tmp_path):
     assert load_run(out).status == "completed"
 
 
+def parts_of_a_killed_run(out):
+    """Blocks of a run that was killed: 1 s each, the hidden folder is all that there is."""
+    process = os.fork()
+    if process == 0:
+        simulate_to(scene_of(HUNTING), out, lambda t: os._exit(0) if t > 3.5 else None, block=200)
+    os.waitpid(process, 0)
+    parts = sorted((out.parent / ".run.h5.parts").iterdir())
+    assert [path.name for path in parts] == ["000000.h5", "000001.h5", "000002.h5"] and not out.exists()
+    return parts
+
+
+def complete(out):
+    """Go on with a run, which ends as the whole one and leaves nothing beside it; what was said."""
+    said = []
+    simulate_to(scene_of(HUNTING), out, say=said.append, block=200)
+    assert_same(load_run(out), simulate(scene_of(HUNTING)))
+    assert [path.name for path in out.parent.iterdir()] == ["run.h5"]
+    return said
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("damage", ["flipped", "gone", "cut", "another"])
+def test_of_damaged_blocks_those_before_are_used(tmp_path, damage, number):
+    parts = parts_of_a_killed_run(tmp_path / "run.h5")
+    content = bytearray(parts[number].read_bytes())
+    content[len(content) // 2] ^= 1
+    if damage == "another":
+        parts[number - 1].replace(parts[number])
+        number = min(number, (number - 1) % 3)
+    else:
+        parts[number].unlink() if damage == "gone" else parts[number].write_bytes(content[: -(damage == "cut") or None])
+    said = complete(tmp_path / "run.h5")
+    assert (f"goes on at t = {number:g} s, where it was interrupted" in said) == (number > 0)
+    assert any("SHA-256" in line for line in said) == (damage in ("flipped", "cut"))
+
+
+def test_a_finished_run_survives_a_kill_while_its_parts_are_removed(tmp_path):
+    parts = parts_of_a_killed_run(tmp_path / "run.h5")
+    complete(tmp_path / "run.h5")
+    kept = (tmp_path / "run.h5").read_bytes()
+    parts_of = tmp_path / ".run.h5.parts.01234567.part"  # what is being removed has another name
+    parts_of.mkdir()
+    (parts_of / parts[1].name).write_bytes(kept)
+    assert complete(tmp_path / "run.h5") == []
+
+
+def test_a_run_that_was_complete_but_for_its_parts_being_removed_is_told_as_one(tmp_path, capsys):
+    out = tmp_path / "run.h5"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("wrcore.run.streaming.remove_folder", lambda _: None)
+        simulate_to(scene_of(HUNTING), out, block=200)
+    sets = [f"--set={key}={value}" for key, value in HUNTING.items()]
+    assert main(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["compile_s"] == 0.0
+    assert complete(out) == []
+
+
+def test_a_damaged_interrupted_run_stays_until_another_is_complete(tmp_path, monkeypatch):
+    out = tmp_path / "run.h5"
+    simulate_to(scene_of(HUNTING), out, interrupt_at(1.5, signal.SIGINT))
+    content = bytearray(out.read_bytes())
+    content[-1000] ^= 1
+    out.write_bytes(content)
+    monkeypatch.setattr("wrcore.run.course.integrate", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        simulate_to(scene_of(HUNTING), out)
+    assert out.read_bytes() == content
+    monkeypatch.undo()
+    (said,) = complete(out)
+    assert "run.h5: expected a complete run file" in said and said.endswith("begins anew")
+
+
+@pytest.mark.parametrize("plant", [lambda path, other: path.symlink_to(other), lambda path, _: path.write_text("")])
+def test_a_planted_folder_of_parts_is_not_followed(tmp_path, plant):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "000000.h5").write_text("mine")
+    plant(tmp_path / ".run.h5.parts", tmp_path / "other")
+    with pytest.raises(InputError, match="expected a folder or nothing as .run.h5.parts"):
+        simulate_to(scene_of(HUNTING), tmp_path / "run.h5")
+    assert (tmp_path / "other" / "000000.h5").read_text() == "mine"
+
+
+def test_a_disk_that_fills_up_keeps_the_blocks(tmp_path):
+    script = """
+import resource, sys
+from tests.run.test_streaming import HUNTING, scene_of
+from wrcore.run.streaming import simulate_to
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+try:
+    simulate_to(scene_of(HUNTING), sys.argv[1], block=int(sys.argv[3]))
+except OSError as error:
+    print(error.filename, error.strerror)
+"""
+    out = tmp_path / "run.h5"
+    for most, block, kept in ((100_000, 200, False), (240_000, 150, True), (100_000, 10_000, False)):
+        command = [sys.executable, "-c", script, str(out), str(most), str(block)]
+        done = subprocess.run(command, cwd=SCENES.parent.parent, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith(f"{out} File too large") and done.stdout.count("\n") == 1
+        assert ("blocks before are kept, the same command goes on" in done.stdout) == kept, done.stdout
+        complete(out)
+        out.unlink()
+
+
 def test_memory_does_not_grow_with_duration(tmp_path):
     peaks = []
     for duration in (5.0, 5.0, 40.0):  # the first one loads what every run needs

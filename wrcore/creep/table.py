@@ -6,13 +6,9 @@ finer table is built until the 99 % quantile of the force error is below the tol
 """
 
 import hashlib
-import os
-import tempfile
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 
-import h5py
 import numpy as np
 
 from wrcore import __version__
@@ -20,7 +16,8 @@ from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
-from wrcore.kernels.jit import cache_root
+from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
+from wrcore.kernels.cache import table_folder, warn
 
 DEFAULT_TOLERANCE = 0.005
 """Error of a table that nobody asked another of. A critical speed depends on it more than on the detection: that of the
@@ -29,7 +26,7 @@ resolution, whose 99 % error was found to be 0.0027); planar detection changes i
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
-_SCHEMA = "wrcore creep table 1"
+_SCHEMA = "wrcore creep table 2"
 
 
 @dataclass(frozen=True)
@@ -122,24 +119,15 @@ def _check_arguments(nu, planes, tolerance):
 
 
 def write_table(path, table):
-    """Write a table as HDF5: to a temporary name first, renamed when complete.
+    """Write a table as HDF5, with a digest of all its bytes.
 
     Parameters
     ----------
     path : path-like
     table : CreepTable
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    os.close(handle)
-    try:
-        with h5py.File(temporary, "w") as file:
-            _write_datasets(file, table)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+    with new_hdf5(path) as file:
+        _write_datasets(file, table)
 
 
 def _write_datasets(file, table):
@@ -174,17 +162,14 @@ def load_table(path):
     Raises
     ------
     InputError
-        If the file is missing or is not a creep table.
+        If the file is missing, is not a creep table, or is no longer what was written.
     """
-    try:
-        with h5py.File(path, "r") as file, np.errstate(over="ignore"):
-            if file.attrs.get("schema") != _SCHEMA:
-                raise InputError(path, "schema", f"expected {_SCHEMA!r}, got {file.attrs.get('schema')!r}")
-            return _read_datasets(path, file)
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails in as many ways as h5py and numpy have
-        raise InputError(path, "", f"expected a creep table in HDF5 ({error})") from error
+    with checked_hdf5(path, "a creep table in HDF5") as (file, signed):
+        found = file.attrs.get("schema")
+        if found != _SCHEMA or not signed:
+            expected = f"expected {_SCHEMA!r} with its digest, got {found!r}"
+            raise InputError(path, "schema", f"{expected}; 'wrcore table build' makes a new one")
+        return _read_datasets(path, file)
 
 
 def _read_datasets(path, file):
@@ -229,8 +214,8 @@ def show_progress(patches):
 
 
 def creep_digest():
-    """Digest (16 hex digits) of everything in this room that the numbers in a table depend on."""
-    digest = hashlib.sha256()
+    """Digest (16 hex digits) of everything in this room that the numbers in a table depend on, and of their form."""
+    digest = hashlib.sha256(_SCHEMA.encode())
     room = files("wrcore.creep")
     for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
         digest.update(room.joinpath(name).read_bytes())
@@ -239,11 +224,11 @@ def creep_digest():
 
 def table_path(nu, planes, tolerance):
     """Where the cache keeps the table with these properties."""
-    return cache_root() / "tables" / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
+    return table_folder() / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
 
 
 def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
-    """The table from the cache; built and cached first where it is not there yet.
+    """The table from the cache; built and cached first where it is not there yet, or is damaged or another one.
 
     Two processes that need the same table at once both build it and the later rename wins, with equal content.
 
@@ -259,9 +244,18 @@ def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progres
     _check_arguments(nu, planes, tolerance)
     path = table_path(nu, planes, tolerance)
     if path.exists():
-        return load_table(path)
+        try:
+            table = load_table(path)
+            if (table.nu, table.planes, table.tolerance) == (nu, planes, tolerance):
+                return table
+            warn(f"{path}: another table than its name says; it is built anew")
+        except InputError as error:
+            warn(f"{error}; it is built anew")
     table = build_table(nu, planes, tolerance, progress)
-    write_table(path, table)
+    try:
+        write_table(path, table)
+    except OSError as error:
+        warn(f"{path}: {error.strerror}; the table is not kept")
     return table
 
 

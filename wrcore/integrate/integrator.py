@@ -24,7 +24,8 @@ import time
 
 import numpy as np
 
-from wrcore.dynamics.system import Equations
+from wrcore.dynamics.system import Equations, state_size
+from wrcore.errors import InputError
 from wrcore.integrate import engine
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
@@ -98,9 +99,15 @@ def integrate(
     Returns
     -------
     Trajectory
+
+    Raises
+    ------
+    InputError
+        If the start is none of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
-    method = start.method if isinstance(start, Checkpoint) else chosen_method(method, model.speed)
+    start, goes_on = _checked(start, model), isinstance(start, Checkpoint)
+    method = start.method if goes_on else chosen_method(method, model.speed)
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
@@ -109,15 +116,18 @@ def integrate(
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
     equations = equations or Equations(model)
     work = equations.work
-    if isinstance(start, Checkpoint):
-        memory, linear = _copied(start.memory), _copied(start.linear)
+    begin = start.memory.state if goes_on else start
+    memory = new_memory(begin, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
+    linear = new_linear(model) if method in ROSENBROCK else None
+    if goes_on:
+        _take_over(memory, start.memory)
+        _take_over(linear, start.linear, planned=True)
+        if not np.isfinite(memory.clock[: engine.ERROR]).all():
+            raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
         work.arc_lengths[:] = start.arc_lengths
         if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
             memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
             memory.clock[engine.NEXT] = step
-    else:
-        memory = new_memory(start, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
-        linear = new_linear(model) if method in ROSENBROCK else None
     scratch = new_scratch(len(memory.state), len(model.bodies.mass))
     record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
     control = Control(float(rtol), float(atol), float(step), float(longest_step), float(derailed_y))
@@ -177,11 +187,33 @@ class _Headway:
         return ""
 
 
-def _copied(part):
-    """Copy of a tuple of arrays, tuples of arrays and numbers."""
-    if isinstance(part, tuple):
-        return type(part)(*(_copied(item) for item in part))
-    return part.copy() if isinstance(part, np.ndarray) else part
+def _checked(start, model):
+    """A start whose state fits the model and is finite."""
+    if isinstance(start, Checkpoint):
+        _checked(start.memory.state, model)
+        places = np.shape(start.arc_lengths) == model.bodies.wheelsets.shape
+        if start.method not in METHODS or not places:
+            raise InputError("start", "checkpoint", f"expected one that a run of {model.bodies.mass.size} bodies left")
+        return start
+    size = state_size(model)
+    state = np.asarray(start)
+    if state.shape != (size,) or state.dtype.kind not in "fiu" or not np.isfinite(state).all():
+        got = f"a {type(start).__name__} of {state.dtype} {state.shape}"
+        raise InputError("start", "", f"expected a Checkpoint, or a state of {size} finite numbers, got {got}")
+    return np.ascontiguousarray(state, float)
+
+
+def _take_over(fresh, kept, planned=False):
+    """Copy the numbers of a checkpoint into arrays made for the model, whose own ``planned`` indices stay."""
+    if type(fresh) is not type(kept):
+        raise InputError("start", "checkpoint", f"expected a {type(fresh).__name__}, got a {type(kept).__name__}")
+    for own, other in zip(fresh or (), kept or (), strict=True):
+        if isinstance(own, tuple):
+            _take_over(own, other, planned)
+        elif np.shape(other) != own.shape or np.asarray(other).dtype != own.dtype:
+            raise InputError("start", "checkpoint", f"expected {own.dtype} {own.shape}, got {np.shape(other)}")
+        elif own.dtype.kind == "f" or not planned:
+            own[...] = other
 
 
 def _ending(outcome, given_up, model, memory, work):

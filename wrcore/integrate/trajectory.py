@@ -24,6 +24,8 @@ class Checkpoint:
         Of Rosenbrock methods.
     arc_lengths : numpy.ndarray, shape (k,)
         Of the wheelsets, m: where the search for the next ones starts.
+    model : str
+        Fingerprint of the model, where a scene's run left it (:func:`wrcore.run.checkpoints.model_fingerprint`).
     """
 
     method: str
@@ -31,6 +33,7 @@ class Checkpoint:
     memory: Memory
     linear: Linear | None
     arc_lengths: np.ndarray
+    model: str = ""
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,12 @@ folder is therefore named after the content of all sources in the rooms that hol
 fresh cache.
 """
 
-import hashlib
-import os
-import time
-from pathlib import Path
-
 import numba
 from numba.core import types
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
+
+from wrcore.kernels.cache import kernel_folder, warn
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
@@ -24,52 +22,28 @@ Which ones do depends on the code around. A kernel that is called, not inlined, 
 it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
 where this showed, goes without the flag so that all copies give the same bits."""
 
-KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "dynamics", "integrate")
-_KEEP_SECONDS = 14 * 86400
+_FOLDER = str(kernel_folder())
 
 
-def cache_root():
-    """Folder for everything that can be rebuilt: compiled kernels and creep tables.
+class _Cache(FunctionCache):
+    """Numba's cache of a kernel; one that is damaged, or full, stops nothing."""
 
-    ``WRCORE_CACHE`` if set, else ``wrcore`` in the user's cache folder (``XDG_CACHE_HOME`` or ``~/.cache``).
-
-    Returns
-    -------
-    pathlib.Path
-    """
-    if "WRCORE_CACHE" in os.environ:
-        return Path(os.environ["WRCORE_CACHE"])
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wrcore"
-
-
-def source_digest():
-    """Digest (16 hex digits) of the sources that kernels are made of."""
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for path in sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _prepare_cache_folder():
-    """Create the kernel cache of this source state and drop those unused for two weeks."""
-    kernels = cache_root() / "kernels"
-    folder = kernels / source_digest()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        for old in kernels.iterdir():
-            if time.time() - old.stat().st_mtime > _KEEP_SECONDS:
-                for file in sorted(old.rglob("*"), reverse=True):
-                    file.rmdir() if file.is_dir() else file.unlink()
-                old.rmdir()
-    except OSError:  # read-only home, or another process clears at the same time: compile without our folder
+    def load_overload(self, *args):
+        try:
+            return super().load_overload(*args)
+        except Exception as error:  # pickles fail in many ways
+            warn(f"cache {self.cache_path}: damaged ({type(error).__name__}); kernels are compiled anew")
+            self._tried(self.flush)
         return None
-    return str(folder)
 
+    def save_overload(self, *args):
+        self._tried(super().save_overload, *args)
 
-_FOLDER = _prepare_cache_folder()
+    def _tried(self, act, *args):
+        try:
+            act(*args)
+        except Exception as error:
+            warn(f"cache {self.cache_path}: {getattr(error, 'strerror', None) or error}; kernels are not kept")
 
 
 def jit(function=None, *, allocates=True, **options):
@@ -89,21 +63,17 @@ def jit(function=None, *, allocates=True, **options):
     """
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
-    settings = {
-        "cache": _FOLDER is not None,
-        "error_model": "numpy",
-        "fastmath": False,
-        "forceinline": False,
-        **options,
-    }
+    settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, **options}
     if not allocates:
         settings["_nrt"] = False
+    dispatcher = numba.njit(function, **settings)
     before = numba.config.CACHE_DIR
     try:
-        numba.config.CACHE_DIR = _FOLDER or before
-        return numba.njit(function, **settings)
+        numba.config.CACHE_DIR = _FOLDER
+        dispatcher._cache = _Cache(function)
     finally:
         numba.config.CACHE_DIR = before
+    return dispatcher
 
 
 @intrinsic

@@ -1,10 +1,12 @@
 """Checkpoints in HDF5 files: nested tuples of arrays and numbers, as groups of datasets and attributes, bit by bit."""
 
+import hashlib
 from typing import NamedTuple, get_type_hints
 
 import h5py
 import numpy as np
 
+from wrcore.dynamics.system import Model
 from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint
@@ -20,14 +22,15 @@ class _Saved(NamedTuple):
 
 def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
     """Write a checkpoint into an empty group."""
-    group.attrs["method"], group.attrs["t"] = checkpoint.method, checkpoint.t
+    for name in ("method", "t", "model"):
+        group.attrs[name] = getattr(checkpoint, name)
     _write(group, _Saved(checkpoint.memory, checkpoint.linear, checkpoint.arc_lengths))
 
 
 def read_checkpoint(group: h5py.Group) -> Checkpoint:
     """Read what `write_checkpoint` wrote; KeyError where something is missing."""
     saved = _read(group, _Saved)
-    return Checkpoint(str(group.attrs["method"]), float(group.attrs["t"]), *saved)
+    return Checkpoint(str(group.attrs["method"]), float(group.attrs["t"]), *saved, str(group.attrs.get("model", "")))
 
 
 def _write(group, parts):
@@ -53,8 +56,20 @@ def _read(group, kind):
     return kind(**parts)
 
 
-def numbers_of(parts) -> list[np.ndarray]:
-    """All arrays and numbers of nested tuples, in their order."""
+def model_fingerprint(model: Model) -> str:
+    """Digest of all that a compiled model is made of."""
+    return digest_of(model).hexdigest()
+
+
+def digest_of(parts, *texts: str):
+    """SHA-256 of texts and of all arrays and numbers of nested tuples, with their types and shapes."""
+    digest = hashlib.sha256("\0".join(texts).encode())
+    for array in _numbers(parts):
+        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
+    return digest
+
+
+def _numbers(parts):
     if isinstance(parts, tuple):
-        return [array for part in parts for array in numbers_of(part)]
+        return [array for part in parts for array in _numbers(part)]
     return [np.ascontiguousarray(parts)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +17,10 @@ from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.geometry.irregularity import irregularity_end
-from wrcore.integrate.integrator import integrate
+from wrcore.errors import InputError
+from wrcore.integrate.integrator import chosen_method, integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
+from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.run import Run
 from wrcore.run.validity import exceeded
 from wrcore.scene.description import Scene, compile_scene
@@ -61,10 +64,17 @@ class Course:
     Attributes
     ----------
     model : Model
+    mark : str
+        Its fingerprint.
     start : Checkpoint or ndarray
         Where the next stretch begins.
     places : Places
         For the channels of the next stretch.
+
+    Raises
+    ------
+    InputError
+        If it cannot begin there.
     """
 
     def __init__(
@@ -77,9 +87,29 @@ class Course:
         self._began = time.perf_counter()
         self.scene = scene
         self.model, state = compile_scene(scene, progress, shared)
-        self.start = state if start is None else start
+        self.mark = model_fingerprint(self.model)
+        self.start = state
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
         self.places = Places(unknown, scene.vehicle.positions[:, 0].astype(float))
+        if start is not None:
+            self.begin_at(start)
+
+    def begin_at(self, start: Checkpoint | np.ndarray, places: Places | None = None) -> None:
+        """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
+        if isinstance(start, Checkpoint):
+            method = chosen_method(self.scene.data["integration"]["method"], self.model.speed)
+            if start.model != self.mark:
+                got = "another one's" if start.model else "one that does not say whose it is (of an older version)"
+                expected = f"expected a checkpoint of this very model, got {got}"
+                raise InputError(self.scene.source, "start", f"{expected}; the run's end_state is a start for any")
+            if start.method != method:
+                expected = f"expected that of the start, {start.method}, got {method}"
+                raise InputError(self.scene.source, "integration.method", expected)
+        if places is not None:
+            if [place.shape for place in places] != [place.shape for place in self.places]:
+                raise InputError(self.scene.source, "start", "expected as many places as wheelsets and bodies")
+            self.places = places
+        self.start = start
 
     def advance(
         self,
@@ -121,12 +151,12 @@ class Course:
         groups, limits = self._channels(trajectory)
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
         record["method_used"] = trajectory.method
-        if trajectory.end is not None:
-            self.start = trajectory.end
+        end = trajectory.end and replace(trajectory.end, model=self.mark)
+        self.start = end or self.start
         self._began = time.perf_counter()
         return Run(
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,
-            trajectory.end, trajectory.end_t, trajectory.end_state,
+            end, trajectory.end_t, trajectory.end_state,
         )  # fmt: skip
 
     def _channels(self, trajectory: Trajectory):

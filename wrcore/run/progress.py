@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from wrcore.kernels.jit import cache_root, source_digest
+from wrcore.kernels.cache import kernel_folder
 
 DELAY = 1.0
 """Work that is done within this time shows no bar, s."""
@@ -51,7 +51,7 @@ def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[fl
     if not somebody_watches():
         yield None
         return
-    if not any((cache_root() / "kernels" / source_digest()).rglob("*advance_*.nbi")):
+    if not any(kernel_folder().rglob("*advance_*.nbi")):
         print("compiling for the first run of this version: about a minute, once", file=sys.stderr)
     form = "{l_bar}{bar}| {n:.2f}/{total:g} s, {remaining} left"
     with _tqdm()(total=duration, unit="s", delay=DELAY, bar_format=form, leave=False) as bar:

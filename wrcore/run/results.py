@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,12 +13,16 @@ import numpy as np
 
 from wrcore import __version__
 from wrcore.errors import InputError
+from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.run.run import Run
 
 FORMAT = "wrcore run"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""Files of version 1 have no digest: their channels are read, but no run goes on from them."""
+
+KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
 END = "end"
 """Group that is no body: the last valid state."""
@@ -36,7 +38,7 @@ def write_run(
 ) -> None:
     """Write a run; the file appears under its name only when it is complete.
 
-    The same run gives the same bytes: no date, host or path is stored.
+    The same run gives the same bytes: no date, host or path is stored. A digest of them stands at the head.
 
     Parameters
     ----------
@@ -49,7 +51,7 @@ def write_run(
     **options
         Of its datasets, instead of `COMPRESSION`.
     """
-    with _appearing(path) as file:
+    with new_hdf5(path) as file:
         _write_attributes(file, run)
         time = _create_dataset(file, "t", data=run.t, **options)
         time.make_scale("t")
@@ -61,20 +63,6 @@ def write_run(
             _write_end(file.create_group(END), run)
         if also is not None:
             also(file, run)
-
-
-@contextmanager
-def _appearing(path):
-    """A new HDF5 file that gets its name when it is complete."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with h5py.File(part, "w") as file:
-            yield file
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _write_attributes(file, run):
@@ -137,8 +125,8 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
     """
     lengths = [_length(part) for part in parts]
     rows = min(max(lengths), ROWS)
-    with _appearing(path) as file:
-        with h5py.File(parts[0], "r") as first:
+    with new_hdf5(path) as file:
+        with checked_hdf5(parts[0], KIND) as (first, _):
             shapes = {name: item.shape[1:] for name, item in _items(first) if isinstance(item, h5py.Dataset)}
         for name, shape in sorted(shapes.items(), key=lambda item: item[0] != "t"):
             group, _, channel = name.rpartition("/")
@@ -152,13 +140,13 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
                 dataset.dims[0].attach_scale(file["t"])
         begin = 0
         for part, length in zip(parts, lengths, strict=True):
-            with h5py.File(part, "r") as content:
+            with checked_hdf5(part, KIND) as (content, _):
                 for at in range(0, length, ROWS):
                     end = min(at + ROWS, length)
                     for name in shapes:
                         file[name][begin + at : begin + end] = content[name][at:end]
             begin += length
-        with h5py.File(parts[-1], "r") as last:
+        with checked_hdf5(parts[-1], KIND) as (last, _):
             for name, value in last.attrs.items():
                 file.attrs[name] = value
             last.copy(END, file)
@@ -166,7 +154,7 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
 
 
 def _length(part):
-    with h5py.File(part, "r") as file:
+    with checked_hdf5(part, KIND) as (file, _):
         return len(file["t"])
 
 
@@ -192,7 +180,7 @@ def load_run(path: str | PathLike[str]) -> Run:
     Raises
     ------
     InputError
-        If the file is absent, truncated, not HDF5, or HDF5 of another kind or version.
+        If the file is absent, truncated, damaged, not HDF5, or HDF5 of another kind or version.
 
     Examples
     --------
@@ -203,17 +191,14 @@ def load_run(path: str | PathLike[str]) -> Run:
     ...     load_run(f"{folder}/run.h5")["wheelset"].y_m
     array([0., 0.])
     """
-    try:
-        with h5py.File(path, "r") as file:
-            _check_format(path, file)
-            run = _read(file)
-    except FileNotFoundError:
-        raise InputError(path, "", "expected a run file (HDF5), got no such file") from None
-    except InputError:
-        raise
-    except Exception as error:  # a damaged file fails in as many ways as h5py, numpy and JSON have
-        raise InputError(path, "", f"expected a complete run file (HDF5), got: {error}") from None
-    _check_run(path, run)
+    with checked_hdf5(path, KIND) as (file, signed):
+        _check_format(path, file, signed)
+        run = _read_frame(file)
+        for name, item in _items(file):
+            if isinstance(item, h5py.Dataset) and "/" in name:
+                group, channel = name.rsplit("/", 1)
+                run.groups.setdefault(group, {})[channel] = item[()]
+        _check_run(path, run)
     return run
 
 
@@ -240,13 +225,15 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
     return cases
 
 
-def _check_format(path, file):
+def _check_format(path, file, signed):
     found = file.attrs.get("format", "none")
     if found != FORMAT:
         raise InputError(path, "attribute format", f"expected {FORMAT!r}, got {found!r}")
     version = int(file.attrs["format_version"])
-    if version != FORMAT_VERSION:
-        raise InputError(path, "attribute format_version", f"expected {FORMAT_VERSION}, got {version}")
+    if not 1 <= version <= FORMAT_VERSION:
+        raise InputError(path, "attribute format_version", f"expected at most {FORMAT_VERSION}, got {version}")
+    if version > 1 and not signed:
+        raise InputError(path, "", "expected the digest that a run file begins with (another program wrote this one)")
 
 
 def _check_run(path, run):
@@ -256,6 +243,8 @@ def _check_run(path, run):
     for name in ("scene", "settings", "counters"):
         if not isinstance(getattr(run, name), dict):
             raise InputError(path, f"attribute {name}", "expected a JSON object")
+    if not all(isinstance(value, int | float) for value in run.counters.values()):
+        raise InputError(path, "attribute counters", "expected numbers")
     times = np.asarray(run.t)
     if times.ndim != 1 or times.dtype.kind != "f" or not (np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise InputError(path, "t", "expected increasing times")
@@ -265,17 +254,6 @@ def _check_run(path, run):
             if values.dtype.kind != "f" or values.ndim not in (1, 2) or len(values) != len(times):
                 expected = f"expected {len(times)} numbers or rows of numbers, got {values.dtype} {values.shape}"
                 raise InputError(path, f"{group}/{name}", expected)
-
-
-def _read(file):
-    groups: dict[str, dict[str, np.ndarray]] = {}
-    for name, item in _items(file):
-        if isinstance(item, h5py.Dataset) and "/" in name:
-            group, channel = name.rsplit("/", 1)
-            groups.setdefault(group, {})[channel] = item[()]
-    run = _read_frame(file)
-    run.groups = groups
-    return run
 
 
 def _read_frame(file):
@@ -289,6 +267,19 @@ def _read_frame(file):
     return run
 
 
-def read_part(file: h5py.File) -> tuple[Run, list[np.ndarray]]:
-    """A stretch of a run without its channels, and the places that :func:`write_going_on` added."""
-    return _read_frame(file), [file[END][name][()] for name in sorted(file[END]) if name.startswith("place_")]
+def read_part(path: str | PathLike[str]) -> tuple[str, Run, list[np.ndarray]]:
+    """What :func:`write_going_on` added to a stretch of a run, which is read without its channels.
+
+    Returns
+    -------
+    mark : str
+        Empty if nothing can go on from there.
+    run : Run
+    places : list of ndarray
+    """
+    with checked_hdf5(path, KIND) as (file, signed):
+        _check_format(path, file, signed)
+        run = _read_frame(file)
+        _check_run(path, run)
+        places = [file[END][name][()] for name in sorted(file.get(END, ())) if name.startswith("place_")]
+        return str(file.attrs.get("fingerprint", "")) if signed and run.end else "", run, places

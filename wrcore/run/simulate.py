@@ -27,7 +27,7 @@ from wrcore.scene.description import Scene, Source, load_scene
 def simulate(
     scene: Source,
     progress: Callable[[float], object] | Literal[False] | None = None,
-    start: Checkpoint | np.ndarray | None = None,
+    start: Checkpoint | np.ndarray | Literal["initial"] = "initial",
     **changes: Any,
 ) -> Run:
     """Run a scene.
@@ -39,9 +39,10 @@ def simulate(
     progress : callable or False, optional
         Called now and then with the simulated time reached, s. Left out: a bar where the run takes more than a second
         and somebody watches (a terminal or a notebook, not a log); False: none.
-    start : Checkpoint or ndarray, shape (size,), optional
+    start : Checkpoint, ndarray of shape (size,), or "initial"
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
-        its time bit by bit as if it had not stopped, or a state at time 0.
+        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit), or a
+        state at time 0. The scene's ``initial`` does not count then.
     **changes
         Keys of the scene with other values, as :func:`wrcore.load_scene` takes them.
 
@@ -63,13 +64,19 @@ def simulate(
     >>> float(run["wheelset"].y_m[0])  # m
     0.002
     """
+    if start is None:
+        expected = "expected a checkpoint, a state or 'initial', got None, as a run has that no run can go on from"
+        raise InputError("simulate", "start", f"{expected}; it may have an end_state")
+    begin_at: Any = None if isinstance(start, str) and start == "initial" else start
+    if begin_at is not None and any(key.partition("__")[0].partition(".")[0] == "initial" for key in changes):
+        raise InputError("simulate", "initial", "expected either this or a start")
     if changes or not isinstance(scene, Scene):
         scene = load_scene(scene, **changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
     begin = start.t if isinstance(start, Checkpoint) else 0.0
     check_memory(scene)
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
-        course = Course(scene, start, show_progress if progress is None else None)
+        course = Course(scene, begin_at, show_progress if progress is None else None)
         return course.advance(output_times(begin, settings["duration"], rate), advance)
 
 

@@ -3,45 +3,38 @@
 A run is integrated in blocks of output times. What does not fit into one block, or takes longer than a minute, is
 written block by block into a folder beside the file (``.run.h5.parts``), each block a run file of its own with a
 checkpoint, renamed when it is complete. At the end the blocks become the run file and the folder goes. A process that
-is killed leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file with what was reached. The
-same command goes on from either, bit by bit as if nothing had happened: blocks do not change a result. Neither of them
-is used if anything decisive is different: the compiled model, integration, output, or the sources of the kernels.
+is killed, or finds the disk full, leaves the folder; one that is told to stop (SIGINT, SIGTERM) leaves the run file
+with what was reached. The same command goes on from either, bit by bit as if nothing had happened: blocks do not change
+a result. Neither of them is used if anything decisive is different: the compiled model, integration, output, or the
+sources of the kernels; of damaged blocks, those before the first one are.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
-import shutil
 import signal
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
-
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
+from wrcore.errors.new_files import locked, remove_folder, remove_remains
 from wrcore.integrate.integrator import METHODS, chosen_method
-from wrcore.kernels.jit import source_digest
-from wrcore.run.checkpoints import numbers_of
+from wrcore.kernels.cache import source_digest
+from wrcore.run.checkpoints import digest_of
 from wrcore.run.course import Course, Places
 from wrcore.run.results import join_runs, read_part, write_going_on, write_run
 from wrcore.run.run import Run
 from wrcore.run.simulate import check_memory, output_blocks
 from wrcore.scene.description import Scene
-
-try:
-    import fcntl
-except ImportError:  # a system without such locks
-    fcntl = None
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
 """Size of a block's channels in memory, bytes, and its number of output times at most."""
@@ -107,7 +100,7 @@ def simulate_to(
     resume : bool
         Go on with an interrupted run of the same scene if there is one; False: begin anew.
     say : callable, optional
-        Told, in one line, that a run is taken up again.
+        Told, in one line, that a run is taken up again, or what is damaged.
     checkpoint_s : float
         Wall time between two checkpoints at most, s.
     block : int, optional
@@ -127,6 +120,8 @@ def simulate_to(
     ------
     InputError
         If another process writes the same file.
+    OSError
+        That names the file, where the disk is full: the blocks written before are kept.
     """
     course, settings = Course(scene), scene.data["integration"]
     if chosen_method(settings["method"], course.model.speed) in METHODS:
@@ -137,7 +132,7 @@ def simulate_to(
     total, parts = Total(), None
     with ExitStack() as stack:
         if path is not None:
-            parts = stack.enter_context(Parts(path, fingerprint(course)))
+            parts = stack.enter_context(Parts(path, fingerprint(course), say))
             if parts.take_up(course, total, resume):
                 say(f"goes on at t = {total.t:.6g} s, where it was interrupted")
         interrupts = stack.enter_context(Interrupts())
@@ -179,11 +174,8 @@ def _block_size(course):
 def fingerprint(course):
     """Digest of everything that decides on the bits of a run's channels: model, start, settings, sources of kernels."""
     data = course.scene.data
-    digest = hashlib.sha256(source_digest().encode())
-    digest.update(json.dumps([data["integration"], data["output"]], sort_keys=True).encode())
-    for array in numbers_of((course.model, course.start)):
-        digest.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
-    return digest.hexdigest()
+    settings = json.dumps([data["integration"], data["output"]], sort_keys=True)
+    return digest_of((course.start,), source_digest(), course.mark, settings).hexdigest()
 
 
 class Total:
@@ -224,26 +216,34 @@ class Total:
 
     def summary(self):
         """The last block with the counters of all."""
-        self.last.counters = {**self.counters, "simulated_s": self.t - self.first}
+        self.last.counters = {"compile_s": 0.0, **self.counters, "simulated_s": self.t - self.first}
         return self.last
 
 
 class Parts:
-    """The folder of blocks beside a run file.
+    """The blocks of a run, numbered from 0 without a gap in a folder beside its file.
 
     Parameters
     ----------
     path : path-like
     mark : str
         Fingerprint of the run.
+    say : callable, optional
+        Told of damaged blocks.
+
+    Attributes
+    ----------
+    count : int
+        Blocks of this run so far.
     """
 
-    def __init__(self, path, mark):
-        self.path, self.mark, self.lock = Path(path), mark, None
+    def __init__(self, path, mark, say=lambda text: None):
+        self.path, self.mark, self.say, self.lock, self.count = Path(path), mark, say, None, 0
         self.folder = self.path.with_name(f".{self.path.name}.parts")
 
     def __enter__(self):
-        if self.folder.is_dir():
+        remove_remains(self.path)
+        if os.path.lexists(self.folder):
             self._open()
         return self
 
@@ -253,63 +253,89 @@ class Parts:
 
     def _open(self):
         """One process at a time writes; the lock goes with it, however it ends."""
-        if self.lock is not None:
-            return
-        self.folder.mkdir(exist_ok=True)
-        self.lock = os.open(self.folder, os.O_RDONLY)
-        try:
-            if fcntl is not None:
-                fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError("--out", self.path, "expected a file that no other process is writing") from None
+        while self.lock is None:
+            try:
+                self.folder.mkdir(exist_ok=True)
+                lock = os.open(self.folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            except (FileExistsError, NotADirectoryError):  # a file or a link
+                raise InputError("--out", self.path, f"expected a folder or nothing as {self.folder.name}") from None
+            if not locked(lock):
+                os.close(lock)
+                raise InputError("--out", self.path, "expected a file that no other process is writing")
+            with suppress(FileNotFoundError):  # whoever held it before may just have removed it
+                if os.path.samestat(os.fstat(lock), os.stat(self.folder)):
+                    self.lock = lock
+                    return
+            os.close(lock)
 
-    def _files(self):
-        """Blocks in their order."""
-        return sorted(self.folder.glob("[0-9]*.h5"))
+    def _part(self, number):
+        return self.folder / f"{number:06d}.h5"
 
     def take_up(self, course, total, resume):
-        """Put a course where an interrupted run of the same scene has got to; False if there is none to go on with."""
-        if resume and not self._files() and self._goes_on(self.path, only_interrupted=True):
-            self._open()
-            os.replace(self.path, self.folder / "000000.h5")
-        files = self._files()
-        if not (resume and files and all(map(self._goes_on, files))):
-            for file in files:
-                file.unlink()
-            return False
-        for file in files:
-            with h5py.File(file) as content:
-                run, places = read_part(content)
+        """Put a course where an interrupted run of the same scene has got to; False if there is none to go on with.
+
+        Everything is read before anything is moved or removed.
+        """
+        files, gap = sorted(self.folder.glob("[0-9]*.h5")), 1.5 / course.scene.data["output"]["rate"]
+        kept = self._readable(files, gap) if resume else []
+        alone = self._readable([self.path], gap) if resume and not kept else []
+        if alone and alone[0][0].reason.startswith(INTERRUPTED):
+            kept = alone
+        for run, _ in kept:
             total.add(run)
             total.over &= not run.reason.startswith(INTERRUPTED)
-        del total.counters["compile_s"]
-        course.start, course.places = run.end, Places(*places)
-        return True
+        if kept:
+            course.begin_at(kept[-1][0].end, Places(*kept[-1][1]))
+            del total.counters["compile_s"]
+        for file in reversed(files if kept is alone else files[len(kept) :]):
+            file.unlink()
+        if kept and kept is alone:
+            self._open()
+            os.replace(self.path, self._part(0))
+        self.count = len(kept)
+        return bool(kept)
 
-    def _goes_on(self, file, only_interrupted=False):
-        """Whether a file holds a block of this run that can be gone on from."""
-        try:
-            with h5py.File(file) as content:
-                reason = str(content.attrs.get("reason", ""))
-                same = content.attrs.get("fingerprint") == self.mark and "end/checkpoint" in content
-                return same and (not only_interrupted or reason.startswith(INTERRUPTED))
-        except OSError:
-            return False
+    def _readable(self, files, gap):
+        """Runs and places of the blocks that can be gone on from, up to the first that cannot."""
+        kept, reached = [], -0.5 * gap
+        for number, file in enumerate(files):
+            if not file.exists() or file not in (self.path, self._part(number)):
+                break
+            try:
+                mark, run, places = read_part(file)
+            except InputError as error:
+                self.say(f"{error}; begins {'before it' if kept else 'anew'}")
+                break
+            if mark != self.mark or not (run.t[:1] > reached).all() or not (run.t[:1] < reached + gap).all():
+                break
+            kept.append((run, places))
+            reached = run.t[-1] if len(run.t) else reached
+        return kept
 
     def add(self, run, course, last):
         """Write a block: as a part, or as the run file if it is the only one."""
-        files = self._files()
-        if last and not files:
-            write_run(self.path, run, partial(write_going_on, mark=self.mark, places=course.places))
-            return
-        self._open()
-        part = self.folder / f"{len(files):06d}.h5"
-        write_run(part, run, partial(write_going_on, mark=self.mark, places=course.places), **PLAIN)
+        also = partial(write_going_on, mark=self.mark, places=course.places)
+        with self._told():
+            if last and not self.count:
+                write_run(self.path, run, also)
+                return
+            self._open()
+            write_run(self._part(self.count), run, also, **PLAIN)
+            self.count += 1
 
     def join(self, total):
         """Make the run file of the blocks and remove them."""
-        files = self._files()
-        if files:
-            join_runs(self.path, files, total.summary().counters)
+        if self.count:
+            with self._told():
+                join_runs(self.path, [self._part(number) for number in range(self.count)], total.summary().counters)
         if self.lock is not None:
-            shutil.rmtree(self.folder)
+            remove_folder(self.folder)
+
+    @contextmanager
+    def _told(self):
+        """A disk that is full is told of the run file, with what is kept."""
+        try:
+            yield
+        except OSError as error:
+            kept = f"; {self.count} blocks before are kept, the same command goes on" if self.count else ""
+            raise OSError(error.errno, f"{error.strerror or error}{kept}", str(self.path)) from None

@@ -20,7 +20,7 @@ from wrcore import __version__
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.integrate.integrator import METHODS
-from wrcore.kernels.jit import source_digest
+from wrcore.kernels.cache import source_digest
 from wrcore.scene.description import Scene, load_scene
 from wrcore.sweep.measures import MEASURES
 

@@ -1,0 +1,183 @@
+"""HDF5 files that hold what was written to them: a digest before HDF5's library sees them, then what they are made of.
+
+The first `BLOCK` bytes, which HDF5 leaves to its users, hold the SHA-256 of all bytes that follow. A file without it
+(an older one) is read, too, where the reader takes such files; what it holds may then be damaged.
+"""
+
+import hashlib
+import math
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import h5py
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.errors.new_files import appearing
+
+BLOCK = 512
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+HEAD = b"HDF5 with SHA-256 of all that follows byte 512: "
+
+FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+MOST_DEFLATED = 1100
+"""Bytes that one stored byte stands for at most: deflate reaches 1032."""
+
+LARGEST_CHUNK = 2**26
+"""Bytes."""
+
+
+@contextmanager
+def new_hdf5(path: str | os.PathLike[str], **options: bool) -> Iterator[h5py.File]:
+    """A new HDF5 file with its digest, which appears under its name when it is complete.
+
+    Parameters
+    ----------
+    path : path-like
+    **options
+        Of :class:`h5py.File`.
+
+    Yields
+    ------
+    h5py.File
+    """
+    with appearing(path) as whole:
+        patient = _Patient(whole.raw)
+        try:
+            with h5py.File(patient, "w", userblock_size=BLOCK, **options) as file:
+                yield file
+        finally:
+            if patient.fault is not None:
+                raise patient.fault
+        _sign(whole)
+
+
+class _Patient:
+    """A file that takes all that HDF5 writes, and keeps the first fault: the library crashes where closing fails."""
+
+    def __init__(self, file):
+        self.file, self.fault = file, None
+        self.seek, self.tell, self.read, self.readinto = file.seek, file.tell, file.read, file.readinto
+
+    def _tried(self, act, *args):
+        try:
+            return None if self.fault else act(*args)
+        except OSError as error:
+            self.fault = error
+
+    def write(self, data):
+        left = memoryview(data).cast("B")
+        while len(left) and not self.fault:
+            left = left[self._tried(self.file.write, left) or 0 :]
+        return len(data)
+
+    def truncate(self, size=None):
+        self._tried(self.file.truncate, size)
+
+    def flush(self):
+        """Nothing is held back."""
+
+
+def _digest(file):
+    file.seek(BLOCK)
+    return HEAD + hashlib.file_digest(file, "sha256").hexdigest().encode()
+
+
+def _sign(file):
+    head = _digest(file)
+    file.seek(0)
+    file.write(head.ljust(BLOCK, b"\0"))
+
+
+def sign(path: str | os.PathLike[str]) -> None:
+    """State the digest of a file anew, after an edit on purpose."""
+    with open(path, "r+b") as file:
+        _sign(file)
+
+
+@contextmanager
+def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[tuple[h5py.File, bool]]:
+    """Open an HDF5 file for reading; whatever is wrong with it or comes up while it is read is one line.
+
+    Parameters
+    ----------
+    path : path-like
+    kind : str
+        What it should be, for errors.
+
+    Yields
+    ------
+    file : h5py.File
+        All its links lead to itself; its datasets hold numbers or text, all of them stored in the file.
+    signed : bool
+        Whether it has a digest, with which its content agrees.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        signed = _check_bytes(path)
+        with h5py.File(path, "r") as file, np.errstate(over="ignore"):
+            _check_content(file, os.path.getsize(path))
+            yield file, signed
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(path, "", f"expected {kind}, got no such file") from None
+    except Exception as error:  # a damaged file fails in as many ways as h5py, numpy and JSON have
+        raise InputError(path, "", f"expected {kind}, got: {getattr(error, 'strerror', None) or error}") from None
+
+
+def _check_bytes(path):
+    """Whether a file has a digest; ValueError if that, or the file, is wrong."""
+    if not stat.S_ISREG(os.stat(path).st_mode):
+        raise ValueError("no regular file")
+    with open(path, "rb") as file:
+        head = file.read(BLOCK)
+        if head.startswith(SIGNATURE):
+            return False
+        if not head.startswith(HEAD):
+            raise ValueError("another kind of file")
+        if head.rstrip(b"\0") != _digest(file):
+            raise ValueError("a content that its SHA-256 does not belong to (damaged, or edited)")
+    return True
+
+
+def _check_content(file, size):
+    """ValueError where reading would leave the file, or read more than it holds."""
+    foreign, items, stored = [], [], 0
+    file.visititems_links(lambda name, link: foreign.append(name) if not isinstance(link, h5py.HardLink) else None)
+    if foreign:
+        raise ValueError(f"a link that leads elsewhere: {foreign[0]}")
+    file.visititems(lambda name, item: items.append((name, item)))
+    for name, item in items:
+        if isinstance(item, h5py.Dataset):
+            fault = _fault(item.id)
+            if fault:
+                raise ValueError(f"{fault}: {name}")
+            stored += item.id.get_storage_size()
+        elif not isinstance(item, h5py.Group):
+            raise ValueError(f"neither group nor dataset: {name}")
+    if stored > size:
+        raise ValueError("datasets that share their storage")
+
+
+def _fault(dataset):
+    """What keeps a dataset from being read; empty if nothing does. What it is stored as comes first."""
+    made = dataset.get_create_plist()
+    layout = made.get_layout()
+    if layout not in (h5py.h5d.COMPACT, h5py.h5d.CONTIGUOUS, h5py.h5d.CHUNKED) or made.get_external_count():
+        return "a dataset stored elsewhere"
+    if not {made.get_filter(k)[0] for k in range(made.get_nfilters())} <= FILTERS:
+        return "a dataset with an unknown filter"
+    kind, shape = dataset.dtype, dataset.shape
+    if kind.kind not in "fiub" and h5py.check_string_dtype(kind) is None or shape is None:
+        return "a dataset that holds neither numbers nor text"
+    if layout == h5py.h5d.CHUNKED and math.prod(made.get_chunk()) * kind.itemsize > LARGEST_CHUNK:
+        return "a dataset in huge chunks"
+    if math.prod(shape) * kind.itemsize > MOST_DEFLATED * dataset.get_storage_size():
+        return "a dataset larger than what is stored"
+    return ""

@@ -1,0 +1,110 @@
+"""Files that appear under their name when they are complete, whatever happens on the way."""
+
+import os
+import re
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import BufferedRandom
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # a system without such locks
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextmanager
+def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
+    """A new file that replaces one of its name when it is complete.
+
+    Until then it has a hidden name of its own and is locked. Hidden files of that kind whose writer is gone are removed
+    by whoever writes the name next.
+
+    Parameters
+    ----------
+    path : path-like
+        Its folder is created if needed.
+
+    Yields
+    ------
+    io.BufferedRandom
+        To be written, and read.
+
+    Raises
+    ------
+    OSError
+        That names the path, where the disk or a quota is full.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    remove_remains(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        with open(part, "x+b") as file:
+            locked(file.fileno())
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+            if fcntl is None:  # such a system renames no open file
+                file.close()
+            os.replace(part, path)
+    except OSError as error:
+        if error.filename not in (None, str(part)):
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def try_out(path: str | os.PathLike[str]) -> None:
+    """OSError where nothing can be written under a name, or under the longest that is derived from it."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.parts.{secrets.token_hex(4)}.part")
+    part.open("xb").close()
+    part.unlink()
+
+
+def locked(descriptor: int) -> bool:
+    """Lock an open file or folder for this process, which ends the lock however it ends; False if it has one."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder at once: it loses its name first and its content then."""
+    gone = folder.with_name(f"{folder.name}.{secrets.token_hex(4)}.part")
+    os.replace(folder, gone)
+    shutil.rmtree(gone, ignore_errors=True)
+
+
+def remove_remains(path: Path) -> None:
+    """Remove what killed processes left of `appearing` and `remove_folder`: hidden, ours, and held by nobody."""
+    if fcntl is None:
+        return
+    left = re.compile(rf"\.{re.escape(path.name)}\.(parts\.)?[0-9a-f]{{1,8}}\.part")
+    with suppress(OSError), os.scandir(path.parent) as entries:
+        for entry in entries:
+            if left.fullmatch(entry.name):
+                with suppress(OSError):
+                    _remove_if_left(entry.path)
+
+
+def _remove_if_left(name):
+    descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        status = os.fstat(descriptor)
+        if status.st_uid != os.geteuid() or not locked(descriptor):
+            return
+        if stat.S_ISREG(status.st_mode):
+            os.unlink(name)
+        elif stat.S_ISDIR(status.st_mode):
+            shutil.rmtree(name, ignore_errors=True)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,129 @@
+"""The folder for what can be rebuilt, compiled kernels and creep tables: real, and nobody else's to write to.
+
+Compiled kernels are pickles: whoever may write to their folder runs code as whoever loads them. A folder that is not
+safe, or that cannot be written, is left alone, and a temporary one serves the process.
+"""
+
+import atexit
+import hashlib
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "dynamics", "integrate")
+_KEEP_SECONDS = 14 * 86400
+
+
+@cache
+def source_digest():
+    """Digest (16 hex digits) of the sources that kernels are made of."""
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def kernel_folder():
+    """Folder of the kernels of this source state."""
+    return cache_root() / "kernels" / source_digest()
+
+
+def table_folder():
+    """Folder of the creep tables."""
+    return cache_root() / "tables"
+
+
+def cache_root():
+    """Folder for everything that can be rebuilt.
+
+    ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's cache folder (``XDG_CACHE_HOME`` or
+    ``~/.cache``); a temporary folder, with one line of warning, where that is no safe place.
+
+    Returns
+    -------
+    pathlib.Path
+    """
+    return _prepared(os.environ.get("WRCORE_CACHE") or _default())
+
+
+def _default():
+    try:
+        return os.path.join(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "wrcore")
+    except RuntimeError:  # nobody's home
+        return ""
+
+
+@cache
+def _prepared(wanted):
+    """The wanted folder with its parts, or a temporary one instead."""
+    try:
+        if not wanted:
+            raise OSError(0, "expected a home folder or WRCORE_CACHE")
+        return _with_parts(Path(os.path.realpath(wanted)))
+    except OSError as error:
+        where = error.filename or wanted
+        warn(f"cache {where + ': ' if where else ''}{error.strerror}; a temporary one is used: kernels compile anew")
+    root = Path(tempfile.mkdtemp(prefix="wrcore-"))
+    atexit.register(_remove_own, root, os.getpid())
+    return _with_parts(root)
+
+
+def _with_parts(root):
+    kernels = root / "kernels"
+    for folder in (root, root / "tables", kernels, kernels / source_digest()):
+        _claim(folder)
+    os.utime(folder)
+    _drop_old(kernels)
+    return root
+
+
+def _claim(folder):
+    """Make a folder, or see that it is real, ours, closed to others' writing and open to ours; OSError if not."""
+    with suppress(FileExistsError):
+        folder.mkdir(mode=0o700, parents=True)
+    status = folder.lstat()
+    fault = ""
+    if not stat.S_ISDIR(status.st_mode):
+        fault = "expected a folder, no file or link"
+    elif hasattr(os, "geteuid") and status.st_uid != os.geteuid():
+        fault = "expected a folder of one's own"
+    elif os.name == "posix" and status.st_mode & 0o022:
+        fault = "expected a folder that others may not write to (chmod -R go-w)"
+    elif not os.access(folder, os.W_OK | os.X_OK):
+        fault = "expected a folder that can be written"
+    if fault:
+        raise OSError(0, fault, str(folder))
+
+
+def _drop_old(kernels):
+    """Drop kernels that were not used for two weeks: numba's files in folders that we named, and nothing else."""
+    for old in os.scandir(kernels):
+        with suppress(OSError):  # another process clears at the same time
+            own = re.fullmatch("[0-9a-f]{16}", old.name) and old.is_dir(follow_symlinks=False)
+            if not own or time.time() - old.stat(follow_symlinks=False).st_mtime < _KEEP_SECONDS:
+                continue
+            for folder, _, files in os.walk(old.path, topdown=False):
+                for name in files:
+                    if re.search(r"\.(nbi|nbc)(\.tmp\.\w+)?$", name):
+                        os.unlink(os.path.join(folder, name))
+                os.rmdir(folder)
+
+
+def _remove_own(root, process):
+    if os.getpid() == process:  # not in a fork
+        shutil.rmtree(root, ignore_errors=True)
+
+
+@cache
+def warn(text):
+    """Say something on standard error, once."""
+    print(f"wrcore: {text}", file=sys.stderr)
