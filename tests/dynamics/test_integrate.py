@@ -352,7 +352,7 @@ def test_no_headway_is_a_stall(wheelset, monkeypatch):
     assert calm.status == "completed"
     monkeypatch.setattr("wrcore.integrate.integrator.STALL_STEP", 1.0)
     run = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
-    assert run.status == "stalled" and run.reason.startswith("50 steps brought it") and run.steps + run.rejected == 50
+    assert run.status == "stalled" and "50 steps brought it" in run.reason and run.steps + run.rejected == 50
     assert np.isfinite(run.end_state).all()
     fixed = integrate(*wheelset, np.linspace(0.0, 0.1, 11), "tsit5", step=1e-4)  # as short as they were asked for
     assert fixed.status == "completed" and fixed.steps > 50
