@@ -74,7 +74,9 @@ def test_products_of_force_and_creepage_keep_their_signs(run):
 
 def test_creep_power_is_what_the_energy_loses_by_creep():
     channels = ["pose", "velocity", "contact", "energy"]
-    run = wr.simulate(SCENES / "suspended_wheelset.yaml", speed=60, integration__duration=0.5, output__channels=channels)
+    run = wr.simulate(
+        SCENES / "suspended_wheelset.yaml", speed=60, integration__duration=0.5, output__channels=channels
+    )
     power = sum(av.creep_power(run, "wheelset", side) for side in ("left", "right"))
     lost = run["energy"].dissipated_by_creep_W
     np.testing.assert_allclose(power, lost, rtol=1e-3, atol=1e-6 * lost.max())

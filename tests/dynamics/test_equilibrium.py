@@ -188,6 +188,12 @@ def test_a_moved_wheelset_begins_at_rest_vertically_in_roll_and_about_its_axle(n
         assert part[1] == pytest.approx(0.002, abs=1e-12)
 
 
+def test_without_friction_wheels_begin_at_pure_rolling():
+    changes = {"contact": {"friction": 1e-9, "creep": {"model": "she"}}, "initial": {"y": 0.002, "yaw": 0.05}}
+    _, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", **changes))
+    assert np.linalg.norm(state[10:13]) == pytest.approx(20.0 / 0.46, rel=0.02)
+
+
 def test_a_train_begins_as_its_vehicles_do():
     changes = ["initial.y=0", "contact.creep.model=she"]
     train = ["vehicle.count=2", "vehicle.spacing=30"]

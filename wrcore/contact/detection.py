@@ -65,8 +65,9 @@ DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
 PLANAR, SPATIAL, AUTO = 0, 1, 2
 """``auto``: planar while the bound of its error stays below a tolerance, spatial else."""
 
-_PARTS = 3
-"""Sub-intervals of a scan step where the search looks closer."""
+_PARTS, _EXACT_PARTS = 3, 12
+"""Sub-intervals of a scan step where the search looks closer: of common poses, and of those beyond the rail's cells,
+whose strips on a curved flange lie up to four times as far apart along the rail."""
 
 _FLANK = 2
 """Close strips on either side of an overlap that are taken for its own flanks."""
@@ -152,11 +153,12 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
         if abs(coarse) < reserve and not exact:  # the node may have left its rail cell: its sign is not safe
             coarse = gap_at(geometry, pose, here)[0]
         cosine = rail[RAIL_COSINE, cell]
-        parts = _PARTS if 0.0 <= min(coarse, before) < reserve else 1
+        closer = _EXACT_PARTS if exact else _PARTS
+        parts = closer if 0.0 <= min(coarse, before) < reserve else 1
         for part in range(1, parts + 1):
             u, gap = here, coarse
             if part < parts:
-                u -= (parts - part) * (SCAN_STEP / _PARTS)
+                u -= (parts - part) * (SCAN_STEP / closer)
                 gap = gap_at(geometry, pose, u)[0]
             if gap < 0.0:
                 if not inside:

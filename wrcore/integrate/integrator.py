@@ -45,7 +45,7 @@ STIFF_SPEED = 25.0
 
 STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-7
 """So many steps (tried ones) in a row that are this short on average, s, are no headway: some 0.1 s of work for a
-wheelset, after which every simulated second would take five million steps. The shortest time scale of a stiff contact is
+wheelset, and at this pace a simulated second takes five million steps. The shortest time scale of a stiff contact is
 10 us, and explicit methods at 0.1 m/s take steps of 5 us. Steps of a stated length, or bounded by ``longest_step``, may
 be as short as they are asked to be.
 """

@@ -3,8 +3,8 @@
 With Fx, Fy, Mz the creep forces on the wheel and xi, eta, phi the creepages of a patch, its work per metre run is
 -(Fx xi + Fy eta + Mz phi): what friction turns into heat and wear, never negative. T gamma is its amount without the
 spin's part, as wear models for rails and wheels take it (T for the tangential force, gamma for the creepage), or with
-it. The products carry signs: where spin drives the lateral force against its creepage (on a flange, mostly), one of them
-is negative, and a sum of their amounts is neither.
+it. The products carry signs: where spin drives the lateral force along its creepage (on a flange, mostly), one of them
+gives work back, and a sum of their amounts is neither.
 
 References
 ----------

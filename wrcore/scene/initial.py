@@ -29,6 +29,9 @@ from wrcore.vehicle.train import repeated_equilibrium
 LARGEST_REST = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
 
+LARGEST_SLIP, NEARBY = 0.01, 5e-3
+"""Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
+
 REST_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
 
@@ -218,9 +221,13 @@ def _steady(vehicle, model, state):
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(Equilibrium(_steady(unit, alone, first), np.zeros((0, 2)), 0.0), vehicle).state
     try:
-        return steady_running(model, state).state
+        found = steady_running(model, state).state
     except np.linalg.LinAlgError:
         return state
+    wheelsets = [_parts(vehicle, row)[model.bodies.wheelsets] for row in (found, state)]
+    turning, moving = (np.linalg.norm(rows[:, 10:13], axis=1) for rows in wheelsets)
+    aside = np.abs(wheelsets[0][:, 1] - wheelsets[1][:, 1])
+    return found if np.all(np.abs(turning - moving) < LARGEST_SLIP * moving) and np.all(aside < NEARBY) else state
 
 
 @np.errstate(all="ignore")  # what overflows is no better
@@ -247,19 +254,30 @@ def _balanced(vehicle, model, state):
         about = [row[10:13] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
         return new, np.column_stack([rates[:, 9:11], about])
 
-    found, left = standing(stands)
-    steps = np.diag([1e-8, 1e-8, 1e-7 * model.speed])
-    for _ in range(20):
-        slopes = np.stack([(standing(stands + h)[1] - standing(stands - h)[1]) / (2.0 * h.sum()) for h in steps], -1)
-        try:
-            new = stands - np.linalg.solve(slopes, left[..., None])[..., 0]
-        except np.linalg.LinAlgError:  # no creep force
+    for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
+        found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
+        if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
-        moved, still_left = standing(new)
+    return standing(found)[0]
+
+
+def _improved(standing, stands, steps):
+    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve."""
+    own = slice(len(steps))
+    left = standing(stands)[1][:, own]
+    for _ in range(20):
+        ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
+        slopes = np.stack([(high - low)[:, own] / width for high, low, width in ends], axis=-1)
+        new = stands.copy()
+        try:
+            new[:, own] -= np.linalg.solve(slopes, left[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            break
+        still_left = standing(new)[1][:, own]
         if not np.max(np.abs(still_left)) < np.max(np.abs(left)):
             break
-        found, left, stands = moved, still_left, new
-    return found
+        stands, left = new, still_left
+    return stands
 
 
 def _on_path(path, s, part):
