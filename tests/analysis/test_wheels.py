@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import wrcore as wr
 from study.speeds.tables import cost_table, speed_row
+from tests.conftest import SCENES
 from tests.synthetic import hunting_run
 from wrcore.analysis import wheels as av
 
@@ -55,9 +57,30 @@ def test_two_patches_add_up(run):
     assert lateral[0] == pytest.approx(500.0)
 
 
-def test_wear_number_is_the_creep_work_per_metre(run):
-    put(run, "left", Fx_N=-3e3, xi=2e-3, Fy_N=1e3, eta=-1e-3)
-    assert av.wear_number(run, "wheelset", "left")[0] == pytest.approx(3e3 * 2e-3 + 1e3 * 1e-3)
+def test_products_of_force_and_creepage_keep_their_signs(run):
+    # spin drives the lateral force along its creepage: friction gives back 1 N there and takes 4 N by spin
+    put(run, "left", Fx_N=-3e3, xi=2e-3, Fy_N=1e3, eta=1e-3, Mz_Nm=-10.0, phi_per_m=0.4)
+    run.groups["wheelset/left"]["Fx_N"][:, 1] = -500.0
+    run.groups["wheelset/left"]["xi"][:, 1] = 1e-3
+    for name in ("Fy_N", "eta", "Mz_Nm", "phi_per_m"):
+        run.groups["wheelset/left"][name][:, 1] = 0.0
+    run.groups["wheelset"]["vx_m_per_s"][:], run.groups["wheelset"]["vy_m_per_s"][:] = 12.0, 5.0
+    assert av.wear_number(run, "wheelset", "left")[0] == pytest.approx((6.0 - 1.0) + 0.5)
+    assert av.wear_number(run, "wheelset", "left", spin=True)[0] == pytest.approx((6.0 - 1.0 + 4.0) + 0.5)
+    assert av.creep_power(run, "wheelset", "left")[0] == pytest.approx(13.0 * 9.5)
+    del run.groups["wheelset"]["vx_m_per_s"]
+    assert av.creep_power(run, "wheelset", "left")[0] == pytest.approx(20.0 * 9.5)
+
+
+def test_creep_power_is_what_the_energy_loses_by_creep():
+    channels = ["pose", "velocity", "contact", "energy"]
+    run = wr.simulate(
+        SCENES / "suspended_wheelset.yaml", speed=60, integration__duration=0.5, output__channels=channels
+    )
+    power = sum(av.creep_power(run, "wheelset", side) for side in ("left", "right"))
+    lost = run["energy"].dissipated_by_creep_W
+    np.testing.assert_allclose(power, lost, rtol=1e-3, atol=1e-6 * lost.max())
+    assert lost.max() > 100.0
 
 
 def test_quotient_leaves_out_unloaded_wheels():

@@ -173,3 +173,17 @@ def test_joints_work_only_where_they_drive(contact):  # noqa: F811
         assert (np.abs(channels["input_by_joints_W"]).max() > 0.1) == driven
         if not driven:
             assert np.abs(channels["input_by_joints_W"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("name", ["wheelset", "suspended_wheelset"])
+def test_no_energy_comes_from_a_gauge_too_narrow_for_a_yawed_wheelset(name):
+    # both flanges ride, 94 mrad of yaw, no friction: flange contacts that the search lost and found again a millimetre
+    # deep gave 2.2 and 16 kJ; what is left is Hertz's stiffness that changes along the profile
+    run = simulate(
+        SCENES / f"{name}.yaml", speed=0.1, track={"gauge": 1.42}, initial={"y": 0.002, "yaw": 0.094},
+        contact={"friction": 1e-9, "patch": "moment", "creep": {"model": "she"}},
+        integration={"duration": 0.1, "rtol": 1e-7, "atol": 1e-10, "method": "rk45"},
+        output={"rate": 5000.0, "channels": ["energy"]},
+    )  # fmt: skip
+    energy = sum(run["energy"][store] for store in CHANNELS[:4])
+    assert run.status == "completed" and np.max(energy - energy[0]) < 3.0

@@ -70,6 +70,13 @@ def oscillation(t, speed):
     return np.array(places)
 
 
+def thrown(model, start):
+    """The same start with wheelsets that slide sideways: a start without transients has errors of the nodes' size."""
+    start = start.copy()
+    start[13 * model.bodies.wheelsets + 8] += 0.01
+    return model, start
+
+
 def orders(errors):
     return np.log2(np.array(errors[:-1]) / errors[1:])
 
@@ -101,12 +108,26 @@ def test_order_on_a_tumbling_body(contact, method):  # noqa: F811
 @pytest.mark.parametrize("method", METHODS)
 def test_order_on_the_suspended_wheelset(wheelset, method):
     """The real contact for 40 ms. Patches gain and lose nodes, where forces have one continuous derivative only."""
-    model, start = wheelset
+    model, start = thrown(*wheelset)
     exact = integrate(model, start, [0.0, 0.04], "scipy_dop853", 1e-13, 1e-14).states[-1]
     steps = (4e-4, 2e-4, 1e-4) if ORDERS[method] < 5 else (8e-4, 4e-4)
     errors = [np.abs(integrate(model, start, [0.0, 0.04], method, step=h).states[-1] - exact).max() for h in steps]
-    assert errors[-1] < 1e-8
+    assert errors[-1] < 2e-8
     assert orders(errors).max() > ORDERS[method] - 0.4
+
+
+def test_rodas4_keeps_its_order_on_irregular_track():
+    """The vehicle at 20 m/s: fourfold error per halving if columns of the Jacobian did not belong to one motion."""
+    rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 200, begin: 5}}"
+    model, start = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", ["speed=20", rough]))
+    exact = integrate(model, start, [0.0, 1.5], "tsit5", 1e-10, 1e-13).states[-1]
+    places = [13 * body + 1 for body in model.bodies.wheelsets]
+    errors = [
+        np.abs(integrate(model, start, [0.0, 1.5], "rodas4", step=h).states[-1] - exact)[places].max()
+        for h in (4e-3, 2e-3)  # the reference is right to 1e-10
+    ]
+    assert errors[0] < 1e-7
+    assert orders(errors)[-1] > 3.5
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -338,7 +359,7 @@ def test_no_headway_is_a_stall(wheelset, monkeypatch):
     assert calm.status == "completed"
     monkeypatch.setattr("wrcore.integrate.integrator.STALL_STEP", 1.0)
     run = integrate(*wheelset, np.linspace(0.0, 1.0, 11), "tsit5")
-    assert run.status == "stalled" and run.reason.startswith("50 steps brought it") and run.steps + run.rejected == 50
+    assert run.status == "stalled" and "50 steps brought it" in run.reason and run.steps + run.rejected == 50
     assert np.isfinite(run.end_state).all()
     fixed = integrate(*wheelset, np.linspace(0.0, 0.1, 11), "tsit5", step=1e-4)  # as short as they were asked for
     assert fixed.status == "completed" and fixed.steps > 50

@@ -166,3 +166,13 @@ def test_profiles_command_lists_the_named_profiles(capsys):
     assert main(["profiles"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in ("S1002", "UIC60-MBench", "60E1", "54E1"))
+
+
+def test_a_collapsed_step_size_is_said_early():
+    # contact damping that saturates within 1 um/s makes a scene so stiff that an explicit method would need half a
+    # minute of work for 0.5 s
+    damping = {"normal": {"damping": {"c_e": 0.01, "v0": 1e-6}}, "creep": {"model": "she"}}
+    settings = {"duration": 0.5, "method": "tsit5"}
+    run = simulate(SCENES / "suspended_wheelset.yaml", contact=damping, integration=settings)
+    assert run.status == "stalled" and run.reason.startswith("the step size collapsed: 20000 steps")
+    assert run.counters["steps"] + run.counters["rejected"] == 20_000

@@ -83,3 +83,22 @@ def test_counters_of_a_run_and_what_the_command_says(tmp_path, capsys):
     assert "beyond the models' limits" in printed and LIMITS["search_fallback"] in printed
     assert main(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets[::2]]) == 0
     assert "limits" not in capsys.readouterr().out
+
+
+def test_a_yawed_wheel_is_hollow_along_the_rail_beyond_33_mrad():
+    contact = compile_scene(load_scene(SCENES / "wheelset.yaml", {"contact.creep.model": "she"}))[0].contact
+    steep = -0.0382  # the root's arc of 13 mm next to the flank of 70 degrees
+    assert counts(contact, patch(steep, -0.03), yaw=0.030) <= {"search_fallback"}
+    assert "hollow_ahead" in counts(contact, patch(steep, -0.03), yaw=0.040)
+    assert "hollow_ahead" not in counts(contact._replace(detection=0), patch(steep, -0.03), yaw=0.040)
+
+
+def test_both_flanges_on_the_rails(contact):
+    rows = patch(angle=0.9)
+    rows[0, 0, 1, 0] = rows[0, 0, 0, 0]
+    assert counts(contact, rows) == set()  # both contact planes lean to the left
+    rows[0, 0, 1, 0, reduction.ANGLE] = -0.9
+    assert counts(contact, rows) == {"both_flanges"}
+    changes = {"initial": {"y": 0.0}, "integration": {"duration": 0.02}, "contact": {"creep": {"model": "she"}}}
+    tight = simulate(SCENES / "wheelset.yaml", track={"gauge": 1.42}, **changes)
+    assert tight.counters["both_flanges"] == len(tight.t)

@@ -7,7 +7,7 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
-from wrcore.analysis.wheels import wear_number, wheel_forces
+from wrcore.analysis.wheels import creep_power, wear_number, wheel_forces
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.motion import amplitude, hunting_frequency
@@ -53,8 +53,13 @@ def test_measures_of_a_row_are_those_of_the_run_alone(smoke, row):
     assert got["Q_min_N"] == pytest.approx(min(q.min() for q, _ in wheels), rel=1e-12)
     assert got["Y_max_N"] == pytest.approx(max(np.abs(lateral).max() for _, lateral in wheels), rel=1e-12)
     assert got["Y_over_Q_max"] == pytest.approx(max(np.abs(lateral / q).max() for q, lateral in wheels), rel=1e-12)
-    wear = max(wear_number(run, "wheelset", side)[late].mean() for side in ("left", "right"))
-    assert got["wear_number_mean_N"] == pytest.approx(wear, rel=1e-12)
+    wear = {
+        "T_gamma_mean_N": lambda side: wear_number(run, "wheelset", side),
+        "T_gamma_spin_mean_N": lambda side: wear_number(run, "wheelset", side, spin=True),
+        "creep_power_mean_W": lambda side: creep_power(run, "wheelset", side),
+    }
+    for name, of in wear.items():
+        assert got[name] == pytest.approx(max(of(side)[late].mean() for side in ("left", "right")), rel=1e-12)
     for counter in ("steps", "rejected", "rhs_evaluations", "table_out_of_range", "simulated_s"):
         assert got[counter] == run.counters[counter]
     assert (got["status"], got["method"]) == (run.status, run.settings["method_used"])

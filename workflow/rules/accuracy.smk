@@ -93,3 +93,20 @@ rule speed_against_error:
         accuracies=ACCURACY["accuracies"],
     script:
         "../scripts/accuracy/speed_against_error.py"
+
+
+rule claims:
+    message:
+        "What the README promises: medians and worst cases"
+    input:
+        core=CORE["accuracy_figures"],
+        contact=rules.contact_reductions.output.cases,
+        creep=rules.creep_errors.output,
+        front="wrcore/run/accuracy_front.csv",
+    output:
+        table="<results>/accuracy/claims.csv",
+        text="<results>/accuracy/claims.md",
+    log:
+        "<logs>/claims.log",
+    script:
+        "../scripts/accuracy/claims.py"

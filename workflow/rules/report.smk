@@ -67,6 +67,7 @@ rule study:
         rules.ivp_study.input,
         rules.speeds_study.input,
         rules.speed_against_error.output,
+        rules.claims.output,
         rules.cost_study.input,
 
 

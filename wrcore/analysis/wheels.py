@@ -2,7 +2,8 @@
 
 Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: its lateral force on the rail in the plane
 of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Wear
-number T gamma: sum over the patches of |Fx xi| + |Fy eta|, the creep work per metre run without spin (N).
+number T gamma: |Fx xi + Fy eta| summed over the patches (N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what
+friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed over the patches (W); see :mod:`wrcore.run.wear`.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 
 from wrcore.analysis.motion import SIDES
 from wrcore.run.motion import growth_rate, hunting_frequency
+from wrcore.run.wear import creep_work
 
 OUTWARDS = {"left": 1.0, "right": -1.0}
 
@@ -48,10 +50,24 @@ def wheel_forces(run, wheelset, side):
     return vertical, -OUTWARDS[side] * lateral
 
 
-def wear_number(run, wheelset, side):
-    """Wear number T gamma of a wheel over time, N, shape (n,)."""
-    contact = run[f"{wheelset}/{side}"]
-    return np.nansum(np.abs(contact.Fx_N * contact.xi) + np.abs(contact.Fy_N * contact.eta), axis=1)
+def _creep_work(run, wheelset, side):
+    c = run[f"{wheelset}/{side}"]
+    return creep_work(c.Fx_N, c.Fy_N, c.Mz_Nm, c.xi, c.eta, c.phi_per_m)
+
+
+def wear_number(run, wheelset, side, spin=False):
+    """Wear number T gamma of a wheel over time, N, shape (n,); without or with the spin's part."""
+    return _creep_work(run, wheelset, side)[int(spin)]
+
+
+def creep_power(run, wheelset, side):
+    """Power that a wheel's creep dissipates over time, W, shape (n,).
+
+    Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
+    """
+    body = run[wheelset]
+    speed = np.hypot(body.vx_m_per_s, body.vy_m_per_s) if "vx_m_per_s" in body else run.scene["speed"]
+    return _creep_work(run, wheelset, side)[2] * speed
 
 
 def quotient(vertical, lateral):
@@ -71,8 +87,8 @@ def wheel_table(run, begin=0.0):
     Returns
     -------
     pandas.DataFrame
-        A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q| and mean wear number
-        (N).
+        A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
+        without and with spin (N) and mean creep power (W).
     """
     late = run.t >= begin
     rows = []
@@ -89,7 +105,9 @@ def wheel_table(run, begin=0.0):
                     "Q_max_N": np.max(vertical),
                     "Y_max_N": np.max(np.abs(lateral)),
                     "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
-                    "wear_number_mean_N": np.mean(wear_number(run, wheelset, side)[late]),
+                    "T_gamma_mean_N": np.mean(wear_number(run, wheelset, side)[late]),
+                    "T_gamma_spin_mean_N": np.mean(wear_number(run, wheelset, side, spin=True)[late]),
+                    "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
                 }
             )
     return pd.DataFrame(rows)

@@ -17,7 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.contact.geometry import RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, WHEEL_RESERVE, YAW_LIMIT
+from wrcore.contact.geometry import (
+    RADIUS,
+    RAIL_COSINE,
+    RAIL_RESERVE,
+    RESERVE_TO_SECOND,
+    SCAN_STEP,
+    WHEEL_RESERVE,
+    YAW_LIMIT,
+)
 from wrcore.contact.reduction import (
     CURVATURE_Y,
     MAX_PATCHES,
@@ -57,8 +65,9 @@ DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
 PLANAR, SPATIAL, AUTO = 0, 1, 2
 """``auto``: planar while the bound of its error stays below a tolerance, spatial else."""
 
-_PARTS = 3
-"""Sub-intervals of a scan step where the search looks closer."""
+_PARTS, _EXACT_PARTS = 3, 12
+"""Sub-intervals of a scan step where the search looks closer: of common poses, and of those beyond the rail's cells,
+whose strips on a curved flange lie up to four times as far apart along the rail."""
 
 _FLANK = 2
 """Close strips on either side of an overlap that are taken for its own flanks."""
@@ -90,9 +99,10 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
             middle = first
             m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP, m2 * SCAN_STEP
         else:
-            middle = 0.5 * (outside + beyond)
-            ahead = cells_ahead(geometry, middle, strip_point(geometry, pose, middle)[0])
-            m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, ahead, outside, beyond)
+            fine_nodes, middle = 0, 0.5 * (outside + beyond)
+            if not leaves_cells(pose):
+                ahead = cells_ahead(geometry, middle, strip_point(geometry, pose, middle)[0])
+                m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, ahead, outside, beyond)
             if fine_nodes < _WIDE:
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
@@ -107,8 +117,9 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
 def _search(geometry, pose, grid, reduction, first_close, last_close, patches, count):
     """All overlaps strip by strip, with a closer look wherever the reserve allows one between two nodes without.
 
-    Only strips from ``first_close`` to ``last_close`` and their neighbours can take part. Patches are added to the
-    ``count`` there are; returns their new number.
+    Only strips from ``first_close`` to ``last_close`` and their neighbours can take part: of those over the rail's
+    cells or, where strips leave these, of the whole wheel. Patches are added to the ``count`` there are; returns their
+    new number.
     """
     rarely_called()
     wheel, rail = geometry.scan_wheel, geometry.scan_rail
@@ -121,8 +132,11 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
     outside = first = last = deepest = begin
     depth = m0 = m1 = m2 = 0.0
     two_back, one_back, one_back_at, before = 1.0, 1.0, begin, 1.0
-    k = max(first_close - 1, 0)
-    end = min(last_close + 2, cells)
+    least, most = 0, cells
+    if exact:
+        least, most = cells - grid.node, wheel.shape[1] - cells - grid.node
+    k = max(first_close - 1, least)
+    end = min(last_close + 2, most)
     while k < end:
         here = begin + k * SCAN_STEP
         if here < geometry.wheel_start or here > wheel_end:
@@ -133,14 +147,18 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
             coarse = strip_gap(grid, wheel, rail, k)
         cell = rail_cell(geometry, pose, here) if exact else k
         reserve = wheel[WHEEL_RESERVE, grid.node + k] + rail[RAIL_RESERVE, cell]
+        if exact:  # yaw draws strips of a curved flange apart along the rail: the gap bends with the square of that
+            second = RESERVE_TO_SECOND * wheel[WHEEL_RESERVE, grid.node + k]
+            reserve *= (1.0 + grid.tilt_square * wheel[RADIUS, grid.node + k] * second) ** 2
         if abs(coarse) < reserve and not exact:  # the node may have left its rail cell: its sign is not safe
             coarse = gap_at(geometry, pose, here)[0]
         cosine = rail[RAIL_COSINE, cell]
-        parts = _PARTS if 0.0 <= min(coarse, before) < reserve else 1
+        closer = _EXACT_PARTS if exact else _PARTS
+        parts = closer if 0.0 <= min(coarse, before) < reserve else 1
         for part in range(1, parts + 1):
             u, gap = here, coarse
             if part < parts:
-                u -= (parts - part) * (SCAN_STEP / _PARTS)
+                u -= (parts - part) * (SCAN_STEP / closer)
                 gap = gap_at(geometry, pose, u)[0]
             if gap < 0.0:
                 if not inside:
@@ -170,7 +188,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
         before = coarse
         k += 1
         if k == end and inside:
-            end = min(end + 1, cells)
+            end = min(end + 1, most)
     if inside:
         count = _add_overlap(geometry, pose, reduction, outside, first, last, last, deepest, depth, m0, m1, m2, nodes,
                              patches, count)  # fmt: skip
@@ -288,7 +306,8 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     if node < 0 or node + cells > geometry.scan_wheel.shape[1]:
         return 0
     if leaves_cells(pose):
-        return _search(geometry, pose, window.grid, reduction, 0, cells, patches, 0)
+        nodes = geometry.scan_wheel.shape[1]
+        return _search(geometry, pose, window.grid, reduction, -nodes, nodes, patches, 0)
     count = 0
     near = near_blocks(geometry, window)
     while near > 0:

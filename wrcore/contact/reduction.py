@@ -146,16 +146,18 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
 
 @jit(allocates=False)
 def overlap_moments(geometry, pose, first, last):
-    """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature, M1 and M2 about the interval's middle."""
-    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    """M0, M1, M2 of g^2 over [first, last] by Gauss-Legendre quadrature in panels, M1 and M2 about the middle."""
+    panels = int((last - first) / SCAN_STEP) + 1
+    middle, half = 0.5 * (first + last), 0.5 * (last - first) / panels
     m0 = m1 = m2 = 0.0
-    for i in range(len(GAUSS_POINTS)):
-        e = half * GAUSS_POINTS[i]
-        gap = min(gap_at(geometry, pose, middle + e)[0], 0.0)
-        square = GAUSS_WEIGHTS[i] * gap * gap
-        m0 += square
-        m1 += square * e
-        m2 += square * e * e
+    for panel in range(panels):
+        for i in range(len(GAUSS_POINTS)):
+            e = half * (2 * panel + 1 - panels + GAUSS_POINTS[i])
+            gap = min(gap_at(geometry, pose, middle + e)[0], 0.0)
+            square = GAUSS_WEIGHTS[i] * gap * gap
+            m0 += square
+            m1 += square * e
+            m2 += square * e * e
     return half * m0, half * m1, half * m2
 
 

@@ -6,6 +6,8 @@
 `profile_edge`         patches that reach beyond the end of a profile
 `search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
 `beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
+`hollow_ahead`         patches of a yawed wheel (spatial detection) whose surface there is hollow along the rail
+`both_flanges`         wheelsets that touch with the flanges of both wheels: too wide for the gauge
 =====================  ================================================================================================
 
 A patch of an output time counts once; counters of what happens between outputs (creep look-ups out of the table's
@@ -16,14 +18,17 @@ small against the radii of curvature (Johnson, Contact Mechanics (1985), section
 the parabola is off a circle's height by (b/R)^2/4 = 2.8 % at the edge of the patch, and the surface there is inclined
 by 19 degrees. *Conformal.* The pressure acts along the surface's own normal; where this turns by 0.35 rad (20 degrees)
 over the patch, the pressure at its edges points 10 degrees past the patch's one normal, and 17 % of it lie in the
-tangent plane. Curvatures are those that Hertz is given, averaged over the profile's window.
+tangent plane. Curvatures are those that Hertz is given, averaged over the profile's window. *Hollow ahead.* A strip
+touches where its normal has no component along the rail. That is its deepest point as long as the wheel's normal
+curvature along the rail, cos^2(chi)/(R sqrt(1 + R'^2)) + kappa sin^2(chi) with sin(chi) = sin(yaw) sqrt(1 + R'^2), is
+positive: in the flange root of S1002 up to 33 mrad of yaw where it is steepest. Beyond, no patch is meant by it.
 """
 
 import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.detection import PLANAR
-from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, YAW_STRAY
+from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, VALUE, YAW_STRAY
 
 WIDEST = 1.0 / 3.0
 """Largest semi-axis across rolling over the smaller radius of curvature."""
@@ -31,11 +36,16 @@ WIDEST = 1.0 / 3.0
 WIDEST_TURN = 0.35
 """Largest turn of the normal over a patch in a hollow, rad."""
 
+FLANGE = 0.5
+"""Contact angle from which a wheel touches with its flange, rad."""
+
 LIMITS = {
     "half_space": "patches too wide for a half-space",
     "conformal": "conformal patches",
     "profile_edge": "patches at a profile's end",
     "search_fallback": "wheels searched strip by strip",
+    "hollow_ahead": "patches of wheels too yawed for their hollow",
+    "both_flanges": "wheelsets with both flanges on the rails",
     "table_out_of_range": "creep look-ups out of the table's range",
     "step_collapses": "collapses of the step size",
     "beyond_irregularity": "wheelsets past the end of the irregularity",
@@ -59,14 +69,18 @@ def exceeded(contact, patches, roll, yaw):
     dict of str to int
         ``patches`` that were looked at, and the counts by name.
     """
-    rows = patches[np.isfinite(patches[..., reduction.NORMAL])]
+    present = np.isfinite(patches[..., reduction.NORMAL])
+    rows = patches[present]
     geometry, width = contact.geometry, rows[:, reduction.SEMI_B]
-    wheel, wheel_ends = _convexity(
+    wheel, wheel_ends, larger, slope = _profile(
         geometry.wheel, geometry.wheel_start, geometry.wheel_step, rows[:, reduction.U_WHEEL]
     )
-    rail, rail_ends = _convexity(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
+    rail, rail_ends, *_ = _profile(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
     reach = width * np.cos(rows[:, reduction.ANGLE])
     tilt = np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
+    ahead = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # sin^2(chi)
+    hollow = (geometry.rolling_radius + larger) * wheel * np.sqrt(1.0 + slope**2)
+    flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
     stray = ROLL_STRAY * np.abs(np.sin(roll)) + YAW_STRAY * tilt**2  # as the search sees it
     return {
         "patches": len(rows),
@@ -74,14 +88,16 @@ def exceeded(contact, patches, roll, yaw):
         "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
         "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
         "search_fallback": 2 * int(np.sum(stray > STRAY)),
+        "hollow_ahead": int(np.sum(1.0 - ahead + hollow * ahead < 0.0)),
+        "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }
 
 
-def _convexity(nodes, start, step, u):
-    """Curvature at u (1/m), positive where wheel or rail bulge, and distance from there to the profile's end (m).
+def _profile(nodes, start, step, u):
+    """Of a profile at u: curvature (1/m, positive where wheel or rail bulge), distance to its end (m), value and slope.
 
     Both the wheel's radius and the rail's height grow out of the body.
     """
     places = start + step * np.arange(len(nodes))
-    slope, second = (np.interp(u, places, nodes[:, column]) for column in (SLOPE, CURVATURE))
-    return -second / (1.0 + slope**2) ** 1.5, np.minimum(u - places[0], places[-1] - u)
+    value, slope, second = (np.interp(u, places, nodes[:, column]) for column in (VALUE, SLOPE, CURVATURE))
+    return -second / (1.0 + slope**2) ** 1.5, np.minimum(u - places[0], places[-1] - u), value, slope

@@ -1,4 +1,10 @@
-"""Where a vehicle begins: in static equilibrium on the rails, moved as the scene says, rolling without slip."""
+"""Where a vehicle begins: in steady running on the rails, moved as the scene says.
+
+Static equilibrium comes first, without friction: it depends neither on speed nor on creep. From there a vehicle that
+is not moved goes on to steady running with all contact forces, spin's lateral force among them. One that is moved is in
+no lateral equilibrium; its wheelsets take the height, the roll and the rolling rate at which no contact force
+accelerates them vertically, in roll or about their axles.
+"""
 
 import dataclasses
 import math
@@ -10,8 +16,9 @@ from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
-from wrcore.dynamics.equilibrium import FRICTIONLESS, solve_equilibrium, stand_on_rails
-from wrcore.dynamics.system import state_size
+from wrcore.dynamics.equilibrium import FRICTIONLESS, Equilibrium, solve_equilibrium, stand_on_rails
+from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.system import Equations, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
@@ -21,6 +28,9 @@ from wrcore.vehicle.train import repeated_equilibrium
 
 LARGEST_REST = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
+
+LARGEST_SLIP, NEARBY = 0.01, 5e-3
+"""Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
 
 REST_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
@@ -140,10 +150,9 @@ def _settled(scene, model, y, yaw, load):
 
 
 def initial_state(scene, model, at_rest=None):
-    """State at the start: static equilibrium, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
+    """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
-    Wheelsets keep their static loads: height and roll are those at which each wheel carries half of its wheelset's.
-    They stand on the rails where these are out of line, too, and axle boxes stay on their axles.
+    Where rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles.
 
     Parameters
     ----------
@@ -160,17 +169,36 @@ def initial_state(scene, model, at_rest=None):
     at_rest = at_rest or rest(scene, model)
     y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
     state = _moving_ahead(model, at_rest)
+    level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
     for k, body in enumerate(vehicle.bodies.wheelsets):
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         if y or yaw:
             roll, z = _settled(scene, model, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
-            part[10:13] = _rolling(scene, model, y, z, roll, yaw)
-        else:
-            _roll_as_it_stands(scene, model, part)
+        _roll_as_it_stands(scene, model, part)
+    if y or yaw:
+        for body, name in enumerate(vehicle.body_names):
+            state[STATE_SIZE * body + 1] += y * (vehicle.data["bodies"][name]["kind"] == "body")
+    else:
+        state = _steady(vehicle, level, state)
+    state = _balanced(vehicle, level, state)
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
-    parts = {name: state[STATE_SIZE * b : STATE_SIZE * (b + 1)] for b, name in enumerate(vehicle.body_names)}
+        state = _with_axle_boxes(vehicle, state)
+        for part, (s, _, _) in zip(_parts(vehicle, state), vehicle.positions, strict=True):
+            part[:] = _on_path(model.track.path, s, part)
+    return state
+
+
+def _parts(vehicle, state):
+    """The bodies' parts of a state, as views, shape (n, 13)."""
+    return state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, STATE_SIZE)
+
+
+def _with_axle_boxes(vehicle, state):
+    """The state with axle boxes on their axles."""
+    state = state.copy()
+    parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
     places = dict(zip(parts, vehicle.positions, strict=True))
     for name, part in parts.items():
         described = vehicle.data["bodies"][name]
@@ -178,12 +206,78 @@ def initial_state(scene, model, at_rest=None):
             axle = parts[described["wheelset"]]
             part[:3] = axle[:3] + matrix_of(axle[3:7]) @ (places[name] - places[described["wheelset"]])
             part[3:7] = axle[3:7]
-        elif described["kind"] == "body":
-            part[1] += y
-    if not model.track.tangent:
-        for part, (s, _, _) in zip(parts.values(), vehicle.positions, strict=True):
-            part[:] = _on_path(model.track.path, s, part)
     return state
+
+
+def _steady(vehicle, model, state):
+    """Steady running near a state; the state itself where there is none (no creep force, say).
+
+    The vehicles of a train do not act on each other: the first one's is that of all.
+    """
+    unit = vehicle.unit
+    if unit is not None:
+        size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
+        first = np.concatenate([state[: size - own], state[STATE_SIZE * len(vehicle.body_names) :][:own]])
+        alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
+        return repeated_equilibrium(Equilibrium(_steady(unit, alone, first), np.zeros((0, 2)), 0.0), vehicle).state
+    try:
+        found = steady_running(model, state).state
+    except np.linalg.LinAlgError:
+        return state
+    wheelsets = [_parts(vehicle, row)[model.bodies.wheelsets] for row in (found, state)]
+    turning, moving = (np.linalg.norm(rows[:, 10:13], axis=1) for rows in wheelsets)
+    aside = np.abs(wheelsets[0][:, 1] - wheelsets[1][:, 1])
+    return found if np.all(np.abs(turning - moving) < LARGEST_SLIP * moving) and np.all(aside < NEARBY) else state
+
+
+@np.errstate(all="ignore")  # what overflows is no better
+def _balanced(vehicle, model, state):
+    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates.
+
+    Newton's method for all wheelsets at once: as long as the other bodies stay, none of them acts on another.
+    """
+    equations, wheelsets = Equations(model), model.bodies.wheelsets
+    parts = _parts(vehicle, state)[wheelsets]
+    rolls, _, yaws = angles(parts[:, 3:7])
+    axles = np.array([matrix_of(part[3:7])[:, 1] for part in parts])
+    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, 10:13], axis=1)])
+
+    def standing(stands):
+        """The state with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
+        new = state.copy()
+        axes = [rotation(roll, yaw) for roll, yaw in zip(stands[:, 1], yaws, strict=True)]
+        for body, turned, (z, _, rate) in zip(wheelsets, axes, stands, strict=True):
+            part = new[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+            part[2:7], part[10:13] = (z, *euler_of(turned)), rate * turned[:, 1]
+        new = _with_axle_boxes(vehicle, new)
+        rates = _parts(vehicle, equations(0.0, new))[wheelsets]
+        about = [row[10:13] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
+        return new, np.column_stack([rates[:, 9:11], about])
+
+    for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
+        found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
+        if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
+            break
+    return standing(found)[0]
+
+
+def _improved(standing, stands, steps):
+    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve."""
+    own = slice(len(steps))
+    left = standing(stands)[1][:, own]
+    for _ in range(20):
+        ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
+        slopes = np.stack([(high - low)[:, own] / width for high, low, width in ends], axis=-1)
+        new = stands.copy()
+        try:
+            new[:, own] -= np.linalg.solve(slopes, left[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            break
+        still_left = standing(new)[1][:, own]
+        if not np.max(np.abs(still_left)) < np.max(np.abs(left)):
+            break
+        stands, left = new, still_left
+    return stands
 
 
 def _on_path(path, s, part):

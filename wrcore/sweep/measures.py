@@ -9,7 +9,9 @@
 ``Q_min_N``, ``Q_max_N``      least and largest vertical force of a wheel
 ``Y_max_N``                   largest lateral force of a wheel on its rail, by amount
 ``Y_over_Q_max``              their largest quotient, by amount, where the wheel carries more than 1 kN
-``wear_number_mean_N``        mean of T gamma = |Fx xi| + |Fy eta|, summed over a wheel's patches
+``T_gamma_mean_N``            mean of T gamma = |Fx xi + Fy eta|, summed over a wheel's patches; ``T_gamma_spin_mean_N``
+                              with the spin's part, |Fx xi + Fy eta + Mz phi|
+``creep_power_mean_W``        mean power that a wheel's creep dissipates, -V (Fx xi + Fy eta + Mz phi)
 ``simulated_s``               time reached
 ``steps``, ``rejected``       accepted and rejected steps; likewise ``rhs_evaluations``, ``jacobians``,
                               ``factorisations``, ``table_out_of_range`` and ``smallest_step_s``
@@ -35,6 +37,7 @@ from wrcore.dynamics.track import track_poses
 from wrcore.integrate.trajectory import Trajectory
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulate import evaluated
+from wrcore.run.wear import creep_work
 
 LEAST_Q = 1e3
 """Wheels that carry less have no quotient Y/Q, N."""
@@ -51,7 +54,7 @@ class Motions:
     yaw: np.ndarray
     """(runs, n, wheelsets), rad."""
     forces: np.ndarray | None
-    """(runs, n, wheelsets, 2, 3): Q, Y (N) and T gamma (N) of each wheel; None where no measure needs them."""
+    """(runs, n, wheelsets, 2, 5): of each wheel, as `wheel_forces` gives them; None where no measure needs them."""
     window: float
     """Length of the last part of a run, s."""
 
@@ -97,7 +100,9 @@ FORCES: dict[str, Callable[[Any], np.ndarray]] = {
     "Q_max_N": lambda m: _worst(m.forces[..., 0]),
     "Y_max_N": lambda m: _worst(np.abs(m.forces[..., 1])),
     "Y_over_Q_max": _quotient,
-    "wear_number_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 2], axis=1)),
+    "T_gamma_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 2], axis=1)),
+    "T_gamma_spin_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 3], axis=1)),
+    "creep_power_mean_W": lambda m: _worst(np.nanmean(m.forces[..., 4], axis=1)),
 }
 """Measures of the wheels' forces, shape (runs,)."""
 
@@ -156,13 +161,15 @@ def lateral_and_yaw(motion: np.ndarray, tangent: bool) -> tuple[np.ndarray, np.n
 
 
 def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:
-    """Q, Y and T gamma of each wheel of a run, N, shape (n, wheelsets, 2, 3)."""
+    """Q, Y, T gamma without and with spin (N) and creep power (W) of each wheel, shape (n, wheelsets, 2, 5)."""
     patches, _, _ = evaluated(model, trajectory)
     angle, normal, lateral = (patches[..., k] for k in (reduction.ANGLE, reduction.NORMAL, reduction.FY))
     cosine, sine = np.cos(angle), np.sin(angle)
-    out = np.empty((*patches.shape[:3], 3))
+    out = np.empty((*patches.shape[:3], 5))
     out[..., 0] = np.nansum(normal * cosine + lateral * sine, axis=-1)
     out[..., 1] = np.nansum(lateral * cosine - normal * sine, axis=-1)
-    slips = patches[..., reduction.FX] * patches[..., reduction.XI], lateral * patches[..., reduction.ETA]
-    out[..., 2] = np.nansum(np.abs(slips[0]) + np.abs(slips[1]), axis=-1)
+    columns = (reduction.FX, reduction.FY, reduction.MZ, reduction.XI, reduction.ETA, reduction.PHI)
+    out[..., 2], out[..., 3], work = creep_work(*(patches[..., column] for column in columns))
+    vx, vy = (trajectory.states[:, STATE_SIZE * model.bodies.wheelsets + k] for k in (7, 8))
+    out[..., 4] = work * np.hypot(vx, vy)[..., None]
     return out

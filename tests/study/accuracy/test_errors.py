@@ -12,6 +12,7 @@ from wrcore.scene.description import load_scene
 def worn_run(**kwargs):
     """A hunting motion whose wheels creep: without wear there is no relative error of it."""
     run = hunting_run(**kwargs)
+    run.groups["wheelset"]["vx_m_per_s"][:] = 20.0
     run.groups["wheelset/left"]["Fx_N"][:, 0], run.groups["wheelset/left"]["xi"][:, 0] = -1e3, 1e-3
     return run
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
+from wrcore.analysis.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
 from wrcore.run.accuracy import Choice, kind_of
 from wrcore.run.motion import amplitude, hunting_frequency
 from wrcore.run.simulate import simulate
@@ -48,18 +48,21 @@ def run_errors(run, reference, until=np.inf):
     -------
     dict
         RMS and maximum over all wheelsets of the lateral position's error (m); RMS over all wheels of the error of Q
-        and Y (N); relative errors of mean wear number, amplitude and frequency over the second half.
+        and Y (N); relative errors of mean wear number and creep power, and of amplitude and frequency over the second
+        half.
     """
     if run.t[-1] < min(until, reference.t[-1]) - 1e-9:
         return dict.fromkeys(ERRORS, np.nan)  # did not get there
     here = reference.t[: run.t.size] <= until
     names = wheelsets_of(reference)
     gaps = np.array([(run[name].y_m - reference[name].y_m)[here] for name in names])
-    forces, wear, sure_wear = [], [], []
+    forces = []
     for name, side in product(names, SIDES):
         forces.append(np.subtract(wheel_forces(run, name, side), wheel_forces(reference, name, side))[:, here])
-        wear.append(np.mean(wear_number(run, name, side)[here]))
-        sure_wear.append(np.mean(wear_number(reference, name, side)[here]))
+    (wear, sure_wear), (power, sure_power) = (
+        [np.sum([of(r, name, side)[here] for name, side in product(names, SIDES)]) for r in (run, reference)]
+        for of in (wear_number, creep_power)
+    )
     late = here & (reference.t >= 0.5 * min(until, reference.t[-1]))
     leading = names[0]
     motion = [(r.t[late], r[leading].y_m[late]) for r in (run, reference)]
@@ -71,13 +74,17 @@ def run_errors(run, reference, until=np.inf):
         "y_rms_m": float(np.sqrt(np.mean(gaps**2))),
         "y_max_m": float(np.max(np.abs(gaps))),
         "force_rms_N": float(np.sqrt(np.mean(np.square(forces)))),
-        "wear_number_relative": float(abs(np.mean(wear) / np.mean(sure_wear) - 1.0)),
+        "T_gamma_relative": float(abs(wear / sure_wear - 1.0)),
+        "creep_power_relative": float(abs(power / sure_power - 1.0)),
         "amplitude_relative": float(abs(size / sure_size - 1.0)),
         "frequency_relative": float(abs(beat / sure_beat - 1.0)),
     }
 
 
-ERRORS = ("y_rms_m", "y_max_m", "force_rms_N", "wear_number_relative", "amplitude_relative", "frequency_relative")
+ERRORS = (
+    "y_rms_m", "y_max_m", "force_rms_N", "T_gamma_relative", "creep_power_relative", "amplitude_relative",
+    "frequency_relative",
+)  # fmt: skip
 
 
 COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")

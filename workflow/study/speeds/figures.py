@@ -88,7 +88,7 @@ RESPONSE = (
     ("Y_over_Q_max", 1.0, "largest Y/Q"),
     ("Y_max_N", KN, "largest Y / kN"),
     ("Q_max_N", KN, "largest Q / kN"),
-    ("wear_number_mean_N", 1.0, r"mean wear number T$\gamma$ / N"),
+    ("T_gamma_mean_N", 1.0, r"mean wear number T$\gamma$ / N"),
     ("car_body_ay_rms_m_per_s2", 1.0, "lateral acceleration, rms / (m/s²)"),
     ("car_body_az_rms_m_per_s2", 1.0, "vertical acceleration, rms / (m/s²)"),
 )

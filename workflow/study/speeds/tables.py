@@ -46,7 +46,9 @@ def speed_row(run, begin=0.5, body="car_body"):
         "Q_max_N": wheels["Q_max_N"].max(),
         "Y_max_N": wheels["Y_max_N"].max(),
         "Y_over_Q_max": wheels["Y_over_Q_max"].max(),
-        "wear_number_mean_N": wheels["wear_number_mean_N"].mean(),
+        "T_gamma_mean_N": wheels["T_gamma_mean_N"].mean(),
+        "T_gamma_spin_mean_N": wheels["T_gamma_spin_mean_N"].mean(),
+        "creep_power_mean_W": wheels["creep_power_mean_W"].mean(),
     }
     for axis in "yz":
         channel = run.groups.get(body, {}).get(f"a{axis}_m_per_s2")

@@ -1,0 +1,31 @@
+"""What the README promises: medians and worst cases of stated cases."""
+
+import pandas as pd
+import pytest
+
+from study.accuracy.claims import claims, claims_markdown, contact_claims, creep_claims, speed_claims
+from tests.conftest import ROOT
+
+
+def test_each_claim_names_its_cases_and_its_worst():
+    contact = pd.DataFrame({
+        "set": "light", "reduction": "moment", "y_m": [0.0, -0.006, 0.009], "lateral_m": [1e-6, -3e-6, 8e-6],
+        "height_equal_normal_m": 0.0, "height_equal_load_m": 0.0, "p_max_relative": -0.1,
+    })  # fmt: skip
+    found = contact_claims(contact).set_index(["what", "cases"])
+    assert found.loc[("lateral contact position", "CONTACT, light"), "worst"] == pytest.approx(8e-3)
+    near = found.loc[("lateral contact position", "CONTACT, light, y up to 6 mm")]
+    assert (near["count"], near["median"], near["worst"]) == (2, pytest.approx(2e-3), pytest.approx(3e-3))
+    creep = pd.DataFrame({"cases": ["a", "b"], "model": "Polach", "against": "CONTACT", "force_error": [0.1, 0.4]})
+    rows = creep_claims(creep).set_index("cases")
+    assert rows.loc["CONTACT, all", "worst"] == pytest.approx(40.0) and rows.loc["CONTACT, a", "count"] == 1
+    front = pd.read_csv(ROOT / "wrcore" / "run" / "accuracy_front.csv")
+    whole = claims(contact, creep, front)
+    assert "Polach" in claims_markdown(whole) and len(whole) == 8 + 3 + len(speed_claims(front))
+
+
+def test_vehicles_are_as_fast_as_the_readme_says():
+    front = pd.read_csv(ROOT / "wrcore" / "run" / "accuracy_front.csv")
+    rows = speed_claims(front)
+    best = rows[rows["what"].str.endswith("vehicle")]["best"]
+    assert round(best.max()) == 141 and "28 to 141 times" in (ROOT / "README.md").read_text(encoding="utf-8")
