@@ -16,8 +16,8 @@ from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, workspace
 from wrcore.dynamics.track import track_poses
-from wrcore.geometry.irregularity import irregularity_end
 from wrcore.errors import InputError
+from wrcore.geometry.irregularity import irregularity_end
 from wrcore.integrate.integrator import chosen_method, integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.checkpoints import model_fingerprint
