@@ -6,6 +6,7 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import damping_factor, hertz_ellipse
+from wrcore.contact.patch.model import strip_work
 from wrcore.creep.laws import LAWS, creep_force
 from wrcore.dynamics.wheel import MOTION_COLUMNS, wheel_wrenches
 from wrcore.geometry.track import rotation
@@ -60,7 +61,7 @@ def one_wheel(model, motion):
     motions[0, 1, 2] += 1.0
     patches = np.zeros((1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((1, 2), int), np.zeros((1, 2)), np.zeros((1, 2, 6))
-    wheel_wrenches(model, motions, patches, counts, bounds, wrenches)
+    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, np.zeros(3, int), strip_work(model.strips))
     assert counts[0, 1] == 0 and not wrenches[0, 1].any()
     return wrenches[0, 0], patches[0, 0, : counts[0, 0]], bounds[0, 0]
 
@@ -91,7 +92,9 @@ def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
     motions = motions.reshape(20, 2, MOTION_COLUMNS)
     patches = np.zeros((20, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((20, 2), int), np.zeros((20, 2)), np.zeros((20, 2, 6))
-    assert wheel_wrenches(model, motions, patches, counts, bounds, wrenches) == 0
+    counters = np.zeros(3, int)
+    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, strip_work(model.strips))
+    assert counters[1] == 0
     for place in np.ndindex(20, 2):
         wrench, rows, bound = one_wheel(model, motions[place])
         assert (len(rows), bound) == (counts[place], bounds[place])

@@ -41,7 +41,8 @@ interpenetrate more at the sides, the curvature at one point says nothing about 
 U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y = range(10)
 SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
 COSINE, SINE = 19, 20  # of the contact angle
-PATCH_COLUMNS = 21
+P_MAX = 21  # filled where patches are no ellipses
+PATCH_COLUMNS = 22
 
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""

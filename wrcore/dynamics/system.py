@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
@@ -19,7 +20,7 @@ from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
-from wrcore.kernels.handles import Handle, Kernel, call_at
+from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
 
@@ -51,6 +52,8 @@ class Model(NamedTuple):
     alpha: float
     beta: float
     """Baumgarte's parameters, 1/s."""
+    wheels: int = 0
+    """Address of the kernel that finds the rails' wrenches, see `Equations`."""
 
 
 class Workspace(NamedTuple):
@@ -79,11 +82,12 @@ class Workspace(NamedTuple):
     bounds: np.ndarray
     """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
     counters: np.ndarray
-    """(2,) int: evaluations, creep look-ups out of range."""
+    """(3,) int: evaluations, creep look-ups out of range, patches solved on a grid."""
     constraints: ConstraintWork
     frame: np.ndarray
     """(3, 3): axes of the track's frame."""
     irregularity: np.ndarray
+    strips: StripWork
 
 
 def state_size(model):
@@ -107,8 +111,8 @@ def workspace(model):
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)), np.zeros((k, 2, 3, 3)),
-        np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(2, np.int64),
-        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
+        np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(3, np.int64),
+        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)), strip_work(model.contact.strips),
     )  # fmt: skip
 
 
@@ -148,9 +152,10 @@ def _add_rail_wrenches(model, state, work):
             for i in range(6):
                 row[6 + i] = state[at + 7 + i]
             row[12] = row[13] = 0.0
-    work.counters[1] += wheel_wrenches(
-        model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches
-    )
+    call_address(
+        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+        work.counters, work.strips,
+    )  # fmt: skip
     for k in range(wheelsets.shape[0]):
         if not tangent:
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
@@ -219,6 +224,24 @@ def fill_many(equations, t, states, model, work, rates):
         derivatives_at(equations, t, states[i], model, work, rates[i])
 
 
+def with_wheels(model, work):
+    """The model with the address of the kernel for its wheels: only the one that a scene runs is ever compiled."""
+    if not len(model.bodies.wheelsets):
+        return model
+    wrenches, contact = wheel_wrenches, model.contact
+    if contact.strips.strips:
+        from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
+
+        fallback = Kernel(solve_on_grid, Handle(contact), work.motions[0, 0], work.strips.force)
+        contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
+        wrenches = strip_wrenches
+    kernel = Kernel(
+        wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+        work.counters, Handle(work.strips),
+    )  # fmt: skip
+    return model._replace(contact=contact, wheels=kernel.address)
+
+
 class Equations:
     """A model's equations of motion with their scratch arrays, for kernels and as ``function(t, state)``.
 
@@ -236,14 +259,14 @@ class Equations:
 
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work
-        model, work = Handle(model), Handle(self.work)
+        model, work = Handle(with_wheels(model, self.work)), Handle(self.work)
         state = np.empty(0)
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
 
     def renew(self, model):
         """Turn to another model of the same types, in fresh scratch arrays: a series of runs looks nothing up again."""
         self.work = workspace(model)
-        self.arguments[1].renew(model)
+        self.arguments[1].renew(with_wheels(model, self.work))
         self.arguments[2].renew(self.work)
         return self
 

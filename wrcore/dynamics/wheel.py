@@ -7,6 +7,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, damping_factor, hertz_shape_at, inverse_cube_root
+from wrcore.contact.patch.model import StripModel
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -57,6 +58,8 @@ class ContactModel(NamedTuple):
     """v0 of the damping factor, m/s."""
     least_speed: float
     """Rolling speed is not taken smaller than this in creepages, m/s."""
+    strips: StripModel
+    """Patches on strips, if the scene asks for them."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -119,7 +122,7 @@ def _patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z,
 
 
 @jit(allocates=False, fastmath=FUSED)
-def wheel_wrenches(model, motions, patches, counts, bounds, wrenches):
+def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
     """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
 
     One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
@@ -138,18 +141,16 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches):
         Filled: number of patches; AUTO's bound of planar detection's error (m).
     wrenches : numpy.ndarray, shape (k, 2, 6)
         Filled: force (N) and moment about the wheelset's centre (N m).
-
-    Returns
-    -------
-    int
-        Number of creep look-ups outside the range of the creep law's table.
+    counters : numpy.ndarray, shape (3,)
+        The second one counts creep look-ups outside the range of the creep law's table.
+    work : StripWork
+        Not used by ellipses.
     """
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m = motions[i, wheel]
             count, bound = _find(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
             counts[i, wheel], bounds[i, wheel] = count, bound
-    outside = 0
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m, w = motions[i, wheel], wrenches[i, wheel]
@@ -160,6 +161,5 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches):
                 )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz
-                outside += missed
+                counters[1] += missed
             w[0], w[1], w[2], w[3], w[4], w[5] = fx, fy, fz, mx, my, mz
-    return outside

@@ -265,7 +265,12 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     for b in range(n):
         for k in range(STATE_SIZE * b, STATE_SIZE * b + 3):
             jacobian.drift[k] = state[k + VELOCITY]
-    evaluations = sweep.starts.shape[0]
+    base, evaluations = rate, sweep.starts.shape[0]
+    strips = model.contact.strips.strips > 0
+    if strips:  # a smooth neighbour of the model: ellipses
+        work.strips.cheap[0] = 1
+        base = jacobian.by_time
+        derivatives_at(equations, t, state, model, work, base)
     for i in range(evaluations):
         copy_into(trial, state)
         in_time = i == sweep.starts.shape[0] - 1
@@ -278,13 +283,13 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
         derivatives_at(equations, t + MOMENT if in_time else t, trial, model, work, slope)
         if in_time:
             for j in range(state.shape[0]):
-                jacobian.by_time[j] = (slope[j] - rate[j]) / MOMENT
+                jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT
         for k in range(first, last):
             column, difference = sweep.columns[k], differences[k - first]
             for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
                 row = sweep.rows[j]
                 at = STATE_SIZE * (row // 6) + 7 + row % 6 if row < 6 * n else 7 * n + row
-                value = (slope[at] - rate[at]) / difference
+                value = (slope[at] - base[at]) / difference
                 if column < 6 * n:
                     jacobian.by_position[column, row] = value
                 else:
@@ -297,6 +302,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
                 for j in range(4):
                     value = 0.0
                     for m in range(4):
-                        value += jacobian.axes[body, j, m] * (slope[at + m] - rate[at + m])
+                        value += jacobian.axes[body, j, m] * (slope[at + m] - base[at + m])
                     jacobian.turning[body, j, place] = value * (2.0 if j < 3 else 1.0) / difference
-    return evaluations
+    work.strips.cheap[0] = 0
+    return evaluations + strips

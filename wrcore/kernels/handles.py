@@ -68,9 +68,13 @@ def _get_field(context, builder, reference, pointer, name):
     field = reference.target.types[k]
     if isinstance(field, types.BaseNamedTuple):
         return place
+    value = _read(builder, place)
     if context.enable_nrt and isinstance(field, types.Array):  # the handle keeps it alive, nobody counts references
-        raise TypingError("arrays of a Handle can only be read in kernels compiled with allocates=False")
-    return _read(builder, place)
+        array = context.make_array(field)(context, builder, value=value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+    return value
 
 
 @intrinsic
@@ -165,21 +169,28 @@ def _unbox_address(kind, holder, c):
     return NativeValue(pointer, is_error=c.pyapi.c_api_error())
 
 
+def _call(context, builder, call, values):
+    """Call what ``values[0]`` points at with the arguments in ``values[1]``."""
+    kinds = tuple(call.args[1])
+    handed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
+    function = context.call_conv.get_function_type(types.none, kinds).as_pointer()
+    from_number = isinstance(values[0].type, ir.IntType)
+    pointer = (builder.inttoptr if from_number else builder.bitcast)(values[0], function)
+    status, _ = context.call_conv.call_function(builder, pointer, types.none, kinds, handed)
+    with cgutils.if_unlikely(builder, status.is_error):
+        context.call_conv.return_status_propagate(builder, status)
+    return context.get_dummy_value()
+
+
 @intrinsic
 def call_at(_, kernel, *arguments):
     """Call a `Kernel` with arguments of just the types that it was compiled for."""
     if tuple(arguments) != kernel.arguments:
         raise TypingError(f"a kernel compiled for {kernel.arguments} is called with {tuple(arguments)}")
+    return types.void(kernel, types.StarArgTuple(arguments)), _call
 
-    def generate(context, builder, call, values):
-        kinds = tuple(call.args[1])
-        handed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
-        function = context.call_conv.get_function_type(types.none, kinds).as_pointer()
-        status, _ = context.call_conv.call_function(
-            builder, builder.bitcast(values[0], function), types.none, kinds, handed
-        )
-        with cgutils.if_unlikely(builder, status.is_error):
-            context.call_conv.return_status_propagate(builder, status)
-        return context.get_dummy_value()
 
-    return types.void(kernel, types.StarArgTuple(arguments)), generate
+@intrinsic
+def call_address(_, address, *arguments):
+    """Call the `Kernel` with this ``address``, a field of a model say; the types of the arguments are not checked."""
+    return types.void(types.int64, types.StarArgTuple(arguments)), _call

@@ -17,7 +17,8 @@ import numpy as np
 from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import hertz_table
-from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.patch.model import strip_model
+from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, load_table
 from wrcore.dynamics.marker import FRAME
@@ -260,9 +261,11 @@ def compile_scene(
             )),
             hertz_table(), LAWS[contact["creep"]["model"]],
             _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
-            DETECTIONS[scene.detection], float(contact["detection_tolerance"]), REDUCTIONS[contact["patch"]],
+            DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
+            REDUCTIONS.get(contact["patch"], MOMENT),
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
+            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"]),
         ),
         vehicle.elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),

@@ -128,7 +128,9 @@ def _roll_as_it_stands(scene, model, part):
 def _rolling(scene, model, y, z, roll, yaw):
     """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
     detection = "planar" if scene.detection == "planar" else "spatial"
-    patches = detect(model.contact.geometry, y, z, roll, yaw, detection, scene.data["contact"]["patch"])
+    patches = detect(
+        model.contact.geometry, y, z, roll, yaw, detection, "maximum" if model.contact.reduction == 0 else "moment"
+    )
     radius = sum(z - patch.z_m for patch in patches) / len(patches)
     return rotation(roll, yaw)[:, 1] * model.speed / radius
 

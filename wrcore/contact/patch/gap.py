@@ -1,0 +1,255 @@
+"""The gap of a real wheel over a real rail in the frame of one patch, strip by strip, and its rigid slip.
+
+The contact frame (x forward, s lateral, n normal from rail into wheel) has one contact angle per patch. At fixed s the
+wheel's height over x is a parabola about the extreme point of the wheel's strip there, the locus N_x = 0 that spatial
+detection has in closed form (:mod:`wrcore.contact.strip`):
+
+    g(x, s) = g0(s) + A(s) (x - x_c(s))^2,   A = kappa_x / (2 cos(delta_w - delta)),
+    kappa_x = cos(alpha)/R (1 - q) + kappa_profile q,   q = sin^2 of the angle between the circle's tangent and x.
+
+Inside, s counts outwards (to the field side) on both wheels, so that a mirrored pose is solved by the same operations.
+"""
+
+import math
+from typing import NamedTuple
+
+from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_WHEEL
+from wrcore.contact.strip import (
+    cubic_at,
+    curvature_at,
+    gap_at,
+    strip_point,
+    wheel_slope,
+)
+from wrcore.kernels.jit import FUSED, jit
+
+JOINED_ANGLE = 0.5
+"""Neighbouring overlaps whose planes differ by less (rad) are one patch with one contact angle."""
+
+NODES = 48
+"""Nodes over each overlap at which the gap is looked at."""
+
+_REACH = 1.4
+"""Half of the range that is looked at, over the half width that the overlap's moments give."""
+
+# Rows of the nodes over the overlaps.
+S, NODE_GAP, NODE_SHAPE, NODE_SQUARE, NODE_SHARE = range(5)
+NODE_ROWS = 5
+
+# Rows of the strip gap: what `strip_gap` fills.
+GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, U, UR = range(9)
+GAP_ROWS = 9
+
+_PROBE = 2e-5
+"""Step in u for the rates of A and x_c, m."""
+
+
+class Frame(NamedTuple):
+    """Contact frame of a patch, for kernels; lateral coordinates count outwards."""
+
+    cosine: float
+    sine: float
+    """Of the contact angle, positive where the rail rises outwards."""
+    x: float
+    """Origin, m: from the wheelset's cross-section."""
+    ur: float
+    """Origin: rail coordinate."""
+    z: float
+    u: float
+    """Wheel coordinate of the origin."""
+
+
+@jit(allocates=False)
+def group_end(patches, count, first):
+    """End of the run of overlaps, from ``first``, that are one patch."""
+    last = first + 1
+    while last < count and abs(patches[last, ANGLE] - patches[last - 1, ANGLE]) < JOINED_ANGLE:
+        last += 1
+    return last
+
+
+@jit(allocates=False)
+def frame_of_overlaps(geometry, pose, patches, first, last):
+    """Contact frame of the overlaps from ``first`` to before ``last``, at the lateral mean of g^2 over all of them."""
+    weight = mean = 0.0
+    for k in range(first, last):
+        row = patches[k]
+        _, slope = gap_at(geometry, pose, row[U_WHEEL])
+        square = 1.0 / (1.0 + slope * slope)
+        width = math.sqrt(row[PENETRATION] * square / row[CURVATURE_Y])
+        share = row[PENETRATION] * row[PENETRATION] / square * width
+        weight += share
+        mean += share * row[U_WHEEL]
+    u = mean / weight
+    ur, _, radius, slope, _, along = strip_point(geometry, pose, u)
+    f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+    both = 0.5 * (wheel_slope(pose, slope, along) + df)
+    cosine = 1.0 / math.sqrt(1.0 + both * both)
+    x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+    return Frame(cosine, both * cosine, x, ur, f, u)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _shape_at(geometry, pose, tangent, u, radius, slope, along, m):
+    """A (1/m) and the extreme point's x (m, from the wheelset's cross-section) of the wheel's strip at u."""
+    rise = (m - tangent) / (1.0 + m * tangent)
+    cosine = 1.0 / math.sqrt(1.0 + slope * slope)
+    kappa = cosine / radius
+    if pose.tilt != 0.0:
+        cross = 1.0 - pose.q * pose.q * (1.0 - along * along)
+        profile = -curvature_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
+        kappa += (profile * cosine * cosine * cosine - kappa) * cross
+    secant = math.sqrt(1.0 + rise * rise)  # 1/cos(delta_w - delta)
+    return 0.5 * kappa * secant, radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def strip_gap(geometry, pose, frame, s, u, ur):
+    """Gap of the strip at ``s`` (m, outwards) from guesses of its wheel and rail coordinates.
+
+    Returns
+    -------
+    gap, gap_slope : float
+        g0 (m) and its slope over s.
+    shape, crest : float
+        A (1/m) and x_c (m).
+    shape_rate, crest_rate : float
+        Their slopes over s (1/m^2 and -).
+    height : float
+        Height of the wheel's extreme point along n, m.
+    u, ur : float
+        Wheel and rail coordinates, m: guesses for the next strip.
+    """
+    tangent = frame.sine / frame.cosine
+    here = normal = rise = radius = slope = second = along = height = m = 0.0
+    rate = 1.0
+    for _ in range(6):
+        across, height, radius, slope, second, along = strip_point(geometry, pose, u)
+        m = wheel_slope(pose, slope, along)
+        y, z = across - frame.ur, height - frame.z
+        here, normal = y * frame.cosine + z * frame.sine, z * frame.cosine - y * frame.sine
+        rise = (m - tangent) / (1.0 + m * tangent)
+        down = math.sqrt(max(1.0 - along * along, 1e-6))
+        dy = down * pose.y_down + along * pose.y_along
+        rate = pose.ey + slope * dy + radius * pose.tilt * second * (pose.y_along - along / down * pose.y_down)
+        if abs(s - here) < 1e-8:
+            break
+        u += (s - here) / (pose.side * rate * (frame.cosine + m * frame.sine))
+    top = normal + (s - here) * rise
+    rate = pose.side * rate * (frame.cosine + m * frame.sine)
+    shape, crest = _shape_at(geometry, pose, tangent, u, radius, slope, along, m)
+    _, _, radius, slope, _, along = strip_point(geometry, pose, u + _PROBE)
+    m = wheel_slope(pose, slope, along)
+    shape_rate, crest_rate = _shape_at(geometry, pose, tangent, u + _PROBE, radius, slope, along, m)
+    inverse = 1.0 / (_PROBE * rate)
+    shape_rate, crest_rate = (shape_rate - shape) * inverse, (crest_rate - crest) * inverse
+    crest -= frame.x
+    fall = 0.0
+    for _ in range(6):
+        f, m, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+        y, z = ur - frame.ur, f - frame.z
+        here, normal = y * frame.cosine + z * frame.sine, z * frame.cosine - y * frame.sine
+        fall = (m - tangent) / (1.0 + m * tangent)
+        if abs(s - here) < 1e-8:
+            break
+        ur += (s - here) / (frame.cosine + m * frame.sine)
+    gap = top - normal - (s - here) * fall
+    return gap, rise - fall, shape, crest, shape_rate, crest_rate, top, u, ur
+
+
+@jit(allocates=False)
+def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
+    """Gap at nodes over the overlaps of a patch.
+
+    Parameters
+    ----------
+    nodes : numpy.ndarray, shape (NODE_ROWS, n)
+        Filled, outwards: s, gap (m) and A (1/m).
+    ends : numpy.ndarray of int, shape (n,)
+        Filled: number of nodes up to the end of each stretch, within which nodes are equally far apart in u.
+
+    Returns
+    -------
+    int
+        Number of stretches.
+    """
+    count = stretches = 0
+    stop = -1e9
+    for k in range(first, last):
+        row = patches[k]
+        slope = gap_at(geometry, pose, row[U_WHEEL])[1]
+        width = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
+        low, high = row[U_WHEEL] - _REACH * width, row[U_WHEEL] + _REACH * width
+        for _ in range(6):
+            if gap_at(geometry, pose, low)[0] > 0.0:
+                break
+            low -= 0.3 * width
+        for _ in range(6):
+            if gap_at(geometry, pose, high)[0] > 0.0:
+                break
+            high += 0.3 * width
+        if k + 1 < last:
+            high = min(high, 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL]))
+        low = max(low, stop)
+        stop = high
+        step = (high - low) / (NODES - 1)
+        for i in range(NODES):
+            u = low + i * step
+            _fill_node(geometry, pose, frame, u, nodes, count)
+            count += 1
+        ends[stretches] = count
+        stretches += 1
+    return stretches
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _fill_node(geometry, pose, frame, u, nodes, k):
+    """Node k: s, gap and A of the wheel's strip at u, from the vertical gap (right to second order of the overlap)."""
+    ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
+    gap, df = gap_at(geometry, pose, u)
+    nodes[0, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
+    tangent = frame.sine / frame.cosine
+    fall = (df - tangent) / (1.0 + df * tangent)
+    nodes[1, k] = gap * (frame.cosine - frame.sine * fall)
+    m = wheel_slope(pose, slope, along)
+    rise = (m - tangent) / (1.0 + m * tangent)
+    nodes[2, k] = 0.5 * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+
+
+@jit(allocates=False, fastmath=FUSED)
+def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, slip):
+    """Rigid slip of the wheel's over the rail's surface, strip by strip, from the wheelset's motion.
+
+    Parameters
+    ----------
+    velocity : tuple of float
+        vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), and the rolling speed V (m/s, > 0).
+    centre, middle, height : numpy.ndarray, shape (n,)
+        s and X of the strips (s to the left), and the height of the wheel's extreme point along the normal, m.
+    slip : numpy.ndarray, shape (4, n)
+        Filled at the strips' middles: velocity of the wheel's material point relative to the rail's over V along x and
+        along s, each followed by its slope over x (1/m): slip_x, slip_x_dx, slip_s, slip_s_dx.
+
+    Notes
+    -----
+    The material point lies on the wheel's undeformed surface, as in CONTACT: equal bodies shorten alike under pressure.
+    """
+    vx, vy, vz, wx, wy, wz, speed = velocity
+    slowness, sine = 1.0 / speed, pose.side * frame.sine
+    for i in range(len(centre)):
+        s, n = pose.side * centre[i], height[i]
+        across = frame.ur + geometry.rail_distance + s * frame.cosine - n * frame.sine
+        px, py = frame.x + middle[i], pose.side * across - pose.y
+        pz = frame.z + s * frame.sine + n * frame.cosine - pose.z
+        slip[0, i] = (vx + wy * pz - wz * py) * slowness
+        slip[1, i] = 0.0
+        slip[2, i] = ((vy + wz * px - wx * pz) * frame.cosine + (vz + wx * py - wy * px) * sine) * slowness
+        slip[3, i] = (wz * frame.cosine - wy * sine) * slowness
+
+
+@jit(allocates=False)
+def creepage_slip(xi, eta, phi, centre, middle, slip):
+    """As `rigid_slip`, from one set of creepages at the origin of the contact frame (wheel relative to rail)."""
+    for i in range(len(centre)):
+        slip[0, i], slip[1, i] = xi - phi * centre[i], 0.0
+        slip[2, i], slip[3, i] = eta + phi * middle[i], phi

@@ -1,0 +1,130 @@
+"""What the kernels of a run need to solve the real patch: settings and tables, and scratch arrays."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.contact.patch import strips as normal_strips
+from wrcore.contact.patch.library import Library, make_library
+from wrcore.contact.patch.normal_influence import influence_table
+from wrcore.contact.patch.rolling import LEVELS, Level, make_workspace
+from wrcore.contact.patch.rolling import Workspace as RollingWork
+from wrcore.contact.patch.rolling_influence import Panels, make_panels
+from wrcore.contact.patch.solve import EXACT, STRIP_ROWS, STRIPS, SUMS
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.errors import InputError
+
+PATCHES = ("maximum", "moment", "strips", "exact")
+"""Patch models by name: two reductions to an ellipse, cheap and exact strips."""
+
+RESOLUTIONS = ("coarse", "middle", "fine")
+SLIPS = ("surfaces", "creepages")
+FORCE_ROWS = 16
+
+
+class StripModel(NamedTuple):
+    """Settings and tables of patches on strips, for kernels; without strips its arrays are empty."""
+
+    strips: int
+    """Strips of a window; 0: patches are ellipses."""
+    normal: int
+    """EXACT or STRIPS (virtual penetration) of `solve`."""
+    rolling: int
+    """1: the rolling problem is solved on the strips, 0: the scene's creep law at the ellipse of equal moments."""
+    surfaces: int
+    """1: rigid slip of the surfaces, strip by strip; 0: one set of creepages."""
+    values: np.ndarray
+    """Of the `InfluenceTable`."""
+    library: Library
+    slender: Library
+    """Resolution of slender patches."""
+    fallback: int = 0
+    """Address of the kernel that solves a patch on a grid."""
+
+
+class StripWork(NamedTuple):
+    """Scratch arrays of one patch at a time."""
+
+    cheap: np.ndarray
+    """(1,) int: 1 while ellipses stand in for strips."""
+    rows: np.ndarray
+    out: np.ndarray
+    strips: np.ndarray
+    slip: np.ndarray
+    sums: np.ndarray
+    force: np.ndarray
+    normal: normal_strips.Workspace
+    rolling: RollingWork
+    slender: RollingWork
+
+
+def _no_library(nu):
+    panels = make_panels(4)
+    return Library(Level(0, 0, 0, 0), Panels(*(_emptied(part) for part in panels)), nu, 0.0, 1.0,
+                   np.zeros((0, 0), np.float32))  # fmt: skip
+
+
+def _emptied(part):
+    """An array of the same type without elements; numbers as they are."""
+    return np.zeros((0,) * part.ndim, part.dtype) if isinstance(part, np.ndarray) else part
+
+
+def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28):
+    """Settings and tables of a scene's patch model.
+
+    Parameters
+    ----------
+    patch : {"maximum", "moment", "strips", "exact"}
+    resolution : {"coarse", "middle", "fine"}
+        8, 12 or 16 strips of a window.
+    slip : {"surfaces", "creepages"}
+        Rigid slip from the real surfaces, or from one set of creepages per patch.
+    nu : float
+        Poisson's ratio.
+
+    Returns
+    -------
+    StripModel
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
+    for name, (value, known) in named.items():
+        if value not in known:
+            raise InputError("contact", name, f"expected one of {', '.join(known)}, got {value!r}")
+    return _strip_model(patch, resolution, slip, float(nu))
+
+
+@lru_cache(maxsize=8)
+def _strip_model(patch, resolution, slip, nu):
+    if patch not in ("strips", "exact"):
+        return StripModel(0, 0, 0, 0, np.zeros((0,) * influence_dimensions()), _no_library(nu), _no_library(nu))
+    exact = patch == "exact"
+    level, slender = (make_library(name, nu) if exact else _no_library(nu) for name in (resolution, "slender"))
+    return StripModel(
+        LEVELS[resolution].strips, EXACT if exact else STRIPS, int(exact), int(slip == "surfaces"),
+        influence_table().values, level, slender,
+    )  # fmt: skip
+
+
+def influence_dimensions():
+    """Dimensions of the influence table's array."""
+    return 2
+
+
+def strip_work(model):
+    """Scratch arrays for a `StripModel`; next to nothing where patches are ellipses."""
+    count = normal_strips.MAX_STRIPS if model.strips else 1
+    normal = normal_strips.workspace()
+    if not model.strips:
+        normal = normal_strips.Workspace(*(_emptied(part) for part in normal))
+    return StripWork(
+        np.zeros(1, np.int64), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
+        np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
+        normal,
+        *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
+    )  # fmt: skip

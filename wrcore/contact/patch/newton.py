@@ -1,0 +1,164 @@
+"""Newton's iteration for strips in windows whose ends are the tips of contact."""
+
+import math
+
+from wrcore.contact.patch.gap import CREST
+from wrcore.contact.patch.strips import assemble, place_strips
+from wrcore.kernels.jit import FUSED, jit
+
+
+@jit(allocates=False, fastmath=FUSED)
+def solve_linear(matrix, n):
+    """Gaussian elimination with partial pivoting; the solution ends up in column n. False if singular."""
+    for k in range(n):
+        pivot, largest = k, abs(matrix[k, k])
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > largest:
+                pivot, largest = i, abs(matrix[i, k])
+        if not largest > 1e-300:
+            return False
+        if pivot != k:
+            for j in range(k, n + 1):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        inverse = 1.0 / matrix[k, k]
+        row = matrix[k]
+        for i in range(k + 1, n):
+            other = matrix[i]
+            factor = other[k] * inverse
+            if factor != 0.0:
+                for j in range(k + 1, n + 1):
+                    other[j] -= factor * row[j]
+    for k in range(n - 1, -1, -1):
+        total = matrix[k, n]
+        for j in range(k + 1, n):
+            total -= matrix[k, j] * matrix[j, n]
+        matrix[k, n] = total / matrix[k, k]
+    return True
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _limited(value, low, high):
+    return min(max(value, low), high)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _tips_too_fast(work, windows, kinds, bold):
+    """Steps of the tips: at most a strip's width, and half of the step before where one turns back.
+
+    A tip that goes on turning back sits where a kink of the gap leaves no zero: if ``bold`` it then follows the sign of
+    the tip's condition alone, outwards while c does not fall fast enough.
+
+    Returns whether one was cut: the strips' steps then belong to another window and are solved for again.
+    """
+    tips, cut = kinds * work.start[windows], False
+    n = tips + 2 * windows
+    for k in range(windows):
+        w = work.width[work.start[k]]
+        for side in range(2):
+            step, before = work.matrix[tips + 2 * k + side, n], work.stride[side, k]
+            limit = min(w, 0.5 * abs(before)) if step * before < 0.0 else w
+            work.stride[side, k] = min(max(step, -limit), limit)
+            if step * before < 0.0 and abs(step) > limit and bold:
+                end = work.start[k] if side == 0 else work.start[k + 1] - 1
+                inner = end + 1 - 2 * side
+                outwards = 2.0 * side - 1.0 if 3.0 * work.square[end] > work.square[inner] else 1.0 - 2.0 * side
+                work.stride[side, k] = 0.5 * w * outwards
+            cut = cut or work.stride[side, k] != step
+    return cut
+
+
+CONVERGED, STARVED, CROSSED, LOST = 0, 1, 2, 3
+
+_RESTLESS = 6
+"""Steps after which a tip that turns back is taken for trapped."""
+
+_PATIENCE = 3
+"""Steps in which a strip would lose its pressure, or two windows overlap, before Newton's iteration gives up."""
+
+
+@jit(allocates=False, fastmath=FUSED)
+def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tolerance):
+    """Newton's iteration from the strips in ``work``, with limits strip by strip; ``bold``: see `_tips_too_fast`.
+
+    Returns
+    -------
+    int
+        CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST.
+    """
+    strips = work.start[windows]
+    starved_for = crossed_for = 0
+    for k in range(windows):
+        work.stride[0, k] = work.stride[1, k] = 0.0
+    for step in range(most):
+        place_strips(geometry, pose, frame, work, windows)
+        largest = 0.0
+        for i in range(strips):
+            if kinds == 2:
+                work.middle[i] = work.gap[i, CREST]
+            largest = max(largest, work.square[i])
+            work.logs[1, i] = math.log(work.square[i])
+        n = assemble(values, work, windows, kinds)
+        if not solve_linear(work.matrix, n):
+            return LOST
+        if _tips_too_fast(work, windows, kinds, bold and step >= _RESTLESS):
+            n = assemble(values, work, windows, kinds)
+            for k in range(kinds * strips, n):
+                for j in range(n):
+                    work.matrix[k, j] = 0.0
+                work.matrix[k, k] = 1.0
+                work.matrix[k, n] = work.stride[(k - kinds * strips) % 2, (k - kinds * strips) // 2]
+            if not solve_linear(work.matrix, n):
+                return LOST
+        change, starved = 0.0, False
+        for i in range(strips):
+            k = kinds * i
+            dq, dc = work.matrix[k, n], work.matrix[k + 1, n]
+            q, c = work.share[i], work.square[i]
+            if not (abs(dq) < 1e300 and abs(dc) < 1e300):
+                return LOST
+            change = max(change, abs(dq) / q, abs(dc) / largest)
+            starved = starved or (c + dc < 0.0 and c < 2e-3 * largest)
+            work.share[i] = _limited(q + dq, 0.5 * q, 1.5 * q)
+            work.square[i] = _limited(c + dc, max(0.3 * c, 1e-9 * largest), 1.5 * c + 0.1 * largest)
+            if kinds == 3:
+                dx, a = work.matrix[k + 2, n], math.sqrt(c)
+                change = max(change, abs(dx) / math.sqrt(largest))
+                work.middle[i] += _limited(dx, -0.5 * a, 0.5 * a)
+        starved_for = starved_for + 1 if starved else 0
+        crossed = False
+        for k in range(windows):
+            w = work.width[work.start[k]]
+            change = max(change, abs(work.stride[0, k]) / w, abs(work.stride[1, k]) / w)
+            work.low[k] += work.stride[0, k]
+            work.high[k] += work.stride[1, k]
+            if k > 0 and work.low[k] <= work.high[k - 1]:
+                crossed = True
+                middle = 0.5 * (work.low[k] + work.high[k - 1])
+                work.low[k], work.high[k - 1] = middle + 0.05 * w, middle - 0.05 * w
+        crossed_for = crossed_for + 1 if crossed else 0
+        if change < tolerance:
+            return CONVERGED
+        if starved_for >= _PATIENCE:
+            return STARVED
+        if crossed_for >= _PATIENCE:
+            return CROSSED
+    return LOST
+
+
+@jit(allocates=False, fastmath=FUSED)
+def solve_shares(values, work, windows, kinds):
+    """Q of all strips from the first of Galerkin's conditions at fixed half lengths: a start where Hertz gives none."""
+    strips = work.start[windows]
+    for i in range(strips):
+        work.logs[1, i] = math.log(work.square[i])
+    n = assemble(values, work, windows, kinds)
+    matrix = work.matrix
+    mean = 0.0
+    for i in range(strips):
+        mean += work.share[i] / strips
+        matrix[i, strips] = matrix[kinds * i, n]
+        for j in range(strips):
+            matrix[i, j] = matrix[kinds * i, kinds * j]
+    if solve_linear(matrix, strips):
+        for i in range(strips):
+            work.share[i] = _limited(work.share[i] + matrix[i, strips], 0.3 * mean, 3.0 * mean)

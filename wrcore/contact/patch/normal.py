@@ -1,0 +1,252 @@
+"""Exact non-Hertzian normal contact of a wheel on a rail: Galerkin strips in windows that end at the tips of contact.
+
+Across the patch, strips of width w carry a pressure that is semi-elliptic along x,
+
+    p = p0 sqrt(1 - ((x - X)/a)^2),   p0 = pi E* Q a,
+
+with unknown Q, half length a and (with yaw) middle X. Galerkin's conditions make the loaded gap vanish in the mean and
+in its second and first moment along the strip; the tips of a window lie where a^2, linear there, vanishes. All strips
+of a patch, whichever window they belong to, act on each other through the half-space
+(:mod:`wrcore.contact.patch.normal_influence`).
+
+References
+----------
+Johnson, Contact Mechanics (1985), chapters 3 and 4. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrcore.contact.detection import axle_direction
+from wrcore.contact.normal import hertz_table
+from wrcore.contact.patch.gap import creepage_slip, group_end, rigid_slip
+from wrcore.contact.patch.normal_influence import influence_table
+from wrcore.contact.patch.solve import (
+    CENTRE,
+    EXACT,
+    MIDDLE,
+    PEAK,
+    STRIP_ROWS,
+    STRIPS,
+    SUMS,
+    WHEEL_HEIGHT,
+    WINDOW,
+    publish,
+    solve_patch,
+    wheel_overlaps,
+)
+from wrcore.contact.patch.strips import MAX_STRIPS, workspace
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.errors import InputError
+from wrcore.geometry.surface import SIDES
+
+RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}
+"""Strips of a window; slender windows have 8, wide ones more."""
+
+MODELS = {"exact": EXACT, "strips": STRIPS}
+"""``strips``: shape-corrected virtual penetration, without a solution of the half-space."""
+
+
+@dataclass(frozen=True, eq=False)
+class StripPatch:
+    """Normal contact of one patch on strips; SI units.
+
+    Arrays run over the strips by increasing s in the contact frame: x forward, s lateral (to the left), n from rail
+    into wheel, turned by ``contact_angle`` about x from the track frame.
+    """
+
+    side: str
+    converged: bool
+    """False: no solution was found, and there are no strips (and NaN for the sums). So far seen where one overlap runs
+    from the flange root up the flange, which no one contact plane fits, and rarely where lobes are about to join."""
+    contact_angle: float
+    origin: tuple
+    """Of the frame in the track frame (x from the wheelset's cross-section), m."""
+    centre: np.ndarray
+    width: np.ndarray
+    half_length: np.ndarray
+    middle: np.ndarray
+    peak: np.ndarray
+    """Pressure in the middle of a strip, Pa: p = peak sqrt(1 - ((x - middle)/half_length)^2)."""
+    window: np.ndarray
+    normal_force: float
+    p_max: float
+    mean_x: float
+    mean_s: float
+    mean_xx: float
+    mean_ss: float
+    """Means over the pressure, m and m^2."""
+    x_min: float
+    x_max: float
+    s_min: float
+    s_max: float
+    slip_x: np.ndarray = None
+    slip_x_dx: np.ndarray = None
+    slip_s: np.ndarray = None
+    slip_s_dx: np.ndarray = None
+    """Rigid slip over V at the middle of the strips, and its slope along x; None unless a velocity was given."""
+
+    def slip_of_creepages(self, xi, eta, phi):
+        """Rigid slip of one set of creepages at the frame's origin: xi - phi s along x, eta + phi x along s.
+
+        Parameters
+        ----------
+        xi, eta, phi : float
+            Wheel relative to rail, - and 1/m.
+
+        Returns
+        -------
+        numpy.ndarray, shape (4, strips)
+            slip_x, slip_x_dx, slip_s, slip_s_dx.
+        """
+        slip = np.zeros((4, len(self.centre)))
+        creepage_slip(xi, eta, phi, self.centre, self.middle, slip)
+        return slip
+
+
+class NormalContact:
+    """Normal contact of the wheels of a wheelset on strips.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    modulus : float
+        Contact modulus E*, Pa (`wrcore.contact.normal.contact_modulus`).
+    resolution : {"coarse", "middle", "fine"}
+    model : {"exact", "strips"}
+        ``strips``: shape-corrected virtual penetration, without a solution of the half-space.
+    detection : {"planar", "spatial"}
+
+    Raises
+    ------
+    InputError
+        For an unknown name or a modulus that is not positive.
+    """
+
+    def __init__(self, geometry, modulus, resolution="middle", model="exact", detection="spatial"):
+        for name, value, known in (("resolution", resolution, RESOLUTIONS), ("model", model, MODELS),
+                                   ("detection", detection, ("planar", "spatial"))):  # fmt: skip
+            if value not in known:
+                raise InputError("NormalContact", name, f"expected one of {', '.join(known)}, got {value!r}")
+        if not 0.0 < modulus < math.inf:
+            raise InputError("NormalContact", "modulus", f"expected a contact modulus in Pa, got {modulus!r}")
+        self.geometry, self.modulus, self.spatial = geometry, float(modulus), detection == "spatial"
+        self.resolution, self.model = RESOLUTIONS[resolution], MODELS[model]
+        self._hertz, self._values = hertz_table(), influence_table().values
+        self._patches = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
+        self._works = {}
+        self._strips, self._sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
+
+    def at_height(self, side, y, z, roll=0.0, yaw=0.0, velocity=None, warm=False):
+        """Patches of one wheel in a given pose.
+
+        Parameters
+        ----------
+        side : {"left", "right"}
+        y, z, roll, yaw : float
+            Pose of the wheelset, m and rad.
+        velocity : sequence of 7 floats, optional
+            vx, vy, vz (m/s), wx, wy, wz (rad/s) of the wheelset in the track frame and the rolling speed V (m/s): the
+            rigid slip is then given, too.
+        warm : bool
+            Start from the last solution of that side.
+
+        Returns
+        -------
+        list of StripPatch
+            From the flange to the field side; overlaps whose planes are near each other are one patch.
+        """
+        if side not in SIDES:
+            raise InputError("NormalContact", "side", f"expected left or right, got {side!r}")
+        if not all(map(math.isfinite, (y, z, roll, yaw))):
+            raise InputError("NormalContact", "pose", f"expected finite numbers, got {(y, z, roll, yaw)!r}")
+        if velocity is not None and not (len(velocity) == 7 and velocity[6] > 0.0):
+            raise InputError("NormalContact", "velocity", f"expected vx, vy, vz, wx, wy, wz, V > 0, got {velocity!r}")
+        sign = SIDES[side]
+        axle = (sign * c for c in axle_direction(roll, yaw))
+        count, pose = wheel_overlaps(self.geometry, sign, y, z, *axle, self.spatial, self._patches)
+        found, first = [], 0
+        while first < count:
+            last = group_end(self._patches, count, first)
+            if (side, len(found)) not in self._works:
+                self._works[side, len(found)] = workspace()
+            found.append(self._solve(side, pose, first, last, velocity, warm, self._works[side, len(found)]))
+            first = last
+        return found
+
+    def _solve(self, side, pose, first, last, velocity, warm, work):
+        windows, frame = solve_patch(self.geometry, pose, self._hertz, self._values, self._patches, first, last,
+                                     self.resolution, self.model, warm, work)  # fmt: skip
+        count = 0
+        if windows:
+            count = publish(self.geometry, pose, frame, self.modulus, work, windows, self._strips, self._sums)
+        sums = self._sums if windows else np.full(SUMS, np.nan)
+        strips = self._strips[:, :count].copy()
+        slips = (None,) * 4
+        if velocity is not None:
+            slips = np.zeros((4, count))
+            rigid_slip(self.geometry, pose, frame, tuple(map(float, velocity)), strips[CENTRE], strips[MIDDLE],
+                       strips[WHEEL_HEIGHT], slips)  # fmt: skip
+        origin = (frame.x, pose.side * (frame.ur + self.geometry.rail_distance), frame.z)
+        return StripPatch(
+            side, windows > 0, pose.side * math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
+            strips[WINDOW].astype(int), *map(float, sums), *slips,
+        )  # fmt: skip
+
+    def at_load(self, side, y, load, roll=0.0, yaw=0.0, guess=None, vertical=True, velocity=None):
+        """Patches of one wheel that carries a given load, and the wheelset's height.
+
+        Parameters
+        ----------
+        load : float
+            N, > 0.
+        guess : float, optional
+            Height near the one sought, m.
+        vertical : bool
+            The load is the vertical sum over the patches, else the sum of their normal forces.
+
+        Returns
+        -------
+        patches : list of StripPatch
+        z : float
+            Height of the wheelset's centre, m; NaN (and no patches) where none was found.
+        """
+        if not 0.0 < load < math.inf:
+            raise InputError("NormalContact", "load", f"expected a load in N, got {load!r}")
+
+        def excess(z):
+            patches = self.at_height(side, y, z, roll, yaw, warm=True)
+            force = sum(p.normal_force * (math.cos(p.contact_angle) if vertical else 1.0) for p in patches)
+            return force ** (2.0 / 3.0) - load ** (2.0 / 3.0)
+
+        z = height_of_zero(excess, self.geometry.rolling_radius if guess is None else guess)
+        return ([] if math.isnan(z) else self.at_height(side, y, z, roll, yaw, velocity)), z
+
+
+def height_of_zero(excess, z, step=2e-5, most=60):
+    """Zero of a function that falls with z, nearly linear near it: a bracket, then Illinois steps; NaN if lost."""
+    low = high = math.nan
+    e_low = e_high = 0.0
+    last = 0
+    for _ in range(most):
+        e = excess(z)
+        if math.isnan(e):
+            return math.nan
+        pressed = e > 0.0
+        if pressed:
+            low, e_low = z, e
+            e_high *= 0.5 if last > 0 else 1.0
+        else:
+            high, e_high = z, e
+            e_low *= 0.5 if last < 0 else 1.0
+        if math.isnan(low) or math.isnan(high):
+            z, step = z + (step if pressed else -step), 2.0 * step
+            continue
+        last = 1 if pressed else -1
+        new = low + (high - low) * e_low / (e_low - e_high)
+        if abs(new - z) < 1e-13 or high - low < 1e-13:
+            return new
+        z = new
+    return math.nan

@@ -1,0 +1,83 @@
+"""A patch solved exactly on grids, with all its fields: for studies, and for judging other patch models."""
+
+import math
+
+import numpy as np
+
+from wrcore.contact.creepage import creepages
+from wrcore.contact.normal import contact_modulus
+from wrcore.contact.patch.grid import grid_normal, grid_rolling
+from wrcore.contact.patch.result import Patch
+from wrcore.contact.patch.surfaces import Motion, plane_slip, surface_slip
+from wrcore.errors import InputError
+
+FINE = ((40, 32), (48, 40), (56, 48), (64, 48))
+"""Grids (along x, across) of a reference: forces are a straight line over the element size through all of them."""
+
+
+def solve_on_grids(
+    geometry, pose, plane, slip, friction=0.3, shear_modulus=8.2e10, poisson_ratio=0.28, grids=FINE, tolerance=1e-4
+):
+    """Contact of one patch, with forces extrapolated from several grids.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    pose : Pose
+        Of the wheel, from :func:`wrcore.contact.strip.make_pose`.
+    plane : ContactPlane
+        All of the overlap around its origin counts as one patch.
+    slip : Motion or tuple of float
+        Motion of the wheelset, for the rigid slip of the surfaces themselves; or creepages (xi, eta, phi) at the
+        plane's origin, for that of a plane.
+    friction : float
+    shear_modulus, poisson_ratio : float
+        Of both bodies, Pa and -.
+    grids : sequence of (int, int)
+        Elements along x (even) and across, about; coarse to fine. One is enough for 1 % of the friction bound.
+    tolerance : float
+        Remaining change of the tractions over the friction bound.
+
+    Returns
+    -------
+    Patch
+        Fields and normal force of the last grid.
+
+    Raises
+    ------
+    InputError
+        For grids that are none.
+    """
+    if not len(grids) or any(n % 2 or n < 8 or m < 4 for n, m in grids):
+        raise InputError("solve_on_grids", "grids", f"expected even numbers from 8 along, 4 across, got {grids!r}")
+    modulus = contact_modulus(shear_modulus, poisson_ratio)
+    sizes, forces = [], []
+    for nx, ns in grids:
+        grid = grid_normal(geometry, pose, plane, modulus, nx, ns)
+        wx, ws = np.empty(grid.gap.shape), np.empty(grid.gap.shape)
+        if isinstance(slip, Motion):
+            surface_slip(pose, plane, slip, grid.x, grid.s, grid.height, wx, ws)
+        else:
+            plane_slip(*slip, grid.x, grid.s, wx, ws)
+        traction = grid_rolling(grid, wx, ws, friction, shear_modulus, poisson_ratio, tolerance)
+        sizes += [grid.dx, 2.0 * grid.dx]
+        forces += [traction.fine, traction.coarse]
+    forces = np.polyfit(sizes, forces, 1, w=1.0 / np.array(sizes))[1] if len(grids) > 1 else traction[4:7]
+    return _patch(pose, plane, slip, friction, grid, traction, forces)
+
+
+def _patch(pose, plane, slip, friction, grid, traction, forces):
+    """`Patch` of the elements of a grid."""
+    x, s = (a.ravel() for a in np.meshgrid(grid.x, grid.s, indexing="ij"))
+    fields = [a.ravel() for a in (traction.pressure, traction.px, traction.ps, traction.sx, traction.ss)]
+    stick = (fields[0] > 0.0) & (fields[3] == 0.0) & (fields[4] == 0.0)
+    if isinstance(slip, Motion):
+        n = float(np.interp(0.0, grid.s, grid.height.min(axis=0)))
+        at = plane.x, plane.y - n * plane.sine - pose.y, plane.z + n * plane.cosine - pose.z
+        slip = creepages(*slip[:6], *at, plane.cosine, plane.sine, slip.speed)[:3]
+    normal = float(grid.pressure.sum() * grid.dx * grid.ds)
+    return Patch(
+        x, s, np.full(x.shape, grid.dx), np.full(x.shape, grid.ds), *fields, stick, normal, *map(float, forces),
+        *map(float, slip), math.atan2(plane.sine, plane.cosine), (plane.x, plane.y, plane.z), friction,
+        "left" if pose.side > 0.0 else "right",
+    )  # fmt: skip

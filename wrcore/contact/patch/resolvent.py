@@ -1,0 +1,148 @@
+"""Resolvents of strips: from a library of ellipses, or from the triangular factors of a band (see `rolling`)."""
+
+import numpy as np
+
+from wrcore.kernels.jit import FAST, FUSED, jit
+
+SLENDER = 5.0
+"""Panels longer than so many widths of a strip: no ellipse of the library is similar enough for convergence."""
+
+ODD = 0.6
+"""The same for a/b times the distance from an ellipse, see `_shape`."""
+
+_ZERO, _ONE = np.float32(0), np.float32(1)
+
+
+@jit(allocates=False, fastmath=FAST)
+def multiply(matrix, x, y):
+    """y = matrix x, four rows at a time."""
+    size = x.size
+    last = y.size - y.size % 4
+    for i in range(0, last, 4):
+        a, b, c, d = matrix[i], matrix[i + 1], matrix[i + 2], matrix[i + 3]
+        p, q, s, t = _ZERO, _ZERO, _ZERO, _ZERO
+        for j in range(size):
+            v = x[j]
+            p += a[j] * v
+            q += b[j] * v
+            s += c[j] * v
+            t += d[j] * v
+        y[i], y[i + 1], y[i + 2], y[i + 3] = p, q, s, t
+    for i in range(last, y.size):
+        row, p = matrix[i], _ZERO
+        for j in range(size):
+            p += row[j] * x[j]
+        y[i] = p
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _subtract(row, factor, pivot):
+    """row -= factor pivot."""
+    for j in range(row.size):
+        row[j] -= factor * pivot[j]
+
+
+@jit(allocates=False, fastmath=FAST)
+def _dot(one, two):
+    """Scalar product."""
+    total = _ZERO
+    for j in range(one.size):
+        total += one[j] * two[j]
+    return total
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _eliminate(row, one, two, three, four):
+    """Subtract four pivot rows from a row, all beginning with the first pivot; its first four become the factors."""
+    a = row[0] * one[0]
+    b = (row[1] - a * one[1]) * two[1]
+    c = (row[2] - a * one[2] - b * two[2]) * three[2]
+    d = (row[3] - a * one[3] - b * two[3] - c * three[3]) * four[3]
+    for j in range(row.size):
+        row[j] -= a * one[j] + b * two[j] + c * three[j] + d * four[j]
+    row[0], row[1], row[2], row[3] = a, b, c, d
+
+
+@jit(allocates=False, fastmath=FUSED)
+def factorise(matrix, block, reach, factors):
+    """Triangular factors of I + B without the strips farther apart than ``reach``; inverses on the diagonal.
+
+    ``block`` is the number of unknowns of a strip, a multiple of 4. No pivots: the symmetric part of H + A is
+    positive definite.
+    """
+    size = matrix.shape[0]
+    for i in range(size):
+        strip = i // block
+        first, last = max(strip - reach, 0) * block, min((strip + reach + 1) * block, size)
+        row, source = factors[i], matrix[i]
+        for j in range(first, last):
+            row[j] = source[j]
+        row[i] += _ONE
+        begin = i - i % 4
+        for p in range(first, begin, 4):
+            end = min((p // block + reach + 1) * block, size)
+            one, two, three, four = factors[p], factors[p + 1], factors[p + 2], factors[p + 3]
+            _eliminate(row[p:end], one[p:end], two[p:end], three[p:end], four[p:end])
+        for p in range(begin, i):
+            row[p] *= factors[p, p]
+            _subtract(row[p + 1 : last], row[p], factors[p, p + 1 : last])
+        row[i] = _ONE / row[i]
+
+
+@jit(allocates=False, fastmath=FAST)
+def substitute(factors, block, reach, r, y):
+    """y = (L U)^-1 r."""
+    size = r.size
+    for i in range(size):
+        first = max(i // block - reach, 0) * block
+        y[i] = r[i] - _dot(factors[i, first:i], y[first:i])
+    for i in range(size - 1, -1, -1):
+        last = min((i // block + reach + 1) * block, size)
+        y[i] = (y[i] - _dot(factors[i, i + 1 : last], y[i + 1 : last])) * factors[i, i]
+
+
+@jit(allocates=False, fastmath=FAST)
+def _blend(library, log_ratio, out):
+    """Resolvent between two of the library's, linear in ln(a/b): it need only be similar to the patch's."""
+    place = (log_ratio - library.log_min) / library.log_step
+    place = min(max(place, 0.0), library.resolvents.shape[0] - 1.000001)
+    k = int(place)
+    low, high, t = library.resolvents[k], library.resolvents[k + 1], np.float32(place - k)
+    for i in range(out.size):
+        out[i] = low[i] + t * (high[i] - low[i])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _shape(first, last, strip):
+    """a/b of the ellipse as wide as some strips with their mean square of the lengths, and how far they are from it.
+
+    The latter: standard deviation of the middles over a, and eccentricity of the load over b. Means by load.
+    """
+    low = strip[3, first] - 0.5 * strip[4, first]
+    b = 0.5 * (strip[3, last - 1] + 0.5 * strip[4, last - 1] - low)
+    load = square = x = xx = s = 0.0
+    for j in range(first, last):
+        share = strip[5, j] + 1e-9
+        load += share
+        square += share * strip[0, j] * strip[0, j]
+        x += share * strip[1, j]
+        xx += share * strip[1, j] * strip[1, j]
+        s += share * (strip[2, j] - low - b)
+    square *= 1.25 / load
+    skew = max(xx / load - (x / load) ** 2, 0.0) / square
+    return np.sqrt(square) / b, np.sqrt(skew + (s / (load * b)) ** 2)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def take_from_library(library, count, windows, split, work):
+    """Put the resolvents of similar ellipses in the workspace; False if a window has none."""
+    strips, panels = library.level.strips, library.panels
+    if count != windows * strips or (windows == 2 and split != strips):
+        return False
+    size = (2 * panels.n * strips) ** 2
+    for window in range(windows):
+        ratio, oddness = _shape(window * strips, (window + 1) * strips, work.strip)
+        if not (ratio * strips < SLENDER * panels.n and ratio * oddness < ODD):
+            return False
+        _blend(library, np.log(ratio), work.factors[window * size : (window + 1) * size])
+    return True

@@ -1,0 +1,311 @@
+"""Influence of tangential loads between strips along the rolling direction: slip by unit panel forces.
+
+A strip is as wide as given and reaches from X - a to X + a along x; its n panels have edges X + a cos(k pi/n). Loads
+are constant over a panel, displacements are wanted on one line per strip (y), at points X + a cos((k - 1/2) pi/n) and
+one point ahead of the leading edge. With u = 1/(pi G) int K tau dA (two equal half-spaces),
+
+    Kxx = 1/R - nu y^2/R^3,   Kyy = 1/R - nu x^2/R^3,   Kxy = nu x y/R^3,
+
+the integral along x at lateral distance d is, L = asinh(x/|d|),
+
+    Jxx = L - nu x/R,   Jyy = (1 - nu) L + nu x/R,   Jxy = -nu d/R.
+
+Across the width the strip's own load is integrated in closed form, others by the midpoint rule with its second-order
+term, J + w^2/24 d^2J/dd^2 (neighbours: two halves), which costs one logarithm per pair of points. Slip is the
+_difference of displacements between successive points (Kalker's upwind form of -du/dx). Lengths are over c, forces
+over mu N, slip over mu N/(G c^2).
+
+References
+----------
+Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), chapters 1 and 4.
+Love, Phil. Trans. R. Soc. A 228 (1929) 377 (a loaded rectangle on the half-space).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+
+from wrcore.kernels.jit import FUSED, jit
+
+UPWIND = 0.6
+_STEP_SCALE = np.float32(2.5)
+_UNIT = np.float32(1)
+_HALF = 0x3FE6A09E667F3BCD  # bits of sqrt(1/2)
+_ONE = 1023 << 52  # bits of 1.0
+_MAGIC = 0x4330000000000000  # bits of 2^52
+_LN2 = float(np.log(2.0))
+
+
+class Panels(NamedTuple):
+    """Panels along a strip, over its half length and load: what depends on their number alone; a kernel argument.
+
+    Fields
+    ------
+    n : int
+        Panels per strip, from the leading edge backwards.
+    edges, points : (n + 1,)
+        Edges of the panels; points between which the slip is a _difference (the first lies ahead of the strip).
+    share, load, slip : (n,)
+        Share of the panel in the strip's normal load, centroid of that load, and where the slip row holds.
+    scale : (n (n + 1) - 1,)
+        Reciprocals of distances between points times widths of panels, in rows of points with one void between.
+    ahead, behind : (n,)
+        Weights that carry elastic slip from ``slip`` to ``load``.
+    """
+
+    n: int
+    edges: np.ndarray
+    points: np.ndarray
+    share: np.ndarray
+    load: np.ndarray
+    slip: np.ndarray
+    scale: np.ndarray
+    ahead: np.ndarray
+    behind: np.ndarray
+
+
+def make_panels(n):
+    """Lay out ``n`` panels with cosine spacing on a strip with semi-elliptic pressure.
+
+    Parameters
+    ----------
+    n : int
+        Panels per strip, at least 3.
+
+    Returns
+    -------
+    Panels
+    """
+    theta = np.pi * np.arange(n + 1) / n
+    share = np.diff(theta / 2 - np.sin(2 * theta) / 4) / (np.pi / 2)
+    load = np.diff(np.sin(theta) ** 3 / 3) / (np.pi / 2) / share
+    points = np.concatenate([[2 - np.cos(np.pi / (2 * n))], np.cos((np.arange(n) + 0.5) * np.pi / n)])
+    slip = (points[1:] + points[:-1]) / 2
+    shift = load - slip
+    ahead, behind = np.zeros(n), np.zeros(n)
+    ahead[1:] = shift[1:] / np.diff(slip) * np.where(np.arange(1, n) < n - 1, UPWIND, 1.0)
+    behind[:-1] = shift[:-1] / np.diff(slip) * np.where(np.arange(n - 1) > 0, 1 - UPWIND, 1.0)
+    edges, scale = np.cos(theta), np.zeros((n, n + 1))
+    scale[:, :n] = 1 / np.outer(np.diff(points), np.diff(edges))
+    return Panels(n, edges, points, share, load, slip, scale.ravel()[:-1], ahead, behind)
+
+
+@intrinsic
+def _to_bits(_, number):
+    """The 64 bits of a float64 as an integer."""
+
+    def generate(_, builder, __, arguments):
+        return builder.bitcast(arguments[0], ir.IntType(64))
+
+    return types.int64(types.float64), generate
+
+
+@intrinsic
+def _from_bits(_, bits):
+    """A float64 from its 64 bits."""
+
+    def generate(_, builder, __, arguments):
+        return builder.bitcast(arguments[0], ir.DoubleType())
+
+    return types.float64(types.int64), generate
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _log(x):
+    """Logarithm of a positive normal number within 1e-12, without branches: a loop over it becomes vector code."""
+    bits = _to_bits(x)
+    exponent = ((bits - _HALF + _ONE) >> 52) & 2047
+    m = _from_bits(bits - ((exponent - 1023) << 52))
+    s = (m - 1.0) / (m + 1.0)
+    q = s * s
+    p = 1 / 9 + q * (1 / 11 + q * (1 / 13 + q * (1 / 15)))
+    p = 1.0 + q * (1 / 3 + q * (1 / 5 + q * (1 / 7 + q * p)))
+    return (_from_bits(exponent | _MAGIC) - (4503599627370496.0 + 1023.0)) * _LN2 + 2.0 * s * p
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_strip(dx, d, width, weight, nu, gxx, gyy, gxy):
+    """Add to (gxx, gyy, gxy) the integrals along x up to each dx of a strip at distance d, averaged over its width."""
+    scale, square, bend = 1.0 / abs(d), d * d, width * width / 24
+    for i in range(dx.size):
+        x = dx[i]
+        inverse2 = 1.0 / (x * x + square)
+        inverse = np.sqrt(inverse2)
+        radius = (x * x + square) * inverse
+        log = _log((abs(x) + radius) * scale)
+        t = x * inverse
+        bent = bend * t * inverse2
+        log = (log if x > 0 else -log) + bend * t * scale * scale + bent
+        t2 = t + bent * (3.0 * square * inverse2 - 1.0)
+        gxx[i] += weight * (log - nu * t2)
+        gyy[i] += weight * ((1.0 - nu) * log + nu * t2)
+        gxy[i] -= weight * nu * d * inverse * (1.0 - 3.0 * bent * t)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_strip_exactly(dx, far, near, nu, gxx, gyy, gxy):
+    """The same in closed form for a strip from ``near`` to ``far`` (the larger one) that may hold the line.
+
+    Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R.
+    """
+    scale_far, scale_near, weight = 1.0 / abs(far), 1.0 / abs(near), 1.0 / (far - near)
+    sign_far, sign_near = (1.0 if far > 0 else -1.0), (1.0 if near > 0 else -1.0)
+    for i in range(dx.size):
+        x = dx[i]
+        square = x * x + 1e-200
+        size = np.sqrt(square)
+        r_far, r_near = np.sqrt(square + far * far), np.sqrt(square + near * near)
+        log_far = sign_far * _log((abs(far) + r_far) / size)
+        log_near = sign_near * _log((abs(near) + r_near) / size)
+        in_x = x * (log_far - log_near)
+        in_y = far * _log((size + r_far) * scale_far) - near * _log((size + r_near) * scale_near)
+        in_y = in_y if x > 0 else -in_y
+        gxx[i] += weight * ((1.0 - nu) * in_x + in_y)
+        gyy[i] += weight * (in_x + (1.0 - nu) * in_y)
+        gxy[i] -= weight * nu * (r_far - r_near)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _difference(g, scale, factor, out):
+    """Second difference over points and edges of ``g``, in rows of points; ``out`` is as wide, its last column void."""
+    size = scale.size
+    after, below, beyond = g[1 : size + 1], g[g.size - size - 1 :], g[g.size - size :]
+    for i in range(size):
+        out[i] = factor * scale[i] * (after[i] - g[i] + below[i] - beyond[i])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _copy_scaled(source, factor, out):
+    """out = factor source."""
+    for i in range(out.size):
+        out[i] = factor * source[i]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def second_window(centre, width):
+    """Index of the first strip behind a gap, or the number of strips."""
+    for j in range(1, centre.size):
+        if centre[j] - centre[j - 1] > 0.500001 * (width[j] + width[j - 1]):
+            return j
+    return centre.size
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _centroid_shift(before, here, after, first, last):
+    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola).
+
+    At a tip the load per width falls to zero at the strip's outer edge: exact for an ellipse.
+    """
+    if first and last:
+        return 0.0
+    if first:
+        bend = 0.75 * (after - 3.0 * here)
+        slope = 2.0 * here - bend * (2 / 3)
+        shift = (slope / 3 + bend / 4) / here - 0.5
+    elif last:
+        bend = 0.75 * (before - 3.0 * here)
+        slope = 2.0 * here - bend * (2 / 3)
+        shift = 0.5 - (slope / 3 + bend / 4) / here
+    else:
+        shift = (after - before) / (24.0 * here)
+    return min(max(shift, -0.2), 0.2)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def lay_out(centre, width, half_length, middle, peak, split, strip):
+    """Scale the strips by c, c^2 = sum of half length times width/2, and place their lines; returns c and the load."""
+    count = centre.size
+    area = load = longest = 0.0
+    for j in range(count):
+        area += 0.5 * half_length[j] * width[j]
+        load += 0.5 * np.pi * peak[j] * half_length[j] * width[j]
+        longest = max(longest, half_length[j])
+    c = np.sqrt(area)
+    for j in range(count):
+        strip[0, j] = max(half_length[j], 1e-3 * longest) / c
+        strip[1, j], strip[3, j], strip[4, j] = middle[j] / c, centre[j] / c, width[j] / c
+        strip[5, j] = 0.5 * np.pi * peak[j] * half_length[j] * width[j] / load
+        strip[6, j] = peak[j] * half_length[j]
+    for j in range(count):
+        first, last = j == 0 or j == split, j == count - 1 or j == split - 1
+        before, after = strip[6, max(j - 1, 0)], strip[6, min(j + 1, count - 1)]
+        shift = _centroid_shift(before, max(strip[6, j], 1e-30), after, first, last)
+        strip[2, j] = strip[3, j] + shift * strip[4, j]
+    return c, load
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _distances(panels, point_strip, load_strip, strip, dx):
+    """x of all edges of one strip relative to all points of another."""
+    n = panels.n
+    for m in range(n + 1):
+        x = strip[1, point_strip] + strip[0, point_strip] * panels.points[m]
+        for k in range(n + 1):
+            dx[m * (n + 1) + k] = strip[1, load_strip] + strip[0, load_strip] * panels.edges[k] - x
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _corners(panels, i, j, nu, work):
+    """The three integrals at all pairs of points of strip i and edges of strip j."""
+    strip = work.strip
+    dx, gxx, gyy, gxy = work.corner[0], work.corner[1], work.corner[2], work.corner[3]
+    _distances(panels, i, j, strip, dx)
+    for part in range(dx.size):
+        gxx[part] = 0.0
+        gyy[part] = 0.0
+        gxy[part] = 0.0
+    d, width = strip[3, j] - strip[2, i], strip[4, j]
+    if abs(d) < 0.8 * width:
+        _add_strip_exactly(dx, d + 0.5 * width, d - 0.5 * width, nu, gxx, gyy, gxy)
+    elif abs(d) < 1.6 * width:
+        _add_strip(dx, d - 0.25 * width, 0.5 * width, 0.5, nu, gxx, gyy, gxy)
+        _add_strip(dx, d + 0.25 * width, 0.5 * width, 0.5, nu, gxx, gyy, gxy)
+    else:
+        _add_strip(dx, d, width, 1.0, nu, gxx, gyy, gxy)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _block(panels, i, j, work, matrix):
+    """Write the slip of strip i by strip j, over the step."""
+    n = panels.n
+    row, column = 2 * n * i, 2 * n * j
+    factor = 1.0 / (np.pi * work.strip[0, i] * work.strip[0, j])
+    for part in range(3):
+        _difference(work.corner[part + 1], panels.scale, factor, work.slip[part])
+    for m in range(n):
+        first, last = m * (n + 1), m * (n + 1) + n
+        inverse = _UNIT / work.step[row + m]
+        x, s = matrix[row + m, column : column + 2 * n], matrix[row + n + m, column : column + 2 * n]
+        _copy_scaled(work.slip[0, first:last], inverse, x[:n])
+        _copy_scaled(work.slip[2, first:last], inverse, x[n:])
+        _copy_scaled(work.slip[2, first:last], inverse, s[:n])
+        _copy_scaled(work.slip[1, first:last], inverse, s[n:])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def assemble(panels, count, nu, work):
+    """B = H^-1 A of ``count`` strips in the workspace; h = 2.5 sqrt(Axx Ayy) from the diagonals."""
+    n = panels.n
+    size = 2 * n * count
+    matrix = work.matrix[: size * size].reshape((size, size))
+    for i in range(count):
+        row = 2 * n * i
+        for m in range(2 * n):
+            work.step[row + m] = _UNIT
+        _corners(panels, i, i, nu, work)
+        _block(panels, i, i, work, matrix)
+        for m in range(n):
+            xx, yy = matrix[row + m, row + m], matrix[row + n + m, row + n + m]
+            step = _STEP_SCALE * np.sqrt(xx * yy)
+            work.step[row + m] = step
+            work.step[row + n + m] = step
+            for k in range(2 * n):
+                matrix[row + m, row + k] /= step
+                matrix[row + n + m, row + k] /= step
+        for j in range(count):
+            if j != i:
+                _corners(panels, i, j, nu, work)
+                _block(panels, i, j, work, matrix)

@@ -1,0 +1,236 @@
+"""Solution of one patch, from its overlaps to strips with pressure: the kernels behind :mod:`normal`."""
+
+import math
+
+from wrcore.contact.detection import find_patches
+from wrcore.contact.patch.fixed import windows_from_fixed
+from wrcore.contact.patch.gap import HEIGHT, frame_of_overlaps, look_over_overlaps
+from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
+from wrcore.contact.patch.strips import place_strips
+from wrcore.contact.patch.windows import (
+    drop_starved,
+    guess_squares,
+    merge_close,
+    newborn,
+    start_strips,
+    windows_from_guess,
+)
+from wrcore.contact.reduction import MOMENT
+from wrcore.contact.strip import make_pose
+from wrcore.kernels.jit import FUSED, jit
+
+EXACT, STRIPS = 0, 1
+"""``strips``: the shape-corrected virtual penetration that ``exact`` starts from."""
+
+_ROUNDS = 5
+"""Sets of windows that are tried for one patch."""
+
+_MORE_STRIPS = 2
+"""Strips by which a window's number may rise where no solution was found with less."""
+
+_STEPS = 24
+_TOLERANCE = 1e-7
+"""Newton's iteration ends when no step is longer, as a share of the unknown."""
+
+# Rows of the strip array, and of the sums over a patch.
+CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WHEEL_HEIGHT, WINDOW = range(7)
+STRIP_ROWS = 7
+LOAD, LARGEST, MEAN_X, MEAN_S, MEAN_XX, MEAN_SS, X_MIN, X_MAX, S_MIN, S_MAX = range(10)
+SUMS = 10
+
+
+@jit(allocates=False)
+def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, model, warm, work):
+    """Normal problem of the overlaps from ``first`` to before ``last``, which count as one patch.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    pose : Pose
+    hertz : HertzTable
+    values : numpy.ndarray
+        Of an `InfluenceTable`.
+    patches : numpy.ndarray
+        As `find_patches` fills it, with the reduction ``moment``.
+    first, last : int
+    resolution : int
+        Strips of a window.
+    model : int
+        EXACT or STRIPS.
+    warm : bool
+        Start from the solution in ``work`` if it fits; the result is the same to the iteration's tolerance.
+    work : Workspace
+        Filled with the solution.
+
+    Returns
+    -------
+    windows : int
+        Number of windows; 0 where no solution was found.
+    frame : Frame
+    """
+    frame = frame_of_overlaps(geometry, pose, patches, first, last)
+    stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
+    guess_squares(hertz, patches, first, work, stretches, model == EXACT)
+    windows = windows_from_guess(work, stretches, resolution)
+    kinds = 2 if pose.ex == 0.0 else 3
+    if warm and model == EXACT and _resume(frame, work, windows):
+        status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
+        if status == CONVERGED:
+            place_strips(geometry, pose, frame, work, windows)
+            if newborn(values, work, windows, stretches, resolution) == windows:
+                _remember(frame, work, windows)
+                return windows, frame
+        windows = windows_from_guess(work, stretches, resolution)
+    work.memory[0] = 0.0
+    if windows > 0:
+        start_strips(geometry, pose, frame, work, windows, stretches)
+    if model == STRIPS:
+        return windows, frame
+    for extra in range(0, _MORE_STRIPS + 1, 2):
+        strips = resolution + extra
+        found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds)
+        if found > 0:
+            if attempts == 1 and extra == 0:
+                _remember(frame, work, found)
+            return found, frame
+        windows = 0
+    return 0, frame
+
+
+@jit(allocates=False)
+def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds):
+    """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be.
+
+    Returns the number of windows, 0 where no solution was found, and of attempts.
+    """
+    bold, again = False, False
+    for attempt in range(_ROUNDS):
+        if attempt == 1 or again:
+            windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution)
+        if windows == 0:
+            if attempt == 0:
+                continue
+            break
+        start_strips(geometry, pose, frame, work, windows, stretches)
+        if windows > 1 or work.start[windows] > resolution:
+            solve_shares(values, work, windows, kinds)
+        status = newton(geometry, pose, frame, values, work, windows, kinds, bold, _STEPS, _TOLERANCE)
+        again = attempt > 0 and not bold and status == LOST
+        bold = bold or again
+        if status == CROSSED:
+            windows = merge_close(work, windows, resolution)
+        elif status != CONVERGED:
+            windows = drop_starved(work, windows, resolution)
+        else:
+            place_strips(geometry, pose, frame, work, windows)
+            more = newborn(values, work, windows, stretches, resolution)
+            if more == windows:
+                return windows, attempt + 1
+            windows = more
+    return 0, _ROUNDS
+
+
+@jit(allocates=False)
+def _remember(frame, work, windows):
+    """Note what a warm start must know of the solution besides its strips."""
+    memory = work.memory
+    memory[0], memory[1], memory[2], memory[3] = windows, frame.x, frame.ur, frame.z
+    for k in range(windows):
+        memory[4 + k] = work.start[k + 1]
+
+
+@jit(allocates=False)
+def _resume(frame, work, windows):
+    """Move the last solution to the new frame if its windows and strips are those of the first guess."""
+    memory = work.memory
+    if windows == 0 or memory[0] != windows:
+        return False
+    y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
+    shift = y * frame.cosine + z * frame.sine
+    for k in range(windows):
+        first, last = work.start[k], work.start[k + 1]
+        if memory[4 + k] != last:
+            return False
+        low = work.centre[first] - 0.5 * work.width[first] + shift
+        high = work.centre[last - 1] + 0.5 * work.width[last - 1] + shift
+        reach = 0.3 * (high - low)
+        if abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach:
+            return False
+        work.low[k], work.high[k] = low, high
+    for i in range(work.start[windows]):
+        work.middle[i] += along
+    return True
+
+
+@jit(allocates=False)
+def _tip(strips, end, step):
+    """Zero of the parabola through a^2 of a window's last three strips, in strips inwards from the window's end."""
+    length = strips[HALF_LENGTH]
+    c1, c2, c3 = length[end] ** 2, length[end + step] ** 2, length[end + 2 * step] ** 2
+    slope, bend, t = c2 - c1, 0.5 * (c3 - 2.0 * c2 + c1), 0.0
+    for _ in range(3):
+        rate = slope + bend * (2.0 * t - 2.0)
+        if not rate > 0.0:
+            return 0.0
+        t -= (c1 + (t - 0.5) * (slope + bend * (t - 1.5))) / rate
+    return min(max(t, -0.4), 0.4)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def publish(geometry, pose, frame, modulus, work, windows, strips, sums):
+    """Strips of a solution in the contact frame (s to the left on both sides), and sums over them.
+
+    Parameters
+    ----------
+    modulus : float
+        E*, Pa.
+    strips : numpy.ndarray, shape (STRIP_ROWS, MAX_STRIPS)
+        Filled: rows CENTRE to WINDOW, by increasing s.
+    sums : numpy.ndarray, shape (SUMS,)
+        Filled: normal force, largest pressure, means over the pressure of x, s, x^2, s^2, and extents.
+
+    Returns
+    -------
+    int
+        Number of strips.
+    """
+    count, stiffness = work.start[windows], math.pi * modulus
+    for q in range(SUMS):
+        sums[q] = 0.0
+    sums[X_MIN], sums[X_MAX] = 1e9, -1e9
+    best = 0
+    for i in range(count):
+        k = i if pose.side > 0.0 else count - 1 - i
+        a, x, w = math.sqrt(work.square[k]), work.middle[k], work.width[k]
+        s, peak = pose.side * work.centre[k], stiffness * work.share[k] * a
+        window = work.window[k] if pose.side > 0.0 else windows - 1 - work.window[k]
+        strips[CENTRE, i], strips[WIDTH, i], strips[HALF_LENGTH, i], strips[MIDDLE, i] = s, w, a, x
+        strips[PEAK, i], strips[WHEEL_HEIGHT, i], strips[WINDOW, i] = peak, work.gap[k, HEIGHT], window
+        load = 0.5 * math.pi * peak * a * w
+        sums[LOAD] += load
+        sums[MEAN_X] += load * x
+        sums[MEAN_S] += load * s
+        sums[MEAN_XX] += load * (x * x + 0.25 * a * a)
+        sums[MEAN_SS] += load * s * s
+        sums[X_MIN], sums[X_MAX] = min(sums[X_MIN], x - a), max(sums[X_MAX], x + a)
+        if peak > strips[PEAK, best]:
+            best = i
+    for q in range(MEAN_X, MEAN_SS + 1):
+        sums[q] /= sums[LOAD]
+    low, high = _tip(strips, 0, 1), _tip(strips, count - 1, -1)
+    sums[S_MIN] = strips[CENTRE, 0] - (0.5 - low) * strips[WIDTH, 0]
+    sums[S_MAX] = strips[CENTRE, count - 1] + (0.5 - high) * strips[WIDTH, count - 1]
+    square = strips[PEAK, best] ** 2
+    if 0 < best < count - 1 and strips[WINDOW, best - 1] == strips[WINDOW, best + 1]:
+        # half of the way to the top of a parabola, which p0^2 is for an ellipse: pressures may have a kink
+        low, high = strips[PEAK, best - 1] ** 2, strips[PEAK, best + 1] ** 2
+        square += 0.0625 * (high - low) ** 2 / max(2.0 * square - low - high, 1e-6 * square)
+    sums[LARGEST] = math.sqrt(square)
+    return count
+
+
+@jit(allocates=False)
+def wheel_overlaps(geometry, side, y, z, ex, ey, ez, spatial, patches):
+    """Overlaps of one wheel, reduced by moments (see `find_patches`), and its pose."""
+    count = find_patches(geometry, side, y, z, ex, ey, ez, spatial, MOMENT, patches)
+    return count, make_pose(side, y, z, ex, ey, ez, spatial)

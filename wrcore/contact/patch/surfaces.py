@@ -1,0 +1,178 @@
+"""Gap and rigid slip of the real surfaces over a contact plane: the wheel of revolution above the swept rail.
+
+A contact plane has the axes (1) x forward, (2) s to the left in the plane, (3) n from rail into wheel. Wheel and rail
+are cut by the lines along n through its points, without any expansion along x or s.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.contact.strip import cubic_at
+from wrcore.kernels.jit import jit
+
+NO_RAIL = 1.0
+"""Gap where one of the two profiles has ended, m."""
+
+_TOLERANCE = 1e-12
+_ON_PROFILE = 1e-9
+_MOST_STEPS = 60
+
+
+class ContactPlane(NamedTuple):
+    """Origin (track frame, x from the wheelset's cross-section, m) and contact angle of a contact plane."""
+
+    x: float
+    y: float
+    z: float
+    cosine: float
+    sine: float
+
+
+class Motion(NamedTuple):
+    """Velocity of the wheelset's centre (m/s), its angular velocity (rad/s), both in the track frame, and speed (m/s).
+
+    The angular velocity contains the rolling rate: about the axle, positive forward.
+    """
+
+    vx: float
+    vy: float
+    vz: float
+    wx: float
+    wy: float
+    wz: float
+    speed: float
+
+
+def contact_plane(x, y, z, angle):
+    """Contact plane through (x, y, z), m, at a contact angle (rad, about x)."""
+    return ContactPlane(float(x), float(y), float(z), math.cos(angle), math.sin(angle))
+
+
+@jit(allocates=False)
+def rail_height(geometry, pose, plane, s, u):
+    """Height n (m) of the rail over a contact plane at s, and its profile coordinate there, from the guess ``u``.
+
+    NaN where the line along n does not meet the rail's profile.
+    """
+    side, sine = pose.side, pose.side * plane.sine
+    origin = side * plane.y - geometry.rail_distance
+    low, high = geometry.rail_start, geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
+    u = min(max(u, low), high)
+    for _ in range(_MOST_STEPS):
+        f, slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, u)
+        # in the side's own direction outwards: side s = (u - origin) cos + (f - z) side sin
+        miss = (u - origin) * plane.cosine + (f - plane.z) * sine - side * s
+        rate = plane.cosine + slope * sine
+        if miss > 0.0:
+            high = u
+        else:
+            low = u
+        step = miss / rate if rate > 0.0 else math.copysign(high - low, miss)
+        new = u - step
+        if not low <= new <= high:
+            new = 0.5 * (low + high)
+        if abs(new - u) < _TOLERANCE:  # past an end of the profile the bisection gets there with a miss left
+            height = -(u - origin) * sine + (f - plane.z) * plane.cosine
+            return (height if abs(miss) < _ON_PROFILE else np.nan), u
+        u = new
+    return np.nan, u
+
+
+@jit(allocates=False)
+def wheel_height(geometry, pose, plane, x, s, n):
+    """Height n (m) of the wheel over a contact plane at (x, s), from a guess; NaN where it does not get there."""
+    # relative to the wheelset's centre; the plane's axes are (1, 0, 0), (0, cos, sin), (0, -sin, cos)
+    rx, ry = plane.x + x, plane.y + s * plane.cosine - pose.y
+    rz = plane.z + s * plane.sine - pose.z
+    across = rx * pose.ex + ry * pose.ey + rz * pose.ez
+    lift = -plane.sine * pose.ey + plane.cosine * pose.ez
+    square, linear = rx * rx + ry * ry + rz * rz, -ry * plane.sine + rz * plane.cosine
+    last = geometry.wheel_start + (geometry.wheel.shape[0] - 1) * geometry.wheel_step
+    for _ in range(_MOST_STEPS):
+        along = across + n * lift
+        u = along - geometry.half_distance
+        extra, slope, _ = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
+        radius = math.sqrt(max(square + n * (2.0 * linear + n) - along * along, 1e-12))
+        miss = radius - geometry.rolling_radius - extra
+        step = miss / ((linear + n - along * lift) / radius - slope * lift)
+        n -= step
+        if abs(step) < _TOLERANCE:
+            return n if geometry.wheel_start < u < last else np.nan
+        if not abs(n) < 0.1:
+            break
+    return np.nan
+
+
+@jit(allocates=False)
+def surface_gap(geometry, pose, plane, x, s, gap, height):
+    """Gap between wheel and rail over a contact plane, exactly as the surfaces are.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    pose : Pose
+        Of the wheel, from :func:`wrcore.contact.strip.make_pose` (spatial or planar makes no difference).
+    plane : ContactPlane
+    x : numpy.ndarray, shape (nx,)
+    s : numpy.ndarray, shape (ns,)
+        Points of the plane relative to its origin, m, both increasing.
+    gap : numpy.ndarray, shape (nx, ns)
+        Written: distance from rail to wheel along n, m; negative in overlap, `NO_RAIL` where a profile has ended.
+    height : numpy.ndarray, shape (nx, ns)
+        Written: the wheel's height n over the plane, m; 0 where a profile has ended.
+    """
+    u = pose.side * plane.y - geometry.rail_distance + pose.side * plane.cosine * s[0]
+    for j in range(s.size):
+        rail, u = rail_height(geometry, pose, plane, s[j], u)
+        n = rail if rail == rail else 0.0
+        for i in range(x.size):
+            wheel = wheel_height(geometry, pose, plane, x[i], s[j], n)
+            if wheel == wheel and rail == rail:
+                gap[i, j], height[i, j], n = wheel - rail, wheel, wheel
+            else:
+                gap[i, j], height[i, j] = NO_RAIL, 0.0
+
+
+@jit(allocates=False)
+def surface_slip(pose, plane, motion, x, s, height, wx, ws):
+    """Rigid slip of the wheel's own surface over the rail at rest, in the contact plane's directions.
+
+    A strip of the wheel counts with its radius at its point nearest to the rail: away from it the undeformed wheel
+    moves more slowly along x, but the flattened one does not, as its surface passes over the same length.
+
+    Parameters
+    ----------
+    pose, plane
+        As for `surface_gap`.
+    motion : Motion
+        Of the wheelset.
+    x, s : numpy.ndarray, shapes (nx,), (ns,)
+        m.
+    height : numpy.ndarray, shape (nx, ns)
+        Of the wheel over the plane, m.
+    wx, ws : numpy.ndarray, shape (nx, ns)
+        Written: velocity of wheel relative to rail over the speed, forward and to the left.
+    """
+    slowness = 1.0 / motion.speed
+    for j in range(s.size):
+        low = height[0, j]
+        for i in range(1, x.size):
+            low = min(low, height[i, j])
+        py = plane.y + s[j] * plane.cosine - low * plane.sine - pose.y
+        pz = plane.z + s[j] * plane.sine + low * plane.cosine - pose.z
+        for i in range(x.size):
+            px = plane.x + x[i]
+            vy = motion.vy + motion.wz * px - motion.wx * pz
+            vz = motion.vz + motion.wx * py - motion.wy * px
+            wx[i, j] = (motion.vx + motion.wy * pz - motion.wz * py) * slowness
+            ws[i, j] = (vy * plane.cosine + vz * plane.sine) * slowness
+
+
+@jit(allocates=False)
+def plane_slip(xi, eta, phi, x, s, wx, ws):
+    """Rigid slip of one set of creepages at the plane's origin: wx = xi - phi s, ws = eta + phi x, shapes (nx, ns)."""
+    for i in range(x.size):
+        for j in range(s.size):
+            wx[i, j], ws[i, j] = xi - phi * s[j], eta + phi * x[i]

@@ -1,0 +1,259 @@
+"""Windows of strips, one per lobe of contact: first guesses from the overlaps, and repairs after a solution.
+
+What the windows are depends on the pose alone: they start from the overlaps, and every repair follows from a solution
+that does not depend on where its iteration started.
+"""
+
+import math
+
+from wrcore.contact.normal import hertz_ellipse
+from wrcore.contact.patch.gap import CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
+from wrcore.contact.patch.strips import MAX_STRIPS, MAX_WINDOWS, gap_under_load, place_strips
+from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y, PENETRATION
+from wrcore.kernels.jit import FUSED, jit
+
+LEAST = 8
+"""Strips of a slender window (length over width above `SLENDER`), whatever the resolution."""
+
+SLENDER = 4.0
+
+_SADDLE = 0.02
+"""A lobe of its own rises by this share of the deepest penetration from its neighbour."""
+
+_MERGE = 0.3
+"""Windows closer than this share of a strip are one."""
+
+
+@jit(allocates=False, fastmath=FUSED)
+def guess_squares(hertz, patches, first, work, stretches, by_lobes):
+    """First guess of c and Q at the nodes: shape-corrected virtual penetration of every lobe.
+
+    For a lobe of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's ellipse of
+    the overlap, and Q of that ellipse: exact for an ellipse. Else (not ``by_lobes``) d - min g is that
+    ellipse's, too, and Q gives its force.
+    """
+    nodes = work.nodes
+    begin = 0
+    for k in range(stretches):
+        end, row = work.ends[k], patches[first + k]
+        stiffness, a, b = hertz_ellipse(hertz, row[CURVATURE_X], row[CURVATURE_Y])
+        k_a, k_b = row[CURVATURE_X] * a * a, row[CURVATURE_Y] * b * b
+        least = 0.0
+        for i in range(begin, end):
+            least = min(least, nodes[NODE_GAP, i])
+        share = 1.5 * stiffness / (math.pi * math.pi * a * a * b)
+        i = begin
+        while i < end:  # lobe by lobe: down to its bottom, then up until the gap has fallen again from a saddle
+            start = i
+            bottom = top = nodes[NODE_GAP, i]
+            top_at = i
+            while i < end:
+                g = nodes[NODE_GAP, i]
+                if g < bottom and top < bottom - _SADDLE * least:
+                    bottom = top = g
+                    top_at = i
+                if g > top:
+                    top, top_at = g, i
+                if top > bottom - _SADDLE * least and g < top + _SADDLE * least:
+                    break
+                bottom = min(bottom, g)
+                if g <= bottom:
+                    top, top_at = g, i
+                i += 1
+            stop = end if i >= end else top_at + 1
+            for j in range(start, stop):
+                depth = max(-bottom, 0.0) if by_lobes else row[PENETRATION]
+                v = -nodes[NODE_GAP, j] - (1.0 - k_b) * depth
+                nodes[NODE_SQUARE, j], nodes[NODE_SHARE, j] = k_a / k_b * v / nodes[NODE_SHAPE, j], share
+            i = max(stop, start + 1)
+        if not by_lobes:
+            total = 0.0
+            for j in range(begin + 1, end - 1):
+                total += max(nodes[NODE_SQUARE, j], 0.0) * 0.5 * (nodes[S, j + 1] - nodes[S, j - 1])
+            force = stiffness * row[PENETRATION] * math.sqrt(row[PENETRATION])
+            for j in range(begin, end):
+                nodes[NODE_SHARE, j] = 2.0 * force / (math.pi * math.pi * max(total, 1e-300))
+        begin = end
+
+
+@jit(allocates=False, fastmath=FUSED)
+def guess_at(work, count, s):
+    """First guess of c (m^2, linear between nodes) and Q (1/m) at s."""
+    nodes = work.nodes
+    for i in range(1, count):
+        if nodes[S, i] >= s and nodes[S, i] > nodes[S, i - 1]:
+            part = (s - nodes[S, i - 1]) / (nodes[S, i] - nodes[S, i - 1])
+            return nodes[NODE_SQUARE, i - 1] * (1.0 - part) + nodes[NODE_SQUARE, i] * part, nodes[NODE_SHARE, i]
+    return 0.0, nodes[NODE_SHARE, 0]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def count_strips(width, length, resolution):
+    """Strips of a window: few where it is slender, more where it is wide (it then has lobes)."""
+    if length > SLENDER * width:
+        return LEAST
+    ratio = width / length
+    halves = 2 if ratio <= 1.2 else min(int(math.ceil(2.0 * ratio / 1.2)), 4)
+    return min(resolution * halves // 2, MAX_STRIPS)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def windows_from_guess(work, stretches, resolution):
+    """Windows where the guess of c is positive. Returns their number."""
+    nodes, count, windows = work.nodes, work.ends[stretches - 1], 0
+    inside, largest = False, 0.0
+    for i in range(count):
+        c = nodes[NODE_SQUARE, i]
+        fresh = i == 0
+        if c > 0.0 and not inside and windows < MAX_WINDOWS:
+            inside, largest = True, c
+            low = nodes[S, i]
+            if not fresh:
+                before = nodes[NODE_SQUARE, i - 1]
+                low -= (nodes[S, i] - nodes[S, i - 1]) * c / (c - before)
+            work.low[windows] = low
+        elif inside and (c <= 0.0 or i == count - 1):
+            before = nodes[NODE_SQUARE, i - 1]
+            high = nodes[S, i]
+            if c < 0.0:
+                high -= (nodes[S, i] - nodes[S, i - 1]) * c / (c - before)
+            work.high[windows] = high
+            work.start[windows + 1] = count_strips(high - work.low[windows], 2.0 * math.sqrt(largest), resolution)
+            inside = False
+            windows += 1
+        if inside:
+            largest = max(largest, c)
+    _number(work, windows)
+    return windows
+
+
+@jit(allocates=False)
+def _number(work, windows):
+    """From counts of strips (in start[1:]) to first strips of the windows; fewer each where they do not all fit."""
+    total = 0
+    for k in range(windows):
+        total += work.start[k + 1]
+    work.start[0] = 0
+    for k in range(windows):
+        count = work.start[k + 1]
+        if total > MAX_STRIPS:
+            count = min(count, MAX_STRIPS // windows)
+        work.start[k + 1] = work.start[k] + count
+
+
+@jit(allocates=False, fastmath=FUSED)
+def start_strips(geometry, pose, frame, work, windows, stretches):
+    """Strips of the windows with the guess of c (never nothing) and of Q."""
+    count = work.ends[stretches - 1]
+    work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
+    place_strips(geometry, pose, frame, work, windows)
+    for k in range(windows):
+        largest = 0.0
+        first, last = work.start[k], work.start[k + 1]
+        for i in range(first, last):
+            work.square[i], work.share[i] = guess_at(work, count, work.centre[i])
+            largest = max(largest, work.square[i])
+        for i in range(first, last):
+            t = (2.0 * (i - first) + 1.0) / (last - first) - 1.0
+            least = (0.1 * largest if largest > 0.0 else work.width[i] ** 2) * (1.0 - t * t)
+            work.square[i] = max(work.square[i], least)
+            work.middle[i] = work.gap[i, CREST]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def drop_starved(work, windows, resolution):
+    """Windows of the runs of strips that kept their pressure after a starved iteration. Returns their number."""
+    largest = 0.0
+    strips = work.start[windows]
+    for i in range(strips):
+        largest = max(largest, work.square[i])
+    found, inside = 0, False
+    lows, highs = work.fresh[0], work.fresh[1]
+    for i in range(strips):
+        alive = work.square[i] > 2e-3 * largest
+        edge = i > 0 and work.window[i] != work.window[i - 1]
+        if inside and (edge or not alive):
+            highs[found] = work.centre[i - 1] + 0.5 * work.width[i - 1]
+            found, inside = found + 1, False
+        if alive and not inside and found < MAX_WINDOWS:
+            lows[found], inside = work.centre[i] - 0.5 * work.width[i], True
+    if inside:
+        highs[found] = work.centre[strips - 1] + 0.5 * work.width[strips - 1]
+        found += 1
+    return take_fresh(work, found, math.sqrt(largest), resolution)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def merge_close(work, windows, resolution):
+    """Windows closer than a share of a strip become one. Returns their number."""
+    largest = 0.0
+    for i in range(work.start[windows]):
+        largest = max(largest, work.square[i])
+    lows, highs = work.fresh[0], work.fresh[1]
+    found = 0
+    for k in range(windows):
+        w = work.width[work.start[k]]
+        if k > 0:
+            w = max(w, work.width[work.start[k - 1]])
+        if k > 0 and work.low[k] - work.high[k - 1] < _MERGE * w:
+            highs[found - 1] = work.high[k]
+        else:
+            lows[found], highs[found] = work.low[k], work.high[k]
+            found += 1
+    if found == windows:
+        return windows
+    return take_fresh(work, found, math.sqrt(largest), resolution)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def take_fresh(work, found, a, resolution):
+    for k in range(found):
+        work.low[k], work.high[k] = work.fresh[0, k], work.fresh[1, k]
+        work.start[k + 1] = count_strips(work.high[k] - work.low[k], 2.0 * a, resolution)
+    _number(work, found)
+    return found
+
+
+@jit(allocates=False, fastmath=FUSED)
+def newborn(values, work, windows, stretches, resolution):
+    """Windows where the loaded surfaces interpenetrate outside the windows are added. Returns the new number."""
+    nodes, count = work.nodes, work.ends[stretches - 1]
+    depth = 0.0
+    for i in range(count):
+        depth = max(depth, -nodes[NODE_GAP, i])
+    lows, highs = work.fresh[0], work.fresh[1]
+    found = windows
+    for k in range(windows):
+        lows[k], highs[k] = work.low[k], work.high[k]
+    open_at = -1
+    for i in range(count):
+        s, gap = nodes[S, i], nodes[NODE_GAP, i]
+        free = gap < 0.0
+        crest = 0.0
+        best = 1e9
+        for k in range(windows):
+            w = work.width[work.start[k]]
+            free = free and not work.low[k] - 0.7 * w < s < work.high[k] + 0.7 * w
+            for j in (work.start[k], work.start[k + 1] - 1):
+                if abs(s - work.centre[j]) < best:
+                    best, crest = abs(s - work.centre[j]), work.gap[j, CREST]
+        inside = free and gap_under_load(values, work, windows, s, crest, gap) < -1e-3 * depth
+        if inside and open_at < 0 and found < MAX_WINDOWS:
+            open_at = i
+            lows[found] = s - 0.5 * abs(nodes[S, max(i, 1)] - nodes[S, max(i, 1) - 1])
+        if open_at >= 0 and (not inside or i == count - 1):
+            highs[found] = nodes[S, i - 1] + 0.5 * abs(nodes[S, i] - nodes[S, i - 1])
+            found, open_at = found + 1, -1
+    if found == windows:
+        return windows
+    for i in range(1, found):  # in order
+        low, high = lows[i], highs[i]
+        j = i - 1
+        while j >= 0 and lows[j] > low:
+            lows[j + 1], highs[j + 1] = lows[j], highs[j]
+            j -= 1
+        lows[j + 1], highs[j + 1] = low, high
+    largest = 0.0
+    for i in range(work.start[windows]):
+        largest = max(largest, work.square[i])
+    return take_fresh(work, found, math.sqrt(largest), resolution)

@@ -1,0 +1,268 @@
+"""Wrench of the rails on wheelsets with the real patch: contact on strips in place of an ellipse.
+
+``exact`` solves the normal and the rolling problem on Galerkin strips; ``strips`` takes the shape-corrected virtual
+penetration for the normal one and the creep law at the ellipse of equal moments of pressure. The rigid slip is that of
+the wheel's over the rail's surface, strip by strip, or follows one set of creepages. Where strips do not converge a
+uniform grid takes over (counted).
+
+The damping factor acts as on an ellipse: the half-space sees the elastic approach c_d^(2/3) delta, and the wheel is
+lifted along the contact normal by the rest.
+"""
+
+import math
+
+import numpy as np
+
+from wrcore.contact import reduction
+from wrcore.contact.creepage import creepages
+from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
+from wrcore.contact.normal import damping_factor, inverse_cube_root
+from wrcore.contact.patch.gap import creepage_slip, frame_of_overlaps, group_end, rigid_slip
+from wrcore.contact.patch.grid import grid_normal, grid_rolling
+from wrcore.contact.patch.rolling import AUTO as ANY_METHOD
+from wrcore.contact.patch.rolling import rolling_force
+from wrcore.contact.patch.solve import (
+    CENTRE,
+    HALF_LENGTH,
+    LARGEST,
+    LOAD,
+    MEAN_S,
+    MEAN_SS,
+    MEAN_X,
+    MEAN_XX,
+    MIDDLE,
+    PEAK,
+    WHEEL_HEIGHT,
+    WIDTH,
+    publish,
+    solve_patch,
+)  # fmt: skip
+from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, surface_slip
+from wrcore.contact.reduction import ANGLE, COSINE, MOMENT, PATCH_COLUMNS, PENETRATION, SINE, X, Y, Z
+from wrcore.contact.strip import make_pose
+from wrcore.creep.laws import creep_force_at
+from wrcore.dynamics.wheel import wheel_wrenches
+from wrcore.kernels.handles import call_address
+from wrcore.kernels.jit import FUSED, jit
+
+SLENDER = 3.0
+"""Length over width from which strips get more panels along rolling."""
+
+FELL_BACK = 2
+"""Counter of patches that the grid has solved."""
+
+GRID, GRID_TOLERANCE = 32, 1e-3
+"""Elements along and across the patch of that grid, and the tolerance of its tractions."""
+
+
+@jit
+def solve_on_grid(model, motion, place):
+    """Fallback: a patch on a uniform grid; a kernel of its own that may allocate.
+
+    Parameters
+    ----------
+    model : ContactModel
+    motion : numpy.ndarray, shape (MOTION_COLUMNS,)
+    place : numpy.ndarray
+        y and z of the wheelset (m), whether detection is spatial, the frame's cosine, sine, x, ur and z, and the
+        creepages. Overwritten: Fx, Fs, Mn about the origin, N, means over the pressure of x and s, semi-axes of the
+        ellipse of equal moments, greatest pressure.
+    """
+    side, y, z, cosine, sine = motion[0], place[0], place[1], place[3], motion[0] * place[4]
+    pose = make_pose(side, y, z, side * motion[3], side * motion[4], side * motion[5], place[2] > 0.0)
+    plane = ContactPlane(place[5], side * (place[6] + model.geometry.rail_distance), place[7], cosine, sine)
+    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
+    grid = grid_normal(model.geometry, pose, plane, modulus, GRID, GRID)
+    wx, ws = np.empty(grid.gap.shape), np.empty(grid.gap.shape)
+    if model.strips.surfaces == 0:
+        plane_slip(place[8], place[9], place[10], grid.x, grid.s, wx, ws)
+    else:
+        speed = max(abs(motion[6]), model.least_speed)
+        turning = Motion(motion[6], motion[7], motion[8], motion[9], motion[10], motion[11], speed)
+        surface_slip(pose, plane, turning, grid.x, grid.s, grid.height, wx, ws)
+    found = grid_rolling(grid, wx, ws, model.friction, model.shear_modulus, model.poisson_ratio, GRID_TOLERANCE)
+    load = xm = sm = xx = ss = top = 0.0
+    for i in range(grid.x.size):
+        for j in range(grid.s.size):
+            p = grid.pressure[i, j]
+            load, top = load + p, max(top, p)
+            xm, sm = xm + p * grid.x[i], sm + p * grid.s[j]
+            xx, ss = xx + p * grid.x[i] ** 2, ss + p * grid.s[j] ** 2
+    load = max(load, 1e-30)
+    xm, sm = xm / load, sm / load
+    place[0], place[1], place[2], place[3] = found.fx, found.fs, found.mn, load * grid.dx * grid.ds
+    place[4], place[5], place[8] = xm, sm, top
+    place[6] = math.sqrt(5.0 * max(xx / load - xm * xm, 1e-14))
+    place[7] = math.sqrt(5.0 * max(ss / load - sm * sm, 1e-14))
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _apply(frame, side, rail_distance, y, z, fx, fs, normal, mx, ms, mn, wrench):
+    """Add a patch's force and its moment about the frame's origin (axes x, s, n) to a wheelset's wrench."""
+    cosine, sine = frame.cosine, side * frame.sine
+    px, py, pz = frame.x, side * (frame.ur + rail_distance) - y, frame.z - z
+    gy, gz = fs * cosine - normal * sine, fs * sine + normal * cosine
+    wrench[0] += fx
+    wrench[1] += gy
+    wrench[2] += gz
+    wrench[3] += py * gz - pz * gy + mx
+    wrench[4] += pz * fx - px * gz + ms * cosine - mn * sine
+    wrench[5] += px * gy - py * fx + ms * sine + mn * cosine
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _lifted(model, side, y, z, ex, ey, ez, spatial, u, rows):
+    """Overlaps of a lifted wheel and, of its groups, the one nearest to wheel coordinate ``u``: (pose, first, last)."""
+    pose = make_pose(side, y, z, ex, ey, ez, spatial)
+    count = find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, MOMENT, rows)
+    best, low, high, first = 1e9, 0, 0, 0
+    while first < count:
+        last = group_end(rows, count, first)
+        for k in range(first, last):
+            distance = abs(rows[k, reduction.U_WHEEL] - u)
+            if distance < best:
+                best, low, high = distance, first, last
+        first = last
+    return pose, low, high
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _creep_by_law(model, strips, slip, count, sums, xi_eta_phi):
+    """Creep force of the scene's law at the ellipse of equal moments: Fx, Fs, Mn about the origin, look-ups missed."""
+    mean_x, mean_s = sums[MEAN_X], sums[MEAN_S]
+    a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
+    b = math.sqrt(5.0 * max(sums[MEAN_SS] - mean_s * mean_s, 1e-14))
+    xi = eta = phi = 0.0
+    for i in range(count):
+        share = 0.5 * math.pi * strips[PEAK, i] * strips[HALF_LENGTH, i] * strips[WIDTH, i] / sums[LOAD]
+        xi += share * slip[0, i]
+        eta += share * (slip[2, i] + slip[3, i] * (mean_x - strips[MIDDLE, i]))
+        phi += share * slip[3, i]
+    xi_eta_phi[0], xi_eta_phi[1], xi_eta_phi[2] = xi, eta, phi
+    limit, c = model.friction * sums[LOAD], math.sqrt(a * b)
+    scale = model.shear_modulus * c * c / limit
+    f1, f2, m3, missed = creep_force_at(
+        model.law, model.creep, math.log(a / b), a / b, 0.0, xi * scale, eta * scale, phi * scale * c
+    )
+    fx, fs = limit * f1, limit * f2
+    return fx, fs, limit * c * m3 + mean_x * fs - mean_s * fx, missed
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
+    """Solve the overlaps from ``first`` to before ``last`` as one patch: its row, its share of the wrench."""
+    settings = model.strips
+    side, y, z = m[0], m[1], m[2]
+    ex, ey, ez = side * m[3], side * m[4], side * m[5]
+    speed = max(abs(m[6]), model.least_speed)
+    pose = make_pose(side, y, z, ex, ey, ez, spatial)
+    frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
+    depth, u = 0.0, 0.0
+    for k in range(first, last):
+        if rows[k, PENETRATION] > depth:
+            depth, u = rows[k, PENETRATION], rows[k, reduction.U_WHEEL]
+            for column in range(PATCH_COLUMNS):
+                out[column] = rows[k, column]
+    py, pz = side * (frame.ur + model.geometry.rail_distance) - y, frame.z - z
+    xi, eta, phi, approach = creepages(
+        m[6], m[7], m[8], m[9], m[10], m[11], frame.x, py, pz, frame.cosine, side * frame.sine, speed
+    )
+    factor = damping_factor(approach, model.damping, model.damping_speed)
+    lift = (1.0 - factor * inverse_cube_root(factor)) * depth
+    windows = 0
+    if lift < depth:
+        pose, low, high = _lifted(
+            model, side, y - lift * side * frame.sine, z + lift * frame.cosine, ex, ey, ez, spatial, u, work.rows
+        )
+        if high == low:
+            out[reduction.NORMAL] = 0.0
+            return
+        windows, frame = solve_patch(
+            model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, settings.normal,
+            False, work.normal,
+        )  # fmt: skip
+    strips, slip, sums = work.strips, work.slip, work.sums
+    if windows == 0:
+        counters[FELL_BACK] += 1
+        f = work.force
+        f[0], f[1], f[2] = y - lift * side * frame.sine, z + lift * frame.cosine, 1.0 if spatial else 0.0
+        f[3], f[4], f[5], f[6], f[7] = frame.cosine, frame.sine, frame.x, frame.ur, frame.z
+        f[8], f[9], f[10] = xi, eta, phi
+        call_address(settings.fallback, model, m, f)
+        fx, fs, mn, normal, mean_x, mean_s, a, b, top = f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8]
+    else:
+        modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
+        count = publish(model.geometry, pose, frame, modulus, work.normal, windows, strips, sums)
+        normal, mean_x, mean_s, top = sums[LOAD], sums[MEAN_X], sums[MEAN_S], sums[LARGEST]
+        if settings.surfaces == 0:
+            creepage_slip(xi, eta, phi, strips[CENTRE, :count], strips[MIDDLE, :count], slip[:, :count])
+        else:
+            velocity = m[6], m[7], m[8], m[9], m[10], m[11], speed
+            rigid_slip(
+                model.geometry, pose, frame, velocity, strips[CENTRE, :count], strips[MIDDLE, :count],
+                strips[WHEEL_HEIGHT, :count], slip[:, :count],
+            )  # fmt: skip
+        a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
+        b = math.sqrt(5.0 * max(sums[MEAN_SS] - mean_s * mean_s, 1e-14))
+        if settings.rolling == 0:
+            fx, fs, mn, missed = _creep_by_law(model, strips, slip, count, sums, work.force)
+            counters[1] += missed
+        elif a > SLENDER * b:
+            fx, fs, mn, _, _ = rolling_force(
+                strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
+                strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
+                model.shear_modulus, model.friction, settings.slender, work.slender, ANY_METHOD,
+            )  # fmt: skip
+        else:
+            fx, fs, mn, _, _ = rolling_force(
+                strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
+                strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
+                model.shear_modulus, model.friction, settings.library, work.rolling, ANY_METHOD,
+            )  # fmt: skip
+    cosine, sine = frame.cosine, side * frame.sine
+    out[ANGLE], out[COSINE], out[SINE] = math.atan2(sine, cosine), cosine, sine
+    out[X] = frame.x + mean_x
+    out[Y] = side * (frame.ur + model.geometry.rail_distance) + mean_s * cosine
+    out[Z] = frame.z + mean_s * sine
+    out[reduction.SEMI_A], out[reduction.SEMI_B], out[reduction.NORMAL] = a, b, normal
+    out[reduction.FX], out[reduction.FY], out[reduction.MZ] = fx, fs, mn + mean_s * fx - mean_x * fs
+    out[reduction.XI], out[reduction.ETA], out[reduction.PHI] = xi - phi * mean_s, eta + phi * mean_x, phi
+    out[reduction.P_MAX] = top
+    _apply(
+        frame, side, model.geometry.rail_distance, y, z, fx, fs, normal, mean_s * normal, -mean_x * normal, mn, wrench
+    )
+
+
+@jit(allocates=False, fastmath=FUSED)
+def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
+    """As `wheel_wrenches`, with patches on strips; arguments as there.
+
+    While ``work.cheap[0]`` is set the ellipse of equal moments of the overlap stands in: a Jacobian by differences
+    wants a smooth neighbour of the model, not the model.
+    """
+    if work.cheap[0] != 0:
+        wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work)
+        return
+    for i in range(motions.shape[0]):
+        for wheel in range(2):
+            m, rows, w = motions[i, wheel], patches[i, wheel], wrenches[i, wheel]
+            side, ex, ey, ez = m[0], m[3], m[4], m[5]
+            bound, spatial = 0.0, model.detection == SPATIAL
+            if model.detection == AUTO:
+                bound = planar_error_bound(model.geometry, side, m[1], m[2], side * ex, side * ey, side * ez)
+                spatial = bound > model.detection_tolerance
+            count = find_patches(
+                model.geometry, side, m[1], m[2], side * ex, side * ey, side * ez, spatial, MOMENT, rows
+            )
+            for k in range(6):
+                w[k] = 0.0
+            first = kept = 0
+            while first < count:
+                last = group_end(rows, count, first)
+                _group_wrench(model, m, spatial, rows, first, last, work.out, w, counters, work)
+                if work.out[reduction.NORMAL] > 0.0:
+                    for column in range(PATCH_COLUMNS):
+                        rows[kept, column] = work.out[column]
+                    kept += 1
+                first = last
+            counts[i, wheel], bounds[i, wheel] = kept, bound
