@@ -149,6 +149,29 @@ def _creep_by_law(model, strips, slip, count, sums, xi_eta_phi):
 
 
 @jit(allocates=False, fastmath=FUSED)
+def _roll_at(model, library, work, strips, slip, count):
+    """Creep force on the strips at a library's resolution: Fx, Fs, Mn."""
+    fx, fs, mn, _, _ = rolling_force(
+        strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
+        strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
+        model.shear_modulus, model.friction, library, work, ANY_METHOD,
+    )  # fmt: skip
+    return fx, fs, mn
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _roll(model, settings, strips, slip, count, slender, windows, work):
+    """Creep force on the strips with the library whose ellipses have as many."""
+    if slender:
+        return _roll_at(model, settings.slender, work.slender, strips, slip, count)
+    if windows == 1 and count == settings.wider.level.strips:
+        return _roll_at(model, settings.wider, work.rolling, strips, slip, count)
+    if windows == 1 and count == settings.widest.level.strips:
+        return _roll_at(model, settings.widest, work.rolling, strips, slip, count)
+    return _roll_at(model, settings.library, work.rolling, strips, slip, count)
+
+
+@jit(allocates=False, fastmath=FUSED)
 def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
     """Solve the overlaps from ``first`` to before ``last`` as one patch: its row, its share of the wrench."""
     settings = model.strips
@@ -207,18 +230,8 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, w
         if settings.rolling == 0:
             fx, fs, mn, missed = _creep_by_law(model, strips, slip, count, sums, work.force)
             counters[1] += missed
-        elif a > SLENDER * b:
-            fx, fs, mn, _, _ = rolling_force(
-                strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
-                strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
-                model.shear_modulus, model.friction, settings.slender, work.slender, ANY_METHOD,
-            )  # fmt: skip
         else:
-            fx, fs, mn, _, _ = rolling_force(
-                strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
-                strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
-                model.shear_modulus, model.friction, settings.library, work.rolling, ANY_METHOD,
-            )  # fmt: skip
+            fx, fs, mn = _roll(model, settings, strips, slip, count, a > SLENDER * b, windows, work)
     cosine, sine = frame.cosine, side * frame.sine
     out[ANGLE], out[COSINE], out[SINE] = math.atan2(sine, cosine), cosine, sine
     out[X] = frame.x + mean_x

@@ -37,6 +37,9 @@ class StripModel(NamedTuple):
     values: np.ndarray
     """Of the `InfluenceTable`."""
     library: Library
+    wider: Library
+    widest: Library
+    """Windows that are wide have 3/2 or 2 times the strips of others."""
     slender: Library
     """Resolution of slender patches."""
     fallback: int = 0
@@ -102,18 +105,18 @@ def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28):
 @lru_cache(maxsize=8)
 def _strip_model(patch, resolution, slip, nu):
     if patch not in ("strips", "exact"):
-        return StripModel(0, 0, 0, 0, np.zeros((0,) * influence_dimensions()), _no_library(nu), _no_library(nu))
-    exact = patch == "exact"
-    level, slender = (make_library(name, nu) if exact else _no_library(nu) for name in (resolution, "slender"))
+        return StripModel(0, 0, 0, 0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
+    exact, level = patch == "exact", LEVELS[resolution]
+    levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
+    libraries = (make_library(each, nu) if exact else _no_library(nu) for each in (*levels, LEVELS["slender"]))
     return StripModel(
-        LEVELS[resolution].strips, EXACT if exact else STRIPS, int(exact), int(slip == "surfaces"),
-        influence_table().values, level, slender,
-    )  # fmt: skip
-
-
-def influence_dimensions():
-    """Dimensions of the influence table's array."""
-    return 2
+        level.strips,
+        EXACT if exact else STRIPS,
+        int(exact),
+        int(slip == "surfaces"),
+        influence_table().values,
+        *libraries,
+    )
 
 
 def strip_work(model):
