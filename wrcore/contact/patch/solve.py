@@ -29,7 +29,7 @@ _MORE_STRIPS = 2
 """Strips by which a window's number may rise where no solution was found with less."""
 
 _STEPS = 24
-_TOLERANCE = 1e-7
+_TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
 
 # Rows of the strip array, and of the sums over a patch.
