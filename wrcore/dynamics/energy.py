@@ -201,7 +201,11 @@ def _elastic_contact_energy(contact, work):
             for i in range(work.counts[k, wheel]):
                 row = work.patches[k, wheel, i]
                 delta = row[reduction.PENETRATION]
-                force = normal_contact(contact, delta, row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], 0.0)[0]
+                if contact.strips.strips > 0:  # no potential is known: that of an ellipse under the same force
+                    force = row[reduction.NORMAL]
+                else:
+                    curvatures = row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y]
+                    force = normal_contact(contact, delta, curvatures[0], curvatures[1], 0.0)[0]
                 energy += 0.4 * force * delta
     return energy
 

@@ -159,6 +159,7 @@ def integrate(
         Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy()),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
+        int(work.counters[2]),
     )  # fmt: skip
 
 

@@ -53,8 +53,8 @@ class Trajectory:
     steps, rejected, rhs_evaluations, jacobians, factorisations : int
         Accepted steps, rejected attempts, right-hand sides in all (those of Jacobians, too), refreshed Jacobians and
         factorised matrices.
-    out_of_range : int
-        Creep look-ups out of range.
+    out_of_range, on_grid : int
+        Creep look-ups out of range; patches that strips did not solve and a grid did.
     smallest_step : float
         Smallest accepted step, s.
     wall_s : float
@@ -87,6 +87,7 @@ class Trajectory:
     end_t: float = np.nan
     end_state: np.ndarray | None = None
     collapses: int = 0
+    on_grid: int = 0
 
 
 def derailment(model, t, state, arc_lengths, limit=-1.0):

@@ -52,6 +52,7 @@ DESCRIPTIONS = {
     "xi": "longitudinal creepage, wheel relative to rail",
     "eta": "lateral creepage, wheel relative to rail",
     "phi_per_m": "spin creepage, wheel relative to rail",
+    "p_max_Pa": "greatest pressure in the patch",
     "kinetic_J": "kinetic energy of all bodies",
     "gravitational_J": "gravitational energy of all bodies, from z = 0",
     "springs_J": "energy of all springs, those in series with dampers too, from nominal position",

@@ -144,7 +144,7 @@ class Course:
             "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
             "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
             "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses,
-            "table_out_of_range": trajectory.out_of_range,
+            "table_out_of_range": trajectory.out_of_range, "patches_on_grid": trajectory.on_grid,
             "wall_s": trajectory.wall_s, "compile_s": compiled,
             "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
         }  # fmt: skip
@@ -179,6 +179,8 @@ class Course:
                 k = int(np.flatnonzero(wheelsets == body)[0])
                 for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
                     groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+                    if model.contact.strips.strips:
+                        groups[f"{name}/{side}"]["p_max_Pa"] = rows[..., reduction.P_MAX]
                 if scene.detection == "auto":
                     groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
                     spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
