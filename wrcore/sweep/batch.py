@@ -76,7 +76,7 @@ class _Outcome(NamedTuple):
 
 
 class _Series:
-    """Equations of motion that a thread uses again for all runs with the same parts; looks up the wheels' kernel only."""
+    """Equations of motion that a thread uses again for all runs with the same parts; finds the wheels' kernel anew."""
 
     def __init__(self, model: Model) -> None:
         self.equations = Equations(model)
