@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
+from study.paper.tables import rigid_contact
 from tests.conftest import DATA
 from wrcore.contact.conicity import conicity_curve, en15302_tolerance, equivalent_conicity
 from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack, first_touch
-from wrcore.contact.poses import geometry_table
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -196,9 +196,9 @@ def test_rolling_radius_difference_of_the_benchmark(manchester):
 
 
 def test_agrees_with_the_lightly_loaded_search(manchester, benchmark_pair):
-    """geometry_table presses with 1 mN and detects patches by another search; its contact moves by < 10 um."""
+    """rigid_contact presses with 1 mN and detects patches by another search; its contact moves by < 10 um."""
     y = np.array([-5.5e-3, -2e-3, 1e-3, 3e-3, 5e-3, 7e-3])
-    ours, other = first_touch(manchester, y), geometry_table(benchmark_pair, y)
+    ours, other = first_touch(manchester, y), rigid_contact(benchmark_pair, y)
     assert ours.roll_rad.to_numpy() == pytest.approx(other.roll_rad.to_numpy(), abs=1e-4)
     for side in ("left", "right"):
         angles = ours[f"contact_angle_{side}_rad"].to_numpy(), other[f"{side}_contact_angle_rad"].to_numpy()

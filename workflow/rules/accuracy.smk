@@ -101,7 +101,7 @@ rule claims:
     input:
         core=CORE["accuracy_figures"],
         contact=rules.contact_reductions.output.cases,
-        creep=rules.creep_errors.output,
+        creep=rules.creep_errors.output[0],
         front="wrcore/run/accuracy_front.csv",
     output:
         table="<results>/accuracy/claims.csv",

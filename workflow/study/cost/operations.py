@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from wrcore.dynamics import wheel
 from wrcore.dynamics.system import workspace
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
@@ -228,6 +229,11 @@ def _registers(tally):
     }
 
 
+def _call_wheels(_, *arguments):
+    """Stands in for the call of the wheels' kernel by its address: wheels on ellipses."""
+    wheel.wheel_wrenches(*arguments)
+
+
 @contextmanager
 def interpreted(tally):
     """Kernels run by Python, their stages told apart, until the block ends."""
@@ -244,6 +250,8 @@ def interpreted(tally):
                 new = mathematics
             elif name in registers and getattr(value, "__module__", "") == "wrcore.kernels.lanes":
                 new = registers[name]
+            elif (module.__name__, name) == ("wrcore.dynamics.system", "call_address"):
+                new = _call_wheels
             elif name == "rarely_called":
                 new = lambda: None  # noqa: E731
             if (module.__name__, name) in WHERE:
