@@ -16,8 +16,8 @@ import wrcore as wr
 from tests.conftest import ROOT, SCENES
 
 DOCUMENTED = (
-    "analysis.contact", "creep.cases", "run.channels", "run.progress", "run.results", "run.run", "run.simulate",
-    "scene.description", "sweep.batch", "sweep.plan",
+    "analysis.contact", "analysis.patch", "creep.cases", "run.channels", "run.progress", "run.results", "run.run",
+    "run.simulate", "scene.description", "sweep.batch", "sweep.plan",
 )  # fmt: skip
 """Modules with runnable examples; each must have some."""
 

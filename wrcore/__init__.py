@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from wrcore.analysis.contact import contact_table as contact_table
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
+    from wrcore.analysis.patch import patch as patch
     from wrcore.analysis.plot_contact import plot_pair as plot_pair
     from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
     from wrcore.analysis.plot_run import plot_run as plot_run
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from wrcore.contact.conicity import conicity_curve as conicity_curve
     from wrcore.contact.first_touch import WheelsetOnTrack as WheelsetOnTrack
     from wrcore.contact.first_touch import first_touch as first_touch
+    from wrcore.contact.patch.result import Patch as Patch
     from wrcore.creep.cases import creep_force as creep_force
     from wrcore.creep.halfspace import RollingContact as RollingContact
     from wrcore.creep.table import CreepTable as CreepTable
@@ -57,6 +59,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "InputError": "wrcore.errors",
     "CreepTable": "wrcore.creep.table",
+    "Patch": "wrcore.contact.patch.result",
     "RollingContact": "wrcore.creep.halfspace",
     "Run": "wrcore.run.run",
     "Scene": "wrcore.scene.description",
@@ -76,6 +79,7 @@ _PUBLIC = {
     "load_sweep": "wrcore.sweep.plan",
     "modes": "wrcore.analysis.stability",
     "named_profile": "wrcore.geometry.standards",
+    "patch": "wrcore.analysis.patch",
     "plot_creep_force": "wrcore.analysis.plot_creep",
     "plot_pair": "wrcore.analysis.plot_contact",
     "plot_run": "wrcore.analysis.plot_run",

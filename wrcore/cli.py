@@ -16,6 +16,15 @@ from wrcore import __version__
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing, try_out
 
+_CONTACT = """
+Patches of both wheels for each pose of IN.csv: pose_id, y_m, yaw_rad and, optionally, roll_rad, z_m. z given: forces at
+that height; only roll given: each wheel carries the load by itself; neither: both are solved. Roll turns the wheelset
+about x first, then yaw about z. Optional motion: V_m_per_s, omega_rad_per_s (rolling rate, positive forward; empty:
+free rolling), vy_m_per_s, yaw_rate_rad_per_s, mu; creep forces act where V is given. In OUT.csv x, y, z, x_min_m and
+x_max_m count in the track frame (x from the wheelset's cross-section), width_m in the contact plane; creepages, forces
+on the wheel and Mz refer to the point x, y, z, of strips the centroid of pressure.
+"""
+
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message):
@@ -90,7 +99,7 @@ def _add_sweep(commands):
 
 
 def _add_contact(commands):
-    command = commands.add_parser("contact", help="static contact of a wheelset in given poses")
+    command = commands.add_parser("contact", help="contact of a wheelset in given poses", description=_CONTACT)
     command.add_argument("--poses", required=True, metavar="IN.csv")
     command.add_argument("--wheel", required=True, metavar="NAME|FILE")
     command.add_argument("--rail", required=True, metavar="NAME|FILE")
@@ -101,7 +110,22 @@ def _add_contact(commands):
     command.add_argument("--shear-modulus", type=float, default=8.2e10, metavar="Pa")
     command.add_argument("--poisson-ratio", type=float, default=0.28)
     command.add_argument("--detection", choices=("planar", "spatial"), default="spatial")
-    command.add_argument("--patch", choices=("maximum", "moment"), default="moment", help="reduction of an overlap")
+    command.add_argument(
+        "--patch", choices=("maximum", "moment", "strips", "exact", "grid"), default="moment",
+        help="reduction of an overlap to an ellipse, or the real patch",
+    )  # fmt: skip
+    command.add_argument(
+        "--resolution", choices=("coarse", "middle", "fine"), default="fine", help="of strips and grids"
+    )
+    command.add_argument(
+        "--slip", choices=("surfaces", "creepages"), default="surfaces",
+        help="rigid slip of strips and grids: of the real surfaces, or of one set of creepages per patch",
+    )  # fmt: skip
+    command.add_argument(
+        "--load-by", choices=("vertical", "normal"), default="vertical",
+        help="the load is the vertical sum of all forces on a wheel, or the sum of its normal forces",
+    )  # fmt: skip
+    command.add_argument("--friction", type=float, default=0.3, metavar="mu", help="where a pose gives none")
     command.add_argument("--wheel-load", type=float, required=True, metavar="N")
     command.add_argument("--out", required=True, metavar="OUT.csv")
     command.set_defaults(run=_contact)
@@ -282,8 +306,9 @@ def _batch(text, runs):
 
 
 def _contact(options):
+    from wrcore.analysis.poses import loaded_poses
     from wrcore.contact.geometry import contact_geometry
-    from wrcore.contact.poses import read_poses, solve_poses
+    from wrcore.contact.poses import read_poses
     from wrcore.geometry.standards import named_profile
     from wrcore.geometry.track import Track
 
@@ -294,15 +319,18 @@ def _contact(options):
     geometry = contact_geometry(
         wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
     )
-    table = solve_poses(
-        poses, geometry, options.wheel_load, options.detection, options.patch, options.shear_modulus,
-        options.poisson_ratio,
+    table = loaded_poses(
+        poses, geometry, options.wheel_load, options.patch, options.resolution, options.slip, options.load_by,
+        options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
     )  # fmt: skip
     if table.empty:
         raise InputError(options.poses, "", "expected a pose in which a wheel touches its rail, got none")
     _write_csv(table, out)
     missing = len(set(poses.pose_id) - set(table.pose_id))
-    print(f"{len(poses)} poses, {len(table)} patches{f', {missing} poses without contact' if missing else ''}: {out}")
+    remarks = f", {missing} poses without contact" if missing else ""
+    if options.patch != "grid" and table.attrs["on_grid"]:
+        remarks += f", {table.attrs['on_grid']} patches by the grid"
+    print(f"{len(poses)} poses, {len(table)} patches{remarks}: {out}")
     return 0
 
 

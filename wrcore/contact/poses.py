@@ -19,17 +19,27 @@ PATCH_FIELDS = {
 """Columns of the result and of the patch array."""
 
 
+POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0}
+MOTION_LIMITS = {"V_m_per_s": 200.0, "omega_rad_per_s": 4e3, "vy_m_per_s": 200.0, "yaw_rate_rad_per_s": 1e3, "mu": 2.0}
+"""Columns of poses and of their motion, and the greatest value that is taken for the unit."""
+
+_NOT_NEGATIVE = ("V_m_per_s", "mu")
+_WANTED = ("pose_id", "y_m", "yaw_rad")
+
+
 def read_poses(path):
     """Read and check a CSV file of poses.
 
     Parameters
     ----------
     path : str or Path
-        Columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m; an empty cell counts as not given.
+        Columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m, and of the motion V_m_per_s, omega_rad_per_s,
+        vy_m_per_s, yaw_rate_rad_per_s, mu; an empty cell counts as not given.
 
     Returns
     -------
     pandas.DataFrame
+        With all of these columns; NaN for what is not given.
 
     Raises
     ------
@@ -39,31 +49,40 @@ def read_poses(path):
     import pandas as pd
 
     frame = read_csv_table(path, "pose_id")
-    known = ("pose_id", "y_m", "yaw_rad", "roll_rad", "z_m")
-    for name in known[:3]:
+    limits = POSE_LIMITS | MOTION_LIMITS
+    known = ("pose_id", *limits)
+    for name in _WANTED:
         if name not in frame:
             raise InputError(path, name, f"expected this column; found {', '.join(map(str, frame.columns))}")
+    own = {name.split("_")[0].lower() for name in limits}
     for name in frame.columns:  # other columns are left alone, but not a pose in another unit or spelling
-        if name not in known and str(name).split("_")[0].strip().lower() in ("y", "yaw", "roll", "z"):
+        if name not in known and str(name).split("_")[0].strip().lower() in own:
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
     if frame.empty:
         raise InputError(path, "", "expected at least one pose, got none")
-    for name, limit in (("y_m", 0.1), ("yaw_rad", 0.5), ("roll_rad", 0.5), ("z_m", 2.0)):
+    for name, limit in limits.items():
         if name not in frame:
             frame[name] = np.nan
             continue
         values = pd.to_numeric(frame[name], errors="coerce")
         empty = frame[name].isna()
-        bad = (values.isna() & ~empty) | (values.abs() > limit) | (empty & (name in known[:3]))
-        if bad.any():
-            row = int(np.argmax(bad.to_numpy()))
-            raise InputError(
-                path,
-                f"{name}, row {row + 1}",
-                f"expected a number within {limit:g}, got {str(frame[name].iloc[row])!r}",
-            )
+        bad = (values.isna() & ~empty) | (values.abs() > limit) | (empty & (name in _WANTED))
+        expected = f"a number within {limit:g}"
+        if name in _NOT_NEGATIVE:
+            bad, expected = bad | (values < 0.0), f"0 to {limit:g}"
+        _refuse(path, frame, name, bad, expected)
         frame[name] = values
+    still = frame["V_m_per_s"].isna() | (frame["V_m_per_s"] == 0.0)
+    moves = frame[["omega_rad_per_s", "vy_m_per_s", "yaw_rate_rad_per_s"]].fillna(0.0).ne(0.0).any(axis=1)
+    _refuse(path, frame, "V_m_per_s", still & moves, "a speed above 0 where the wheelset moves")
     return frame
+
+
+def _refuse(path, frame, name, bad, expected):
+    """Name the first row that is bad."""
+    if bad.any():
+        row = int(np.argmax(bad.to_numpy()))
+        raise InputError(path, f"{name}, row {row + 1}", f"expected {expected}, got {str(frame[name].iloc[row])!r}")
 
 
 def solve_poses(

@@ -40,6 +40,9 @@ NODE_ROWS = 5
 GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, U, UR = range(9)
 GAP_ROWS = 9
 
+_ANGLE_NODES = 32
+"""Nodes over half of each overlap for the mean contact angle, over its half width; as many again where it goes on."""
+
 _PROBE = 2e-5
 """Step in u for the rates of A and x_c, m."""
 
@@ -70,7 +73,11 @@ def group_end(patches, count, first):
 
 @jit(allocates=False)
 def frame_of_overlaps(geometry, pose, patches, first, last):
-    """Contact frame of the overlaps from ``first`` to before ``last``, at the lateral mean of g^2 over all of them."""
+    """Contact frame of the overlaps from ``first`` to before ``last``, at the lateral mean of g^2 over all of them.
+
+    Its angle is the mean of that of the surfaces over g^2.5, which is g^2 over the overlap's area. Where a patch has
+    two lobes the angle at the mean place is off by up to 18 mrad, and spin and lateral force with it.
+    """
     weight = mean = 0.0
     for k in range(first, last):
         row = patches[k]
@@ -83,10 +90,37 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
     u = mean / weight
     ur, _, radius, slope, _, along = strip_point(geometry, pose, u)
     f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
-    both = 0.5 * (wheel_slope(pose, slope, along) + df)
-    cosine = 1.0 / math.sqrt(1.0 + both * both)
+    angle = _mean_angle(geometry, pose, patches, first, last, math.atan(0.5 * (wheel_slope(pose, slope, along) + df)))
     x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
-    return Frame(cosine, both * cosine, x, ur, f, u)
+    return Frame(math.cos(angle), math.sin(angle), x, ur, f, u)
+
+
+@jit(allocates=False)
+def _mean_angle(geometry, pose, patches, first, last, otherwise):
+    """Mean of the angle of wheel and rail over the overlaps, rad."""
+    weight = mean = 0.0
+    for k in range(first, last):
+        row = patches[k]
+        slope = gap_at(geometry, pose, row[U_WHEEL])[1]
+        width = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
+        low = 0.5 * (row[U_WHEEL] + patches[k - 1, U_WHEEL]) if k > first else -1e9
+        high = 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL]) if k + 1 < last else 1e9
+        for direction in (-1.0, 1.0):
+            step = direction * _REACH * width / _ANGLE_NODES
+            for i in range(2 * _ANGLE_NODES):
+                u = row[U_WHEEL] + (i + 0.5) * step
+                ur, z, _, slope, _, along = strip_point(geometry, pose, u)
+                f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+                depth = f - z
+                if not low < u < high or (i >= _ANGLE_NODES and depth <= 0.0):
+                    break
+                if depth > 0.0:
+                    both = 0.5 * (wheel_slope(pose, slope, along) + df)
+                    depth /= math.sqrt(1.0 + both * both)
+                    share = depth * depth * math.sqrt(depth) * width
+                    weight += share
+                    mean += share * math.atan(both)
+    return mean / weight if weight > 0.0 else otherwise
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

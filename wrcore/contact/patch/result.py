@@ -41,6 +41,12 @@ class Patch:
     friction : float
     side : str
         left, right or empty.
+    peak : float
+        Greatest pressure, Pa, where it is known better than from the cells; else NaN.
+    ends : tuple of float
+        x_min, x_max, s_min, s_max, m, where they are known better than from the cells; else empty.
+    pose : tuple of float
+        y, z (m), roll and yaw (rad) of the wheelset; may be empty.
     """
 
     x: np.ndarray = field(repr=False)
@@ -64,6 +70,9 @@ class Patch:
     origin: tuple
     friction: float
     side: str = ""
+    peak: float = math.nan
+    ends: tuple = ()
+    pose: tuple = ()
 
     @property
     def cell_area(self):
@@ -77,8 +86,8 @@ class Patch:
 
     @property
     def p_max(self):
-        """Greatest mean pressure of a cell, Pa."""
-        return float(self.pressure.max(initial=0.0))
+        """Greatest pressure, Pa; of a grid: the greatest mean of a cell."""
+        return float(self.pressure.max(initial=0.0)) if math.isnan(self.peak) else self.peak
 
     @property
     def area(self):
@@ -98,6 +107,8 @@ class Patch:
     @property
     def extent(self):
         """x_min, x_max, s_min, s_max, m: outer edges of cells with pressure; NaN without contact."""
+        if self.ends:
+            return self.ends
         at = self.touching
         if not at.any():
             return (math.nan,) * 4

@@ -1,0 +1,455 @@
+"""A loaded wheel on its rail, at a height or under a load, by any patch model: ellipses, strips or a grid.
+
+A wheelset rolls with the speed V along the track and omega about its axle, moves sideways and turns; all of it is
+optional. Without a motion a patch carries its normal force alone. Without omega the wheel rolls freely: the mean of its
+longitudinal rigid slip over the pressure of all its patches vanishes.
+"""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.contact import reduction as columns
+from wrcore.contact.creepage import creepages
+from wrcore.contact.detection import axle_direction, find_patches
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.patch.gap import group_end
+from wrcore.contact.patch.library import make_library, solve_patch
+from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS
+from wrcore.contact.patch.normal import NormalContact, height_of_zero
+from wrcore.contact.patch.reference import FINE, solve_on_grids
+from wrcore.contact.patch.result import Patch
+from wrcore.contact.patch.surfaces import Motion, contact_plane
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
+from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle, wheel_at_rest
+from wrcore.contact.strip import make_pose
+from wrcore.creep.laws import LAWS, creep_data, creep_force_at
+from wrcore.creep.table import ensure_table
+from wrcore.errors import InputError, check_number
+from wrcore.geometry.surface import SIDES
+
+MODELS = (*PATCHES, "grid")
+
+GRIDS = {"coarse": ((32, 24),), "middle": ((32, 24), (40, 32)), "fine": FINE}
+"""Grids of each resolution (elements along x, across)."""
+
+SLENDER = 3.0
+"""Length over width from which strips get more panels along rolling, as in runs."""
+
+_CARRIED = 1e-9
+"""Relative error of F^(2/3) that ends the search for a height."""
+
+_LEVEL = 1e-10
+"""Step in roll that ends the search for it, rad."""
+
+_MOST_ROLLS = 25
+
+
+class Rolling(NamedTuple):
+    """Motion of a wheelset: speed V > 0 and lateral velocity (m/s), rates of rolling (NaN: free) and yaw (rad/s)."""
+
+    speed: float
+    rate: float = math.nan
+    vy: float = 0.0
+    yaw_rate: float = 0.0
+
+    def motion(self, roll, yaw, rate=None):
+        """`Motion` of a wheelset in a pose."""
+        rate = self.rate if rate is None else rate
+        wx, wy, wz = (rate * c for c in axle_direction(roll, yaw))
+        return Motion(self.speed, self.vy, 0.0, wx, wy, wz + self.yaw_rate, self.speed)
+
+    def per_rate(self, roll, yaw):
+        """What one rad/s about the axle adds to that motion."""
+        return Motion(0.0, 0.0, 0.0, *axle_direction(roll, yaw), self.speed)
+
+
+class Found(NamedTuple):
+    """One patch of a wheel."""
+
+    row: np.ndarray
+    """(PATCH_COLUMNS,) as in runs; point, creepages and moment refer to the pressure's centroid, the coordinates of the
+    profiles to the deepest overlap. Creepages are means of the rigid slip over the pressure; NaN without a motion."""
+    extent: tuple
+    """x_min, x_max (from the wheelset's cross-section) and width in the contact plane, m."""
+    patch: Patch = None
+    """With its fields, where the model has them and they were asked for."""
+    on_grid: bool = False
+
+    @property
+    def vertical(self):
+        """Force upwards on the wheel, N."""
+        angle = self.row[columns.ANGLE]
+        return self.row[columns.NORMAL] * math.cos(angle) + self.row[columns.FY] * math.sin(angle)
+
+
+class LoadedWheels:
+    """Wheels of a wheelset by one patch model; see `loaded_wheels`."""
+
+    reduction = MOMENT
+
+    def __init__(self, geometry, shear_modulus=8.2e10, poisson_ratio=0.28, detection="spatial"):
+        check_number(shear_modulus, 1e9, 1e12, "contact", "shear_modulus", "Pa")
+        check_number(poisson_ratio, 0.0, 0.5, "contact", "poisson_ratio")
+        if detection not in ("planar", "spatial"):
+            raise InputError("detection", "", f"expected planar or spatial, got {detection!r}")
+        self.geometry, self.shear_modulus, self.poisson_ratio = geometry, float(shear_modulus), float(poisson_ratio)
+        self.modulus, self.detection = contact_modulus(self.shear_modulus, self.poisson_ratio), detection
+        self.spatial, self._hertz = detection == "spatial", hertz_table()
+        self._rows = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
+
+    def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
+        """Patches of one wheel in a pose.
+
+        Parameters
+        ----------
+        side : {"left", "right"}
+        y, z, roll, yaw : float
+            Of the wheelset, m and rad; roll first, then yaw about the vertical.
+        rolling : Rolling, optional
+            Without, the wheel stands and there are no creep forces.
+        friction : float
+        fields : bool
+            Give a `Patch` with its fields, too.
+
+        Returns
+        -------
+        list of Found
+            From the flange to the field side.
+        """
+        raise NotImplementedError
+
+    def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
+        """Height of the wheelset at which one wheel carries a load.
+
+        Parameters
+        ----------
+        load : float
+            N: of all forces vertically, or of the normal forces.
+        vertical : bool
+        guess : float
+            m.
+
+        Returns
+        -------
+        float
+            m; NaN where there is none.
+        """
+        goal = load ** (2.0 / 3.0)
+
+        def excess(z):
+            found = self.at_height(side, y, z, roll, yaw, rolling, friction)
+            force = sum(f.vertical if vertical else f.row[columns.NORMAL] for f in found)
+            rest = max(force, 0.0) ** (2.0 / 3.0) - goal
+            return 0.0 if abs(rest) < _CARRIED * goal else rest
+
+        if math.isnan(guess):
+            guess = self._still_height(side, y, load, roll, yaw)
+        return math.nan if math.isnan(guess) else height_of_zero(excess, guess)
+
+    def _still_height(self, side, y, load, roll, yaw):
+        """Height at which an ellipse carries a load vertically."""
+        return height_at_load(
+            self.geometry, self._hertz, self.modulus, SIDES[side], y, roll, yaw, self.spatial, self.reduction, load,
+            self.geometry.rolling_radius, self._rows,
+        )  # fmt: skip
+
+    def _still_settled(self, y, load, yaw):
+        """Roll and height at which ellipses carry a load each vertically."""
+        nominal = self.geometry.rolling_radius
+        return settle(
+            self.geometry, self._hertz, self.modulus, y, yaw, self.spatial, self.reduction, load, nominal
+        )  # fmt: skip
+
+    def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
+        """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
+        roll, z = self._still_settled(y, load, yaw)
+        if math.isnan(z):
+            return math.nan, math.nan
+        before = difference = math.nan
+        slope, left, right = ROLL_SLOPE, z, z
+        for _ in range(_MOST_ROLLS):
+            left = self.height("left", y, load, roll, yaw, rolling, friction, vertical, left)
+            right = self.height("right", y, load, roll, yaw, rolling, friction, vertical, right)
+            if roll != before and not math.isnan(before):
+                slope = (left - right - difference) / (roll - before)
+            difference, before = left - right, roll
+            step = difference / slope
+            if not abs(step) < 0.02:
+                break
+            if abs(step) < _LEVEL:
+                return roll, 0.5 * (left + right)
+            roll -= step
+            left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
+        return math.nan, math.nan
+
+
+class Ellipses(LoadedWheels):
+    """Overlaps reduced to ellipses, and the creep table."""
+
+    def __init__(self, geometry, reduction="moment", **options):
+        super().__init__(geometry, **options)
+        self.reduction = REDUCTIONS[reduction]
+
+    def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
+        """See `LoadedWheels.at_height`; there are no fields."""
+        rows = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
+        count, _ = wheel_at_rest(self.geometry, self._hertz, self.modulus, SIDES[side], y, z, roll, yaw, self.spatial,
+                                 self.reduction, rows)  # fmt: skip
+        rows = rows[:count]
+        rows[:, columns.XI : columns.PHI + 1] = np.nan
+        if rolling is not None and count:
+            self._roll(rows, y, z, roll, yaw, rolling, friction)
+        for row in rows:
+            row[columns.P_MAX] = 1.5 * row[columns.NORMAL] / (math.pi * row[columns.SEMI_A] * row[columns.SEMI_B])
+        ends = ((r[columns.X] - r[columns.SEMI_A], r[columns.X] + r[columns.SEMI_A], 2 * r[columns.SEMI_B])
+                for r in rows)  # fmt: skip
+        return [Found(row, tuple(map(float, end))) for row, end in zip(rows, ends, strict=True)]
+
+    def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
+        """See `LoadedWheels.height`."""
+        if rolling is None and vertical:
+            return self._still_height(side, y, load, roll, yaw)
+        return super().height(side, y, load, roll, yaw, rolling, friction, vertical, guess)
+
+    def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
+        """See `LoadedWheels.settled`."""
+        if rolling is None and vertical:
+            return self._still_settled(y, load, yaw)
+        return super().settled(y, load, yaw, rolling, friction, vertical)
+
+    def _roll(self, rows, y, z, roll, yaw, rolling, friction):
+        """Creepages and creep forces of ellipses."""
+        places = [(r[columns.X], r[columns.Y] - y, r[columns.Z] - z, math.cos(r[columns.ANGLE]),
+                   math.sin(r[columns.ANGLE])) for r in rows]  # fmt: skip
+
+        def at(motion):
+            return np.array([creepages(*motion[:6], *place, motion.speed)[:3] for place in places])
+
+        found = _free(at, rolling, roll, yaw, lambda creeps: rows[:, columns.NORMAL] @ creeps[:, 0])
+        for row, creep in zip(rows, found, strict=True):
+            row[columns.XI : columns.PHI + 1] = creep
+            row[columns.FX : columns.MZ + 1] = creep_by_table(
+                row[columns.SEMI_A], row[columns.SEMI_B], row[columns.NORMAL], *creep, friction, self.shear_modulus,
+                self.poisson_ratio,
+            )  # fmt: skip
+
+
+class Strips(LoadedWheels):
+    """Strips, exact or by virtual penetration with the creep table; a grid where strips find no solution, or always."""
+
+    def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", **options):
+        super().__init__(geometry, **options)
+        for name, value, known in (("resolution", resolution, RESOLUTIONS), ("slip", slip, SLIPS)):
+            if value not in known:
+                raise InputError("contact", name, f"expected one of {', '.join(known)}, got {value!r}")
+        self.resolution, self.surfaces, self.always = resolution, slip == "surfaces", model == "grid"
+        self.exact, self.grids = model != "strips", GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
+        arguments = geometry, self.modulus, resolution
+        self._contact = NormalContact(*arguments, "exact" if self.exact else "strips", self.detection)
+        self._rough = NormalContact(*arguments, "strips", self.detection)
+
+    def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
+        """See `LoadedWheels.at_height`."""
+        pose = side, y, z, roll, yaw
+        shapes = self._contact.at_height(*pose)
+        if not shapes:
+            return []
+        solved = [shape.converged for shape in shapes]
+        if not all(solved):  # these stand in for the pressure in the mean slip
+            rough = self._rough.at_height(*pose)
+            shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
+        motion, slips = None, [np.zeros((4, len(shape.centre))) for shape in shapes]
+        if rolling is not None:
+            at = lambda motion: self._slips(pose, motion, solved)  # noqa: E731
+            loads = [_loads(shape) for shape in shapes]
+            mean = lambda slips: sum(load @ slip[0] for load, slip in zip(loads, slips, strict=True))  # noqa: E731
+            slips, rate = _free_rate(at, rolling, roll, yaw, mean)
+            motion = rolling.motion(roll, yaw, rate)
+        rows = self._overlaps(*pose)
+        found = []
+        for shape, slip, row, good in zip(shapes, slips, rows, solved, strict=True):
+            if self.always or not good:
+                found.append(self._on_grid(shape, slip, row, pose, motion, friction))
+            else:
+                found.append(self._on_strips(shape, slip, row, pose, rolling is not None, friction, fields))
+        return found
+
+    def _slips(self, pose, motion, solved):
+        """Rigid slip of every patch, (4, strips) each."""
+        shapes = self._contact.at_height(*pose, motion)
+        if not all(solved):
+            rough = self._rough.at_height(*pose, motion)
+            shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
+        if self.surfaces:
+            return [np.array([s.slip_x, s.slip_x_dx, s.slip_s, s.slip_s_dx]) for s in shapes]
+        return [shape.slip_of_creepages(*self._creepages(shape, pose, motion)) for shape in shapes]
+
+    @staticmethod
+    def _creepages(shape, pose, motion):
+        """Of the frame's origin."""
+        (x, y, z), angle = shape.origin, shape.contact_angle
+        return creepages(*motion[:6], x, y - pose[1], z - pose[2], math.cos(angle), math.sin(angle), motion.speed)[:3]
+
+    def _overlaps(self, side, y, z, roll, yaw):
+        """Row of the deepest overlap of each group of them that is one patch."""
+        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+        count = find_patches(self.geometry, SIDES[side], y, z, *axle, self.spatial, MOMENT, self._rows)
+        first, deepest = 0, []
+        while first < count:
+            last = group_end(self._rows, count, first)
+            deepest.append(max(self._rows[first:last], key=lambda row: row[columns.PENETRATION]).copy())
+            first = last
+        return deepest
+
+    def _on_strips(self, shape, slip, row, pose, rolls, friction, fields):
+        """`Found` of a patch that strips have solved."""
+        mean_x, mean_s, creep = shape.mean_x, shape.mean_s, _mean_creepages(shape, slip)
+        a, b = (math.sqrt(5.0 * max(square - mean * mean, 1e-14))
+                for square, mean in ((shape.mean_xx, mean_x), (shape.mean_ss, mean_s)))  # fmt: skip
+        field, force = None, (0.0, 0.0, 0.0)
+        level = "slender" if a > SLENDER * b else self.resolution
+        if self.exact and (rolls or fields):
+            field = solve_patch(
+                (shape.centre, shape.width, shape.half_length, shape.middle, shape.peak), slip, self.shear_modulus,
+                friction, level, self.poisson_ratio,
+            )  # fmt: skip
+            force = field.Fx, field.Fs, field.Mn + mean_s * field.Fx - mean_x * field.Fs
+        elif rolls:
+            force = creep_by_table(a, b, shape.normal_force, *creep, friction, self.shear_modulus, self.poisson_ratio)
+        angle = shape.contact_angle
+        point = shape.origin[0] + mean_x, shape.origin[1] + mean_s * math.cos(angle)
+        point = *point, shape.origin[2] + mean_s * math.sin(angle)
+        _fill(row, point, angle, (a, b), shape.normal_force, force, creep if rolls else (math.nan,) * 3, shape.p_max)
+        extent = shape.origin[0] + shape.x_min, shape.origin[0] + shape.x_max, shape.s_max - shape.s_min
+        patch = None
+        if fields and field is not None:
+            panels = make_library(level, self.poisson_ratio).panels
+            patch = _patch_of_strips(shape, field, panels, row, friction, pose)
+        return Found(row, extent, patch)
+
+    def _on_grid(self, shape, slip, row, pose, motion, friction):
+        """`Found` of a patch on grids, in the plane of its strips."""
+        side, y, z, roll, yaw = pose
+        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+        rigid = (0.0, 0.0, 0.0)
+        if motion is not None:
+            rigid = motion if self.surfaces else self._creepages(shape, pose, motion)
+        solved = solve_on_grids(
+            self.geometry, make_pose(SIDES[side], y, z, *axle, self.spatial),
+            contact_plane(*shape.origin, shape.contact_angle), rigid, friction, self.shear_modulus, self.poisson_ratio,
+            self.grids,
+        )  # fmt: skip
+        patch = replace(solved, pose=(y, z, roll, yaw))
+        mean_x, mean_s = patch.centroid
+        load = patch.pressure * patch.cell_area
+        axes = (math.sqrt(5.0 * max(load @ (q - mean) ** 2 / max(load.sum(), 1e-30), 1e-14))
+                for q, mean in ((patch.x, mean_x), (patch.s, mean_s)))  # fmt: skip
+        cosine, sine = math.cos(shape.contact_angle), math.sin(shape.contact_angle)
+        point = shape.origin[0] + mean_x, shape.origin[1] + mean_s * cosine, shape.origin[2] + mean_s * sine
+        force = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
+        _fill(row, point, shape.contact_angle, tuple(axes), patch.normal, force,
+              (math.nan,) * 3 if motion is None else _mean_creepages(shape, slip), patch.p_max)  # fmt: skip
+        x_min, x_max, s_min, s_max = patch.extent
+        return Found(row, (shape.origin[0] + x_min, shape.origin[0] + x_max, s_max - s_min), patch, True)
+
+
+def loaded_wheels(geometry, model="exact", resolution="middle", slip="surfaces", **options):
+    """Wheels of a wheelset by a patch model.
+
+    Parameters
+    ----------
+    geometry : ContactGeometry
+    model : {"maximum", "moment", "strips", "exact", "grid"}
+    resolution : {"coarse", "middle", "fine"}
+        Of strips and grids.
+    slip : {"surfaces", "creepages"}
+        Rigid slip of strips and grids: of the real surfaces, or of one set of creepages per patch.
+    **options
+        shear_modulus (Pa), poisson_ratio, detection.
+
+    Returns
+    -------
+    LoadedWheels
+
+    Raises
+    ------
+    InputError
+        For an unknown choice, or a number in another unit.
+    """
+    if model not in MODELS:
+        raise InputError("patch", "", f"expected one of {', '.join(MODELS)}, got {model!r}")
+    if model in REDUCTIONS:
+        return Ellipses(geometry, model, **options)
+    return Strips(geometry, model, resolution, slip, **options)
+
+
+def creep_by_table(a, b, normal, xi, eta, phi, friction, shear_modulus, poisson_ratio):
+    """Fx, Fy (N) and Mz (N m) on the wheel of an ellipse, by the default creep table."""
+    limit, c = friction * normal, math.sqrt(a * b)
+    if not limit > 0.0:
+        return 0.0, 0.0, 0.0
+    scale = shear_modulus * c * c / limit
+    fx, fy, mz, _ = creep_force_at(LAWS["table"], _table(poisson_ratio), math.log(a / b), a / b, 0.0, xi * scale,
+                                   eta * scale, phi * scale * c)  # fmt: skip
+    return limit * fx, limit * fy, limit * c * mz
+
+
+@lru_cache(maxsize=4)
+def _table(nu):
+    return creep_data(nu, ensure_table(nu).kernel_data())
+
+
+def _free_rate(at, rolling, roll, yaw, mean):
+    """Slip at the rolling rate, or where none is given at the one without a mean; and the rate."""
+    if not math.isnan(rolling.rate):
+        return at(rolling.motion(roll, yaw)), rolling.rate
+    still, turning = at(rolling.motion(roll, yaw, 0.0)), at(rolling.per_rate(roll, yaw))
+    rate = -mean(still) / mean(turning)
+    return [one + rate * other for one, other in zip(still, turning, strict=True)], rate
+
+
+def _free(at, rolling, roll, yaw, mean):
+    """Creepages (n, 3) by `_free_rate`."""
+    return np.array(_free_rate(at, rolling, roll, yaw, lambda rows: mean(np.asarray(rows)))[0])
+
+
+def _loads(shape):
+    """Normal force of each strip, N."""
+    return 0.5 * math.pi * shape.peak * shape.half_length * shape.width
+
+
+def _mean_creepages(shape, slip):
+    """Longitudinal, lateral and spin creepage at the pressure's centroid: means of the rigid slip."""
+    share = _loads(shape) / _loads(shape).sum()
+    return share @ slip[0], share @ (slip[2] + slip[3] * (shape.mean_x - shape.middle)), share @ slip[3]
+
+
+def _fill(row, point, angle, axes, normal, force, creep, p_max):
+    """Put a patch's results into its row."""
+    row[columns.X], row[columns.Y], row[columns.Z] = point
+    row[columns.ANGLE], row[columns.NORMAL], row[columns.P_MAX] = angle, normal, p_max
+    row[columns.SEMI_A], row[columns.SEMI_B] = axes
+    row[columns.FX : columns.MZ + 1], row[columns.XI : columns.PHI + 1] = force, creep
+
+
+def _patch_of_strips(shape, field, panels, row, friction, pose):
+    """`Patch` of strips, their panels as cells, about the pressure's centroid."""
+    edges = shape.middle[:, None] + shape.half_length[:, None] * panels.edges
+    like = np.ones(edges[:, 1:].shape)
+    mean_x, mean_s = shape.mean_x, shape.mean_s
+    cells = (
+        0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, like * (shape.centre - mean_s)[:, None],
+        edges[:, :-1] - edges[:, 1:], like * shape.width[:, None],
+        field.pressure, field.traction_x, field.traction_s,
+        np.where(field.slides, field.slip_x, 0.0), np.where(field.slides, field.slip_s, 0.0), ~field.slides,
+    )  # fmt: skip
+    ends = shape.x_min - mean_x, shape.x_max - mean_x, shape.s_min - mean_s, shape.s_max - mean_s
+    return Patch(
+        *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
+        *map(float, row[columns.XI : columns.PHI + 1]), shape.contact_angle,
+        tuple(map(float, row[[columns.X, columns.Y, columns.Z]])), friction, pose[0], shape.p_max, ends, pose[1:],
+    )  # fmt: skip

@@ -1,0 +1,114 @@
+"""The real contact patch of one wheel, with pressure, traction, slip and adhesion: ``wr.patch``."""
+
+import math
+
+from wrcore.analysis.contact import pair_geometry
+from wrcore.analysis.loaded import GRIDS, Rolling, Strips
+from wrcore.contact.first_touch import WheelsetOnTrack
+from wrcore.contact.geometry import contact_geometry
+from wrcore.errors import InputError, check_number
+from wrcore.geometry.surface import SIDES
+from wrcore.scene.description import load_scene
+
+METHODS = ("exact", "grid")
+
+
+def patch(
+    source, y=0.0, yaw=0.0, roll=None, z=None, load=None, side="left", speed=None, omega=None, vy=0.0, yaw_rate=0.0,
+    mu=None, method="exact", resolution="middle", slip="surfaces", load_by="vertical",
+):  # fmt: skip
+    """Contact patches of one wheel, solved on the real surfaces.
+
+    Parameters
+    ----------
+    source : Scene, str, Path, dict or WheelsetOnTrack
+        A scene lends its wheel, rail, gauge and material, and what is left out of load, speed and friction; a pair
+        (with equal sides) the profiles and their places alone.
+    y, yaw, roll, z : float
+        Pose of the wheelset, m and rad; roll first, then yaw about the vertical. z given: at that height (roll left
+        out: 0). Roll given, z not: the height at which this wheel carries the load. Neither: both wheels carry it.
+    load : float, optional
+        Of a wheel, N; a pair needs one unless z is given. Left out: the scene's first wheelset at rest.
+    side : {"left", "right"}
+    speed : float, optional
+        m/s; left out: the scene's, for a pair 1.
+    omega : float, optional
+        Rate of rolling, rad/s, positive forward; left out: that of free rolling, at which the longitudinal rigid slip
+        of this wheel has no mean over the pressure.
+    vy, yaw_rate : float
+        Of the wheelset, m/s and rad/s.
+    mu : float, optional
+        Coefficient of friction; left out: the scene's, for a pair 0.3.
+    method : {"exact", "grid"}
+        Strips (0.5 ms per solution), or a uniform grid (a second), their reference. Where strips find no solution the
+        grid takes over.
+    resolution : {"coarse", "middle", "fine"}
+    slip : {"surfaces", "creepages"}
+        Rigid slip of the real surfaces, or of one set of creepages per patch.
+    load_by : {"vertical", "normal"}
+        The load is the vertical sum of all forces, or that of the normal forces.
+
+    Returns
+    -------
+    list of Patch
+        From the flange to the field side, most often one; empty where the wheel does not touch. Each holds its forces
+        and fields, and draws itself: ``patches[0].plot()``.
+
+    Raises
+    ------
+    InputError
+        For an unknown choice, a number in another unit, or a load that no height gives.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> (tread,) = wr.patch(pair, y=0.003, load=5e4, omega=1 / 0.46)
+    >>> [round(1e-3 * force, 1) for force in (tread.normal, tread.fx, tread.fs)], tread.side
+    ([49.9, 9.9, 3.3], 'left')
+    """
+    for name, value, known in (("method", method, METHODS), ("side", side, SIDES), ("resolution", resolution, GRIDS),
+                               ("load_by", load_by, ("vertical", "normal"))):  # fmt: skip
+        if value not in known:
+            raise InputError("patch", name, f"expected one of {', '.join(known)}, got {value!r}")
+    geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source)
+    load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
+    numbers = {"y": (y, 0.1), "yaw": (yaw, 0.5), "roll": (roll, 0.5), "z": (z, 2.0), "omega": (omega, 4e3),
+               "vy": (vy, 200.0), "yaw_rate": (yaw_rate, 1e3)}  # fmt: skip
+    for name, (value, limit) in numbers.items():
+        if value is not None:
+            check_number(value, -limit, limit, "patch", name)
+    check_number(speed, 1e-6, 200.0, "patch", "speed", "m/s")
+    check_number(mu, 0.0, 2.0, "patch", "mu")
+    wheels = Strips(geometry, method, resolution, slip, **options)
+    rolling = Rolling(float(speed), math.nan if omega is None else float(omega), float(vy), float(yaw_rate))
+    how, vertical = {"rolling": rolling, "friction": float(mu)}, load_by == "vertical"
+    if z is None:
+        check_number(load, 1e-9, 1e6, "patch", "load", "N")
+        if roll is None:
+            roll, z = wheels.settled(y, load, yaw, vertical=vertical, **how)
+        else:
+            z = wheels.height(side, y, load, roll, yaw, vertical=vertical, **how)
+        if math.isnan(z):
+            raise InputError("patch", "load", f"expected a load that the wheel finds at y = {y:g} m, got {load:g} N")
+    found = wheels.at_height(side, y, z, roll or 0.0, yaw, fields=True, **how)
+    return [one.patch for one in found]
+
+
+def _of_pair(pair):
+    """Geometry, material and usual values of a pair."""
+    return pair_geometry(pair), {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
+
+
+def _of_scene(source):
+    """The same of a scene."""
+    scene = load_scene(source)
+    vehicle, contact = scene.vehicle, scene.data["contact"]
+    if not len(vehicle.bodies.wheelsets):
+        raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
+    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
+    detection = "planar" if scene.detection == "planar" else "spatial"
+    load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])
+    return geometry, {**contact["material"], "detection": detection}, {
+        "load": load, "speed": scene.data["speed"] or 1.0, "mu": contact["friction"],
+    }  # fmt: skip
