@@ -75,7 +75,8 @@ def test_left_and_right_are_mirror_images(exact):
     other = equations(0.0, mirrored)
     sign = np.ones(6)
     sign[[1, 3, 5]] = -1.0
-    np.testing.assert_allclose(other[7:13], sign * rates[7:13], rtol=1e-6, atol=1e-6)
+    # panel forces are float32: 1e-7 of the friction force, over the wheelset's inertia
+    np.testing.assert_allclose(other[7:13], sign * rates[7:13], rtol=1e-6, atol=1e-5)
 
 
 def test_the_grid_gives_the_same_forces(exact):
