@@ -109,7 +109,7 @@ def edited(path, rng):
         file.visititems(lambda name, item: groups.append(name) if isinstance(item, h5py.Group) else None)
         for _ in range(rng.randint(1, 2)):
             name, kind = rng.choice(names), rng.choice(["value"] * 4 + ["number"] * 4 + ["attribute"] * 4 + EDITS)
-            with contextlib.suppress(KeyError, TypeError, ValueError, OSError, AttributeError):  # a group by now
+            with contextlib.suppress(KeyError, TypeError, ValueError, OSError, AttributeError, OverflowError):
                 _edit(file, name, rng.choice([*names, *groups]), kind, fifo, rng)
     sign(path)
 
