@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.plot_run import plot_run as plot_run
     from wrcore.analysis.stability import critical_speeds as critical_speeds
     from wrcore.analysis.stability import modes as modes
+    from wrcore.analysis.to_accuracy import simulate_to_accuracy as simulate_to_accuracy
     from wrcore.analysis.wheels import creep_power as creep_power
     from wrcore.analysis.wheels import wear_number as wear_number
     from wrcore.analysis.wheels import wheel_forces as wheel_forces
@@ -87,6 +88,7 @@ _PUBLIC = {
     "simulate": "wrcore.run.simulate",
     "simulate_many": "wrcore.run.simulate",
     "creep_power": "wrcore.analysis.wheels",
+    "simulate_to_accuracy": "wrcore.analysis.to_accuracy",
     "wear_number": "wrcore.analysis.wheels",
     "wheel_forces": "wrcore.analysis.wheels",
     "wheel_table": "wrcore.analysis.wheels",

@@ -26,6 +26,10 @@ on the wheel and Mz refer to the point x, y, z, of strips the centroid of pressu
 """
 
 
+NOT_REACHED = 4
+"""Exit status of a run that is not as accurate as asked for, or that left the rails: what came after is unknown."""
+
+
 class _Parser(argparse.ArgumentParser):
     def error(self, message):
         raise InputError(self.prog, "", message)
@@ -42,7 +46,8 @@ def main(arguments=None):
     Returns
     -------
     int
-        Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 128 and its number for a signal.
+        Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 4 an accuracy that was not reached or is that
+        of a derailment, 128 and its number for a signal.
     """
     try:
         options = _parser().parse_args(arguments)
@@ -83,8 +88,12 @@ def _add_simulate(commands):
     )
     command.add_argument("--json", action="store_true", help="end with one line of JSON")
     command.add_argument(
-        "--accuracy", type=float, metavar="m", help="choose the fastest model and integrator with this error of y (rms)"
+        "--accuracy", type=float, metavar="X", help="tighten the integration until its measured error is below this"
     )
+    command.add_argument(
+        "--accuracy-of", default="y", metavar="y|Y|Q|wear",
+        help="of the lateral position of wheelsets (m, rms; the default), wheel forces (N, rms), mean wear number (N)",
+    )  # fmt: skip
     command.set_defaults(run=_simulate)
 
 
@@ -227,24 +236,33 @@ def _simulate(options):
     from wrcore.scene.description import load_scene
 
     out = _output(options.out, HDF5) if options.out else None
-    scene, record = load_scene(options.scene, options.overrides), {}
-    if options.accuracy is not None:
-        from wrcore.run.accuracy import choose
-
-        _positive(options.accuracy, "--accuracy")
-        choice, reason = choose(scene, options.accuracy)
-        scene = load_scene(options.scene, [*choice.overrides(), *options.overrides])
-        record = {"accuracy_m": options.accuracy, "accuracy_reason": reason}
-        print(f"{scene.data['name']}: {reason}")
+    scene = load_scene(options.scene, options.overrides)
     if out:
         _refuse_others(out, "scene", scene.data["name"])
+    if options.accuracy is not None:
+        return _simulate_to_accuracy(options, scene, out)
     with simulated_time(scene.data["integration"]["duration"]) as advance:
         say = partial(print, f"{scene.data['name']}:")
-        run, interrupted = simulate_to(scene, out, advance, options.resume, say, record=record)
+        run, interrupted = simulate_to(scene, out, advance, options.resume, say)
     _print_run(run, options.json)
     if interrupted:
         return 128 + interrupted
     return 0 if run.status in ("completed", "derailed") else 1
+
+
+def _simulate_to_accuracy(options, scene, out):
+    from wrcore.analysis.to_accuracy import simulate_to_accuracy
+
+    say = partial(print, f"{scene.data['name']}:")
+    run, accuracy = simulate_to_accuracy(scene, options.accuracy, options.accuracy_of, say)
+    run.settings |= {f"accuracy_{name}": value for name, value in vars(accuracy).items()}
+    say(f"{accuracy.reason}; {accuracy.cost:.1f} times the time of this run in all")
+    if out:
+        run.save(out)
+    _print_run(run, options.json)
+    if run.status not in ("completed", "derailed"):
+        return 1
+    return 0 if accuracy.reached and run.status == "completed" else NOT_REACHED
 
 
 def _print_run(run, as_json):

@@ -9,9 +9,11 @@ import pytest
 from tests.conftest import SCENES
 from tests.dynamics.test_system import body_state, contact, make_model  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.integrate import engine
-from wrcore.integrate.integrator import METHODS, STIFF_SPEED, chosen_method, integrate
+from wrcore.integrate.choice import fastest_rate
+from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.reference import SOLVERS, integrate_function
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulate import output_times, simulate, simulate_many
@@ -176,20 +178,44 @@ def test_stiff_scenes_cost_rosenbrock_methods_little():
     model, start = compile_scene(load_scene(WHEELSET, ["speed=1"]))
     times = np.linspace(0.0, 2.0, 101)
     exact = integrate(model, start, times, "scipy_radau", 1e-10, 1e-13).states[:, 1]
-    runs = {method: integrate(model, start, times, method, 1e-4, 1e-7) for method in ("tsit5", "rodas4", "ros34pw2")}
+    runs = {method: integrate(model, start, times, method, 1e-5) for method in ("tsit5", "rodas4", "ros34pw2")}
     for run in runs.values():
         assert np.abs(run.states[:, 1] - exact).max() < 3e-7
-    assert runs["tsit5"].rhs_evaluations > 30 * runs["rodas4"].rhs_evaluations
-    assert runs["rodas4"].rhs_evaluations > 1.5 * runs["ros34pw2"].rhs_evaluations
+    assert runs["tsit5"].rhs_evaluations > 30 * max(runs[name].rhs_evaluations for name in ("rodas4", "ros34pw2"))
     assert runs["tsit5"].smallest_step < 1e-4 < runs["rodas4"].t[-1] / runs["rodas4"].steps
 
 
-def test_auto_takes_the_rosenbrock_method_at_low_speed(wheelset):
-    assert [chosen_method("auto", v) for v in (0.1, STIFF_SPEED - 0.1, STIFF_SPEED, 90.0)] == ["ros34pw2"] * 2 + [
-        "tsit5"
-    ] * 2
-    assert chosen_method("rk23", 0.1) == "rk23"
-    assert integrate(*wheelset, [0.0, 0.01]).method == "ros34pw2"
+def test_auto_takes_what_the_scene_needs(wheelset):
+    """Creep makes low speed stiff; at high speed a rough track, or wheelsets that hunt, ask for short steps anyway."""
+    assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4"
+    rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 5}}"
+    curve = "track.path=[{transition: 40}, {curve: 300, radius: 300}]"
+    for scene, overrides, expected in (
+        ("suspended_wheelset", ["speed=0.1"], "rodas4"),
+        ("suspended_wheelset", ["speed=60"], "tsit5"),
+        ("trailer_vehicle", ["speed=60"], "rodas4"),
+        ("trailer_vehicle", ["speed=60", rough], "tsit5"),
+        ("trailer_vehicle", ["speed=15", rough], "rodas4"),
+        ("trailer_vehicle", ["speed=15", curve], "rodas4"),
+        ("metro_car", ["speed=60"], "tsit5"),
+    ):
+        model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", overrides))
+        assert integrate(model, start, [0.0, 1e-3]).method == expected, (scene, overrides)
+
+
+def test_auto_sees_a_stiff_damper(contact):  # noqa: F811
+    """A rate of 16667/s, whatever the speed: what a Maxwell element with a relaxation time of 60 us has."""
+    model, start = oscillators(contact, 60.0)
+    equations = Equations(model)
+    counters = equations.work.counters.copy()
+    assert fastest_rate(model, equations, 0.0, start) == pytest.approx(np.sqrt(1e4 / 10.0), rel=0.1)
+    np.testing.assert_array_equal(equations.work.counters, counters)
+    damped = model._replace(elements=model.elements._replace(springs=model.elements.springs.copy()))
+    damped.elements.springs[:, 9:12] = 16667.0 * 10.0  # N s/m, on 10 kg
+    assert fastest_rate(damped, Equations(damped), 0.0, start) == pytest.approx(
+        16667.0 * 2.5, rel=0.1
+    )  # the one of 4 kg
+    assert integrate(damped, start, [0.0, 1e-3]).method == "rodas4"
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -266,18 +292,21 @@ def test_the_tolerance_does_not_loosen_along_the_track(contact):  # noqa: F811
         assert np.abs(found - exact).max() < 1e-5
 
 
-def test_error_weights(contact):  # noqa: F811
-    """Positions count up to 1 m, velocities as they are: the norm of known errors, and no infinity slips through."""
-    control = engine.Control(1e-3, 1e-6, 0.0, 1.0, math.inf)
-    caps = engine.new_scratch(13, 1).caps
-    old, new = np.zeros(13), np.zeros(13)
-    new[0], new[4], old[7], new[7] = 800.0, 0.5, 60.0, -20.0
-    errors = np.zeros(13)
-    errors[0], errors[4], errors[7] = 2e-3, 3e-3, 4e-2
-    expected = math.sqrt(sum((e / (1e-6 + 1e-3 * s)) ** 2 for e, s in ((2e-3, 1.0), (3e-3, 0.5), (4e-2, 60.0))) / 13)
-    assert engine.error_size(control, caps, old, new, errors) == pytest.approx(expected, rel=1e-14)
-    new[12] = math.inf
-    assert not math.isfinite(engine.error_size(control, caps, old, new, errors))
+def test_a_step_is_as_good_as_its_worst_body():
+    """The norm of known errors of two bodies and an own state; no infinity slips through."""
+    tolerances = np.linspace(1.0, 2.0, 27)
+    new, errors = np.ones(27), np.zeros(27)
+    errors[[0, 4, 20]] = 2e-3, 3e-3, 5e-3
+    first, second = (errors[:13] / tolerances[:13]), (errors[13:26] / tolerances[13:26])
+    expected = max(math.sqrt(sum(part**2) / 13) for part in (first, second))
+    assert engine.error_size(tolerances, 2, new, errors) == pytest.approx(expected, rel=1e-14)
+    errors[26] = 0.01
+    assert engine.error_size(tolerances, 2, new, errors) == pytest.approx(0.01 / 2.0, rel=1e-14)
+    for place in (3, 17, 26):
+        for number in (math.inf, math.nan):
+            spoiled = new.copy()
+            spoiled[place] = number
+            assert not math.isfinite(engine.error_size(tolerances, 2, spoiled, errors))
 
 
 LEAVES = ["initial.yaw=0.09", "contact.friction=0.9", "speed=10", "integration.duration=0.5"]
@@ -310,7 +339,7 @@ def test_failures_are_values(wheelset, contact, method):  # noqa: F811
         run = integrate(broken, start, [0.0, 1.0], method, step=step)
         assert run.status == "failed" and "not finite at t = 0 s" in run.reason
         assert len(run.t) == 1 and run.steps == 0
-    run = integrate(model, start, [0.0, 1.0], method, 1e-17, 1e-30)
+    run = integrate(model, start, [0.0, 1.0], method, 1e-30)
     assert run.status == "failed" and "resolution of time" in run.reason and run.steps < 10
     # a step beyond the bound of stability blows up: no state that is not finite is ever accepted
     free, state = oscillators(contact, 0.0)
@@ -412,7 +441,7 @@ def test_many_runs_are_the_single_ones():
     many = simulate_many(scenes, progress=lambda items: (seen.append(item) or item for item in items))
     assert seen == scenes
     for runs in (many, simulate_many(scenes, threads=2)):
-        assert [run.settings["method_used"] for run in runs] == ["ros34pw2", "ros34pw2", "tsit5"]
+        assert [run.settings["method_used"] for run in runs] == ["rodas4", "rodas4", "tsit5"]
         assert all(map(same, runs, single))
     assert not same(single[0], single[1])
 

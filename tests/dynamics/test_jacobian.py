@@ -54,16 +54,47 @@ def displaced(state, bodies, column, axes, size):
     return out
 
 
+def turned(values, bodies, rate, angle):
+    """Vectors and Euler parameters of all bodies, turned about the vertical by an angle; None: their rates instead."""
+    out, factor = values.copy(), (lambda half: 1j * rate * half if angle is None else np.exp(1j * angle * half))
+    for body in range(bodies):
+        for x, y, half in ((7, 8, 1.0), (10, 11, 1.0), (3, 6, 0.5), (4, 5, 0.5)):
+            pair = (values[13 * body + x] + 1j * values[13 * body + y]) * factor(half)
+            out[13 * body + x], out[13 * body + y] = pair.real, pair.imag
+        if angle is None:
+            out[13 * body : 13 * body + 3] = out[13 * body + 9] = out[13 * body + 12] = 0.0
+    if angle is None:
+        out[13 * bodies :] = 0.0
+    return out
+
+
+def rates_seen(function, t, state, bodies, rate, angle=0.0):
+    """Right-hand side in axes that turn at a rate, positions aside."""
+    return turned(function(t, state) - turned(state, bodies, rate, None), bodies, rate, -angle)
+
+
+def on_its_circle(state, bodies, rate, t):
+    """Where a state is after a time if all of it turns at a rate."""
+    out = turned(state, bodies, rate, rate * t)
+    for body in range(bodies):
+        velocity = state[13 * body + 7] + 1j * state[13 * body + 8]
+        way = velocity * (t if rate == 0.0 else (np.exp(1j * rate * t) - 1.0) / (1j * rate))
+        out[13 * body : 13 * body + 3] += way.real, way.imag, t * state[13 * body + 9]
+    return out
+
+
 def test_every_entry_against_central_differences(moving):
     """One column at a time, all rows: entries that the sweeps leave out must be zero."""
     model, t, state, _, function = moving
     n = len(model.bodies.mass)
     jacobian = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model))
     rows = np.r_[[13 * b + 7 + k for b in range(n) for k in range(6)], 13 * n : len(state)].astype(int)
-    found = np.vstack([jacobian.by_position, jacobian.by_velocity])
+    found, rate = np.vstack([jacobian.by_position, jacobian.by_velocity]), jacobian.turn[0]
+    assert rate == pytest.approx(0.0 if model.track.tangent else state[7] / 500.0, rel=0.01)
     for column in range(len(found)):
         size = 1e-7 if column < 6 * n or column >= 12 * n else 1e-6
-        ahead, behind = (function(t, displaced(state, n, column, jacobian.axes, s)) for s in (size, -size))
+        moved = (displaced(state, n, column, jacobian.axes, s) for s in (size, -size))
+        ahead, behind = (rates_seen(function, t, one, n, rate) for one in moved)
         slope = (ahead - behind) / (2 * size)
         # one-sided: a contact 0.1 mm deep gets 0.5e-4 stiffer over 1e-8 m. Rounding: heights to 5e-17 m, which a
         # contact's stiffness over mass, 1.6e6/s^2, and the difference 1e-8 turn into 0.01 (found: 0.0115).
@@ -77,8 +108,12 @@ def test_every_entry_against_central_differences(moving):
     for body in range(n):
         drift[13 * body : 13 * body + 3] = state[13 * body + 7 : 13 * body + 10]
     np.testing.assert_array_equal(jacobian.drift, drift)
-    later, earlier = function(t + 1e-7, state + 1e-7 * drift), function(t - 1e-7, state - 1e-7 * drift)
+    later, earlier = (
+        rates_seen(function, t + s, on_its_circle(state, n, rate, s), n, rate, rate * s) for s in (1e-7, -1e-7)
+    )
     found, expected = jacobian.by_time, (later - earlier) / 2e-7
+    for body in range(n):  # velocities stay
+        expected[13 * body : 13 * body + 3] = 0.0
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max() + 0.01)
 
 
@@ -99,6 +134,25 @@ def test_refreshing_the_contacts_refreshes_what_belongs_to_the_wheelsets(moving)
     np.testing.assert_allclose(again.by_velocity, known.by_velocity, rtol=1e-12, atol=1e-3)
 
 
+def test_refreshed_in_axes_that_have_turned(moving):
+    """Where they have turned by 0.3 rad since the whole was taken, the blocks turn back by that."""
+    model, n = moving[0], len(moving[0].bodies.mass)
+    sweep = plan_sweeps(model)[0]
+    straight, aside = refreshed(moving, sweep, new_jacobian(model)), new_jacobian(model)
+    aside.turn[1] = 0.3
+    refreshed(moving, sweep, aside)
+    c, s = np.cos(0.3), np.sin(0.3)
+    axes = np.kron(np.eye(2 * n), [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    own = np.eye(model.elements.states)
+    whole = np.block([[axes, np.zeros((6 * n, len(own)))], [np.zeros((len(own), 6 * n)), own]])
+    for found, known, left in (
+        (aside.by_position, straight.by_position, axes),
+        (aside.by_velocity, straight.by_velocity, whole),
+    ):
+        expected = left @ known @ whole.T
+        np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max() + 0.02)
+
+
 def test_stages_are_solved_as_a_dense_system_would_be(moving):
     """Unknown: displacements, velocities, own states; the matrix written out in full and solved by numpy."""
     model, _, state, _, _ = moving
@@ -107,14 +161,16 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
     axles = np.array([matrix_of(part[3:7])[:, 1] for part in state[: 13 * n].reshape(n, 13)])
     frames = omegas - np.sum(omegas * axles, axis=1, keepdims=True) * axles  # a wheelset's frame does not spin
     jacobian, system = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model)), new_system(model)
-    size = 12 * n + model.elements.states
+    size, rate = 12 * n + model.elements.states, jacobian.turn[0]
     matrix = np.zeros((size + n,) * 2)  # last the lengths of p
     for b in range(n):
         q, v = 6 * b, 6 * n + 6 * b
         matrix[q : q + 3, v : v + 3] = np.eye(3)
+        matrix[q, q + 1], matrix[q + 1, q] = rate, -rate
         matrix[q + 3 : q + 6, q + 3 : q + 6] = jacobian.turning[b, :3, :3]
         matrix[q + 3 : q + 6, v + 3 : v + 6] = jacobian.turning[b, :3, 3:]
         matrix[q + 3 : q + 6, size + b] = model.bodies.spins[b] * frames[b] + (1 - model.bodies.spins[b]) * omegas[b]
+        matrix[q + 5, size + b] -= rate
         matrix[size + b, q + 3 : q + 6], matrix[size + b, v + 3 : v + 6] = np.split(jacobian.turning[b, 3], 2)
         matrix[size + b, size + b] = -2.0 * model.alpha
     matrix[6 * n : size, : 6 * n], matrix[6 * n : size, 6 * n : size] = jacobian.by_position.T, jacobian.by_velocity.T

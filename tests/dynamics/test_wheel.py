@@ -61,7 +61,7 @@ def one_wheel(model, motion):
     motions[0, 1, 2] += 1.0
     patches = np.zeros((1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((1, 2), int), np.zeros((1, 2)), np.zeros((1, 2, 6))
-    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, np.zeros(3, int), strip_work(model.strips))
+    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, np.zeros(3, int), strip_work(model.strips, 1))
     assert counts[0, 1] == 0 and not wrenches[0, 1].any()
     return wrenches[0, 0], patches[0, 0, : counts[0, 0]], bounds[0, 0]
 
@@ -93,7 +93,7 @@ def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
     patches = np.zeros((20, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((20, 2), int), np.zeros((20, 2)), np.zeros((20, 2, 6))
     counters = np.zeros(3, int)
-    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, strip_work(model.strips))
+    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, strip_work(model.strips, len(motions)))
     assert counters[1] == 0
     for place in np.ndindex(20, 2):
         wrench, rows, bound = one_wheel(model, motions[place])

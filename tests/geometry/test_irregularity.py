@@ -107,7 +107,7 @@ def test_spectra_have_their_published_values(quantity, level, value):
 @pytest.mark.parametrize("level", ["low", "high"])
 def test_variance_of_a_whole_period_is_the_integral_of_the_one_sided_spectrum(monkeypatch, level):
     # over a whole period each cosine has variance a^2 / 2 exactly: what is left is Simpson's rule on 1500 shares
-    monkeypatch.setattr("wrcore.geometry.irregularity.next_fast_len", lambda n, real: n // 2)
+    monkeypatch.setattr("scipy.fft.next_fast_len", lambda n, real: n // 2)
     s, values = generate(level, 3, 2400.0 - 0.25, 0.25, 3.0, 80.0)
     assert len(s) == 9600
     mean, difference = 0.5 * (values[:, :2] + values[:, 2:]), values[:, 1] - values[:, 3]

@@ -2,6 +2,7 @@
 
 import importlib
 import re
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -46,6 +47,32 @@ def test_a_kernel_has_an_address_and_a_handle_a_type():
 
     assert Kernel(fill, np.zeros(1)).address > 0
     assert "Reference" in str(Handle((np.zeros(1), 1.0))._numba_type_)
+
+
+def test_a_handle_holds_what_a_kernel_would_write():
+    class Inner(NamedTuple):
+        flag: bool
+        number: float
+
+    class Outer(NamedTuple):
+        yes: bool
+        whole: int
+        rows: np.ndarray
+        inner: Inner
+        single: np.ndarray
+        no: bool
+
+    value = Outer(True, -7, np.arange(6.0).reshape(2, 3), Inner(True, 2.5), np.ones(2, np.float32), False)
+    handle = Handle(value)
+
+    @jit(allocates=False, cache=False)
+    def read(outer, out):
+        out[0], out[1], out[2] = outer.yes, outer.whole, outer.rows[1, 2]
+        out[3], out[4], out[5], out[6] = outer.inner.flag, outer.inner.number, outer.single[1], outer.no
+
+    out = np.full(7, np.nan)
+    read(handle, out)
+    assert out.tolist() == [1.0, -7.0, 5.0, 1.0, 2.5, 1.0, 0.0]
 
 
 def test_the_release_of_numba_is_one_that_was_tested():

@@ -21,7 +21,12 @@ from wrcore.run.simulate import output_blocks, output_times, simulate
 from wrcore.run.streaming import Parts, simulate_to
 from wrcore.scene.description import load_scene
 
-HUNTING = {"speed": 60.0, "integration.duration": 4.0, "contact.creep.model": "she"}
+HUNTING = {
+    "speed": 60.0,
+    "integration.duration": 4.0,
+    "contact.creep.model": "she",
+    "integration.rtol": 1e-6,
+}  # several chunks of steps
 CURVE = HUNTING | {
     "integration.duration": 2.0, "output.channels": ["pose", "velocity", "acceleration", "contact", "energy"],
     "track.path": [{"tangent": 20.0}, {"transition": 40.0}, {"curve": 200.0, "radius": 600.0, "cant": 0.1}],

@@ -2,6 +2,7 @@
 
 ACCURACY = config["accuracy"]
 ACCURACY_SCENES = list(ACCURACY["scenes"])
+WITH_EXACT = [name for name, entry in ACCURACY["scenes"].items() if "exact" in entry]
 
 
 wildcard_constraints:
@@ -13,14 +14,47 @@ def measured_scene(wildcards):
 
 
 def measured_settings(wildcards):
-    entry = ACCURACY["scenes"][wildcards.measured]
+    entry, grids = ACCURACY["scenes"][wildcards.measured], ACCURACY["grids"]
     return {
         "overrides": changes(entry["set"]),
-        "grids": [{**ACCURACY["grids"]["models"], **entry.get("models", {})}, ACCURACY["grids"]["integrators"]],
+        "grids": [{**grid, **(entry.get("models", {}) if name == "models" else {})} for name, grid in grids.items()],
         "reference": ACCURACY["reference"],
+        "twins": ACCURACY["twins"],
         "until": entry.get("until"),
         "repetitions": ACCURACY["repetitions"],
     }
+
+
+def exact_settings(wildcards):
+    entry = ACCURACY["scenes"][wildcards.measured]
+    return {"overrides": changes(entry["set"]), "exact": ACCURACY["exact"], "duration": entry["exact"]["duration"]}
+
+
+rule accuracy_exact:
+    message:
+        "{wildcards.measured}: exact contact at two resolutions"
+    input:
+        core=CORE["simulation"] + CORE["accuracy"],
+        scenes=SCENES,
+        scene=measured_scene,
+        table=rules.creep_table.output,
+    output:
+        run="<results>/accuracy/{measured}_exact.h5",
+        table="<results>/accuracy/{measured}_exact.csv",
+    log:
+        "<logs>/accuracy_exact/{measured}.log",
+    benchmark:
+        "<benchmarks>/accuracy_exact/{measured}.tsv"
+    params:
+        settings=exact_settings,
+    script:
+        "../scripts/accuracy/accuracy_exact.py"
+
+
+def exact_run(wildcards):
+    """The run with exact contact, for scenes that have one."""
+    found = [wildcards.measured] if wildcards.measured in WITH_EXACT else []
+    return expand(rules.accuracy_exact.output.run, measured=found)
 
 
 rule accuracy_tables:
@@ -48,6 +82,7 @@ rule accuracy_study:
         scenes=SCENES,
         scene=measured_scene,
         tables=rules.accuracy_tables.output,
+        exact=exact_run,
     output:
         choices="<results>/accuracy/{measured}.csv",
         reference="<results>/accuracy/{measured}_reference.csv",
@@ -70,6 +105,7 @@ rule speed_against_error:
         core=CORE["accuracy_figures"],
         choices=expand(rules.accuracy_study.output.choices, measured=ACCURACY_SCENES),
         references=expand(rules.accuracy_study.output.reference, measured=ACCURACY_SCENES),
+        exacts=expand(rules.accuracy_exact.output.table, measured=WITH_EXACT),
     output:
         report(
             "<results>/accuracy/speed_against_error.png",
@@ -85,14 +121,46 @@ rule speed_against_error:
             labels={"table": "choose this for that accuracy"},
         ),
         "<results>/accuracy/accuracy_front.csv",
+        report(
+            "<results>/accuracy/models.csv",
+            caption="../report/accuracy/models.rst",
+            category="07 Speed against error",
+            labels={"table": "errors of models"},
+        ),
     log:
         "<logs>/speed_against_error.log",
     params:
         titles={name: entry["title"] for name, entry in ACCURACY["scenes"].items()},
+        exact=WITH_EXACT,
         finest=ACCURACY["reference"]["creep"],
         accuracies=ACCURACY["accuracies"],
     script:
         "../scripts/accuracy/speed_against_error.py"
+
+
+rule accuracy_requests:
+    message:
+        "Random scenes: is an accuracy that is asked for reached?"
+    input:
+        core=CORE["simulation"] + CORE["accuracy_requests"],
+        scenes=SCENES,
+        table=rules.creep_table.output,
+    output:
+        rows="<results>/accuracy/requests.csv",
+        summary=report(
+            "<results>/accuracy/requests_summary.csv",
+            caption="../report/accuracy/requests.rst",
+            category="07 Speed against error",
+            labels={"table": "accuracies asked for and reached"},
+        ),
+    log:
+        "<logs>/accuracy_requests.log",
+    benchmark:
+        "<benchmarks>/accuracy_requests.tsv"
+    params:
+        settings=ACCURACY["requests"],
+    script:
+        "../scripts/accuracy/accuracy_requests.py"
 
 
 rule claims:
@@ -102,6 +170,7 @@ rule claims:
         core=CORE["accuracy_figures"],
         contact=rules.contact_reductions.output.cases,
         creep=rules.creep_errors.output[0],
+        patch=rules.patch_errors.output.summary,
         front="wrcore/run/accuracy_front.csv",
     output:
         table="<results>/accuracy/claims.csv",

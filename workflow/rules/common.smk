@@ -52,6 +52,10 @@ def check_config():
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
             scenes[f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"] = (entry["scene"], changes)
+    for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
+        for name, model in config["patch"]["runs"]["models"].items():
+            place = f"patch.runs.vehicles.{vehicle} with patch.runs.models.{name}"
+            scenes[place] = (config["critical_speed"]["vehicles"][vehicle]["scene"], model["set"] | entry["track"])
     for key, (scene, changes) in scenes.items():
         try:
             load_scene(scene, [f"{name}={value}" for name, value in changes.items()])
@@ -97,7 +101,8 @@ CORE = {
     "simulation": sources(*RUN),
     "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
     "vehicle_figures": sources("run", *VEHICLE, STYLE, "study/speeds"),
-    "accuracy": sources(*VEHICLE, "study/accuracy/errors"),
+    "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
+    "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, STYLE, "study/accuracy"),
     "paper": sources("run", "analysis/motion", "study/paper/tables"),
     "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", STYLE, "study/paper"),

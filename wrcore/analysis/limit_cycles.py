@@ -41,8 +41,8 @@ class Settling:
     rate : float
         Samples per second of the amplitude.
     method : str
-    rtol, atol : float
-        Integration method and tolerances, see `wrcore.integrate.integrator.integrate`.
+    rtol : float
+        Integration method and tolerance, see `wrcore.integrate.integrator.integrate`.
     """
 
     window: float = 2.0
@@ -53,13 +53,12 @@ class Settling:
     rate: float = 500.0
     method: str = "auto"
     rtol: float = 1e-5
-    atol: float = 1e-8
 
 
 def _run(model, state, settling):
     """Lateral positions (samples, wheelsets) over a window, the state at its end, and whether the wheels stay on."""
     times = np.linspace(0.0, settling.window, round(settling.window * settling.rate) + 1)
-    run = integrate(model, state, times, settling.method, settling.rtol, settling.atol, derailed_y=DERAILED_Y)
+    run = integrate(model, state, times, settling.method, settling.rtol, derailed_y=DERAILED_Y)
     lateral = run.states[:, STATE_SIZE * model.bodies.wheelsets + 1]
     return run.t, lateral, run.states[-1], run.status == "completed"
 

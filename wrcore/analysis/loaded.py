@@ -23,7 +23,7 @@ from wrcore.contact.patch.normal import NormalContact, height_of_zero
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.surfaces import Motion, contact_plane
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data, creep_force_at
@@ -263,13 +263,13 @@ class Strips(LoadedWheels):
             rough = self._rough.at_height(*pose)
             shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
         motion, slips = None, [np.zeros((4, len(shape.centre))) for shape in shapes]
+        rows = self._overlaps(*pose)
         if rolling is not None:
-            at = lambda motion: self._slips(pose, motion, solved)  # noqa: E731
+            at = lambda motion: self._slips(pose, motion, solved, rows)  # noqa: E731
             loads = [_loads(shape) for shape in shapes]
             mean = lambda slips: sum(load @ slip[0] for load, slip in zip(loads, slips, strict=True))  # noqa: E731
             slips, rate = _free_rate(at, rolling, roll, yaw, mean)
             motion = rolling.motion(roll, yaw, rate)
-        rows = self._overlaps(*pose)
         found = []
         for shape, slip, row, good in zip(shapes, slips, rows, solved, strict=True):
             if self.always or not good:
@@ -278,7 +278,7 @@ class Strips(LoadedWheels):
                 found.append(self._on_strips(shape, slip, row, pose, rolling is not None, friction, fields))
         return found
 
-    def _slips(self, pose, motion, solved):
+    def _slips(self, pose, motion, solved, rows):
         """Rigid slip of every patch, (4, strips) each."""
         shapes = self._contact.at_height(*pose, motion)
         if not all(solved):
@@ -286,13 +286,18 @@ class Strips(LoadedWheels):
             shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
         if self.surfaces:
             return [np.array([s.slip_x, s.slip_x_dx, s.slip_s, s.slip_s_dx]) for s in shapes]
-        return [shape.slip_of_creepages(*self._creepages(shape, pose, motion)) for shape in shapes]
+        return [
+            shape.slip_of_creepages(*self._creepages(shape, row, pose, motion))
+            for shape, row in zip(shapes, rows, strict=True)
+        ]
 
     @staticmethod
-    def _creepages(shape, pose, motion):
-        """Of the frame's origin."""
-        (x, y, z), angle = shape.origin, shape.contact_angle
-        return creepages(*motion[:6], x, y - pose[1], z - pose[2], math.cos(angle), math.sin(angle), motion.speed)[:3]
+    def _creepages(shape, row, pose, motion):
+        """Of the undeformed wheel's material point above the frame's origin."""
+        (x, y, z), angle, depth = shape.origin, shape.contact_angle, row[PENETRATION]
+        cosine, sine = math.cos(angle), math.sin(angle)
+        y, z = y + depth * sine - pose[1], z - depth * cosine - pose[2]
+        return creepages(*motion[:6], x, y, z, cosine, sine, motion.speed)[:3]
 
     def _overlaps(self, side, y, z, roll, yaw):
         """Row of the deepest overlap of each group of them that is one patch."""
@@ -301,7 +306,7 @@ class Strips(LoadedWheels):
         first, deepest = 0, []
         while first < count:
             last = group_end(self._rows, count, first)
-            deepest.append(max(self._rows[first:last], key=lambda row: row[columns.PENETRATION]).copy())
+            deepest.append(max(self._rows[first:last], key=lambda row: row[PENETRATION]).copy())
             first = last
         return deepest
 
@@ -337,7 +342,7 @@ class Strips(LoadedWheels):
         axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
         rigid = (0.0, 0.0, 0.0)
         if motion is not None:
-            rigid = motion if self.surfaces else self._creepages(shape, pose, motion)
+            rigid = motion if self.surfaces else self._creepages(shape, row, pose, motion)
         solved = solve_on_grids(
             self.geometry, make_pose(SIDES[side], y, z, *axle, self.spatial),
             contact_plane(*shape.origin, shape.contact_angle), rigid, friction, self.shear_modulus, self.poisson_ratio,

@@ -59,6 +59,7 @@ from wrcore.contact.scan import (
 )
 from wrcore.contact.strip import gap_at, make_pose, strip_point
 from wrcore.errors import InputError
+from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit, rarely_called
 
 DETECTIONS = {"planar": 0, "spatial": 1, "auto": 2}
@@ -182,8 +183,9 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
                 lowest = deepest_point(geometry, pose, one_back_at, SLOPE_TOLERANCE)
                 overlap = -gap_at(geometry, pose, lowest)[0]
                 if overlap > 0.0:
+                    none = np.int64(0)
                     count = _add_overlap(geometry, pose, reduction, one_back_at - SCAN_STEP / parts, lowest, lowest, u,
-                                         lowest, overlap * cosine, 0.0, 0.0, 0.0, 0, patches, count)  # fmt: skip
+                                         lowest, overlap * cosine, 0.0, 0.0, 0.0, none, patches, count)  # fmt: skip
             two_back, one_back, one_back_at = one_back, gap, u
         before = coarse
         k += 1
@@ -307,8 +309,8 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
         return 0
     if leaves_cells(pose):
         nodes = geometry.scan_wheel.shape[1]
-        return _search(geometry, pose, window.grid, reduction, -nodes, nodes, patches, 0)
-    count = 0
+        return _search(geometry, pose, window.grid, reduction, -nodes, nodes, patches, np.int64(0))
+    count = np.int64(0)  # of one type with what is handed over above: one copy of the search
     near = near_blocks(geometry, window)
     while near > 0:
         begin, end, near = first_zone(near, geometry.block)
@@ -366,7 +368,7 @@ def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="ma
     if reduction not in REDUCTIONS:
         raise InputError("detect", "reduction", f"expected one of {', '.join(REDUCTIONS)}, got {reduction!r}")
     axle = axle_direction(roll, yaw)
-    found = []
+    found, geometry = [], Handle(geometry)  # as in runs, which share the kernel
     for side, sign in (("left", 1.0), ("right", -1.0)):
         rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
         sided = (sign * c for c in axle)

@@ -42,7 +42,8 @@ U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y 
 SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
 COSINE, SINE = 19, 20  # of the contact angle
 P_MAX = 21  # filled where patches are no ellipses
-PATCH_COLUMNS = 22
+PSI = 22  # shape number, filled where the creep table asks for it
+PATCH_COLUMNS = 23
 
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""

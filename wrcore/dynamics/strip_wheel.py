@@ -172,7 +172,7 @@ def _roll(model, settings, strips, slip, count, slender, windows, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
+def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """Solve the overlaps from ``first`` to before ``last`` as one patch: its row, its share of the wrench."""
     settings = model.strips
     side, y, z = m[0], m[1], m[2]
@@ -186,7 +186,9 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, w
             depth, u = rows[k, PENETRATION], rows[k, reduction.U_WHEEL]
             for column in range(PATCH_COLUMNS):
                 out[column] = rows[k, column]
-    py, pz = side * (frame.ur + model.geometry.rail_distance) - y, frame.z - z
+    # a material point of the undeformed wheel, as the surfaces' slip has it
+    py = side * (frame.ur + model.geometry.rail_distance) + depth * side * frame.sine - y
+    pz = frame.z - depth * frame.cosine - z
     xi, eta, phi, approach = creepages(
         m[6], m[7], m[8], m[9], m[10], m[11], frame.x, py, pz, frame.cosine, side * frame.sine, speed
     )
@@ -202,7 +204,7 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, w
             return
         windows, frame = solve_patch(
             model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, settings.normal,
-            False, work.normal,
+            memory, work.normal,
         )  # fmt: skip
     strips, slip, sums = work.strips, work.slip, work.sums
     if windows == 0:
@@ -269,10 +271,13 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             )
             for k in range(6):
                 w[k] = 0.0
-            first = kept = 0
+            first = kept = group = 0
             while first < count:
                 last = group_end(rows, count, first)
-                _group_wrench(model, m, spatial, rows, first, last, work.out, w, counters, work)
+                memory = work.memory[i, wheel, group] if work.warm[0] else work.spare
+                work.spare[0] = 0.0
+                _group_wrench(model, m, spatial, rows, first, last, work.out, w, counters, memory, work)
+                group += 1
                 if work.out[reduction.NORMAL] > 0.0:
                     for column in range(PATCH_COLUMNS):
                         rows[kept, column] = work.out[column]

@@ -19,7 +19,7 @@ from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inv
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
-from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
+from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -53,7 +53,9 @@ class Model(NamedTuple):
     beta: float
     """Baumgarte's parameters, 1/s."""
     wheels: int = 0
-    """Address of the kernel that finds the rails' wrenches, see `Equations`."""
+    """Address of the kernel that finds the rails' wrenches, see `with_kernels`."""
+    reactions: int = 0
+    """Address of the kernel that adds the joints' reactions."""
 
 
 class Workspace(NamedTuple):
@@ -112,7 +114,7 @@ def workspace(model):
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
         np.zeros((k, 2), np.int64), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)), np.zeros((k, 2, 3, 3)),
         np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(3, np.int64),
-        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)), strip_work(model.contact.strips),
+        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)), strip_work(model.contact.strips, k),
     )  # fmt: skip
 
 
@@ -201,7 +203,7 @@ def fill_derivatives(t, state, model, work, rate):
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
-        add_reactions(model, t, state, work)
+        call_address(model.reactions, model, t, state, work)
     for b in range(n):
         at = STATE_SIZE * b
         euler_rates(state, at, work.turns[b, 0], work.turns[b, 1], work.turns[b, 2], model.alpha, rate)
@@ -224,8 +226,11 @@ def fill_many(equations, t, states, model, work, rates):
         derivatives_at(equations, t, states[i], model, work, rates[i])
 
 
-def with_wheels(model, work):
-    """The model with the address of the kernel for its wheels: only the one that a scene runs is ever compiled."""
+def with_kernels(model, work):
+    """The model with the addresses of the kernels of its wheels and joints: only what a scene runs is compiled."""
+    if model.joints.equations:
+        kernel = Kernel(add_reactions, Handle(model), 0.0, np.empty(0), Handle(work))
+        model = model._replace(reactions=kernel.address)
     if not len(model.bodies.wheelsets):
         return model
     wrenches, contact = wheel_wrenches, model.contact
@@ -235,6 +240,10 @@ def with_wheels(model, work):
         fallback = Kernel(solve_on_grid, Handle(contact), work.motions[0, 0], work.strips.force)
         contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
         wrenches = strip_wrenches
+    elif shaped(contact):
+        from wrcore.dynamics.shaped_wheel import shaped_wrenches
+
+        wrenches = shaped_wrenches
     kernel = Kernel(
         wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, Handle(work.strips),
@@ -259,14 +268,14 @@ class Equations:
 
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work
-        model, work = Handle(with_wheels(model, self.work)), Handle(self.work)
+        model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
         state = np.empty(0)
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
 
     def renew(self, model):
         """Turn to another model of the same types, in fresh scratch arrays: a series of runs looks nothing up again."""
         self.work = workspace(model)
-        self.arguments[1].renew(with_wheels(model, self.work))
+        self.arguments[1].renew(with_kernels(model, self.work))
         self.arguments[2].renew(self.work)
         return self
 

@@ -27,7 +27,7 @@ from wrcore.contact.reduction import (
     Y,
     Z,
 )
-from wrcore.creep.laws import CreepData, creep_force_at
+from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.kernels.jit import FUSED, jit
 
 MOTION_COLUMNS = 14
@@ -62,6 +62,11 @@ class ContactModel(NamedTuple):
     """Patches on strips, if the scene asks for them."""
 
 
+def shaped(contact):
+    """Whether a `ContactModel` asks for the shape numbers of its patches."""
+    return contact.law == LAWS["table"] and contact.creep.table.axes.n_psi > 1 and not contact.strips.strips
+
+
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """`normal_contact`, and a/b and its logarithm."""
@@ -84,19 +89,23 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _find(model, side, y, z, ex, ey, ez, rows):
-    """Patches of a wheel by the model's detection: their number, and AUTO's bound of planar detection's error."""
+def find_overlaps(model, side, y, z, ex, ey, ez, rows):
+    """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
+    detection was spatial."""
     bound, spatial = 0.0, model.detection == SPATIAL
     if model.detection == AUTO:
         bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
         spatial = bound > model.detection_tolerance
     ex, ey, ez = side * ex, side * ey, side * ez
-    return find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, model.reduction, rows), bound
+    return find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, model.reduction, rows), bound, spatial
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, row):
-    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left."""
+def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, row, psi):
+    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
+
+    ``psi`` is the patch's shape number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`.
+    """
     px, py, pz = row[X], row[Y] - y, row[Z] - z
     cosine, sine = row[COSINE], row[SINE]
     speed = max(abs(vx), model.least_speed)
@@ -108,11 +117,13 @@ def _patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z,
     limit = model.friction * normal
     square = a * b
     c = math.sqrt(square)
-    scale = model.shear_modulus * square / limit
+    scale, aside = model.shear_modulus * square / limit, 0.25 * psi * b
     f1, f2, m3, missed = creep_force_at(
-        model.law, model.creep, log_axis_ratio, axis_ratio, 0.0, xi * scale, eta * scale, phi * scale * c
-    )
+        model.law, model.creep, log_axis_ratio, axis_ratio, psi,
+        (xi - phi * aside) * scale, eta * scale, phi * scale * c,
+    )  # fmt: skip
     f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
+    m3 -= aside * f1
     gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
     row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
     row[FX], row[FY], row[MZ] = f1, f2, m3
@@ -149,15 +160,15 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m = motions[i, wheel]
-            count, bound = _find(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+            count, bound, _ = find_overlaps(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
             counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m, w = motions[i, wheel], wrenches[i, wheel]
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
-                gx, gy, gz, nx, ny, nz, missed = _patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], patches[i, wheel, k]
+                gx, gy, gz, nx, ny, nz, missed = patch_wrench(
+                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], patches[i, wheel, k], 0.0
                 )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz

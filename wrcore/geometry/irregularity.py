@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from wrcore.errors import InputError
@@ -295,6 +294,8 @@ def generate(level, seed, length, spacing, shortest, longest):
         Deviations of the channels, m, not faded.
     """
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
+    from scipy.fft import next_fast_len  # a quarter of a second that other scenes need not wait
+
     period = next_fast_len(2 * len(s), real=True)
     random = np.random.default_rng(seed)
     alignment, level_, angle = (

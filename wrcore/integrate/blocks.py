@@ -14,6 +14,7 @@ import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.jacobian import own_state_bodies, reached_bodies
+from wrcore.integrate.moving_axes import RATE
 from wrcore.kernels.jit import jit
 
 
@@ -58,6 +59,8 @@ class System(NamedTuple):
     """(n, 6): displacements that do not depend on the velocities sought."""
     scratch: np.ndarray
     """(6, 6)."""
+    slide: np.ndarray
+    """(3,): (sigma - Q)^-1 of the positions in axes that turn: along x and y, across them, along z."""
 
 
 def plan_elimination(model):
@@ -106,7 +109,7 @@ def new_system(model):
     return System(
         pattern, np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),
         np.zeros(len(pattern.state_starts) - 1), np.zeros((entries, 6)), np.zeros((entries, 6)), np.zeros((n, 6)),
-        np.zeros((n, 6)), np.zeros((6, 6)),
+        np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(3),
     )  # fmt: skip
 
 
@@ -198,14 +201,24 @@ def _carry_rotations(jacobian, system, sigma):
 
 
 @jit(allocates=False, inline="always")
-def _derivative(jacobian, carried, sigma, row, body, direction):
+def _slid(slide, x, y, z):
+    """(sigma - Q)^-1 times a vector, for positions: u' = v - omega x u."""
+    return slide[0] * x + slide[1] * y, slide[0] * y - slide[1] * x, slide[2] * z
+
+
+@jit(allocates=False, inline="always")
+def _derivative(jacobian, system, row, body, direction):
     """Derivative of a row with respect to a velocity, with what the displacement that it brings about adds."""
-    column = 6 * body + direction
-    value = jacobian.by_velocity[column, row]
-    if direction < 3:
-        return value + jacobian.by_position[column, row] / sigma
+    columns, first = jacobian.by_position, 6 * body
+    value = jacobian.by_velocity[first + direction, row]
+    if direction == 0:
+        return value + system.slide[0] * columns[first, row] - system.slide[1] * columns[first + 1, row]
+    if direction == 1:
+        return value + system.slide[1] * columns[first, row] + system.slide[0] * columns[first + 1, row]
+    if direction == 2:
+        return value + system.slide[2] * columns[first + 2, row]
     for k in range(3):
-        value += jacobian.by_position[6 * body + 3 + k, row] * carried[k, direction - 3]
+        value += columns[first + 3 + k, row] * system.carried[body, k, direction - 3]
     return value
 
 
@@ -214,6 +227,9 @@ def factorise(jacobian, system, sigma):
     """Assemble and factorise the system for sigma = 1/(h gamma); False if it is singular."""
     pattern, blocks = system.pattern, system.blocks
     n = pattern.order.shape[0]
+    rate = jacobian.turn[RATE]
+    system.slide[0], system.slide[1] = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
+    system.slide[2] = 1.0 / sigma
     _carry_rotations(jacobian, system, sigma)
     blocks[:] = 0.0
     for q in range(pattern.pairs.shape[0]):
@@ -221,7 +237,7 @@ def factorise(jacobian, system, sigma):
         block = blocks[pattern.place[i, j]]
         for column in range(6):
             for row in range(6):
-                block[row, column] = -_derivative(jacobian, system.carried[j], sigma, 6 * i + row, j, column)
+                block[row, column] = -_derivative(jacobian, system, 6 * i + row, j, column)
     for b in range(n):
         block = blocks[pattern.place[b, b]]
         for k in range(6):
@@ -233,7 +249,7 @@ def factorise(jacobian, system, sigma):
             body = pattern.state_bodies[q]
             for k in range(6):
                 system.force[q, k] = -jacobian.by_velocity[6 * n + s, 6 * body + k]
-                system.drive[q, k] = -_derivative(jacobian, system.carried[body], sigma, 6 * n + s, body, k)
+                system.drive[q, k] = -_derivative(jacobian, system, 6 * n + s, body, k)
         for q in range(first, last):
             for p in range(first, last):
                 block = blocks[pattern.place[pattern.state_bodies[q], pattern.state_bodies[p]]]
@@ -315,8 +331,8 @@ def solve_stage(jacobian, system, sigma, increment):
     own = increment[STATE_SIZE * n :]
     for b in range(n):
         at, axes, inverse, to = STATE_SIZE * b, jacobian.axes[b], system.inverse[b], shift[b]
+        to[0], to[1], to[2] = _slid(system.slide, increment[at], increment[at + 1], increment[at + 2])
         for i in range(3):
-            to[i] = increment[at + i] / sigma
             to[3 + i] = 0.0
             right[b, i], right[b, 3 + i] = increment[at + 7 + i], increment[at + 10 + i]
         length = 0.0
@@ -347,8 +363,9 @@ def solve_stage(jacobian, system, sigma, increment):
         length = 0.0
         for j in range(4):
             length += axes[3, j] * increment[at + 3 + j]
+        x, y, z = _slid(system.slide, velocity[0], velocity[1], velocity[2])
+        increment[at], increment[at + 1], increment[at + 2] = to[0] + x, to[1] + y, to[2] + z
         for i in range(3):
-            increment[at + i] = to[i] + velocity[i] / sigma
             increment[at + 7 + i], increment[at + 10 + i] = velocity[i], velocity[3 + i]
             for j in range(3):
                 to[3 + i] += carried[i, j] * velocity[3 + j]

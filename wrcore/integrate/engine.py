@@ -4,9 +4,7 @@ A kernel advances by a number of attempts and returns; everything it knows lies 
 pauses nor where a run is taken up again changes a bit of the result. Steps are never cut to meet an output time or
 the end: outputs are interpolated, and the last step reaches beyond the end.
 
-The error of a step is weighted component by component with ``atol + rtol |y|``, and with ``atol + rtol min(|y|, 1)``
-for positions (m), Euler parameters and the force elements' own states (m): the springs of a vehicle 800 m down the
-track need its position no less accurately than at the start. The norm is the root mean square over the components.
+What a step may err is in `wrcore.integrate.tolerances`.
 """
 
 import math
@@ -14,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.system import derivatives_at
 from wrcore.geometry.path import arc_length_of, track_frame
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry
 from wrcore.kernels.jit import jit
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
@@ -28,6 +27,9 @@ LEAST_STEP = 1e-13
 
 COLLAPSE = 3
 """Rejections in a row that make a collapse of the step size: each may shorten the step fivefold."""
+
+STILL = (0.0, 0.0)
+"""Axes that do not turn."""
 
 FIRST_STEP = 1e-5
 """Length of the first attempt of a run with step control, s: below every time scale of a vehicle. The steps after it
@@ -49,8 +51,8 @@ is none), contact refreshes since the last full one, patches at the state."""
 class Control(NamedTuple):
     """What a run is asked for."""
 
-    rtol: float
-    atol: float
+    tolerances: np.ndarray
+    """(n,): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
     fixed_step: float
     """s; 0 for steps by the error estimate."""
     longest_step: float
@@ -81,8 +83,6 @@ class Scratch(NamedTuple):
     """(n,)."""
     slope: np.ndarray
     """(n,)."""
-    caps: np.ndarray
-    """(n,): largest size that counts in a component's error weight."""
     defect: np.ndarray
     """(n,)."""
     still: np.ndarray
@@ -124,12 +124,9 @@ def new_memory(state, start, stages, first_step):
     return Memory(clock, counters, state, np.zeros_like(state), state.copy(), np.zeros((stages, len(state))))
 
 
-def new_scratch(size, bodies):
-    """Scratch arrays for a state vector of a length and a number of bodies."""
-    caps = np.ones(size)
-    for b in range(bodies):
-        caps[STATE_SIZE * b + VELOCITY : STATE_SIZE * (b + 1)] = np.inf
-    return Scratch(np.zeros(size), np.zeros(size), caps, np.zeros(size), np.zeros(size))
+def new_scratch(size):
+    """Scratch arrays for a state vector of a length."""
+    return Scratch(*np.zeros((4, size)))
 
 
 @jit(allocates=False, inline="always")
@@ -140,14 +137,25 @@ def copy_into(target, source):
 
 
 @jit(allocates=False)
-def error_size(control, caps, old, new, errors):
-    """Weighted root mean square of the components' errors; NaN or infinite if any number is not finite."""
-    total = 0.0
-    for i in range(old.shape[0]):
-        scale = control.atol + control.rtol * min(max(abs(old[i]), abs(new[i])), caps[i])
-        ratio = errors[i] / scale
-        total += ratio * ratio + 0.0 * new[i]
-    return math.sqrt(total / old.shape[0])
+def error_size(tolerances, bodies, new, errors):
+    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed.
+
+    The force elements' own states make one more body. NaN or infinite if any number of the state is not finite.
+    """
+    largest, size = 0.0, new.shape[0]
+    for b in range(bodies + 1):
+        first = STATE_SIZE * b
+        last = first + STATE_SIZE if b < bodies else size
+        total = 0.0
+        for i in range(first, last):
+            ratio = errors[i] / tolerances[i]
+            total += ratio * ratio + 0.0 * new[i]
+        if last > first:
+            mean = total / (last - first)
+            largest = mean if not mean <= largest else largest
+            if math.isnan(mean):
+                return mean
+    return math.sqrt(largest)
 
 
 @jit(allocates=False)
@@ -228,7 +236,7 @@ def _on_the_rails(limit, state, model, work):
 
 
 @jit(allocates=False)
-def take_stock(control, dense, scale, drift, memory, record, model, work):
+def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and say whether it goes on.
 
     Parameters
@@ -237,8 +245,8 @@ def take_stock(control, dense, scale, drift, memory, record, model, work):
     dense : numpy.ndarray, shape (s, d)
     scale : float
         Factor of the stages in the dense output.
-    drift : numpy.ndarray, shape (n,)
-        Part of the rate that is constant during the step and not in the stages.
+    turn, drift : numpy.ndarray, shapes (2,) and (n,)
+        Axes of the stages, at the step's end: see `wrcore.integrate.moving_axes`.
     memory : Memory
     record : Record
     model : Model
@@ -250,6 +258,7 @@ def take_stock(control, dense, scale, drift, memory, record, model, work):
         RUNNING, COMPLETED, DERAILED or TOO_SMALL.
     """
     clock, stages = memory.clock, memory.stages
+    work.strips.warm[0] = 0
     times, reached = record.times, record.reached[0]
     while reached < times.shape[0] and times[reached] <= clock[T]:
         out = record.states[reached]
@@ -257,8 +266,7 @@ def take_stock(control, dense, scale, drift, memory, record, model, work):
             copy_into(out, memory.state)
         else:
             theta = (times[reached] - clock[T_OLD]) / (clock[T] - clock[T_OLD])
-            for j in range(out.shape[0]):
-                out[j] = memory.old[j] + (times[reached] - clock[T_OLD]) * drift[j]
+            out[:] = 0.0
             for i in range(stages.shape[0]):
                 weight = 0.0
                 for k in range(dense.shape[1] - 1, -1, -1):
@@ -266,6 +274,8 @@ def take_stock(control, dense, scale, drift, memory, record, model, work):
                 weight *= scale
                 for j in range(out.shape[0]):
                     out[j] += weight * stages[i, j]
+            begin = (turn[RATE], turn[ANGLE] - turn[RATE] * (clock[T] - clock[T_OLD]))
+            carry(model.bodies.mass.shape[0], begin, drift, times[reached] - clock[T_OLD], memory.old, out)
         reached += 1
         record.reached[0] = reached
         if not _on_the_rails(control.derailed_y, out, model, work):
@@ -306,10 +316,11 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
     n, last = state.shape[0], stages.shape[0] - 1
     while True:
         last_step = clock[T] - clock[T_OLD]
-        outcome = take_stock(control, tableau.dense, last_step, scratch.still, memory, record, model, work)
+        outcome = take_stock(control, tableau.dense, last_step, STILL, scratch.still, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
+        work.strips.warm[0] = 1
         step = clock[NEXT]
         for i in range(last + 1):
             stage = stages[i]
@@ -333,7 +344,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
             weight = step * tableau.error[i]
             for k in range(n):
                 errors[k] += weight * stages[i, k]
-        error = error_size(control, scratch.caps, state, trial, errors)
+        error = error_size(control.tolerances, model.bodies.mass.shape[0], trial, errors)
         if judge(control, tableau.exponent, 1.0, memory, error):
             accept(control, memory, trial, step)
             copy_into(memory.rate, stages[last])

@@ -3,7 +3,7 @@
 =====================================================  =============================================================
 ``rk45``, ``tsit5``, ``rk23``, ``rk4``                 explicit pairs of order 5(4), 5(4), 3(2), 4(3), compiled
 ``rodas4``, ``ros34pw2``                               Rosenbrock methods of order 4(3), 3(2), compiled
-``auto``                                               ``ros34pw2`` below `STIFF_SPEED`, else ``tsit5``
+``auto``                                               ``rodas4`` or ``tsit5``: :mod:`wrcore.integrate.choice`
 ``scipy_rk45``, ``_rk23``, ``_dop853``, ``_radau``,    scipy's solvers over the same right-hand side
 ``_bdf``, ``_lsoda``
 ``cvode``                                              SUNDIALS' BDF, if scikit-sundae is installed
@@ -27,9 +27,11 @@ import numpy as np
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.errors import InputError
 from wrcore.integrate import engine
+from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.integrate.tolerances import step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory, derailment
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
@@ -38,10 +40,6 @@ METHODS = (*EXPLICIT, *ROSENBROCK)
 
 REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_bdf", "scipy_lsoda", "cvode")
 """Methods of other libraries."""
-
-
-STIFF_SPEED = 25.0
-"""Below this speed (m/s) ``auto`` takes the Rosenbrock method."""
 
 
 STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-7
@@ -56,15 +54,8 @@ CHUNK = 2000
 """Attempts between two returns to Python, for progress and interrupts."""
 
 
-def chosen_method(method, speed):
-    """The method that a name stands for at a speed (m/s): ``auto`` depends on it."""
-    if method != "auto":
-        return method
-    return "ros34pw2" if speed < STIFF_SPEED else "tsit5"
-
-
 def integrate(
-    model, start, times, method="auto", rtol=1e-4, atol=1e-7, step=0.0, longest_step=0.05, derailed_y=np.inf,
+    model, start, times, method="auto", rtol=1e-4, atol=0.0, step=0.0, longest_step=0.05, derailed_y=np.inf,
     progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
 ):  # fmt: skip
     """Integrate a model's equations of motion and sample them at given times.
@@ -79,8 +70,8 @@ def integrate(
     method : str
         One of `METHODS` or `REFERENCES`, or ``auto``.
     rtol, atol : float
-        Tolerance of a step: ``atol + rtol |y|``, where no more than 1 counts of a position or a Euler parameter (see
-        :mod:`wrcore.integrate.engine`; the references count all of it).
+        Tolerance of a step: part of 1 cm that positions may err by, and what comes on top, m. All else follows from
+        that: :mod:`wrcore.integrate.tolerances`. The references use the same, but average over all components.
     step : float
         Length of all steps, s; 0 for steps by the tolerance. Compiled methods only.
     longest_step : float
@@ -109,11 +100,15 @@ def integrate(
     """
     times = np.ascontiguousarray(times, float)
     start, goes_on = _checked(start, model), isinstance(start, Checkpoint)
-    method = start.method if goes_on else chosen_method(method, model.speed)
+    method = start.method if goes_on else method
+    if method == "auto":
+        equations = equations or Equations(model)
+        method = cheaper_method(model, equations, times[0], start, longest_step)
+    tolerances = step_tolerances(model, rtol, atol, method)
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
-        return integrate_by_reference(model, start, times, method, rtol, atol, longest_step, derailed_y, progress, stop,
+        return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
     equations = equations or Equations(model)
@@ -121,8 +116,10 @@ def integrate(
     begin = start.memory.state if goes_on else start
     memory = new_memory(begin, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
     linear = new_linear(model) if method in ROSENBROCK else None
+    work.strips.memory[...] = 0.0
     if goes_on:
         _take_over(memory, start.memory)
+        _take_over((work.strips.memory,), (start.patches,))
         _take_over(linear, start.linear, planned=True)
         if not np.isfinite(memory.clock[: engine.ERROR]).all():
             raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
@@ -130,9 +127,9 @@ def integrate(
         if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
             memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
             memory.clock[engine.NEXT] = step
-    scratch = new_scratch(len(memory.state), len(model.bodies.mass))
+    scratch = new_scratch(len(memory.state))
     record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
-    control = Control(float(rtol), float(atol), float(step), float(longest_step), float(derailed_y))
+    control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
 
     def advance(attempts):
         if linear is None:
@@ -156,7 +153,7 @@ def integrate(
         method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
         int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
         int(counters[engine.FACTORISATIONS]), int(work.counters[1]), float(memory.clock[engine.SMALLEST]), wall,
-        Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy()),
+        Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy(), work.strips.memory.copy()),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
         int(work.counters[2]),

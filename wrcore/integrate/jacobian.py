@@ -14,6 +14,7 @@ greatest error of all. Positions are therefore counted from a motion at constant
 Jacobian was taken, and the derivative with respect to time is the one along that drift.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.integrate.engine import copy_into
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_rate
 from wrcore.kernels.jit import jit
 
 DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
@@ -70,6 +72,9 @@ class Jacobian(NamedTuple):
     """(size,): velocities of all bodies at the places of their positions, zero elsewhere."""
     axes: np.ndarray
     """(n, 4, 4): rows of E(p), then p, where the Jacobian was taken."""
+    turn: np.ndarray
+    """(2,): turn rate of the axes that increments are counted in (rad/s), and their turn since they were those of the
+    track (rad); see `wrcore.integrate.moving_axes`."""
 
 
 def _links(model):
@@ -190,30 +195,48 @@ def new_jacobian(model):
     m = size - 7 * n
     return Jacobian(
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
-        np.zeros(size), np.zeros((n, 4, 4)),
+        np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2),
     )  # fmt: skip
 
 
+@jit(allocates=False, inline="always")
+def turn_of(jacobian):
+    """Turn rate and angle of the axes, see `Jacobian`."""
+    return jacobian.turn[RATE], jacobian.turn[ANGLE]
+
+
 @jit(allocates=False)
-def _take_axes(state, rate, axes, spin):
-    """Write E(p), p and the frames' angular velocities 2 E(p) p' of all bodies, see :class:`Jacobian`."""
-    for b in range(axes.shape[0]):
-        at = STATE_SIZE * b
-        e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
-        rows = axes[b]
+def _take_axes(jacobian, state, rate):
+    """Write E(p), p, and the frames' angular velocities 2 E(p) p' of all bodies, see :class:`Jacobian`."""
+    c, s = math.cos(0.5 * jacobian.turn[ANGLE]), math.sin(0.5 * jacobian.turn[ANGLE])
+    for b in range(jacobian.axes.shape[0]):
+        at, rows = STATE_SIZE * b, jacobian.axes[b]
+        e0, e3 = c * state[at + 3] + s * state[at + 6], c * state[at + 6] - s * state[at + 3]
+        e1, e2 = c * state[at + 4] + s * state[at + 5], c * state[at + 5] - s * state[at + 4]
         rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = -e1, e0, -e3, e2
         rows[1, 0], rows[1, 1], rows[1, 2], rows[1, 3] = -e2, e3, e0, -e1
         rows[2, 0], rows[2, 1], rows[2, 2], rows[2, 3] = -e3, -e2, e1, e0
         rows[3, 0], rows[3, 1], rows[3, 2], rows[3, 3] = e0, e1, e2, e3
         for i in range(3):
-            spin[b, i] = 0.0
+            jacobian.spin[b, i] = 0.0
             for j in range(4):
-                spin[b, i] += 2.0 * rows[i, j] * rate[at + 3 + j]
+                jacobian.spin[b, i] += 2.0 * rows[i, j] * rate[at + 3 + j]
+
+
+@jit(allocates=False)
+def _take_drift(jacobian, state):
+    """Write the velocities of all bodies as the drift, see :class:`Jacobian`."""
+    c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
+    for b in range(jacobian.axes.shape[0]):
+        at = STATE_SIZE * b
+        vx, vy = state[at + VELOCITY], state[at + VELOCITY + 1]
+        jacobian.drift[at], jacobian.drift[at + 1] = c * vx + s * vy, c * vy - s * vx
+        jacobian.drift[at + 2] = state[at + VELOCITY + 2]
 
 
 @jit(allocates=False)
 def _perturb(trial, column, axes, fine):
-    """Perturb one unknown and return by how much; differences of velocities are multiplied by ``fine``."""
+    """Add a difference in one unknown to increments and return it; those of velocities are multiplied by ``fine``."""
     n = axes.shape[0]
     if column >= 12 * n:
         at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
@@ -227,9 +250,21 @@ def _perturb(trial, column, axes, fine):
             for i in range(4):
                 trial[at - k + 3 + i] += 0.5 * TURN * axes[column // 6, k - 3, i]
             return TURN
-    before = trial[at]
     trial[at] += difference
-    return trial[at] - before
+    return difference
+
+
+@jit(allocates=False)
+def _resolved(difference, column, bodies, turn, state, trial):
+    """The difference that a state far down the track resolved."""
+    k = column % 6
+    if column >= 6 * bodies or k >= 3:
+        return difference
+    at = STATE_SIZE * (column // 6)
+    if k == 2:
+        return trial[at + 2] - state[at + 2]
+    c, s, dx, dy = math.cos(turn[ANGLE]), math.sin(turn[ANGLE]), trial[at] - state[at], trial[at + 1] - state[at + 1]
+    return c * dx + s * dy if k == 0 else c * dy - s * dx
 
 
 @jit(allocates=False)
@@ -258,29 +293,31 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     int
         Number of evaluations.
     """
-    n = jacobian.axes.shape[0]
-    _take_axes(state, rate, jacobian.axes, jacobian.spin)
+    n, drift, base = jacobian.axes.shape[0], jacobian.drift, jacobian.by_time
+    jacobian.turn[RATE] = turn_rate(state, model, work)
+    axes = turn_of(jacobian)
+    _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW)
-    for b in range(n):
-        for k in range(STATE_SIZE * b, STATE_SIZE * b + 3):
-            jacobian.drift[k] = state[k + VELOCITY]
-    base, evaluations = rate, sweep.starts.shape[0]
-    strips = model.contact.strips.strips > 0
+    evaluations, strips = sweep.starts.shape[0], model.contact.strips.strips > 0
+    copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses
         work.strips.cheap[0] = 1
-        base = jacobian.by_time
         derivatives_at(equations, t, state, model, work, base)
+    rates_of_increments(n, axes, drift, 0.0, state, state, base)
+    _take_axes(jacobian, state, base)
     for i in range(evaluations):
-        copy_into(trial, state)
         in_time = i == sweep.starts.shape[0] - 1
         first, last = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
-        if in_time:
-            for j in range(state.shape[0]):
-                trial[j] += MOMENT * jacobian.drift[j]
+        moment = MOMENT if in_time else 0.0
+        trial[:] = 0.0
         for k in range(first, last):
             differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes, fine)
-        derivatives_at(equations, t + MOMENT if in_time else t, trial, model, work, slope)
+        carry(n, axes, drift, moment, state, trial)
+        for k in range(first, last):
+            differences[k - first] = _resolved(differences[k - first], sweep.columns[k], n, axes, state, trial)
+        derivatives_at(equations, t + moment, trial, model, work, slope)
+        rates_of_increments(n, axes, drift, moment, state, trial, slope)
         if in_time:
             for j in range(state.shape[0]):
                 jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT

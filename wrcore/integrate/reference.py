@@ -16,9 +16,15 @@ SOLVERS = {
 """scipy's classes by method name."""
 
 
-def integrate_by_reference(model, state, times, method, rtol, atol, longest_step, derailed_y, progress=None, halt=None,
+LEAST_RTOL = 3e-14
+"""Tolerance by the size of a component, as small as scipy allows: what counts are the tolerances of each."""
+
+
+def integrate_by_reference(model, state, times, method, tolerances, longest_step, derailed_y, progress=None, halt=None,
                            most_steps=0):  # fmt: skip
     """Integrate a model with a solver of another library; arguments as for `integrator.integrate`.
+
+    ``tolerances`` are those of the components, shape (size,).
 
     Returns
     -------
@@ -36,7 +42,7 @@ def integrate_by_reference(model, state, times, method, rtol, atol, longest_step
 
     bounded = stop if np.isfinite(derailed_y) else None
     return integrate_function(
-        function, state, times, method, rtol, atol, longest_step, bounded, progress, halt, most_steps
+        function, state, times, method, LEAST_RTOL, tolerances, longest_step, bounded, progress, halt, most_steps
     )
 
 
@@ -56,8 +62,8 @@ def integrate_function(
         Increasing output times, s; the last one ends the run.
     method : str
         A key of `SOLVERS`, or ``cvode``.
-    rtol, atol : float
-        Tolerances of the library's step control.
+    rtol, atol : float or numpy.ndarray, shape (n,)
+        Tolerances of the library's step control; the latter may be one for each component.
     longest_step : float
         s.
     stop : callable, optional

@@ -31,7 +31,8 @@ from wrcore.integrate.engine import (
     judge,
     take_stock,
 )
-from wrcore.integrate.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian
+from wrcore.integrate.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian, turn_of
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
 from wrcore.kernels.jit import jit
 
 CONTACT_REFRESHES = 20
@@ -77,7 +78,7 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
         sweep = linear.contact
         if age < 0 or counters[SINCE_FULL] >= CONTACT_REFRESHES:
             sweep = linear.full
-            counters[SINCE_FULL] = 0
+            counters[SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[EVALUATIONS] += refresh_jacobian(
             sweep, linear.jacobian, clock[T], memory.state, memory.rate, scratch.trial, scratch.slope,
             linear.differences, equations, model, work,
@@ -103,7 +104,7 @@ def _touching(work):
 
 
 @jit(allocates=False)
-def _touchdown_error(tableau, control, memory, scratch, linear):
+def _touchdown_error(tableau, control, memory, scratch, linear, model):
     """Error by the rate at the end of an attempt (``scratch.slope``) against the step's own dense output there.
 
     Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
@@ -111,8 +112,9 @@ def _touchdown_error(tableau, control, memory, scratch, linear):
     is stiff.
     """
     step, stages, defect = memory.clock[NEXT], memory.stages, scratch.defect
-    for k in range(defect.shape[0]):
-        defect[k] = scratch.slope[k] - linear.jacobian.drift[k]
+    bodies, turn, drift = model.bodies.mass.shape[0], turn_of(linear.jacobian), linear.jacobian.drift
+    copy_into(defect, scratch.slope)
+    rates_of_increments(bodies, turn, drift, step, memory.state, scratch.trial, defect)
     for i in range(stages.shape[0]):
         weight = 0.0
         for k in range(tableau.dense.shape[1]):
@@ -120,7 +122,7 @@ def _touchdown_error(tableau, control, memory, scratch, linear):
         for k in range(defect.shape[0]):
             defect[k] -= weight / step * stages[i, k]
     solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), defect)
-    return error_size(control, scratch.caps, memory.state, scratch.trial, defect)
+    return error_size(control.tolerances, bodies, scratch.trial, defect)
 
 
 @jit(allocates=False, nogil=True)
@@ -149,26 +151,26 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
     """
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
-    n, last = state.shape[0], stages.shape[0] - 1
+    n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
     hold = HOLD if tableau.reuse > 1 else 1.0
     while True:
-        outcome = take_stock(control, tableau.dense, 1.0, drift, memory, record, model, work)
+        outcome = take_stock(control, tableau.dense, 1.0, turn_of(linear.jacobian), drift, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
+        work.strips.warm[0] = 1
         step, regular = clock[NEXT], True
         for i in range(last + 1):
-            copy_into(trial, state)
+            trial[:] = 0.0
             for j in range(i):
                 weight = tableau.stages[i, j]
                 if weight != 0.0:
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
-            if i > 0:
-                for k in range(n):
-                    trial[k] += tableau.nodes[i] * step * drift[k]
+            moment = tableau.nodes[i] * step
+            carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
             if i > 0 or not counters[HAS_RATE]:
-                derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, slope)
+                derivatives_at(equations, clock[T] + moment, trial, model, work, slope)
                 counters[EVALUATIONS] += 1
             if i == 0:
                 if not counters[HAS_RATE]:
@@ -176,31 +178,33 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                     counters[HAS_RATE], counters[TOUCHING] = 1, _touching(work)
                 regular = _renew(tableau, memory, scratch, linear, equations, model, work)
                 copy_into(slope, memory.rate)
+                copy_into(trial, state)
+            rates_of_increments(bodies, turn_of(linear.jacobian), drift, moment, state, trial, slope)
             increment, by_time = stages[i], step * tableau.by_time[i]
             for k in range(n):
-                increment[k] = slope[k] - drift[k] + by_time * linear.jacobian.by_time[k]
+                increment[k] = slope[k] + by_time * linear.jacobian.by_time[k]
             for j in range(i):
                 weight = tableau.couplings[i, j] / step
                 for k in range(n):
                     increment[k] += weight * stages[j, k]
             solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), increment)
-        for k in range(n):
-            trial[k] = state[k] + step * drift[k]
-        slope[:] = 0.0
+        trial[:], slope[:] = 0.0, 0.0
         for i in range(last + 1):
             for k in range(n):
                 trial[k] += tableau.weights[i] * stages[i, k]
                 slope[k] += tableau.error[i] * stages[i, k]
-        error = error_size(control, scratch.caps, state, trial, slope) if regular else np.nan
+        carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
+        error = error_size(control.tolerances, bodies, trial, slope) if regular else np.nan
         looked_ahead, touching = error <= 1.0, 0
         if looked_ahead:  # the next step's first rate
             derivatives_at(equations, clock[T] + step, trial, model, work, slope)
             counters[EVALUATIONS] += 1
             touching = _touching(work)
             if touching > counters[TOUCHING]:
-                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear))
+                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, model))
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
+            linear.jacobian.turn[ANGLE] += linear.jacobian.turn[RATE] * step
             counters[AGE] += 1
             counters[HAS_RATE], counters[TOUCHING] = looked_ahead, touching
             if looked_ahead:

@@ -24,6 +24,8 @@ class Checkpoint:
         Of Rosenbrock methods.
     arc_lengths : numpy.ndarray, shape (k,)
         Of the wheelsets, m: where the search for the next ones starts.
+    patches : numpy.ndarray
+        Solutions of patches on strips, from which the next ones start (:mod:`wrcore.contact.patch.model`).
     model : str
         Fingerprint of the model, where a scene's run left it (:func:`wrcore.run.checkpoints.model_fingerprint`).
     """
@@ -33,6 +35,7 @@ class Checkpoint:
     memory: Memory
     linear: Linear | None
     arc_lengths: np.ndarray
+    patches: np.ndarray
     model: str = ""
 
 

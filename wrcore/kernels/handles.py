@@ -92,6 +92,27 @@ def _write(value, memory):
     _store(value, memory)
 
 
+def _pack(kind, value, begin, memory):
+    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned.
+
+    A kernel that does it has to be compiled for each type, at a second each.
+    """
+    if isinstance(kind, types.BaseTuple):
+        end, coarsest = begin, 1
+        for one, part in zip(kind.types, value, strict=True):
+            end, aligned = _pack(one, part, end, memory)
+            coarsest = max(coarsest, aligned)
+        return end + -end % coarsest, coarsest
+    if isinstance(kind, types.Array):
+        place = value.__array_interface__["data"][0]
+        numbers = np.array([0, 0, value.size, value.itemsize, place, *value.shape, *value.strides], np.int64)
+    else:
+        numbers = np.array([value], str(kind))
+    begin += -begin % numbers.itemsize
+    memory[begin : begin + numbers.nbytes] = numbers.view(np.uint8)
+    return begin + numbers.nbytes, numbers.itemsize
+
+
 class Handle:
     """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing.
 
@@ -105,7 +126,7 @@ class Handle:
         self.value = value
         self._numba_type_, size = _layout(value)
         self._memory = np.zeros(size, np.uint8)
-        _write(value, self._memory)
+        _pack(self._numba_type_.target, value, 0, self._memory)
         self.address = self._memory.ctypes.data
 
     def renew(self, value):

@@ -6,10 +6,14 @@ from typing import NamedTuple, get_type_hints
 import h5py
 import numpy as np
 
+from wrcore.contact.patch.strips import MEMORY
 from wrcore.dynamics.system import Model
 from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint
+
+NO_PATCHES = np.zeros((0, 0, 0, MEMORY))
+"""Of models without strips; files of before strips say nothing about them."""
 
 
 class _Saved(NamedTuple):
@@ -18,13 +22,14 @@ class _Saved(NamedTuple):
     memory: Memory
     linear: Linear
     arc_lengths: np.ndarray
+    patches: np.ndarray
 
 
 def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
     """Write a checkpoint into an empty group."""
     for name in ("method", "t", "model"):
         group.attrs[name] = getattr(checkpoint, name)
-    _write(group, _Saved(checkpoint.memory, checkpoint.linear, checkpoint.arc_lengths))
+    _write(group, _Saved(checkpoint.memory, checkpoint.linear, checkpoint.arc_lengths, checkpoint.patches))
 
 
 def read_checkpoint(group: h5py.Group) -> Checkpoint:
@@ -48,7 +53,8 @@ def _read(group, kind):
     parts = {}
     for name, type_ in get_type_hints(kind).items():
         if type_ is np.ndarray:
-            parts[name] = np.ascontiguousarray(group[name][()])
+            given = name in group or name != "patches"
+            parts[name] = np.ascontiguousarray(group[name][()] if given else NO_PATCHES)
         elif issubclass(type_, tuple):
             parts[name] = _read(group[name], type_) if name in group else None
         else:

@@ -16,9 +16,10 @@ from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, workspace
 from wrcore.dynamics.track import track_poses
+from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import irregularity_end
-from wrcore.integrate.integrator import chosen_method, integrate
+from wrcore.integrate.integrator import integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.run import Run
@@ -97,12 +98,12 @@ class Course:
     def begin_at(self, start: Checkpoint | np.ndarray, places: Places | None = None) -> None:
         """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
         if isinstance(start, Checkpoint):
-            method = chosen_method(self.scene.data["integration"]["method"], self.model.speed)
+            method = self.scene.data["integration"]["method"]
             if start.model != self.mark:
                 got = "another one's" if start.model else "one that does not say whose it is (of an older version)"
                 expected = f"expected a checkpoint of this very model, got {got}"
                 raise InputError(self.scene.source, "start", f"{expected}; the run's end_state is a start for any")
-            if start.method != method:
+            if method not in (start.method, "auto"):
                 expected = f"expected that of the start, {start.method}, got {method}"
                 raise InputError(self.scene.source, "integration.method", expected)
         if places is not None:
@@ -181,6 +182,8 @@ class Course:
                     groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
                     if model.contact.strips.strips:
                         groups[f"{name}/{side}"]["p_max_Pa"] = rows[..., reduction.P_MAX]
+                    if shaped(model.contact):
+                        groups[f"{name}/{side}"]["psi"] = rows[..., reduction.PSI]
                 if scene.detection == "auto":
                     groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
                     spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]

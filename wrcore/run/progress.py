@@ -1,4 +1,4 @@
-"""Progress of long work: a bar in a terminal or a notebook, nothing in a log."""
+"""Progress of long work: a bar in a terminal or a notebook; in a log one line before the first long wait."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from wrcore.kernels.cache import kernel_folder
+from wrcore.scene.description import announce
 
 DELAY = 1.0
 """Work that is done within this time shows no bar, s."""
@@ -48,11 +49,11 @@ def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[fl
     ...     if advance:
     ...         advance(5.0)
     """
+    if not any(kernel_folder().rglob("*advance_*.nbi")):
+        announce("compiling for the first run of this version: about a minute, once")
     if not somebody_watches():
         yield None
         return
-    if not any(kernel_folder().rglob("*advance_*.nbi")):
-        print("compiling for the first run of this version: about a minute, once", file=sys.stderr)
     form = "{l_bar}{bar}| {n:.2f}/{total:g} s, {remaining} left"
     with _tqdm()(total=duration, unit="s", delay=DELAY, bar_format=form, leave=False) as bar:
         yield lambda t: bar.update(t - begin - bar.n) and None

@@ -27,7 +27,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.new_files import locked, remove_folder, remove_remains
-from wrcore.integrate.integrator import METHODS, chosen_method
+from wrcore.integrate.integrator import REFERENCES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
 from wrcore.run.course import Course, Places
@@ -124,7 +124,7 @@ def simulate_to(
         That names the file, where the disk is full: the blocks written before are kept.
     """
     course, settings = Course(scene), scene.data["integration"]
-    if chosen_method(settings["method"], course.model.speed) in METHODS:
+    if settings["method"] not in REFERENCES:
         size = block or _block_size(course)
     else:  # methods of other libraries have no checkpoints
         check_memory(scene)

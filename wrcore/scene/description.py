@@ -6,6 +6,7 @@ import copy
 import json
 import math
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -20,7 +21,7 @@ from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data
-from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, load_table
+from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, load_table, table_path
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
@@ -131,6 +132,10 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     wheel = _profile(data, "wheel", folder, source)
     rail = _profile(data, "rail", folder, source, _ratio(data["rail"].get("inclination"), source, "rail.inclination"))
     data["contact"]["creep"].setdefault("tolerance", DEFAULT_TOLERANCE)
+    if data["contact"]["creep"]["planes"] == "sdec" and (
+        data["contact"]["patch"] != "moment" or data["contact"]["creep"]["model"] != "table"
+    ):
+        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     if "table" in data["contact"]["creep"]:
         table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
         data["contact"]["creep"]["table"] = str(table)
@@ -212,14 +217,23 @@ def _profile(data, kind, folder, source, inclination=None):
         raise
 
 
+def announce(text):
+    """One line on stderr before work that takes long, whoever listens; none with ``WRCORE_PROGRESS=0``."""
+    if os.environ.get("WRCORE_PROGRESS") != "0":
+        print(f"wrcore: {text}", file=sys.stderr, flush=True)
+
+
 def _creep(scene, progress):
     """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
     creep, nu = scene.data["contact"]["creep"], scene.data["contact"]["material"]["poisson_ratio"]
     if creep["model"] != "table":
         return creep_data(nu)
-    table = (
-        load_table(creep["table"]) if "table" in creep else ensure_table(nu, "ellipse", creep["tolerance"], progress)
-    )
+    if "table" in creep:
+        table = load_table(creep["table"])
+    else:
+        if not table_path(nu, creep["planes"], creep["tolerance"]).exists():
+            announce(f"building a creep table ({creep['planes']}, {creep['tolerance']:g}): some ten seconds, once")
+        table = ensure_table(nu, creep["planes"], creep["tolerance"], progress)
     if abs(table.nu - nu) > 1e-9:
         raise InputError(
             scene.source,

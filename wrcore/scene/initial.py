@@ -23,11 +23,15 @@ from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.track import rotation
+from wrcore.kernels.handles import Handle
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
 LARGEST_REST = 1e-6 * GRAVITY
 """A vehicle whose accelerations are above this at its computed equilibrium has none, m/s^2 or rad/s^2."""
+
+LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
+"""The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
 
 LARGEST_SLIP, NEARBY = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
@@ -79,7 +83,8 @@ def rest(scene, model):
         equilibrium = solve_equilibrium(level, state)
     except np.linalg.LinAlgError as error:
         raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
-    if not (equilibrium.residual < LARGEST_REST and np.all(equilibrium.wheel_loads > 0.0)):
+    limit = LARGEST_REST_ON_STRIPS if contact.strips.strips else LARGEST_REST
+    if not (equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0)):
         raise InputError(
             scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
             f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
@@ -140,7 +145,7 @@ def _settled(scene, model, y, yaw, load):
     contact = model.contact
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     roll, z = settle(
-        contact.geometry, contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
+        Handle(contact.geometry), contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
         scene.vehicle.rolling_radius,
     )  # fmt: skip
     if not math.isfinite(z):

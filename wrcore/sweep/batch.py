@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from wrcore.dynamics.system import Equations, Model, with_wheels
+from wrcore.dynamics.system import Equations, Model, with_kernels
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.channels import unit_of
@@ -87,7 +87,7 @@ class _Series:
         """The equations of another model, with scratch arrays as if they were new."""
         for array, values in zip(self.scratch, self.fresh, strict=True):
             array[...] = values
-        self.equations.arguments[1].renew(with_wheels(model, self.equations.work))
+        self.equations.arguments[1].renew(with_kernels(model, self.equations.work))
         return self.equations
 
 
@@ -132,9 +132,9 @@ def run_sweep(
     ...     "sampling": {"kind": "grid"}, "keys": {"speed": {"values": [20, 30]}}, "measures": ["y_max_m"],
     ... })
     >>> table
-       run  speed     status    method  y_max_m
-    0    0     20  completed  ros34pw2    0.002
-    1    1     30  completed     tsit5    0.002
+       run  speed     status  method  y_max_m
+    0    0     20  completed  rodas4    0.002
+    1    1     30  completed   tsit5    0.002
     """
     sweep = source if isinstance(source, Sweep) else load_sweep(source)
     return run_rows(sweep, sweep.runs, threads, progress)

@@ -146,9 +146,9 @@ class Outcome(NamedTuple):
 
 
 def reference_path(name):
-    """Path of a set's file, or None."""
+    """Path of a set's file, or None; WRCORE_REFERENCE names their folder."""
     shared = Path(os.environ.get("WRCORE_SHARED", Path(__file__).parents[4] / "shared"))
-    path = shared / "reference" / f"{name}.csv"
+    path = Path(os.environ.get("WRCORE_REFERENCE", shared / "reference")) / f"{name}.csv"
     if path.is_file():
         return path
     return TRAVELLING if name == "mbench_contact" else None

@@ -24,7 +24,7 @@ def by_contender(rows):
 
 
 def test_scipy_is_slower_at_the_same_error(scene):
-    rows = by_contender(pairs.engine_against_scipy("wheelset", scene, 1e-8, [1e-2, 1e-3, 1e-4, 1e-5], 1))
+    rows = by_contender(pairs.engine_against_scipy("wheelset", scene, 1e-8, [1e-3, 1e-4, 1e-5, 1e-6], 1))
     assert list(rows) == ["compiled", "scipy"]
     assert rows["scipy"]["ratio"] > 3.0
     assert rows["scipy"]["bar"] == "ratio at least 8"
@@ -39,7 +39,7 @@ def test_time_at_an_error_lies_between_two_runs():
 
 
 def test_plain_equations_are_hundreds_of_times_slower(scene):
-    rows = pairs.compiled_against_plain(scene, states=2, duration=0.002, passes=1)
+    rows = pairs.compiled_against_plain(scene, states=2, duration=0.01, passes=1)
     assert [row["of"] for row in rows] == ["evaluation"] * 2 + ["run"] * 2
     assert rows[1]["ratio"] > 100.0
     assert rows[3]["ratio"] > 30.0

@@ -1,8 +1,10 @@
-"""Run every choice on one scene, timed, and compare it with the reference."""
+"""Run every choice on one scene, timed, and compare it with the reference, its model's twin and exact contact."""
 
 import sys
 
 from study.accuracy.errors import combinations, reference_row, reference_runs, study
+from study.accuracy.models import reference_choice, twins, with_model_errors
+from wrcore.run.results import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings = snakemake.params.settings
@@ -10,6 +12,10 @@ until = settings["until"] or float("inf")
 source = (snakemake.input.scene, settings["overrides"])
 scene, run, twin = reference_runs(*source, settings["reference"])
 reference_row(scene, run, twin, until).to_csv(snakemake.output.reference, index=False)
-table = study(*source, combinations(settings["grids"]), run, until, settings["repetitions"])
+choices = combinations(settings["grids"])
+tight = twins(*source, choices, (reference_choice(settings["reference"]), run), **settings["twins"])
+exact = load_run(snakemake.input.exact[0]) if snakemake.input.exact else None
+table = study(*source, choices, run, until, settings["repetitions"], twins=tight)
+table = with_model_errors(table, tight, exact)
 table.to_csv(snakemake.output.choices, index=False)
 print(table.to_string())

@@ -13,7 +13,7 @@ source, params, output = snakemake.input.scene, snakemake.params, snakemake.outp
 table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
 scenes = {}
 for name, changes in params.variants.items():
-    own = any(change.startswith("contact.creep.tolerance=") for change in changes)
+    own = any(change.startswith(("contact.creep.tolerance=", "contact.creep.planes=")) for change in changes)
     shared = [] if own else [f"contact.creep.table={table}"]
     scenes[name] = load_scene(source, [*shared, "initial.y=0.0", *changes])
 speeds = np.linspace(**params.speeds)

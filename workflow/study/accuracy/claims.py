@@ -58,6 +58,20 @@ def creep_claims(errors):
     return pd.DataFrame(rows)
 
 
+def patch_claims(summary):
+    """Errors of patch models against exact contact; columns as for `contact_claims`.
+
+    Parameters
+    ----------
+    summary : pandas.DataFrame
+        From `study.patch.tables.summary`.
+    """
+    named = summary.rename(columns={"quantity": "what", "model": "of"})
+    return named.assign(cases="poses " + named["zone"])[
+        ["what", "of", "cases", "count", "median", "q95", "worst", "unit"]
+    ]
+
+
 def speed_claims(front):
     """Real-time factors on the fronts of speed against error: least, median and greatest of each kind and accuracy.
 
@@ -76,9 +90,10 @@ def speed_claims(front):
     return pd.DataFrame(rows)
 
 
-def claims(cases, errors, front):
+def claims(cases, errors, patches, front):
     """All of them in one table; arguments as for the parts."""
-    return pd.concat([contact_claims(cases), creep_claims(errors), speed_claims(front)], ignore_index=True)
+    parts = contact_claims(cases), creep_claims(errors), patch_claims(patches), speed_claims(front)
+    return pd.concat(parts, ignore_index=True)
 
 
 def claims_markdown(table):

@@ -4,6 +4,7 @@ The reference runs with spatial detection, the moment reduction and the finest c
 two independent integrators; their difference says how far the reference itself can be trusted.
 """
 
+import dataclasses
 from itertools import product
 
 import numpy as np
@@ -48,17 +49,21 @@ def run_errors(run, reference, until=np.inf):
     -------
     dict
         RMS and maximum over all wheelsets of the lateral position's error (m); RMS over all wheels of the error of Q
-        and Y (N); relative errors of mean wear number and creep power, and of amplitude and frequency over the second
-        half.
+        and Y (N), and of Y alone; of the normal force over its mean; relative errors of mean wear number and creep
+        power, and of amplitude and frequency over the second half.
     """
     if run.t[-1] < min(until, reference.t[-1]) - 1e-9:
         return dict.fromkeys(ERRORS, np.nan)  # did not get there
-    here = reference.t[: run.t.size] <= until
+    run, reference = (first_samples(r, min(run.t.size, reference.t.size)) for r in (run, reference))
+    here = reference.t <= until
     names = wheelsets_of(reference)
     gaps = np.array([(run[name].y_m - reference[name].y_m)[here] for name in names])
-    forces = []
+    forces, normal, sure_normal = [], [], []
     for name, side in product(names, SIDES):
         forces.append(np.subtract(wheel_forces(run, name, side), wheel_forces(reference, name, side))[:, here])
+        for r, found in ((run, normal), (reference, sure_normal)):
+            found.append(np.nansum(r[f"{name}/{side}"].N_N, axis=1)[here])
+    forces, normal, sure_normal = np.array(forces), np.array(normal), np.array(sure_normal)
     (wear, sure_wear), (power, sure_power) = (
         [np.sum([of(r, name, side)[here] for name, side in product(names, SIDES)]) for r in (run, reference)]
         for of in (wear_number, creep_power)
@@ -73,7 +78,9 @@ def run_errors(run, reference, until=np.inf):
     return {
         "y_rms_m": float(np.sqrt(np.mean(gaps**2))),
         "y_max_m": float(np.max(np.abs(gaps))),
-        "force_rms_N": float(np.sqrt(np.mean(np.square(forces)))),
+        "force_rms_N": float(np.sqrt(np.mean(forces**2))),
+        "N_rms_relative": float(np.sqrt(np.mean((normal - sure_normal) ** 2)) / np.mean(sure_normal)),
+        "Y_rms_N": float(np.sqrt(np.mean(forces[:, 1] ** 2))),
         "T_gamma_relative": float(abs(wear / sure_wear - 1.0)),
         "creep_power_relative": float(abs(power / sure_power - 1.0)),
         "amplitude_relative": float(abs(size / sure_size - 1.0)),
@@ -81,10 +88,27 @@ def run_errors(run, reference, until=np.inf):
     }
 
 
+def first_samples(run, count):
+    """A run as far as its first samples go."""
+    if run.t.size == count:
+        return run
+    groups = {name: {key: values[:count] for key, values in group.items()} for name, group in run.groups.items()}
+    return dataclasses.replace(run, t=run.t[:count], groups=groups)
+
+
 ERRORS = (
-    "y_rms_m", "y_max_m", "force_rms_N", "T_gamma_relative", "creep_power_relative", "amplitude_relative",
-    "frequency_relative",
+    "y_rms_m", "y_max_m", "force_rms_N", "N_rms_relative", "Y_rms_N", "T_gamma_relative", "creep_power_relative",
+    "amplitude_relative", "frequency_relative",
 )  # fmt: skip
+
+
+SHOWN = ("y_rms_m", "N_rms_relative", "Y_rms_N", "T_gamma_relative")
+"""Errors that are kept of integration and model apart: lateral position, normal force, guiding force, wear number."""
+
+
+def part_of(errors, of):
+    """Errors that are shown, under names that say of what they are: ``integration`` or ``model``."""
+    return {f"{of}_{name}": errors[name] for name in SHOWN}
 
 
 COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
@@ -121,7 +145,7 @@ def reference_row(scene, run, twin, until=np.inf):
     return pd.DataFrame([facts | run_errors(twin, run, until) | counters])
 
 
-def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None):
+def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None, twins=None):
     """Run every choice on a scene.
 
     Parameters
@@ -137,6 +161,8 @@ def study(source, overrides, choices, reference, until=np.inf, repetitions=1, pr
         hit one alone.
     progress : callable, optional
         Wraps the list of choices in each pass, e.g. ``tqdm.tqdm``.
+    twins : dict of tuple to Run, optional
+        Tight runs by model (`study.accuracy.models.twins`): errors of the integration against them are added.
 
     Returns
     -------
@@ -153,7 +179,9 @@ def study(source, overrides, choices, reference, until=np.inf, repetitions=1, pr
             if repetition == 0:
                 costs = {name: run.counters.get(name, 0) for name in COSTS}
                 errors = run_errors(run, reference, until)
-                rows[choice] = choice._asdict() | {"status": run.status} | errors | costs
+                twin = None if twins is None else twins[choice[:3]]
+                own = {} if twin is None else part_of(run_errors(run, twin, until), "integration")
+                rows[choice] = choice._asdict() | {"status": run.status} | errors | own | costs
     for choice, row in rows.items():
         wall = np.array(times[choice])
         row["wall_s"] = float(np.median(wall))
@@ -208,13 +236,13 @@ def recommendation_table(tables, accuracies):
         m.
     """
     found = {title: recommendations(table, accuracies) for title, table in tables.items()}
-    return pd.concat([rows.assign(scene=title) for title, rows in found.items()])[
-        ["scene", "accuracy_m", *Choice._fields, "y_rms_m", "real_time_factor", "rhs_evaluations"]
-    ]
+    table = pd.concat([rows.assign(scene=title) for title, rows in found.items()])
+    apart = [f"{of}_{name}" for of in ("integration", "model") for name in SHOWN if f"{of}_{name}" in table]
+    return table[["scene", "accuracy_m", *Choice._fields, "y_rms_m", "real_time_factor", "rhs_evaluations", *apart]]
 
 
 def front_table(tables, references):
-    """Fronts of several scenes: what ``wrcore simulate --accuracy`` chooses from.
+    """Fronts of several scenes: the choices that no other beats.
 
     Parameters
     ----------

@@ -16,14 +16,18 @@ MODELS = (
     ("spatial, formula or FASTSIM", "#E69F00", "^"),
     ("planar", "#CC79A7", "v"),
     ("reduction to the maximum", "0.6", "x"),
+    ("strips", "#009E73", "+"),
 )
 """Kinds of model: label, colour (Okabe-Ito; dark to light in grey) and marker."""
+
+INTEGRATION, MODEL = "#0072B2", "#E69F00"
+"""Colours of the errors of integration and model: dark and full against light and open in grey."""
 
 
 def model_kind(row, finest):
     """Which of ``MODELS`` a row of the study belongs to."""
-    if row["patch"] == "maximum":
-        return MODELS[5][0]
+    if row["patch"] != "moment":
+        return MODELS[5 if row["patch"] == "maximum" else 6][0]
     if row["detection"] != "spatial":
         return MODELS[4][0]
     if not row["creep"].startswith("table"):
@@ -35,38 +39,62 @@ def model_kind(row, finest):
 
 
 @styled
-def speed_against_error(tables, finest, doubts=None):
-    """Real-time factor over error, one panel per scene: every choice, and the front that no choice beats.
+def speed_against_error(tables, finest, doubts=None, resolved=None):
+    """Real-time factor over error, one panel per scene: every choice, its errors of integration and of model apart.
 
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
-        By title, from :func:`study.accuracy.errors.study`.
+        By title, from :func:`study.accuracy.errors.study`. With the columns of `study.accuracy.models` the marker says
+        which kind of model it is, and each choice has a full mark at the error of its integration and an open one at
+        that of its model. Without, marks are at the difference from the reference, coloured by kind.
     finest : str
         Creep of the reference, as in the column ``creep``.
     doubts : dict of str to float, optional
         Difference between the two reference runs (RMS, m), drawn as a line: errors below it mean nothing.
+    resolved : dict of str to float, optional
+        Difference between the two runs with exact contact (RMS, m), drawn as a line: errors of models below it mean
+        nothing.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
     rows = -(-len(tables) // 2)
-    figure = Figure(figsize=(7.4, 0.9 + 2.5 * rows), layout="constrained")
+    figure = Figure(figsize=(7.4, 1.1 + 2.5 * rows), layout="constrained")
     panels = np.ravel(figure.subplots(rows, min(2, len(tables)), squeeze=False))
     for axes, (title, table) in zip(panels, tables.items(), strict=False):
         done = table[(table["status"] == "completed") & table["y_rms_m"].notna()]
+        apart = "integration_y_rms_m" in done
         kinds = [model_kind(row, finest) for _, row in done.iterrows()]
+        if apart:
+            axes.scatter([], [], s=12, c=INTEGRATION, label="error of the integration")
+            axes.scatter([], [], s=14, facecolors="none", edgecolors=MODEL, label="error of the model")
         for label, color, marker in reversed(MODELS):
-            here = done[[kind == label for kind in kinds]]
-            axes.scatter(here["y_rms_m"], here["real_time_factor"], s=9, c=color, marker=marker, lw=0.7, label=label)
-        front = pareto_front(done)
-        axes.plot(front["y_rms_m"], front["real_time_factor"], color=ACCENT, lw=1.0, label="best of all")
+            _marks(axes, done[[kind == label for kind in kinds]], label, color, marker, apart)
+        own = done[[kind == MODELS[0][0] for kind in kinds]] if apart else done
+        front = pareto_front(own)
+        label = "fastest with moment, fine table" if apart else "best of all"
+        axes.plot(front["y_rms_m"], front["real_time_factor"], color=ACCENT, lw=1.0, label=label)
         if doubts:
             axes.axvline(doubts[title], color="0.3", ls=":", lw=0.9, label="difference of the references")
+        if resolved and title in resolved:
+            axes.axvline(resolved[title], color=MODEL, ls="--", lw=0.9, label="resolution of exact contact")
         axes.set(xscale="log", yscale="log", xlabel="error of y, rms / m", ylabel="real-time factor")
         axes.set_title(title, loc="left")
     for axes in panels[len(tables) :]:
         axes.remove()
-    shared_legend(figure, panels[:1], fontsize=7, ncols=3)
+    shared_legend(figure, panels[: len(tables)], fontsize=7, ncols=3)
     return figure
+
+
+def _marks(axes, rows, label, color, marker, apart):
+    """Marks of the choices of one kind of model."""
+    speed, size = rows["real_time_factor"], {"s": 9, "marker": marker, "lw": 0.7}
+    if not apart:
+        axes.scatter(rows["y_rms_m"], speed, c=color, label=label, **size)
+        return
+    axes.scatter([], [], c="0.2", label=label, **size)
+    hollow = {"c": MODEL} if marker in "x+" else {"facecolors": "none", "edgecolors": MODEL}
+    axes.scatter(rows["model_y_rms_m"], speed, **hollow, **size | {"lw": 1.0, "s": 14})
+    axes.scatter(rows["integration_y_rms_m"], speed, c=INTEGRATION, **size)

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from wrcore.dynamics import wheel
+from wrcore.dynamics import constraints, wheel
 from wrcore.dynamics.system import workspace
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
@@ -229,9 +229,11 @@ def _registers(tally):
     }
 
 
-def _call_wheels(_, *arguments):
-    """Stands in for the call of the wheels' kernel by its address: wheels on ellipses."""
-    wheel.wheel_wrenches(*arguments)
+def _call(_, *arguments):
+    """Stands in for calls of kernels by their addresses: that of the joints has four arguments, of wheels on ellipses
+    eight."""
+    kernel = constraints.add_reactions if len(arguments) == 4 else wheel.wheel_wrenches
+    kernel(*arguments)
 
 
 @contextmanager
@@ -251,7 +253,7 @@ def interpreted(tally):
             elif name in registers and getattr(value, "__module__", "") == "wrcore.kernels.lanes":
                 new = registers[name]
             elif (module.__name__, name) == ("wrcore.dynamics.system", "call_address"):
-                new = _call_wheels
+                new = _call
             elif name == "rarely_called":
                 new = lambda: None  # noqa: E731
             if (module.__name__, name) in WHERE:

@@ -15,10 +15,11 @@ from wrcore.dynamics.linear import steady_running
 from wrcore.dynamics.system import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
+from wrcore.integrate.tolerances import LENGTH
 from wrcore.run.simulate import output_times
 
-LARGEST_ERROR = 100.0
-"""Global error over the tolerance (rtol times the start's y) that a run of a second may have."""
+LARGEST_ERROR = 30.0
+"""Global error over what a step may err by (rtol times 1 cm) that a run of a second may have."""
 
 STABILITY_MATCH = 0.15
 """Largest stable step found less the predicted one, of the predicted one: friction bends what is linear."""
@@ -68,10 +69,10 @@ def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duratio
             error = float(np.max(np.abs(y - reference)))
             label = {"vehicle": name, "detection": detection, "integrator": method, "rtol": rtol}
             curve.append(label | {"error_m": error, "steps": trajectory.steps, "wall_s": trajectory.wall_s})
-            limit = LARGEST_ERROR * rtol * max(abs(setting.state[size]), 1e-3 * rtol) + 1e-10
+            limit = LARGEST_ERROR * rtol * LENGTH + 1e-10
             checks = [
                 *sound(setting, trajectory)[:1],
-                Check("error of y", error, limit, "m", "100 rtol y(0)"),
+                Check("error of y", error, limit, "m", f"{LARGEST_ERROR:g} times what a step may err by"),
             ]
             found += rows("integration", "tolerances", f"{speed:g} m/s, rtol {rtol:g}", setting, trajectory, checks)
     return found, curve

@@ -39,7 +39,7 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
     offset = 2 * COARSE + 2
     for _ in range(_SWEEPS):
         for i in range(COARSE):
-            work.logs[1, i], work.share[i] = math.log(work.square[i]), 0.0
+            work.share[i] = 0.0
         n = assemble(values, work, 1, 2)
         for _ in range(12):
             used = 0

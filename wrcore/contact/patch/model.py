@@ -51,6 +51,12 @@ class StripWork(NamedTuple):
 
     cheap: np.ndarray
     """(1,) int: 1 while ellipses stand in for strips."""
+    warm: np.ndarray
+    """(1,) int: 1 during a step, where patches start from their last solutions. Elsewhere from nothing."""
+    memory: np.ndarray
+    """(wheelsets, 2, MAX_PATCHES, MEMORY): these solutions; part of what a run knows."""
+    spare: np.ndarray
+    """(MEMORY,): a memory of nothing."""
     rows: np.ndarray
     out: np.ndarray
     strips: np.ndarray
@@ -119,14 +125,16 @@ def _strip_model(patch, resolution, slip, nu):
     )
 
 
-def strip_work(model):
-    """Scratch arrays for a `StripModel`; next to nothing where patches are ellipses."""
+def strip_work(model, wheelsets):
+    """Scratch arrays for a `StripModel` and a number of wheelsets; next to nothing where patches are ellipses."""
     count = normal_strips.MAX_STRIPS if model.strips else 1
     normal = normal_strips.workspace()
     if not model.strips:
         normal = normal_strips.Workspace(*(_emptied(part) for part in normal))
+    wheels = (wheelsets, 2, MAX_PATCHES) if model.strips else (0, 0, 0)
     return StripWork(
-        np.zeros(1, np.int64), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
+        np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((*wheels, normal_strips.MEMORY)),
+        np.zeros(normal_strips.MEMORY), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
         normal,
         *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),

@@ -8,9 +8,9 @@ from wrcore.kernels.jit import FUSED, jit
 
 
 @jit(allocates=False, fastmath=FUSED)
-def solve_linear(matrix, n):
-    """Gaussian elimination with partial pivoting; the solution ends up in column n. False if singular."""
-    for k in range(n):
+def _factorise_panel(matrix, n, begin, end):
+    """Eliminate below the diagonal in columns ``begin`` to before ``end``, rows exchanged whole. False: singular."""
+    for k in range(begin, end):
         pivot, largest = k, abs(matrix[k, k])
         for i in range(k + 1, n):
             if abs(matrix[i, k]) > largest:
@@ -18,22 +18,59 @@ def solve_linear(matrix, n):
         if not largest > 1e-300:
             return False
         if pivot != k:
-            for j in range(k, n + 1):
-                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            one, other = matrix[k], matrix[pivot]
+            for j in range(n + 1):
+                one[j], other[j] = other[j], one[j]
         inverse = 1.0 / matrix[k, k]
-        row = matrix[k]
         for i in range(k + 1, n):
-            other = matrix[i]
-            factor = other[k] * inverse
-            if factor != 0.0:
-                for j in range(k + 1, n + 1):
-                    other[j] -= factor * row[j]
-    for k in range(n - 1, -1, -1):
-        total = matrix[k, n]
-        for j in range(k + 1, n):
-            total -= matrix[k, j] * matrix[j, n]
-        matrix[k, n] = total / matrix[k, k]
+            factor = matrix[i, k] * inverse
+            matrix[i, k] = factor
+            for j in range(k + 1, end):
+                matrix[i, j] -= factor * matrix[k, j]
     return True
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _subtract_four(row, one, two, three, four, a, b, c, d):
+    for j in range(row.size):
+        row[j] -= a * one[j] + b * two[j] + c * three[j] + d * four[j]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def solve_linear(matrix, n):
+    """Gaussian elimination with partial pivoting, four columns at a time; the solution ends up in column n.
+
+    Returns False if the matrix is singular.
+    """
+    for begin in range(0, n, 4):
+        end = min(begin + 4, n)
+        if not _factorise_panel(matrix, n, begin, end):
+            return False
+        for k in range(begin + 1, end):  # the panel's own rows
+            for r in range(begin, k):
+                factor, row, other = matrix[k, r], matrix[k], matrix[r]
+                for j in range(end, n + 1):
+                    row[j] -= factor * other[j]
+        if end == begin + 4:
+            one, two = matrix[begin, end : n + 1], matrix[begin + 1, end : n + 1]
+            three, four = matrix[begin + 2, end : n + 1], matrix[begin + 3, end : n + 1]
+            for i in range(end, n):
+                row = matrix[i]
+                _subtract_four(row[end : n + 1], one, two, three, four, row[begin], row[begin + 1], row[begin + 2],
+                               row[begin + 3])  # fmt: skip
+    for k in range(n - 1, -1, -1):
+        row, total = matrix[k], matrix[k, n]
+        for j in range(k + 1, n):
+            total -= row[j] * matrix[j, n]
+        matrix[k, n] = total / row[k]
+    return True
+
+
+@jit(allocates=False)
+def _copy(source, n, out):
+    for i in range(n):
+        for j in range(n + 1):
+            out[i, j] = source[i, j]
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -96,12 +133,12 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
             if kinds == 2:
                 work.middle[i] = work.gap[i, CREST]
             largest = max(largest, work.square[i])
-            work.logs[1, i] = math.log(work.square[i])
         n = assemble(values, work, windows, kinds)
+        _copy(work.matrix, n, work.kept)
         if not solve_linear(work.matrix, n):
             return LOST
         if _tips_too_fast(work, windows, kinds, bold and step >= _RESTLESS):
-            n = assemble(values, work, windows, kinds)
+            _copy(work.kept, n, work.matrix)
             for k in range(kinds * strips, n):
                 for j in range(n):
                     work.matrix[k, j] = 0.0
@@ -149,8 +186,6 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
 def solve_shares(values, work, windows, kinds):
     """Q of all strips from the first of Galerkin's conditions at fixed half lengths: a start where Hertz gives none."""
     strips = work.start[windows]
-    for i in range(strips):
-        work.logs[1, i] = math.log(work.square[i])
     n = assemble(values, work, windows, kinds)
     matrix = work.matrix
     mean = 0.0

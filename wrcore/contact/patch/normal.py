@@ -37,7 +37,7 @@ from wrcore.contact.patch.solve import (
     solve_patch,
     wheel_overlaps,
 )
-from wrcore.contact.patch.strips import MAX_STRIPS, workspace
+from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
@@ -136,7 +136,7 @@ class NormalContact:
         self.resolution, self.model = RESOLUTIONS[resolution], MODELS[model]
         self._hertz, self._values = hertz_table(), influence_table().values
         self._patches = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
-        self._works = {}
+        self._work, self._memories = workspace(), {}
         self._strips, self._sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, velocity=None, warm=False):
@@ -170,15 +170,17 @@ class NormalContact:
         found, first = [], 0
         while first < count:
             last = group_end(self._patches, count, first)
-            if (side, len(found)) not in self._works:
-                self._works[side, len(found)] = workspace()
-            found.append(self._solve(side, pose, first, last, velocity, warm, self._works[side, len(found)]))
+            memory = self._memories.setdefault((side, len(found)), np.zeros(MEMORY))
+            if not warm:
+                memory[0] = 0.0
+            found.append(self._solve(side, pose, first, last, velocity, memory))
             first = last
         return found
 
-    def _solve(self, side, pose, first, last, velocity, warm, work):
+    def _solve(self, side, pose, first, last, velocity, memory):
+        work = self._work
         windows, frame = solve_patch(self.geometry, pose, self._hertz, self._values, self._patches, first, last,
-                                     self.resolution, self.model, warm, work)  # fmt: skip
+                                     self.resolution, self.model, memory, work)  # fmt: skip
         count = 0
         if windows:
             count = publish(self.geometry, pose, frame, self.modulus, work, windows, self._strips, self._sums)

@@ -14,6 +14,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
 from scipy.ndimage import spline_filter
 
 from wrcore.kernels.jit import FUSED, jit
@@ -114,28 +117,84 @@ def place_across(log_eta):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def across(log_eta):
-    """Column, B-spline weights, and ln eta beyond the table's end."""
+def _edge(eta, log_eta, sign):
+    """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table.
+
+    Beyond its end U grows with pi/2 ln eta.
+    """
     cell, part, beyond = place_across(log_eta)
-    return cell, spline_weights(part), beyond
+    v0, v1, v2, v3, d0, d1, d2, d3 = spline_weights(part)
+    factor, over, rest = sign * eta, sign * eta, 0.0
+    if beyond > 0.0:
+        factor, over, rest = factor * math.exp(-beyond), 0.0, sign * _HALF_PI
+    slope = over * (1.0 / _LOG_STEP)
+    values = factor * v0, factor * v1, factor * v2, factor * v3
+    slopes = over * v0 + slope * d0, over * v1 + slope * d1, over * v2 + slope * d2, over * v3 + slope * d3
+    return cell, values, slopes, rest * beyond, rest
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _tabulated(values, cell, weights, rate, eta, column):
-    """U, its slope over xi, and eta times its slope over eta."""
-    start, (v0, v1, v2, v3, d0, d1, d2, d3), beyond = column
-    value = along = over = 0.0
-    for i in range(4):
-        row, at = np.uint64(cell + i), np.uint64(start)
-        t0, t1, t2, t3 = values[row, at], values[row, at + 1], values[row, at + 2], values[row, at + 3]
-        g = v0 * t0 + v1 * t1 + v2 * t2 + v3 * t3
-        value += weights[i] * g
-        along += weights[4 + i] * g
-        over += weights[i] * (d0 * t0 + d1 * t1 + d2 * t2 + d3 * t3)
-    if beyond > 0.0:
-        eta *= math.exp(-beyond)
-        return eta * value + _HALF_PI * beyond, eta * along * rate, _HALF_PI
-    return eta * value, eta * along * rate, eta * (value + over * (1.0 / _LOG_STEP))
+def edges_of(low, high, log_low, log_high):
+    """What `influence_of` wants of a strip's edges at eta = low and high and their logarithms; the line's own strip,
+    -high to high, has a negative ``low``."""
+    if low < 0.0:
+        return _edge(high, log_high, 0.0), _edge(high, log_high, 2.0)
+    return _edge(low, log_low, -1.0), _edge(high, log_high, 1.0)
+
+
+@intrinsic
+def _contract(_, values, start, columns, weights, of_values, of_slopes):
+    """Sum over a 4 x 4 block of the table at each of two columns: U and dU/d tau of both, dU/d(ln eta) of either."""
+
+    def generate(context, builder, signature, arguments):
+        four = ir.VectorType(ir.DoubleType(), 4)
+        table = context.make_array(signature.args[0])(context, builder, arguments[0])
+        stride = builder.extract_value(table.shape, 1)
+        fuse = ("contract",)
+
+        def vector(aggregate, first):
+            out = ir.Constant(four, ir.Undefined)
+            for k in range(4):
+                lane = builder.extract_value(aggregate, first + k)
+                out = builder.insert_element(out, lane, ir.Constant(ir.IntType(32), k))
+            return out
+
+        def splat(number):
+            one = builder.insert_element(ir.Constant(four, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
+            return builder.shuffle_vector(one, ir.Constant(four, ir.Undefined), mask)
+
+        def added(total, one, other):
+            product = builder.fmul(one, other, flags=fuse)
+            return product if total is None else builder.fadd(total, product, flags=fuse)
+
+        def paired(one, other, first, second):
+            mask = ir.VectorType(ir.IntType(32), 4)
+            return builder.fadd(*(builder.shuffle_vector(one, other, ir.Constant(mask, m)) for m in (first, second)))
+
+        rows = [[splat(builder.extract_value(arguments[3], 4 * part + i)) for i in range(4)] for part in range(2)]
+        value = along = None
+        over = []
+        for side in range(2):
+            here = there = None
+            column = builder.extract_value(arguments[2], side)
+            for i in range(4):
+                row = builder.add(arguments[1], ir.Constant(arguments[1].type, i))
+                at = builder.gep(table.data, [builder.add(builder.mul(row, stride), column)])
+                block = builder.load(builder.bitcast(at, four.as_pointer()), align=8)
+                here, there = added(here, rows[0][i], block), added(there, rows[1][i], block)
+            weight = vector(arguments[4], 4 * side)
+            value, along = added(value, here, weight), added(along, there, weight)
+            over.append(builder.fmul(here, vector(arguments[5], 4 * side)))
+        # sums over the lanes of all four at once
+        sums = [paired(*pair, [0, 4, 2, 6], [1, 5, 3, 7]) for pair in ((value, along), over)]
+        total = paired(*sums, [0, 1, 4, 5], [2, 3, 6, 7])
+        results = [builder.extract_element(total, ir.Constant(ir.IntType(32), k)) for k in range(4)]
+        return context.make_tuple(builder, signature.return_type, results)
+
+    index = types.int64
+    eight = types.UniTuple(types.float64, 8)
+    return types.UniTuple(types.float64, 4)(values, index, types.UniTuple(index, 2), eight, eight, eight), generate
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -163,8 +222,8 @@ def _expanded(xi, low, high):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def influence_of(values, xi, low, high, across_low, across_high):
-    """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0.
+def influence_of(values, xi, low, high, edges):
+    """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0; ``edges``: see `edges_of`.
 
     Returns
     -------
@@ -174,9 +233,10 @@ def influence_of(values, xi, low, high, across_low, across_high):
     if xi * xi + max(low, 0.0) ** 2 > _FAR:
         return _expanded(xi, low, high)
     cell, part, rate = place_along(xi)
-    weights = spline_weights(part)
-    value, along, over = _tabulated(values, cell, weights, rate, high, across_high)
-    if low < 0.0:
-        return 2.0 * value, 2.0 * along, 2.0 * over, 0.0
-    value_low, along_low, over_low = _tabulated(values, cell, weights, rate, low, across_low)
-    return value - value_low, along - along_low, over - over_low, over / high - over_low / max(low, 1e-9)
+    near, far = edges
+    value, along, over_low, over_high = _contract(
+        values, cell, (near[0], far[0]), spline_weights(part), near[1] + far[1], near[2] + far[2]
+    )
+    over_low, over_high = over_low + near[4], over_high + far[4]
+    shear = over_high / high + over_low / max(low, 1e-9) if low >= 0.0 else 0.0
+    return value + near[3] + far[3], along * rate, over_low + over_high, shear

@@ -65,8 +65,8 @@ class Level(NamedTuple):
 
 
 LEVELS = {
-    "coarse": Level(8, 8, 14, 3),
-    "middle": Level(12, 10, 14, 4),
+    "coarse": Level(8, 8, 10, 3),
+    "middle": Level(12, 10, 12, 4),
     "fine": Level(16, 12, 16, 5),
     "slender": Level(8, 20, 16, 4),
 }
@@ -81,7 +81,7 @@ class Workspace(NamedTuple):
     ------
     matrix, factors : (m m,) float32
         B, row by row; the resolvent or the factors of I + B.
-    corner : (4, (n+1)^2)
+    corner : (4, (n+1)^2) float32
         Distances of points and edges, and the three integrals there.
     slip : (3, n (n + 1)) float32
         Slip of one strip by another, components xx, ss, xs.
@@ -129,7 +129,7 @@ def make_workspace(strips, n):
     m = 2 * n * strips
     single = [np.zeros(m, np.float32) for _ in range(11)]
     return Workspace(
-        np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2)),
+        np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
         np.zeros((3, n * (n + 1)), np.float32), np.zeros((7, strips)), np.zeros(5),
         *single, np.zeros(n + 2, np.float32),
     )  # fmt: skip

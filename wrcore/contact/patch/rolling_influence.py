@@ -12,7 +12,7 @@ the integral along x at lateral distance d is, L = asinh(x/|d|),
 
 Across the width the strip's own load is integrated in closed form, others by the midpoint rule with its second-order
 term, J + w^2/24 d^2J/dd^2 (neighbours: two halves), which costs one logarithm per pair of points. Slip is the
-_difference of displacements between successive points (Kalker's upwind form of -du/dx). Lengths are over c, forces
+difference of displacements between successive points (Kalker's upwind form of -du/dx). Lengths are over c, forces
 over mu N, slip over mu N/(G c^2).
 
 References
@@ -31,12 +31,14 @@ from numba.extending import intrinsic
 from wrcore.kernels.jit import FUSED, jit
 
 UPWIND = 0.6
-_STEP_SCALE = np.float32(2.5)
-_UNIT = np.float32(1)
-_HALF = 0x3FE6A09E667F3BCD  # bits of sqrt(1/2)
-_ONE = 1023 << 52  # bits of 1.0
-_MAGIC = 0x4330000000000000  # bits of 2^52
-_LN2 = float(np.log(2.0))
+_STEP_SCALE, _UNIT, _ZERO = np.float32(2.5), np.float32(1), np.float32(0)
+_ROOT_HALF = 0x3F3504F3
+"""Bits of sqrt(1/2)."""
+
+_SERIES = tuple(np.float32(2 / k) for k in (1, 3, 5, 7))
+"""Of ln((1 + s)/(1 - s)) over odd powers of s: within 1e-8 for the mantissas between sqrt(1/2) and sqrt(2)."""
+
+_LN2, _LEAST = np.float32(np.log(2.0)), np.float32(1e-30)
 
 
 class Panels(NamedTuple):
@@ -47,10 +49,10 @@ class Panels(NamedTuple):
     n : int
         Panels per strip, from the leading edge backwards.
     edges, points : (n + 1,)
-        Edges of the panels; points between which the slip is a _difference (the first lies ahead of the strip).
+        Edges of the panels; points between which the slip is a difference (the first lies ahead of the strip).
     share, load, slip : (n,)
         Share of the panel in the strip's normal load, centroid of that load, and where the slip row holds.
-    scale : (n (n + 1) - 1,)
+    scale : (n (n + 1) - 1,) float32
         Reciprocals of distances between points times widths of panels, in rows of points with one void between.
     ahead, behind : (n,)
         Weights that carry elastic slip from ``slip`` to ``load``.
@@ -90,59 +92,66 @@ def make_panels(n):
     behind[:-1] = shift[:-1] / np.diff(slip) * np.where(np.arange(n - 1) > 0, 1 - UPWIND, 1.0)
     edges, scale = np.cos(theta), np.zeros((n, n + 1))
     scale[:, :n] = 1 / np.outer(np.diff(points), np.diff(edges))
-    return Panels(n, edges, points, share, load, slip, scale.ravel()[:-1], ahead, behind)
+    return Panels(n, edges, points, share, load, slip, scale.ravel()[:-1].astype(np.float32), ahead, behind)
 
 
 @intrinsic
-def _to_bits(_, number):
-    """The 64 bits of a float64 as an integer."""
+def _exponent(_, x):
+    """The e of x = m 2^e, m from sqrt(1/2) to sqrt(2), for a positive normal number."""
 
     def generate(_, builder, __, arguments):
-        return builder.bitcast(arguments[0], ir.IntType(64))
+        return builder.sitofp(_shifted(builder, arguments[0])[1], ir.FloatType())
 
-    return types.int64(types.float64), generate
+    return types.float32(types.float32), generate
 
 
 @intrinsic
-def _from_bits(_, bits):
-    """A float64 from its 64 bits."""
+def _mantissa(_, x):
+    """The m of x = m 2^e."""
 
     def generate(_, builder, __, arguments):
-        return builder.bitcast(arguments[0], ir.DoubleType())
+        bits, exponent = _shifted(builder, arguments[0])
+        return builder.bitcast(builder.sub(bits, builder.shl(exponent, ir.IntType(32)(23))), ir.FloatType())
 
-    return types.float64(types.int64), generate
+    return types.float32(types.float32), generate
+
+
+def _shifted(builder, x):
+    """Bits of a number, and the whole number e."""
+    word = ir.IntType(32)
+    bits = builder.bitcast(x, word)
+    return bits, builder.ashr(builder.sub(bits, word(_ROOT_HALF)), word(23))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _log(x):
-    """Logarithm of a positive normal number within 1e-12, without branches: a loop over it becomes vector code."""
-    bits = _to_bits(x)
-    exponent = ((bits - _HALF + _ONE) >> 52) & 2047
-    m = _from_bits(bits - ((exponent - 1023) << 52))
-    s = (m - 1.0) / (m + 1.0)
+    """Logarithm of a positive normal float32 to its precision, without branches: a loop over it becomes vector code."""
+    m = _mantissa(x)
+    s = (m - _UNIT) / (m + _UNIT)
     q = s * s
-    p = 1 / 9 + q * (1 / 11 + q * (1 / 13 + q * (1 / 15)))
-    p = 1.0 + q * (1 / 3 + q * (1 / 5 + q * (1 / 7 + q * p)))
-    return (_from_bits(exponent | _MAGIC) - (4503599627370496.0 + 1023.0)) * _LN2 + 2.0 * s * p
+    return _exponent(x) * _LN2 + s * (_SERIES[0] + q * (_SERIES[1] + q * (_SERIES[2] + q * _SERIES[3])))
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_strip(dx, d, width, weight, nu, gxx, gyy, gxy):
     """Add to (gxx, gyy, gxy) the integrals along x up to each dx of a strip at distance d, averaged over its width."""
-    scale, square, bend = 1.0 / abs(d), d * d, width * width / 24
+    scale, square, bend = np.float32(1.0 / abs(d)), np.float32(d * d), np.float32(width * width / 24)
+    share, across, bend_here = np.float32(weight), np.float32(weight * nu * d), np.float32(bend / (d * d))
+    rest, nu_, three_squares = np.float32(1.0 - nu), np.float32(nu), np.float32(3.0 * d * d)
+    three_bends = np.float32(3.0 * bend)
     for i in range(dx.size):
         x = dx[i]
-        inverse2 = 1.0 / (x * x + square)
-        inverse = np.sqrt(inverse2)
-        radius = (x * x + square) * inverse
+        radius = np.sqrt(x * x + square)
+        inverse = _UNIT / radius
+        inverse2 = inverse * inverse
         log = _log((abs(x) + radius) * scale)
         t = x * inverse
         bent = bend * t * inverse2
-        log = (log if x > 0 else -log) + bend * t * scale * scale + bent
-        t2 = t + bent * (3.0 * square * inverse2 - 1.0)
-        gxx[i] += weight * (log - nu * t2)
-        gyy[i] += weight * ((1.0 - nu) * log + nu * t2)
-        gxy[i] -= weight * nu * d * inverse * (1.0 - 3.0 * bent * t)
+        log = (log if x > _ZERO else -log) + bend_here * t + bent
+        t2 = nu_ * (t + bent * (three_squares * inverse2 - _UNIT))
+        gxx[i] += share * (log - t2)
+        gyy[i] += share * (rest * log + t2)
+        gxy[i] -= across * inverse * (_UNIT - three_bends * t * t * inverse2)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -151,27 +160,30 @@ def _add_strip_exactly(dx, far, near, nu, gxx, gyy, gxy):
 
     Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R.
     """
-    scale_far, scale_near, weight = 1.0 / abs(far), 1.0 / abs(near), 1.0 / (far - near)
-    sign_far, sign_near = (1.0 if far > 0 else -1.0), (1.0 if near > 0 else -1.0)
+    y_far, y_near, share = np.float32(far), np.float32(near), np.float32(1.0 / (far - near))
+    scale_far, scale_near = np.float32(1.0 / abs(far)), np.float32(1.0 / abs(near))
+    sign_far, sign_near = np.float32(1.0 if far > 0 else -1.0), np.float32(1.0 if near > 0 else -1.0)
+    rest, across = np.float32(1.0 - nu), np.float32(nu) * share
     for i in range(dx.size):
         x = dx[i]
-        square = x * x + 1e-200
+        square = x * x + _LEAST
         size = np.sqrt(square)
-        r_far, r_near = np.sqrt(square + far * far), np.sqrt(square + near * near)
-        log_far = sign_far * _log((abs(far) + r_far) / size)
-        log_near = sign_near * _log((abs(near) + r_near) / size)
+        r_far, r_near = np.sqrt(square + y_far * y_far), np.sqrt(square + y_near * y_near)
+        inverse = _UNIT / size
+        log_far = sign_far * _log((abs(y_far) + r_far) * inverse)
+        log_near = sign_near * _log((abs(y_near) + r_near) * inverse)
         in_x = x * (log_far - log_near)
-        in_y = far * _log((size + r_far) * scale_far) - near * _log((size + r_near) * scale_near)
-        in_y = in_y if x > 0 else -in_y
-        gxx[i] += weight * ((1.0 - nu) * in_x + in_y)
-        gyy[i] += weight * (in_x + (1.0 - nu) * in_y)
-        gxy[i] -= weight * nu * (r_far - r_near)
+        in_y = y_far * _log((size + r_far) * scale_far) - y_near * _log((size + r_near) * scale_near)
+        in_y = in_y if x > _ZERO else -in_y
+        gxx[i] += share * (rest * in_x + in_y)
+        gyy[i] += share * (in_x + rest * in_y)
+        gxy[i] -= across * (r_far - r_near)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _difference(g, scale, factor, out):
     """Second difference over points and edges of ``g``, in rows of points; ``out`` is as wide, its last column void."""
-    size = scale.size
+    size, factor = scale.size, np.float32(factor)
     after, below, beyond = g[1 : size + 1], g[g.size - size - 1 :], g[g.size - size :]
     for i in range(size):
         out[i] = factor * scale[i] * (after[i] - g[i] + below[i] - beyond[i])

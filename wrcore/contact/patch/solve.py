@@ -4,9 +4,9 @@ import math
 
 from wrcore.contact.detection import find_patches
 from wrcore.contact.patch.fixed import windows_from_fixed
-from wrcore.contact.patch.gap import HEIGHT, frame_of_overlaps, look_over_overlaps
+from wrcore.contact.patch.gap import HEIGHT, UR, U, frame_of_overlaps, look_over_overlaps
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
-from wrcore.contact.patch.strips import place_strips
+from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
 from wrcore.contact.patch.windows import (
     drop_starved,
     guess_squares,
@@ -28,6 +28,12 @@ _ROUNDS = 5
 _MORE_STRIPS = 2
 """Strips by which a window's number may rise where no solution was found with less."""
 
+_STRIPS_FROM = 4 + 3 * MAX_WINDOWS
+"""Where a memory holds its strips."""
+
+_REACH = 0.5
+"""A window's tips may lie this share of its width from those of the first guess for a solution to start from."""
+
 _STEPS = 24
 _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
@@ -40,7 +46,7 @@ SUMS = 10
 
 
 @jit(allocates=False)
-def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, model, warm, work):
+def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, model, memory, work):
     """Normal problem of the overlaps from ``first`` to before ``last``, which count as one patch.
 
     Parameters
@@ -57,8 +63,9 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         Strips of a window.
     model : int
         EXACT or STRIPS.
-    warm : bool
-        Start from the solution in ``work`` if it fits; the result is the same to the iteration's tolerance.
+    memory : numpy.ndarray, shape (MEMORY,)
+        A solution to start from if it fits (its first number 0: none); the result is the same to the square of the
+        iteration's tolerance. Filled with this one.
     work : Workspace
         Filled with the solution.
 
@@ -73,15 +80,15 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     guess_squares(hertz, patches, first, work, stretches, model == EXACT)
     windows = windows_from_guess(work, stretches, resolution)
     kinds = 2 if pose.ex == 0.0 else 3
-    if warm and model == EXACT and _resume(frame, work, windows):
+    if model == EXACT and _resume(frame, memory, work, windows):
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
             place_strips(geometry, pose, frame, work, windows)
             if newborn(values, work, windows, stretches, resolution) == windows:
-                _remember(frame, work, windows)
+                _remember(frame, work, windows, memory)
                 return windows, frame
         windows = windows_from_guess(work, stretches, resolution)
-    work.memory[0] = 0.0
+    memory[0] = 0.0
     if windows > 0:
         start_strips(geometry, pose, frame, work, windows, stretches)
     if model == STRIPS:
@@ -91,7 +98,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds)
         if found > 0:
             if attempts == 1 and extra == 0:
-                _remember(frame, work, found)
+                _remember(frame, work, found, memory)
             return found, frame
         windows = 0
     return 0, frame
@@ -131,34 +138,44 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
 
 
 @jit(allocates=False)
-def _remember(frame, work, windows):
-    """Note what a warm start must know of the solution besides its strips."""
-    memory = work.memory
+def _remember(frame, work, windows, memory):
+    """Note what a warm start wants to know of the solution."""
     memory[0], memory[1], memory[2], memory[3] = windows, frame.x, frame.ur, frame.z
     for k in range(windows):
-        memory[4 + k] = work.start[k + 1]
+        at = 4 + 3 * k
+        memory[at], memory[at + 1], memory[at + 2] = work.start[k + 1], work.low[k], work.high[k]
+    for i in range(work.start[windows]):
+        at = _STRIPS_FROM + 3 * i
+        memory[at], memory[at + 1], memory[at + 2] = work.share[i], work.square[i], work.middle[i]
 
 
-@jit(allocates=False)
-def _resume(frame, work, windows):
-    """Move the last solution to the new frame if its windows and strips are those of the first guess."""
-    memory = work.memory
+@jit(allocates=False, fastmath=FUSED)
+def _resume(frame, memory, work, windows):
+    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near enough."""
     if windows == 0 or memory[0] != windows:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
-    shift = y * frame.cosine + z * frame.sine
+    shift, old_first = y * frame.cosine + z * frame.sine, 0
     for k in range(windows):
-        first, last = work.start[k], work.start[k + 1]
-        if memory[4 + k] != last:
-            return False
-        low = work.centre[first] - 0.5 * work.width[first] + shift
-        high = work.centre[last - 1] + 0.5 * work.width[last - 1] + shift
-        reach = 0.3 * (high - low)
+        low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
+        reach = _REACH * (high - low)
         if abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach:
             return False
-        work.low[k], work.high[k] = low, high
-    for i in range(work.start[windows]):
-        work.middle[i] += along
+    for k in range(windows):
+        work.low[k], work.high[k] = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
+        old_end, first, end = int(memory[4 + 3 * k]), work.start[k], work.start[k + 1]
+        ratio = (old_end - old_first) / (end - first)
+        for i in range(first, end):
+            place = (i - first + 0.5) * ratio - 0.5
+            j = min(max(int(place), 0), old_end - old_first - 2)
+            at, part = _STRIPS_FROM + 3 * (old_first + j), place - j
+            rest = 1.0 - part
+            work.share[i] = rest * memory[at] + part * memory[at + 3]
+            square = rest * memory[at + 1] + part * memory[at + 4]
+            work.square[i] = max(square, 0.1 * min(memory[at + 1], memory[at + 4]))
+            work.middle[i] = rest * memory[at + 2] + part * memory[at + 5] + along
+        old_first = old_end
+    work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
     return True
 
 

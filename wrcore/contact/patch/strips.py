@@ -19,7 +19,7 @@ from wrcore.contact.patch.gap import (
     U,
     strip_gap,
 )
-from wrcore.contact.patch.normal_influence import across, influence_of
+from wrcore.contact.patch.normal_influence import edges_of, influence_of
 from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.kernels.jit import FUSED, jit
 
@@ -41,6 +41,11 @@ THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 
 BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 """What the second of Galerkin's conditions makes of a parabola t^2."""
+
+
+MEMORY = 4 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
+"""Numbers that a warm start wants of a solution: windows (0: none), x, ur, z of its frame's origin; ends in strips and
+tips of its windows; Q, c and X of its strips."""
 
 
 class Workspace(NamedTuple):
@@ -73,20 +78,20 @@ class Workspace(NamedTuple):
     gap: np.ndarray
     """(MAX_STRIPS, GAP_ROWS), see `strip_gap`."""
     logs: np.ndarray
-    """(2, MAX_STRIPS): ln(k + 1/2), and ln c of the strips."""
+    """(3, MAX_STRIPS): ln(k + 1/2), and ln c and 1/a of the strips."""
     sums: np.ndarray
     """(4, 4): what the points of one strip gather."""
     matrix: np.ndarray
     """(MAX_UNKNOWNS, MAX_UNKNOWNS + 1): Jacobian and residual."""
+    kept: np.ndarray
+    """The same before it is solved."""
     active: np.ndarray
     load: np.ndarray
     """Fixed strips in contact and their loads."""
-    memory: np.ndarray
-    """Windows of the last solution (0: none), x, ur, z of its frame's origin, and ends of its windows in strips."""
 
 
 def workspace():
-    """Arrays for the solution of one patch at a time; it also holds the start for a warm one.
+    """Arrays for the solution of one patch at a time.
 
     Returns
     -------
@@ -97,9 +102,8 @@ def workspace():
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
         np.zeros(m + 1, np.int64), np.zeros((2, m + 1)), np.zeros((2, m)), np.zeros(n, np.int64),
         *(np.zeros(n) for _ in range(5)), np.zeros((n, GAP_ROWS)),
-        np.stack([np.log(np.arange(n) + 0.5), np.zeros(n)]), np.zeros((4, 4)),
-        np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)), np.zeros(n, np.bool_), np.zeros(n),
-        np.zeros(4 + m),
+        np.stack([np.log(np.arange(n) + 0.5), np.zeros(n), np.zeros(n)]), np.zeros((4, 4)),
+        *(np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)) for _ in range(2)), np.zeros(n, np.bool_), np.zeros(n),
     )  # fmt: skip
 
 
@@ -145,6 +149,8 @@ def assemble(values, work, windows, kinds):
     for i in range(n):
         for j in range(n + 1):
             matrix[i, j] = 0.0
+    for j in range(strips):
+        work.logs[1, j], work.logs[2, j] = math.log(work.square[j]), 1.0 / math.sqrt(work.square[j])
     for i in range(strips):
         own, k, row = work.window[i], kinds * i, work.gap[i]
         a, w = math.sqrt(work.square[i]), work.width[i]
@@ -155,7 +161,7 @@ def assemble(values, work, windows, kinds):
             sums[2, m] = sums[3, m] = 0.0
         for j in range(strips):
             c, p = work.square[j], work.share[j]
-            inverse, load = 1.0 / math.sqrt(c), p * c
+            inverse, load = work.logs[2, j], p * c
             distance, wj = abs(work.centre[i] - work.centre[j]), work.width[j]
             low, high = (distance - 0.5 * wj) * inverse, (distance + 0.5 * wj) * inverse
             together = work.window[j] == own
@@ -172,13 +178,13 @@ def assemble(values, work, windows, kinds):
                 part = (j - begin + 0.5) / (end - begin)
             if i == j:
                 low = -1.0
-            column_low, column_high = across(log_low), across(log_high)
+            edges = edges_of(low, high, log_low, log_high)
             b00 = b01 = b02 = b10 = b11 = b12 = b20 = b21 = b22 = 0.0
             for m in range(points):
                 t = POINTS[m]
                 offset = work.middle[i] + a * t - work.middle[j]
                 xi = abs(offset) * inverse
-                value, along, over, shear = influence_of(values, xi, low, high, column_low, column_high)
+                value, along, over, shear = influence_of(values, xi, low, high, edges)
                 turn = load * along * (inverse if offset > 0.0 else -inverse)
                 sums[0, m] += load * value
                 sums[1, m] += turn
@@ -280,9 +286,9 @@ def gap_under_load(values, work, windows, s, x, gap):
         low, high = (distance - 0.5 * w) * inverse, (distance + 0.5 * w) * inverse
         xi = abs(x - work.middle[j]) * inverse
         if low > 1e-9:
-            value = influence_of(values, xi, low, high, across(math.log(low)), across(math.log(high)))[0]
+            value = influence_of(values, xi, low, high, edges_of(low, high, math.log(low), math.log(high)))[0]
         else:  # inside the strip: twice the half of it
             half = 0.5 * w * inverse
-            value = influence_of(values, xi, -1.0, half, across(0.0), across(math.log(half)))[0]
+            value = influence_of(values, xi, -1.0, half, edges_of(-1.0, half, 0.0, math.log(half)))[0]
         gap += work.share[j] * work.square[j] * value
     return gap

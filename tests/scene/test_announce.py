@@ -1,0 +1,45 @@
+"""One line on stderr before work that takes long, terminal or not."""
+
+from pathlib import Path
+
+import pytest
+
+from wrcore.run.progress import simulated_time
+from wrcore.scene import description
+from wrcore.scene.description import _creep, announce, load_scene
+
+
+@pytest.fixture
+def scene():
+    return load_scene("config/scenes/suspended_wheelset.yaml")
+
+
+@pytest.mark.parametrize(("there", "lines"), [(True, 0), (False, 1)])
+def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatch, capsys):
+    class Known(Exception):
+        pass
+
+    def ensure(*_):
+        raise Known
+
+    monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
+    monkeypatch.setattr(description, "table_path", lambda *_: Path(__file__ if there else "nowhere"))
+    monkeypatch.setattr(description, "ensure_table", ensure)
+    with pytest.raises(Known):
+        _creep(scene, None)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == lines and all("creep table" in line for line in said)
+
+
+def test_compiling_is_announced_where_nobody_watches(monkeypatch, capsys, tmp_path):
+    monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
+    monkeypatch.setattr("wrcore.run.progress.kernel_folder", lambda: tmp_path)
+    with simulated_time(1.0) as advance:
+        assert advance is None
+    assert "compiling" in capsys.readouterr().err
+
+
+def test_no_line_where_none_is_wanted(monkeypatch, capsys):
+    monkeypatch.setenv("WRCORE_PROGRESS", "0")
+    announce("work")
+    assert capsys.readouterr().err == ""

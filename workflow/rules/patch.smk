@@ -1,0 +1,193 @@
+# Patch models against exact contact: one pose at a time, in runs, and exact contact against CONTACT.
+
+PATCH = config["patch"]
+CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/contact", STYLE, "study/contact", "study/patch")
+
+
+rule patch_costs:
+    message:
+        "Cost of a patch with each model, in turn, nothing beside it"
+    input:
+        core=CORE["patch"] + sources("study/cost/recorded", "study/cost/timing"),
+        scenes=SCENES,
+        scene=PATCH["cost"]["scene"],
+        table=rules.creep_table.output,
+    output:
+        report(
+            "<results>/patch/costs.csv",
+            caption="../report/patch/patch_costs.rst",
+            category="03 The real patch",
+            labels={"table": "cost of a patch"},
+        ),
+    log:
+        "<logs>/patch_costs.log",
+    benchmark:
+        "<benchmarks>/patch_costs.tsv"
+    params:
+        overrides=changes(PATCH["cost"]["set"]),
+        models={name: PATCH["models"][name] for name in PATCH["cost"]["models"]},
+        settings={name: PATCH["cost"][name] for name in ("states", "passes")},
+    # all cores: nothing else may run beside what is timed
+    threads: workflow.cores
+    script:
+        "../scripts/patch/patch_costs.py"
+
+
+rule patch_errors:
+    message:
+        "Patch models against exact contact, pose by pose"
+    input:
+        core=CORE["patch"],
+        costs=rules.patch_costs.output[0],
+    output:
+        places="<results>/patch/places.csv",
+        forces="<results>/patch/forces.csv",
+        differences="<results>/patch/radius_differences.csv",
+        conicity=report(
+            "<results>/patch/conicity.csv",
+            caption="../report/patch/patch_conicity.rst",
+            category="03 The real patch",
+            labels={"table": "equivalent conicity under load"},
+        ),
+        summary=report(
+            "<results>/patch/summary.csv",
+            caption="../report/patch/patch_errors.rst",
+            category="03 The real patch",
+            labels={"table": "errors of patch models"},
+        ),
+        errors_figure=report(
+            "<results>/patch/patch_errors.png",
+            caption="../report/patch/patch_errors.rst",
+            category="03 The real patch",
+            labels={"figure": "errors of patch models"},
+        ),
+        patches_figure=report(
+            "<results>/patch/patch_fields.png",
+            caption="../report/patch/patch_fields.rst",
+            category="03 The real patch",
+            labels={"figure": "patches"},
+        ),
+        svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields"]),
+    log:
+        "<logs>/patch_errors.log",
+    benchmark:
+        "<benchmarks>/patch_errors.tsv"
+    params:
+        pair=CONTACT_PAIR,
+        settings={name: PATCH[name] for name in PATCH if name != "cost"},
+    script:
+        "../scripts/patch/patch_errors.py"
+
+
+rule patch_reference:
+    message:
+        "Patch models against CONTACT's loaded cases"
+    input:
+        core=CORE["patch"],
+        reference=CONTACT["reductions"]["reference"],
+    output:
+        cases="<results>/patch/contact_cases.csv",
+        summary=report(
+            "<results>/patch/contact.csv",
+            caption="../report/patch/patch_reference.rst",
+            category="03 The real patch",
+            labels={"table": "patch models against CONTACT"},
+        ),
+    log:
+        "<logs>/patch_reference.log",
+    params:
+        pair=CONTACT_PAIR,
+        models={name: entry for name, entry in PATCH["models"].items() if "slip" not in entry},  # at rest
+    script:
+        "../scripts/patch/patch_reference.py"
+
+
+RUNS = PATCH["runs"]
+
+
+wildcard_constraints:
+    hunter="|".join(RUNS["vehicles"]),
+    patch="|".join(RUNS["models"]),
+
+
+def runs_scene(wildcards):
+    return CRITICAL["vehicles"][wildcards.hunter]["scene"]
+
+
+def runs_settings(wildcards):
+    return RUNS["vehicles"][wildcards.hunter]
+
+
+def runs_overrides(wildcards):
+    return changes(RUNS["models"][wildcards.patch]["set"])
+
+
+rule patch_runs:
+    message:
+        "{wildcards.hunter} with {wildcards.patch}: limit cycle, irregular track"
+    input:
+        core=CORE["simulation"] + sources(*VEHICLE, "analysis/stability", "analysis/limit_cycles", "study/patch/runs"),
+        scenes=SCENES,
+        scene=runs_scene,
+        table=rules.creep_table.output,
+    output:
+        "<results>/patch/runs/{hunter}_{patch}.csv",
+    log:
+        "<logs>/patch_runs/{hunter}_{patch}.log",
+    benchmark:
+        "<benchmarks>/patch_runs/{hunter}_{patch}.tsv"
+    params:
+        overrides=runs_overrides,
+        settings=runs_settings,
+    script:
+        "../scripts/patch/patch_runs.py"
+
+
+rule patch_models:
+    message:
+        "Vehicles with every patch model"
+    input:
+        core=sources("study/patch/runs"),
+        rows=expand(rules.patch_runs.output, hunter=RUNS["vehicles"], patch=RUNS["models"]),
+        variants=rules.critical_speeds.output.variants,
+    output:
+        report(
+            "<results>/patch/models.csv",
+            caption="../report/patch/patch_models.rst",
+            category="06 Hunting: critical speeds",
+            labels={"table": "vehicles with every patch model"},
+        ),
+    log:
+        "<logs>/patch_models.log",
+    params:
+        titles={name: CRITICAL["vehicles"][name]["title"] for name in RUNS["vehicles"]},
+        variants={name: entry["variant"] for name, entry in RUNS["models"].items() if "variant" in entry},
+        exact=RUNS["exact"],
+    script:
+        "../scripts/patch/patch_models.py"
+
+
+rule patch_page:
+    message:
+        "What was found of the patch models"
+    input:
+        core=sources("study/patch/page", "study/patch/tables"),
+        summary=rules.patch_errors.output.summary,
+        conicity=rules.patch_errors.output.conicity,
+        contact=rules.patch_reference.output.summary,
+        models=rules.patch_models.output[0],
+    output:
+        "<results>/patch/patch.md",
+    log:
+        "<logs>/patch_page.log",
+    script:
+        "../scripts/patch/patch_page.py"
+
+
+rule patch_study:
+    input:
+        rules.patch_page.output,
+        rules.patch_models.output,
+        rules.patch_reference.output,
+        rules.patch_costs.output,
+        rules.patch_errors.output,

@@ -1,0 +1,148 @@
+"""Is an accuracy that was asked for reached? Random scenes of all kinds, each request against two tight runs.
+
+The two tight runs are by other methods and tolerances than the runs they judge. A request is judged only where they
+agree well below what was asked for: elsewhere (hunting that amplifies, impacts) nobody knows the right answer.
+"""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.to_accuracy import difference, simulate_to_accuracy
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
+
+KINDS = {
+    "wheelset": (0.3, 1.5), "suspended_wheelset": (1.0, 4.0), "trailer_vehicle": (1.0, 2.0), "metro_car": (1.0, 1.5),
+}  # fmt: skip
+"""Scenes by name, in turn, and how long they run, s: a free wheelset reaches the flange soon, and after some impacts
+nothing is known about it."""
+
+WHEELS, RAILS = ("S1002", "S1002", "cone:1/20"), ("UIC60-MBench", "60E1", "60E2", "54E1", "49E1")
+SPEEDS, FRICTIONS, RADII = (10.0, 80.0), (0.15, 0.5), (300.0, 5000.0)
+"""m/s; 1; m."""
+
+LATERAL, GRAVITY, BASE = 0.7, 9.81, 1.5
+"""Uncompensated lateral acceleration in curves at most, m/s2; m/s2; distance of the contact points, m."""
+
+CANT, RAMP = 0.15, 0.01
+"""Largest cant, m, and its largest change, m/m."""
+
+DOUBT = 0.2
+"""Tight runs must differ by less than this part of what was asked for."""
+
+
+def random_scene(seed, seconds=1.0):
+    """A scene of random kind, speed, friction, profiles, track and duration.
+
+    Parameters
+    ----------
+    seed : int
+        Its remainder says which kind.
+    seconds : float
+        Factor of its duration.
+
+    Returns
+    -------
+    kind : str
+        Name of a scene file.
+    changes : dict
+        To that scene, by key path.
+    """
+    rng = np.random.default_rng(seed)
+    kind = list(KINDS)[seed % len(KINDS)]
+    speed = float(np.round(np.exp(rng.uniform(*np.log(SPEEDS))), 1))
+    changes = {
+        "speed": speed,
+        "contact.friction": float(np.round(rng.uniform(*FRICTIONS), 2)),
+        "contact.patch": "moment",
+        "wheel.profile": str(rng.choice(WHEELS)),
+        "rail": {"profile": str(rng.choice(RAILS)), "inclination": str(rng.choice(["1/20", "1/40"]))},
+        "integration.duration": seconds * float(np.round(rng.uniform(*KINDS[kind]), 1)),
+        "initial.y": float(np.round(rng.uniform(-0.003, 0.003), 5)),
+    }
+    if rng.random() < 0.5:
+        changes["track.path"] = _curve(rng, speed, changes["integration.duration"])
+    if rng.random() < 0.6:
+        spectrum = {"level": str(rng.choice(["low", "high"])), "seed": seed, "length": 400.0, "begin": 15.0}
+        changes["track.irregularity"] = {"spectrum": spectrum}
+    return kind, changes
+
+
+def _curve(rng, speed, duration):
+    """A curve with transition that is reached within a run, canted as its speed needs."""
+    radius = max(float(np.exp(rng.uniform(*np.log(RADII)))), speed**2 / (LATERAL + GRAVITY * CANT / BASE))
+    cant = min(CANT, max(0.0, (speed**2 / radius - rng.uniform(0.0, LATERAL)) * BASE / GRAVITY))
+    lengths = np.round(speed * duration * np.array([0.2, 0.3]) + [1.0, 5.0], 1)
+    cant = min(cant, np.floor(1e3 * RAMP * lengths[1]) / 1e3)
+    sign = 1.0 if rng.random() < 0.5 else -1.0
+    whole = {"curve": 1000.0, "radius": sign * float(np.ceil(radius)), "cant": float(np.round(cant, 3))}
+    return [{"tangent": float(lengths[0])}, {"transition": float(lengths[1])}, whole]
+
+
+def judged(source, changes, requests, tight):
+    """Ask for accuracies of one scene and compare what was handed out with a tight run.
+
+    Parameters
+    ----------
+    source, changes
+        Scene, as for :func:`wrcore.load_scene`.
+    requests : dict of str to sequence of float
+        Accuracies by the quantity they are asked of (`wrcore.analysis.to_accuracy.QUANTITIES`).
+    tight : sequence of dict
+        method, rtol and longest_step of two runs; the first one judges.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per request: of, asked, stated, whether it counts as reached, rtol, cost, status, reason, error (against
+        the first tight run), doubt (difference of the tight runs), trusted, ratio (error over asked).
+    """
+    scene = load_scene(source, changes)
+    sure, twin = (
+        simulate(load_scene(scene, {f"integration.{key}": value for key, value in one.items()}), progress=False)
+        for one in tight
+    )
+    rows = []
+    for of, accuracies in requests.items():
+        doubt = _apart(sure, twin, of)
+        for asked in accuracies:
+            run, found = simulate_to_accuracy(scene, asked, of)
+            error = _apart(run, sure, of)
+            rows.append({
+                "of": of, "asked": asked, "stated": found.found, "reached": found.reached, "rtol": found.rtol,
+                "cost": found.cost, "status": run.status, "reason": found.reason, "error": error, "doubt": doubt,
+                "trusted": doubt <= DOUBT * asked, "ratio": error / asked,
+            })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _apart(one, other, of):
+    """Difference of two runs; infinite where they end otherwise, or by more than an output time earlier or later."""
+    if one.status != other.status or abs(one.t.size - other.t.size) > 1:
+        return np.inf
+    return difference(one, other, of)
+
+
+def summary(table):
+    """How many requests were kept, by quantity and accuracy.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        From `judged`, of several scenes.
+
+    Returns
+    -------
+    pandas.DataFrame
+        of, asked, requests, trusted; of the trusted ones: reached, missed (said to be reached, but erred by more),
+        worst ratio of those said to be reached; median and largest cost of all.
+    """
+    rows = []
+    for (of, asked), part in table.groupby(["of", "asked"], sort=False):
+        said = part[part["trusted"] & part["reached"]]
+        rows.append({
+            "of": of, "asked": asked, "requests": len(part), "trusted": int(part["trusted"].sum()),
+            "reached": len(said), "missed": int((said["ratio"] > 1.0).sum()), "worst_ratio": said["ratio"].max(),
+            "cost_median": part["cost"].median(), "cost_largest": part["cost"].max(),
+        })  # fmt: skip
+    return pd.DataFrame(rows)

@@ -1,0 +1,107 @@
+"""What the patch model does to vehicles: limit cycle, forces and wear on irregular track, critical speed."""
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.limit_cycles import Settling, settle_motion, shifted
+from wrcore.analysis.stability import at_speed, straight_ahead
+from wrcore.analysis.wheels import wheel_table, wheelsets_of
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
+
+MEASURES = ("linear_critical_speed_m_per_s", "cycle_amplitude_m", "cycle_frequency_Hz", "y_rms_m", "Q_max_N", "Y_max_N",
+            "T_gamma_mean_N")  # fmt: skip
+"""Columns whose deviation from exact contact is given."""
+
+
+def limit_cycle(source, overrides, cycle):
+    """What a large disturbance settles to at one speed, on perfect track.
+
+    Parameters
+    ----------
+    source, overrides
+        Scene, as for :func:`wrcore.load_scene`.
+    cycle : dict
+        speed (m/s), shift (m, of the vehicle, sideways) and settling, as for `wrcore.analysis.limit_cycles.Settling`.
+
+    Returns
+    -------
+    dict
+    """
+    model, state = at_speed(*straight_ahead(load_scene(source, [*overrides, "initial.y=0.0"])), cycle["speed"])
+    found, _ = settle_motion(model, shifted(model, state, cycle["shift"]), Settling(**cycle["settling"]))
+    return {f"cycle_{name}": found[name] for name in ("speed_m_per_s", "amplitude_m", "frequency_Hz", "status")}
+
+
+def irregular_run(source, overrides, changes, begin):
+    """Motion, forces and wear of a run, and its cost.
+
+    Parameters
+    ----------
+    source, overrides
+        Scene, as for :func:`wrcore.load_scene`.
+    changes : dict
+        Further ones, by key path.
+    begin : float
+        Start of the evaluation, s.
+
+    Returns
+    -------
+    dict
+    """
+    run = simulate(load_scene(source, [*overrides, *(f"{key}={value}" for key, value in changes.items())]))
+    wheels, late = wheel_table(run, begin), run.t >= begin
+    y = np.concatenate([run[name].y_m[late] for name in wheelsets_of(run)])
+    return {
+        "status": run.status, "y_rms_m": float(np.sqrt(np.mean(y**2))), "Q_max_N": wheels["Q_max_N"].max(),
+        "Y_max_N": wheels["Y_max_N"].max(), "T_gamma_mean_N": wheels["T_gamma_mean_N"].mean(),
+        "real_time_factor": float(run.t[-1]) / run.counters["wall_s"],
+    }  # fmt: skip
+
+
+def model_runs(source, overrides, cycle, track, begin):
+    """`limit_cycle` and `irregular_run` of one vehicle with one patch model: a table of one row."""
+    return pd.DataFrame([limit_cycle(source, overrides, cycle) | irregular_run(source, overrides, track, begin)])
+
+
+def compared(rows, exact):
+    """Models of each vehicle beside exact contact.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        vehicle, model, and the measures.
+    exact : str
+        Name of the model that others are compared with.
+
+    Returns
+    -------
+    pandas.DataFrame
+        With relative deviations of the measures from exact contact: columns that end in ``_deviation``.
+    """
+    sure = rows[rows["model"] == exact].set_index("vehicle")
+    table = rows.copy()
+    for name in MEASURES:
+        table[f"{name}_deviation"] = table[name] / table["vehicle"].map(sure[name]) - 1.0
+    return table
+
+
+def linear_speeds(variants, titles, names):
+    """Linear critical speeds by vehicle and model, from the study of critical speeds.
+
+    Parameters
+    ----------
+    variants : pandas.DataFrame
+        Its table of variants: vehicle (title), variant, critical_speed_m_per_s.
+    titles : dict of str to str
+        By vehicle.
+    names : dict of str to str
+        Variant by model; models without one are left out.
+
+    Returns
+    -------
+    dict of (str, str) to float
+    """
+    found = variants.set_index(["vehicle", "variant"])["critical_speed_m_per_s"]
+    return {(vehicle, model): float(found[title, variant])
+            for vehicle, title in titles.items() for model, variant in names.items()}  # fmt: skip

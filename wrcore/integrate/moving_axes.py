@@ -1,0 +1,120 @@
+"""Axes that turn with a vehicle in a curve, for methods that keep a Jacobian for more than a moment.
+
+In a curve all forces turn with the vehicle. In resting axes the Jacobian of what is stiff is wrong after a turn of
+1 mrad, and a method that holds on to it must follow that turn with short steps although nothing moves in the vehicle.
+Increments of a step are therefore counted in axes that turn about the vertical at the constant rate omega, from a
+motion in which each body goes round a circle with its own velocity, the ``drift`` d. With Q(t) the turn since the
+Jacobian was taken, the state at a time t after the step's start (subscript 0) is
+
+    r = r0 + D(t) d + Q u,   p = q(t) p0 + Q u_p,   v = Q(t)/Q(0) v0 + Q u_v,   w likewise,
+
+where D is the integral of Q, q the turn of Euler parameters, and u are increments:
+
+    u' = Q^T v - d - omega x u,   u_p' = Q^T (p' - omega p / 2),   u_v' = Q^T (v' - omega x v).
+
+This is exact for any omega: the order of a method does not rest on it. In steady curving u stays zero, and a step costs
+what it costs on straight track, where omega is zero.
+"""
+
+import math
+
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.geometry.path import arc_length_of, track_frame
+from wrcore.kernels.jit import jit
+
+RATE, ANGLE = range(2)
+"""Places in ``turn``: turn rate (rad/s), turn since the Jacobian was taken (rad)."""
+
+
+@jit(allocates=False)
+def turn_rate(state, model, work):
+    """Rate at which the track turns under the wheelsets on average, about the vertical, rad/s."""
+    wheelsets, total, frame = model.bodies.wheelsets, 0.0, work.frame
+    if model.track.tangent or not wheelsets.shape[0]:
+        return 0.0
+    for k in range(wheelsets.shape[0]):
+        at = STATE_SIZE * wheelsets[k]
+        s = arc_length_of(model.track.path, state[at], state[at + 1], state[at + 2], work.arc_lengths[k])
+        station = track_frame(model.track.path, s, frame)
+        total += station.curvature * (station.tx * state[at + 7] + station.ty * state[at + 8])
+    total /= wheelsets.shape[0]
+    return total if math.isfinite(total) else 0.0
+
+
+@jit(allocates=False, inline="always")
+def _turned(c, s, x, y):
+    """A pair of components, turned by the angle of a cosine and a sine."""
+    return c * x - s * y, s * x + c * y
+
+
+VECTORS, EULER_PAIRS = ((7, 8), (10, 11)), ((3, 6), (4, 5))
+"""Components of a body's state that a turn about the vertical mixes: as a vector, and with half the angle."""
+
+
+@jit(allocates=False, inline="always")
+def _circle(turn, t):
+    """Cosine and sine parts of D, the way along a circle that starts with a velocity of 1 m/s."""
+    half = 0.5 * turn[RATE] * t
+    length = t if half == 0.0 else t * math.sin(half) / half
+    return length * math.cos(turn[ANGLE] + half), length * math.sin(turn[ANGLE] + half)
+
+
+@jit(allocates=False)
+def carry(bodies, turn, drift, t, start, trial):
+    """Turn increments into the state that they lead to.
+
+    Parameters
+    ----------
+    bodies : int
+        Their number.
+    turn : (float, float)
+        Rate and angle at the step's start.
+    drift : numpy.ndarray, shape (size,)
+        d at the places of positions, zero elsewhere.
+    t : float
+        Since the step's start, s.
+    start, trial : numpy.ndarray, shape (size,)
+        State there; increments, overwritten with the state.
+    """
+    ahead, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
+    c0, s0, c, s = math.cos(ahead), math.sin(ahead), math.cos(whole), math.sin(whole)
+    hc0, hs0, hc, hs = math.cos(0.5 * ahead), math.sin(0.5 * ahead), math.cos(0.5 * whole), math.sin(0.5 * whole)
+    dc, ds = _circle(turn, t)
+    for b in range(bodies):
+        at = STATE_SIZE * b
+        dx, dy = _turned(dc, ds, drift[at], drift[at + 1])
+        ux, uy = _turned(c, s, trial[at], trial[at + 1])
+        trial[at], trial[at + 1] = start[at] + dx + ux, start[at + 1] + dy + uy
+        trial[at + 2] += start[at + 2] + t * drift[at + 2]
+        for i, j in EULER_PAIRS:
+            x, y = _turned(hc0, hs0, start[at + i], start[at + j])
+            ux, uy = _turned(hc, hs, trial[at + i], trial[at + j])
+            trial[at + i], trial[at + j] = x + ux, y + uy
+        for i, j in VECTORS:
+            x, y = _turned(c0, s0, start[at + i], start[at + j])
+            ux, uy = _turned(c, s, trial[at + i], trial[at + j])
+            trial[at + i], trial[at + j] = x + ux, y + uy
+            trial[at + j + 1] += start[at + j + 1]
+    for i in range(STATE_SIZE * bodies, trial.shape[0]):
+        trial[i] += start[i]
+
+
+@jit(allocates=False)
+def rates_of_increments(bodies, turn, drift, t, start, trial, slope):
+    """Turn the rate of a state (``slope``, overwritten) into that of the increments; all else as for `carry`."""
+    rate, whole = turn[RATE], turn[ANGLE] + turn[RATE] * t
+    c, s, hc, hs = math.cos(whole), math.sin(whole), math.cos(0.5 * whole), math.sin(0.5 * whole)
+    dc, ds = _circle(turn, t)
+    for b in range(bodies):
+        at = STATE_SIZE * b
+        dx, dy = _turned(dc, ds, drift[at], drift[at + 1])
+        x, y = trial[at] - start[at] - dx, trial[at + 1] - start[at + 1] - dy
+        ux, uy = _turned(c, -s, slope[at] + rate * y, slope[at + 1] - rate * x)
+        slope[at], slope[at + 1] = ux - drift[at], uy - drift[at + 1]
+        slope[at + 2] -= drift[at + 2]
+        for i, j in EULER_PAIRS:
+            x, y = slope[at + i] + 0.5 * rate * trial[at + j], slope[at + j] - 0.5 * rate * trial[at + i]
+            slope[at + i], slope[at + j] = _turned(hc, -hs, x, y)
+        for i, j in VECTORS:
+            x, y = slope[at + i] + rate * trial[at + j], slope[at + j] - rate * trial[at + i]
+            slope[at + i], slope[at + j] = _turned(c, -s, x, y)
