@@ -2,7 +2,6 @@
 
 import doctest
 import importlib
-import os
 import subprocess
 import sys
 import time

@@ -8,7 +8,7 @@ from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.system import Equations
 from wrcore.integrate.blocks import factorise, new_system, solve_stage
 from wrcore.integrate.integrator import integrate
-from wrcore.integrate.jacobian import new_jacobian, plan_sweeps, refresh_jacobian
+from wrcore.integrate.jacobian import joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
 from wrcore.scene.description import compile_scene, load_scene
 
 CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
@@ -30,11 +30,12 @@ def moving(request):
     return model, t, state, equations(t, state), equations
 
 
-def refreshed(moving, sweep, jacobian):
-    _, t, state, rate, equations = moving
+def refreshed(moving, jacobian=None, whole=True):
+    model, t, state, rate, equations = moving
+    jacobian = jacobian or new_jacobian(model)
     refresh_jacobian(
-        sweep, jacobian, t, state, rate, np.empty_like(state), np.empty_like(state), np.empty(99),
-        *equations.arguments,
+        plan_sweep(model), joined_bodies(model), whole, jacobian, t, state, rate, np.empty_like(state),
+        np.empty_like(state), np.empty(99), *equations.arguments,
     )  # fmt: skip
     return jacobian
 
@@ -87,7 +88,7 @@ def test_every_entry_against_central_differences(moving):
     """One column at a time, all rows: entries that the sweeps leave out must be zero."""
     model, t, state, _, function = moving
     n = len(model.bodies.mass)
-    jacobian = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model))
+    jacobian = refreshed(moving)
     rows = np.r_[[13 * b + 7 + k for b in range(n) for k in range(6)], 13 * n : len(state)].astype(int)
     found, rate = np.vstack([jacobian.by_position, jacobian.by_velocity]), jacobian.turn[0]
     assert rate == pytest.approx(0.0 if model.track.tangent else state[7] / 500.0, rel=0.01)
@@ -117,30 +118,37 @@ def test_every_entry_against_central_differences(moving):
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max() + 0.01)
 
 
-def test_refreshing_the_contacts_refreshes_what_belongs_to_the_wheelsets(moving):
+def test_refreshing_the_contacts_is_taking_the_whole_anew(moving):
+    """Taken where the wheelsets are a bit aside, then refreshed where they are: only contacts are that nonlinear."""
     model, t, state, rate, function = moving
-    full, contact = plan_sweeps(model)
-    assert len(contact.starts) - 1 == (10 if model.track.tangent else 12)  # however many wheelsets there are
-    known = refreshed(moving, full, new_jacobian(model))
-    again = new_jacobian(model)
-    again.by_position[:], again.by_velocity[:] = known.by_position, known.by_velocity
-    for body in model.bodies.wheelsets:  # spoil what contact decides: lateral, vertical, roll, yaw, all velocities
-        own = slice(6 * body, 6 * body + 6)
-        for k in (1, 2, 3, 5):
-            again.by_position[6 * body + k, own] = np.nan
-        again.by_velocity[own, own] = np.nan
-    refreshed(moving, contact, again)
-    np.testing.assert_allclose(again.by_position, known.by_position, rtol=1e-12, atol=1e-3)
-    np.testing.assert_allclose(again.by_velocity, known.by_velocity, rtol=1e-12, atol=1e-3)
+    n, aside = len(model.bodies.mass), state.copy()
+    for body in model.bodies.wheelsets:
+        aside[13 * body + 1] += 2e-4
+        aside[13 * body + 7 : 13 * body + 13] += [1e-3, 2e-3, 1e-3, 1e-3, 1e-3, 2e-3]
+    known = refreshed(moving)
+    found = refreshed((model, t, aside, function(t, aside), function))
+
+    def blocks(jacobian):
+        return np.vstack([jacobian.by_position, jacobian.by_velocity])
+
+    before = np.abs(blocks(found) - blocks(known))
+    rates = refreshed(moving, found, whole=False)
+    after = np.abs(blocks(rates) - blocks(known))
+    scale = np.abs(blocks(known)).max(axis=1, keepdims=True) + 1e-9
+    wheelsets = [6 * b + k for b in model.bodies.wheelsets for k in (1, 2, 3, 5)]
+    wheelsets += [6 * n + 6 * b + k for b in model.bodies.wheelsets for k in range(6)]
+    assert (before / scale)[wheelsets].max() > 0.1
+    assert (after / scale)[wheelsets].max() < 0.02  # gyroscopic and inertial terms follow with the whole only
+    np.testing.assert_array_equal(rates.drift, known.drift)
+    np.testing.assert_allclose(rates.by_time, known.by_time, atol=1e-3 * np.abs(known.by_time).max())
 
 
 def test_refreshed_in_axes_that_have_turned(moving):
     """Where they have turned by 0.3 rad since the whole was taken, the blocks turn back by that."""
     model, n = moving[0], len(moving[0].bodies.mass)
-    sweep = plan_sweeps(model)[0]
-    straight, aside = refreshed(moving, sweep, new_jacobian(model)), new_jacobian(model)
+    straight, aside = refreshed(moving), new_jacobian(model)
     aside.turn[1] = 0.3
-    refreshed(moving, sweep, aside)
+    refreshed(moving, aside)
     c, s = np.cos(0.3), np.sin(0.3)
     axes = np.kron(np.eye(2 * n), [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     own = np.eye(model.elements.states)
@@ -160,7 +168,7 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
     omegas = state[: 13 * n].reshape(n, 13)[:, 10:]
     axles = np.array([matrix_of(part[3:7])[:, 1] for part in state[: 13 * n].reshape(n, 13)])
     frames = omegas - np.sum(omegas * axles, axis=1, keepdims=True) * axles  # a wheelset's frame does not spin
-    jacobian, system = refreshed(moving, plan_sweeps(model)[0], new_jacobian(model)), new_system(model)
+    jacobian, system = refreshed(moving), new_system(model)
     size, rate = 12 * n + model.elements.states, jacobian.turn[0]
     matrix = np.zeros((size + n,) * 2)  # last the lengths of p
     for b in range(n):

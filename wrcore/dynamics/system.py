@@ -134,8 +134,8 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_rail_wrenches(model, state, work):
-    """Add the wrenches of the rails to those of the wheelsets."""
+def wheel_motions(model, state, work):
+    """Fill the motions of all wheels in their rails' frames; the wheelsets' rotations are in ``work``."""
     wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
     for k in range(wheelsets.shape[0]):
         b = wheelsets[k]
@@ -154,6 +154,13 @@ def _add_rail_wrenches(model, state, work):
             for i in range(6):
                 row[6 + i] = state[at + 7 + i]
             row[12] = row[13] = 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_rail_wrenches(model, state, work):
+    """Add the wrenches of the rails to those of the wheelsets."""
+    wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
+    wheel_motions(model, state, work)
     call_address(
         model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, work.strips,

@@ -155,20 +155,35 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     counters : numpy.ndarray, shape (3,)
         The second one counts creep look-ups outside the range of the creep law's table.
     work : StripWork
-        Not used by ellipses.
+        While ``held[0]`` is set the patches are those of the last call: only velocities have changed.
     """
-    for i in range(motions.shape[0]):
-        for wheel in range(2):
-            m = motions[i, wheel]
-            count, bound, _ = find_overlaps(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
-            counts[i, wheel], bounds[i, wheel] = count, bound
+    held = work.held[0] != 0
+    if not held:
+        for i in range(motions.shape[0]):
+            for wheel in range(2):
+                m = motions[i, wheel]
+                count, bound, _ = find_overlaps(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+                counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m, w = motions[i, wheel], wrenches[i, wheel]
+            bend, bend_vertical = (0.0, 0.0) if held else (m[12], m[13])  # patches that are held have it already
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], patches[i, wheel, k], 0.0
+                    model,
+                    m[1],
+                    m[2],
+                    m[6],
+                    m[7],
+                    m[8],
+                    m[9],
+                    m[10],
+                    m[11],
+                    bend,
+                    bend_vertical,
+                    patches[i, wheel, k],
+                    0.0,
                 )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz

@@ -2,12 +2,11 @@
 
 Unknown are, per body, a displacement (r, and a rotation vector in track axes that turns the Euler parameters by
 ``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the force elements' own states. Only the accelerations and the
-rates of the elements' own states need differences; that positions change at the rate of the velocities is known.
+rates of the elements' own states need differences; how velocities change positions is known.
 
 A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
-bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). The contact of a wheelset, which
-changes fastest, only meets rows of the wheelset and of bodies joined to it: a sweep of ten evaluations refreshes it for
-all wheelsets that no element links.
+bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). The contacts, which change fastest,
+are brought up to date alone, see :mod:`wrcore.integrate.contact_blocks`.
 
 All bodies run ahead at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
 greatest error of all. Positions are therefore counted from a motion at constant velocity, the ``drift`` of when the
@@ -22,12 +21,19 @@ import numpy as np
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
+from wrcore.dynamics.vector import cross, dot
+from wrcore.dynamics.wheel import MOTION_COLUMNS
+from wrcore.integrate.contact_blocks import (
+    DIRECTIONS,
+    DISPLACEMENT,
+    SPEED,
+    SPIN,
+    TURN,
+    renew_contacts,
+)
 from wrcore.integrate.engine import copy_into
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_rate
 from wrcore.kernels.jit import jit
-
-DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
-"""Differences: m, rad, m/s and rad/s."""
 
 FINE_BELOW = 1e-3
 """Where creepages are divided by a least speed below this (m/s), differences of velocities shrink in proportion:
@@ -35,9 +41,6 @@ friction saturates at creepages of some 1e-3, and a difference must not come nea
 
 MOMENT = 1e-7
 """Difference of time, s."""
-
-DIRECTIONS = 12
-"""Columns of a body: displacement, rotation, velocity, angular velocity."""
 
 
 class Sweep(NamedTuple):
@@ -51,6 +54,15 @@ class Sweep(NamedTuple):
     """(p + 1,) int."""
     rows: np.ndarray
     """(q,) int: accelerations of all bodies (6 each), rates of the elements' own states."""
+
+
+class Joined(NamedTuple):
+    """Bodies that accelerate together with each wheelset: itself and those that joints hold to it."""
+
+    starts: np.ndarray
+    """(k + 1,) int."""
+    bodies: np.ndarray
+    """(p,) int."""
 
 
 class Jacobian(NamedTuple):
@@ -75,6 +87,16 @@ class Jacobian(NamedTuple):
     turn: np.ndarray
     """(2,): turn rate of the axes that increments are counted in (rad/s), and their turn since they were those of the
     track (rad); see `wrcore.integrate.moving_axes`."""
+    contact: np.ndarray
+    """(k, 12, 6 n): what is in it of each wheelset's contacts."""
+    mobility: np.ndarray
+    """(k, 6, 6 n): accelerations of all bodies by a wrench on a wheelset, in the wheelset's axes."""
+    columns: np.ndarray
+    rails: np.ndarray
+    motions: np.ndarray
+    wrenches: np.ndarray
+    idle: np.ndarray
+    """Scratch of :mod:`wrcore.integrate.contact_blocks`."""
 
 
 def _links(model):
@@ -134,8 +156,8 @@ def _sweep(evaluations):
     )  # fmt: skip
 
 
-def plan_sweeps(model):
-    """Plan the evaluations for the whole Jacobian and for a refresh of the contacts.
+def plan_sweep(model):
+    """Plan the evaluations for the whole Jacobian.
 
     Parameters
     ----------
@@ -143,10 +165,10 @@ def plan_sweeps(model):
 
     Returns
     -------
-    full, contact : Sweep
+    Sweep
     """
     n, own = len(model.bodies.mass), own_state_bodies(model)
-    joined, reached = _links(model)
+    reached = reached_bodies(model)
 
     def column(body, direction):
         return 6 * body + direction if direction < 6 else 6 * n + 6 * body + direction - 6
@@ -162,40 +184,32 @@ def plan_sweeps(model):
     ]
     own_rows = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(own)]
     full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
-    wheelsets = [int(b) for b in model.bodies.wheelsets]
-    if not wheelsets:
-        return _sweep(full), _sweep(full)
-    straight = len(model.track.path.pieces) == 0
-    along = (0, 4) if straight else ()  # a straight rail is nearly the same everywhere, and a wheel all around
-    contact = [
-        [(column(body, direction), {6 * b + k for b in joined[body] for k in range(6)}) for body in group]
-        for group in _apart(wheelsets, joined, reached)
-        for direction in range(DIRECTIONS)
-        if direction not in along
-    ]
-    return _sweep(full), _sweep(contact)
+    return _sweep(full)
 
 
-def _apart(wheelsets, joined, reached):
-    """Groups of wheelsets none of which reaches bodies joined to another one."""
-    groups = []
-    for body in wheelsets:
-        for members in groups:
-            if not any(joined[body] & reached[k] or joined[k] & reached[body] for k in members):
-                members.append(body)
-                break
-        else:
-            groups.append([body])
-    return groups
+def joined_bodies(model):
+    """Bodies that accelerate together with each wheelset.
+
+    Returns
+    -------
+    Joined
+    """
+    joined = [sorted(_links(model)[0][b]) for b in model.bodies.wheelsets]
+    return Joined(
+        np.cumsum([0] + [len(bodies) for bodies in joined]),
+        np.array([b for bodies in joined for b in bodies], np.int64),
+    )
 
 
 def new_jacobian(model):
     """Blocks of zeros for a model."""
     n, size = len(model.bodies.mass), state_size(model)
-    m = size - 7 * n
+    m, k = size - 7 * n, len(model.bodies.wheelsets)
     return Jacobian(
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
-        np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2),
+        np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
+        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)),
+        np.zeros(6 * n),
     )  # fmt: skip
 
 
@@ -221,6 +235,34 @@ def _take_axes(jacobian, state, rate):
             jacobian.spin[b, i] = 0.0
             for j in range(4):
                 jacobian.spin[b, i] += 2.0 * rows[i, j] * rate[at + 3 + j]
+
+
+@jit(allocates=False)
+def _take_turning(jacobian, spins, state):
+    """Write what a rotation theta and an angular velocity w change of the rotations' rates.
+
+    With p' = 1/2 Omega p (quaternions; Omega = w, or w - (w a) a for a body of revolution about a, whose frame does not
+    spin) and p + 1/2 theta p in place of p: the rotation vector's rate changes by dOmega + 1/2 Omega x theta, the rate
+    of the length of p by -1/4 Omega theta. In axes that turn, Omega is relative to them.
+    """
+    c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
+    for b in range(jacobian.axes.shape[0]):
+        at, p, omega, out = STATE_SIZE * b + 10, jacobian.axes[b, 3], jacobian.spin[b], jacobian.turning[b]
+        w = c * state[at] + s * state[at + 1], c * state[at + 1] - s * state[at], state[at + 2]
+        a = (
+            2.0 * (p[1] * p[2] - p[0] * p[3]),
+            p[0] * p[0] - p[1] * p[1] + p[2] * p[2] - p[3] * p[3],
+            2.0 * (p[2] * p[3] + p[0] * p[1]),
+        )
+        spinning = 1.0 if spins[b] == 1 else 0.0
+        along = dot(w, a)
+        for k in range(3):
+            axis = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+            tilt, turned = cross(axis, a), cross((omega[0], omega[1], omega[2]), axis)
+            for i in range(3):
+                out[i, k] = 0.5 * turned[i] - spinning * (dot(w, tilt) * a[i] + along * tilt[i])
+                out[i, 3 + k] = axis[i] - spinning * a[i] * a[k]
+            out[3, k], out[3, 3 + k] = -0.25 * omega[k], 0.0
 
 
 @jit(allocates=False)
@@ -268,14 +310,31 @@ def _resolved(difference, column, bodies, turn, state, trial):
 
 
 @jit(allocates=False)
-def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences, equations, model, work):
-    """Refresh the columns of a sweep, and the drift with the derivative along it.
+def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
+    """Write one column, from the rates without and with the difference."""
+    column = sweep.columns[k]
+    for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
+        row = sweep.rows[j]
+        at = STATE_SIZE * (row // 6) + 7 + row % 6 if row < 6 * bodies else 7 * bodies + row
+        value = (slope[at] - base[at]) / difference
+        if column < 6 * bodies:
+            jacobian.by_position[column, row] = value
+        else:
+            jacobian.by_velocity[column - 6 * bodies, row] = value
+
+
+@jit(allocates=False)
+def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slope, differences, equations, model, work):
+    """Refresh the whole Jacobian or the contacts' part, and the drift with the derivative along it.
 
     Parameters
     ----------
     sweep : Sweep
+    joined : Joined
+    whole : bool
+        False: only what the contacts put into it, which the whole must have been taken for once.
     jacobian : Jacobian
-        Overwritten where the sweep reaches.
+        Overwritten.
     t : float
     state, rate : numpy.ndarray, shape (size,)
         Where the Jacobian is taken, and the right-hand side there.
@@ -299,47 +358,33 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW)
-    evaluations, strips = sweep.starts.shape[0], model.contact.strips.strips > 0
+    strips, wheels = model.contact.strips.strips > 0, model.bodies.wheelsets.shape[0] > 0
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses
         work.strips.cheap[0] = 1
         derivatives_at(equations, t, state, model, work, base)
     rates_of_increments(n, axes, drift, 0.0, state, state, base)
     _take_axes(jacobian, state, base)
-    for i in range(evaluations):
-        in_time = i == sweep.starts.shape[0] - 1
-        first, last = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
+    _take_turning(jacobian, model.bodies.spins, state)
+    last = sweep.starts.shape[0] - 1
+    for i in range(0 if whole else last, last + 1):
+        in_time = i == last
+        first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
+        if in_time and wheels:  # before the base's rates turn into the derivative by time
+            renew_contacts(joined, whole, jacobian, t, state, model, work, fine)
         trial[:] = 0.0
-        for k in range(first, last):
+        for k in range(first, end):
             differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes, fine)
         carry(n, axes, drift, moment, state, trial)
-        for k in range(first, last):
+        for k in range(first, end):
             differences[k - first] = _resolved(differences[k - first], sweep.columns[k], n, axes, state, trial)
         derivatives_at(equations, t + moment, trial, model, work, slope)
         rates_of_increments(n, axes, drift, moment, state, trial, slope)
         if in_time:
             for j in range(state.shape[0]):
                 jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT
-        for k in range(first, last):
-            column, difference = sweep.columns[k], differences[k - first]
-            for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
-                row = sweep.rows[j]
-                at = STATE_SIZE * (row // 6) + 7 + row % 6 if row < 6 * n else 7 * n + row
-                value = (slope[at] - base[at]) / difference
-                if column < 6 * n:
-                    jacobian.by_position[column, row] = value
-                else:
-                    jacobian.by_velocity[column - 6 * n, row] = value
-            turn = column % 6
-            if column < 12 * n and turn >= 3:
-                body = (column if column < 6 * n else column - 6 * n) // 6
-                at = STATE_SIZE * body + 3
-                place = turn - 3 if column < 6 * n else turn
-                for j in range(4):
-                    value = 0.0
-                    for m in range(4):
-                        value += jacobian.axes[body, j, m] * (slope[at + m] - base[at + m])
-                    jacobian.turning[body, j, place] = value * (2.0 if j < 3 else 1.0) / difference
+        for k in range(first, end):
+            _take_column(sweep, jacobian, k, differences[k - first], n, base, slope)
     work.strips.cheap[0] = 0
-    return evaluations + strips
+    return (sweep.starts.shape[0] if whole else 1) + strips

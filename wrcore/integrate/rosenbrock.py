@@ -31,7 +31,16 @@ from wrcore.integrate.engine import (
     judge,
     take_stock,
 )
-from wrcore.integrate.jacobian import Jacobian, Sweep, new_jacobian, plan_sweeps, refresh_jacobian, turn_of
+from wrcore.integrate.jacobian import (
+    Jacobian,
+    Joined,
+    Sweep,
+    joined_bodies,
+    new_jacobian,
+    plan_sweep,
+    refresh_jacobian,
+    turn_of,
+)
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
 from wrcore.kernels.jit import jit
 
@@ -46,8 +55,8 @@ factorised matrix."""
 class Linear(NamedTuple):
     """The Jacobian and the factorised system of a run."""
 
-    full: Sweep
-    contact: Sweep
+    sweep: Sweep
+    joined: Joined
     jacobian: Jacobian
     system: System
     differences: np.ndarray
@@ -61,9 +70,9 @@ def new_linear(model):
     -------
     Linear
     """
-    full, contact = plan_sweeps(model)
-    most = int(max(np.diff(sweep.starts).max() for sweep in (full, contact)))
-    return Linear(full, contact, new_jacobian(model), new_system(model), np.zeros(most))
+    sweep = plan_sweep(model)
+    differences = np.zeros(int(np.diff(sweep.starts).max()))
+    return Linear(sweep, joined_bodies(model), new_jacobian(model), new_system(model), differences)
 
 
 @jit(allocates=False)
@@ -75,13 +84,13 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
     clock, counters = memory.clock, memory.counters
     age, step = counters[AGE], clock[NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
-        sweep = linear.contact
-        if age < 0 or counters[SINCE_FULL] >= CONTACT_REFRESHES:
-            sweep = linear.full
+        wheels = model.bodies.wheelsets.shape[0] > 0
+        whole = age < 0 or not wheels or counters[SINCE_FULL] >= CONTACT_REFRESHES
+        if whole:
             counters[SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[EVALUATIONS] += refresh_jacobian(
-            sweep, linear.jacobian, clock[T], memory.state, memory.rate, scratch.trial, scratch.slope,
-            linear.differences, equations, model, work,
+            linear.sweep, linear.joined, whole, linear.jacobian, clock[T], memory.state, memory.rate, scratch.trial,
+            scratch.slope, linear.differences, equations, model, work,
         )  # fmt: skip
         counters[JACOBIANS] += 1
         counters[SINCE_FULL] += 1

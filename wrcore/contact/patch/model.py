@@ -51,6 +51,8 @@ class StripWork(NamedTuple):
 
     cheap: np.ndarray
     """(1,) int: 1 while ellipses stand in for strips."""
+    held: np.ndarray
+    """(1,) int: 1 while ellipses keep the patches found before: only velocities have changed."""
     warm: np.ndarray
     """(1,) int: 1 during a step, where patches start from their last solutions. Elsewhere from nothing."""
     memory: np.ndarray
@@ -133,7 +135,7 @@ def strip_work(model, wheelsets):
         normal = normal_strips.Workspace(*(_emptied(part) for part in normal))
     wheels = (wheelsets, 2, MAX_PATCHES) if model.strips else (0, 0, 0)
     return StripWork(
-        np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((*wheels, normal_strips.MEMORY)),
+        *(np.zeros(1, np.int64) for _ in range(3)), np.zeros((*wheels, normal_strips.MEMORY)),
         np.zeros(normal_strips.MEMORY), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
         normal,

@@ -1,0 +1,229 @@
+"""What the contacts add to the Jacobian: differences of the rails' wrenches alone, one call for all wheels.
+
+Of all parts of the Jacobian those of the contacts change fastest. Between two Jacobians in full they are brought up to
+date without an evaluation of the whole vehicle: for each wheelset the wrench's derivatives C by its pose and velocity
+are found in the rails' own frames, and to the accelerations of the wheelset and of bodies joined to it they add A C,
+where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along
+the rail and a turn about the axle change nothing, and differences of velocities need no search for patches.
+"""
+
+import math
+
+from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
+from wrcore.dynamics.constraints import apply_inverse_inertia
+from wrcore.dynamics.system import wheel_motions
+from wrcore.integrate.engine import copy_into
+from wrcore.integrate.moving_axes import ANGLE
+from wrcore.kernels.handles import call_address
+from wrcore.kernels.jit import FUSED, jit
+
+DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
+"""Differences: m, rad, m/s and rad/s."""
+
+DIRECTIONS = 12
+"""Columns of a body: displacement, rotation, velocity, angular velocity."""
+
+UNIT = 1e3
+"""Wrench whose accelerations are looked at, N and N m."""
+
+
+@jit(allocates=False)
+def take_mobility(jacobian, t, state, model, work):
+    """Write the accelerations of all bodies by a wrench on each wheelset, into ``jacobian.mobility``.
+
+    All in the wheelset's own axes, which do not spin: in these they hardly change.
+
+    Parameters
+    ----------
+    jacobian : Jacobian
+    t : float
+    state : numpy.ndarray
+        Of the evaluation whose rotations are in ``work``.
+    model : Model
+    work : Workspace
+        Its wrenches are overwritten.
+    """
+    wheelsets, idle, bodies = model.bodies.wheelsets, jacobian.idle, model.bodies.mass.shape[0]
+    _accelerations(t, state, model, work, -1, 0, idle)
+    for k in range(wheelsets.shape[0]):
+        axes = work.rotations[wheelsets[k]]
+        for direction in range(6):
+            column = jacobian.mobility[k, direction]
+            _accelerations(t, state, model, work, wheelsets[k], direction, column)
+            for i in range(column.shape[0]):
+                column[i] = (column[i] - idle[i]) / UNIT
+            for part in range(2 * bodies):
+                x, y, z = column[3 * part], column[3 * part + 1], column[3 * part + 2]
+                for i in range(3):
+                    column[3 * part + i] = axes[0, i] * x + axes[1, i] * y + axes[2, i] * z
+
+
+@jit(allocates=False)
+def _accelerations(t, state, model, work, body, direction, out):
+    """Accelerations (6 n,) by one wrench on one body, along its axes, and no other force; ``body`` < 0: none."""
+    bodies, wrenches = model.bodies, work.wrenches
+    wrenches[:] = 0.0
+    if body >= 0:
+        for i in range(3):
+            wrenches[body, direction - direction % 3 + i] = UNIT * work.rotations[body, i, direction % 3]
+    if model.joints.equations > 0:
+        call_address(model.reactions, model, t, state, work)
+    for b in range(bodies.mass.shape[0]):
+        for i in range(3):
+            out[6 * b + i] = wrenches[b, i] / bodies.mass[b]
+        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], wrenches[b], out[6 * b + 3 : 6 * b + 6])
+
+
+@jit(allocates=False)
+def _wrenches(model, work):
+    call_address(
+        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+        work.counters, work.strips,
+    )  # fmt: skip
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _moved(base, direction, difference, row):
+    """Write a wheel's motion with a difference in one direction of its rail's frame into ``row``."""
+    copy_into(row, base)
+    if direction < 3:
+        row[direction] += difference
+    elif direction == 3:
+        row[4], row[5] = base[4] - difference * base[5], base[5] + difference * base[4]
+    elif direction == 5:
+        row[3], row[4] = base[3] - difference * base[4], base[4] + difference * base[3]
+    else:
+        row[direction] += difference
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_column(rail, direction, base, wrench, scale, columns):
+    """Add a derivative, ``scale`` times a difference of wrenches in a rail's frame (axes: columns of ``rail``)."""
+    i, first = direction % 3, direction - direction % 3
+    fx, fy, fz = (wrench[0] - base[0]) * scale, (wrench[1] - base[1]) * scale, (wrench[2] - base[2]) * scale
+    mx, my, mz = (wrench[3] - base[3]) * scale, (wrench[4] - base[4]) * scale, (wrench[5] - base[5]) * scale
+    for axis in range(3):
+        share, column = rail[axis, i], columns[first + axis]
+        for j in range(3):
+            column[j] += share * (rail[j, 0] * fx + rail[j, 1] * fy + rail[j, 2] * fz)
+            column[3 + j] += share * (rail[j, 0] * mx + rail[j, 1] * my + rail[j, 2] * mz)
+
+
+@jit(allocates=False)
+def _take_rails(jacobian, model, work):
+    """Write the axes of all rails' frames in the axes in which increments are counted."""
+    c, s, tangent = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE]), model.track.tangent
+    for k in range(jacobian.rails.shape[0]):
+        for wheel in range(2):
+            rail = jacobian.rails[k, wheel]
+            for j in range(3):
+                x = work.rails[k, wheel, 0, j] if not tangent else (1.0 if j == 0 else 0.0)
+                y = work.rails[k, wheel, 1, j] if not tangent else (1.0 if j == 1 else 0.0)
+                rail[0, j], rail[1, j] = c * x + s * y, c * y - s * x
+                rail[2, j] = work.rails[k, wheel, 2, j] if not tangent else (1.0 if j == 2 else 0.0)
+
+
+@jit(allocates=False)
+def contact_blocks(jacobian, state, model, work, fine, columns):
+    """Derivatives of the rails' wrenches by the motion of their wheelsets.
+
+    Parameters
+    ----------
+    jacobian : Jacobian
+        Its scratch arrays are overwritten.
+    state : numpy.ndarray
+    model : Model
+    work : Workspace
+        What it holds of wheels and patches is overwritten.
+    fine : float
+        Differences of velocities are multiplied by this.
+    columns : numpy.ndarray, shape (k, 12, 6)
+        Filled: force and moment by displacement, rotation, velocity and angular velocity, in the axes in which
+        increments are counted.
+    """
+    wheelsets, base, found, held = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, work.strips.held
+    for k in range(wheelsets.shape[0]):
+        rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
+    wheel_motions(model, state, work)
+    _take_rails(jacobian, model, work)
+    _wrenches(model, work)
+    for k in range(wheelsets.shape[0]):
+        for wheel in range(2):
+            copy_into(base[k, wheel], work.motions[k, wheel])
+            copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
+    columns[:] = 0.0
+    held[0] = 1  # velocities first: the patches are those of the pose
+    for step in range(DIRECTIONS):
+        direction = (step + 6) % DIRECTIONS
+        if direction == 0:
+            held[0] = 0
+        if direction == 0 or direction == 4:
+            continue
+        difference = DISPLACEMENT if direction < 3 else TURN
+        if direction >= 6:
+            difference = fine * (SPEED if direction < 9 else SPIN)
+        for k in range(base.shape[0]):
+            for wheel in range(2):
+                _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
+        _wrenches(model, work)
+        for k in range(base.shape[0]):
+            for wheel in range(2):
+                rail, row, axle = jacobian.rails[k, wheel], work.rail_wrenches[k, wheel], base[k, wheel, 3:6]
+                _add_column(rail, direction, found[k, wheel], row, 1.0 / difference, columns[k])
+                if direction == 3 or direction == 5:  # a turn about the axle changes nothing
+                    share = -axle[direction - 3] / axle[1]
+                    _add_column(rail, 4, found[k, wheel], row, share / difference, columns[k])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _respond(mobility, axes, c, s, wrench, body, out):
+    """Accelerations of one body by a wrench on a wheelset; its axes are in track axes, all else in axes turned."""
+    for i in range(6):
+        out[i] = 0.0
+    for m in range(6):
+        first, i = m - m % 3, m % 3
+        along_x, along_y = c * axes[0, i] + s * axes[1, i], c * axes[1, i] - s * axes[0, i]
+        share = along_x * wrench[first] + along_y * wrench[first + 1] + axes[2, i] * wrench[first + 2]
+        for r in range(6):
+            out[r] += mobility[m, 6 * body + r] * share
+    for first in range(0, 6, 3):
+        p, q, r = out[first], out[first + 1], out[first + 2]
+        x = axes[0, 0] * p + axes[0, 1] * q + axes[0, 2] * r
+        y = axes[1, 0] * p + axes[1, 1] * q + axes[1, 2] * r
+        out[first], out[first + 1] = c * x + s * y, c * y - s * x
+        out[first + 2] = axes[2, 0] * p + axes[2, 1] * q + axes[2, 2] * r
+
+
+@jit(allocates=False)
+def renew_contacts(joined, whole, jacobian, t, state, model, work, fine):
+    """Bring the contacts' part of the Jacobian up to date.
+
+    Parameters
+    ----------
+    joined : Joined
+        Bodies that accelerate with each wheelset.
+    whole : bool
+        The Jacobian has just been taken as a whole: only note what of it the contacts' part is.
+    jacobian : Jacobian
+    t : float
+    state, model, work, fine
+        As for :func:`contact_blocks`.
+    """
+    columns, out = jacobian.columns, jacobian.idle
+    contact_blocks(jacobian, state, model, work, fine, columns)
+    if whole:
+        take_mobility(jacobian, t, state, model, work)
+    c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
+    for k in range(columns.shape[0]):
+        own = model.bodies.wheelsets[k]
+        for direction in range(DIRECTIONS):
+            column = jacobian.by_position[6 * own + direction] if direction < 6 else \
+                jacobian.by_velocity[6 * own + direction - 6]  # fmt: skip
+            for j in range(joined.starts[k], joined.starts[k + 1]):
+                body = joined.bodies[j]
+                _respond(jacobian.mobility[k], work.rotations[own], c, s, columns[k, direction], body, out)
+                for row in range(6):
+                    known = jacobian.contact[k, direction, 6 * body + row]
+                    jacobian.contact[k, direction, 6 * body + row] = out[row]
+                    if not whole:
+                        column[6 * body + row] += out[row] - known
