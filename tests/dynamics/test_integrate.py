@@ -228,7 +228,7 @@ def test_counters(wheelset, method):
         assert (run.jacobians, run.factorisations) == (0, 0)
     else:
         later = len(ROSENBROCK[method].nodes) - 1
-        full, contact = 13, 11  # with the derivative along the drift; without x and pitch
+        full, contact = 14, 1  # at the state, 12 columns, along the drift; along the drift
         refreshed = full + (run.jacobians - 1) * contact + (run.jacobians - 1) // 20 * (full - contact)
         assert run.rhs_evaluations == later * attempts + run.steps + 1 + refreshed  # the rate at a step's end, too
         assert run.jacobians <= run.steps and run.factorisations <= attempts

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.model import StripWork, strip_work
+from wrcore.contact.patch.model import WRENCHES_HELD, StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
@@ -158,15 +158,16 @@ def wheel_motions(model, state, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _add_rail_wrenches(model, state, work):
-    """Add the wrenches of the rails to those of the wheelsets."""
-    wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
-    wheel_motions(model, state, work)
-    call_address(
-        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips,
-    )  # fmt: skip
+    """Add the wrenches of the rails to those of the wheelsets; while they are held, those found last."""
+    wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, work.strips.held[0] == WRENCHES_HELD
+    if not held:
+        wheel_motions(model, state, work)
+        call_address(
+            model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+            work.counters, work.strips,
+        )  # fmt: skip
     for k in range(wheelsets.shape[0]):
-        if not tangent:
+        if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
         wrench = work.wrenches[wheelsets[k]]
         for i in range(6):

@@ -7,7 +7,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, damping_factor, hertz_shape_at, inverse_cube_root
-from wrcore.contact.patch.model import StripModel
+from wrcore.contact.patch.model import PATCHES_HELD, StripModel
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -155,9 +155,9 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     counters : numpy.ndarray, shape (3,)
         The second one counts creep look-ups outside the range of the creep law's table.
     work : StripWork
-        While ``held[0]`` is set the patches are those of the last call: only velocities have changed.
+        While ``held[0]`` is `PATCHES_HELD` the patches are those of the last call: only velocities have changed.
     """
-    held = work.held[0] != 0
+    held = work.held[0] == PATCHES_HELD
     if not held:
         for i in range(motions.shape[0]):
             for wheel in range(2):

@@ -9,6 +9,7 @@ the rail and a turn about the axle change nothing, and differences of velocities
 
 import math
 
+from wrcore.contact.patch.model import PATCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.dynamics.constraints import apply_inverse_inertia
 from wrcore.dynamics.system import wheel_motions
@@ -152,7 +153,7 @@ def contact_blocks(jacobian, state, model, work, fine, columns):
             copy_into(base[k, wheel], work.motions[k, wheel])
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     columns[:] = 0.0
-    held[0] = 1  # velocities first: the patches are those of the pose
+    held[0] = PATCHES_HELD  # velocities first: the patches are those of the pose
     for step in range(DIRECTIONS):
         direction = (step + 6) % DIRECTIONS
         if direction == 0:
@@ -196,14 +197,14 @@ def _respond(mobility, axes, c, s, wrench, body, out):
 
 @jit(allocates=False)
 def renew_contacts(joined, whole, jacobian, t, state, model, work, fine):
-    """Bring the contacts' part of the Jacobian up to date.
+    """Bring the contacts' part of the Jacobian up to date, or add it where the whole was taken without.
 
     Parameters
     ----------
     joined : Joined
         Bodies that accelerate with each wheelset.
     whole : bool
-        The Jacobian has just been taken as a whole: only note what of it the contacts' part is.
+        The Jacobian has just been taken at the wrenches of the rails; else the old part is replaced.
     jacobian : Jacobian
     t : float
     state, model, work, fine
@@ -225,5 +226,4 @@ def renew_contacts(joined, whole, jacobian, t, state, model, work, fine):
                 for row in range(6):
                     known = jacobian.contact[k, direction, 6 * body + row]
                     jacobian.contact[k, direction, 6 * body + row] = out[row]
-                    if not whole:
-                        column[6 * body + row] += out[row] - known
+                    column[6 * body + row] += out[row] - (0.0 if whole else known)

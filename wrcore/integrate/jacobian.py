@@ -5,8 +5,8 @@ Unknown are, per body, a displacement (r, and a rotation vector in track axes th
 rates of the elements' own states need differences; how velocities change positions is known.
 
 A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
-bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). The contacts, which change fastest,
-are brought up to date alone, see :mod:`wrcore.integrate.contact_blocks`.
+bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). They keep the rails' wrenches as
+they are; what the contacts add, and bring up to date more often, is in :mod:`wrcore.integrate.contact_blocks`.
 
 All bodies run ahead at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
 greatest error of all. Positions are therefore counted from a motion at constant velocity, the ``drift`` of when the
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.patch.model import WRENCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
@@ -362,6 +363,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses
         work.strips.cheap[0] = 1
+    if strips or whole:
         derivatives_at(equations, t, state, model, work, base)
     rates_of_increments(n, axes, drift, 0.0, state, state, base)
     _take_axes(jacobian, state, base)
@@ -369,6 +371,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     last = sweep.starts.shape[0] - 1
     for i in range(0 if whole else last, last + 1):
         in_time = i == last
+        work.strips.held[0] = 0 if in_time else WRENCHES_HELD
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time
@@ -387,4 +390,4 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
         for k in range(first, end):
             _take_column(sweep, jacobian, k, differences[k - first], n, base, slope)
     work.strips.cheap[0] = 0
-    return (sweep.starts.shape[0] if whole else 1) + strips
+    return sweep.starts.shape[0] + 1 if whole else 1 + strips

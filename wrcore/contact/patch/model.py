@@ -22,6 +22,9 @@ RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
 FORCE_ROWS = 16
 
+PATCHES_HELD, WRENCHES_HELD = 1, 2
+"""What `StripWork.held` says."""
+
 
 class StripModel(NamedTuple):
     """Settings and tables of patches on strips, for kernels; without strips its arrays are empty."""
@@ -52,7 +55,8 @@ class StripWork(NamedTuple):
     cheap: np.ndarray
     """(1,) int: 1 while ellipses stand in for strips."""
     held: np.ndarray
-    """(1,) int: 1 while ellipses keep the patches found before: only velocities have changed."""
+    """(1,) int: PATCHES_HELD while ellipses keep the patches found last (only velocities have changed), WRENCHES_HELD
+    while the rails' wrenches are kept, else 0."""
     warm: np.ndarray
     """(1,) int: 1 during a step, where patches start from their last solutions. Elsewhere from nothing."""
     memory: np.ndarray
