@@ -19,6 +19,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wrcore.analysis.assess import Assessment as Assessment
+    from wrcore.analysis.assess import assess as assess
     from wrcore.analysis.contact import contact_table as contact_table
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
     from wrcore.analysis.patch import patch as patch
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "Assessment": "wrcore.analysis.assess",
     "InputError": "wrcore.errors",
     "CreepTable": "wrcore.creep.table",
     "Patch": "wrcore.contact.patch.result",
@@ -65,6 +68,7 @@ _PUBLIC = {
     "Run": "wrcore.run.run",
     "Scene": "wrcore.scene.description",
     "WheelsetOnTrack": "wrcore.contact.first_touch",
+    "assess": "wrcore.analysis.assess",
     "conicity_curve": "wrcore.contact.conicity",
     "contact_table": "wrcore.analysis.contact",
     "creep_force": "wrcore.creep.cases",

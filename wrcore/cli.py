@@ -73,6 +73,7 @@ def _parser():
     _add_conicity(commands)
     _add_creep(commands)
     _add_table(commands)
+    _add_assess(commands)
     command = commands.add_parser("profiles", help="list the named wheel and rail profiles")
     command.set_defaults(run=_profiles)
     return parser
@@ -95,6 +96,16 @@ def _add_simulate(commands):
         help="of the lateral position of wheelsets (m, rms; the default), wheel forces (N, rms), mean wear number (N)",
     )  # fmt: skip
     command.set_defaults(run=_simulate)
+
+
+def _add_assess(commands):
+    command = commands.add_parser("assess", help="assess a stored run by EN 14363 or EN 12299")
+    command.add_argument("run_file", metavar="run.h5")
+    command.add_argument("--standard", default="EN 14363", metavar="'EN 14363'|'EN 12299'", help="default: EN 14363")
+    command.add_argument("--begin", type=float, default=0.0, metavar="s", help="leave out what came before; default: 0")
+    command.add_argument("--freight", action="store_true", help="limits of freight wagons")
+    command.add_argument("--out", metavar="sections.csv", help="write percentiles section by section (EN 14363)")
+    command.set_defaults(run=_assess)
 
 
 def _add_sweep(commands):
@@ -289,6 +300,18 @@ def _print_run(run, as_json):
     exceeded = [f"{counters[name]} {text}" for name, text in LIMITS.items() if counters[name]]
     if exceeded:
         print(f"beyond the models' limits: {', '.join(exceeded)}; {counters['patches']} patches at the output times")
+
+
+def _assess(options):
+    from wrcore.analysis.assess import assess
+    from wrcore.run.results import load_run
+
+    out = _output(options.out, (".csv",)) if options.out else None
+    assessment = assess(load_run(options.run_file), options.standard, options.begin, options.freight)
+    print(assessment)
+    if out:
+        _write_csv(assessment.sections, out)
+    return 0
 
 
 def _sweep(options):

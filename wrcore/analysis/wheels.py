@@ -44,9 +44,13 @@ def wheel_forces(run, wheelset, side):
         Vertical (downwards) and lateral (to the field side) force, N.
     """
     contact = run[f"{wheelset}/{side}"]
-    cosine, sine = np.cos(contact.contact_angle_rad), np.sin(contact.contact_angle_rad)
-    vertical = np.nansum(contact.N_N * cosine + contact.Fy_N * sine, axis=1)
-    lateral = np.nansum(contact.Fy_N * cosine - contact.N_N * sine, axis=1)
+    vertical, lateral = np.zeros(len(run.t)), np.zeros(len(run.t))
+    for patch in range(contact.N_N.shape[1]):
+        rows = np.flatnonzero(~np.isnan(contact.N_N[:, patch]))  # few have a second patch
+        normal, aside, angle = (contact[name][rows, patch] for name in ("N_N", "Fy_N", "contact_angle_rad"))
+        cosine, sine = np.cos(angle), np.sin(angle)
+        vertical[rows] += normal * cosine + aside * sine
+        lateral[rows] += aside * cosine - normal * sine
     return vertical, -OUTWARDS[side] * lateral
 
 
@@ -73,6 +77,31 @@ def creep_power(run, wheelset, side):
 def quotient(vertical, lateral):
     """Y/Q; NaN where the wheel is as good as unloaded."""
     return np.divide(lateral, vertical, out=np.full(np.shape(vertical), np.nan), where=np.asarray(vertical) > UNLOADED)
+
+
+def greatest_pressure(run, wheelset, side):
+    """Greatest pressure under a wheel over time, Pa, shape (n,), 0 without contact; of ellipses 3 N/(2 pi a b)."""
+    c = run[f"{wheelset}/{side}"]
+    pressure = c.p_max_Pa if "p_max_Pa" in c else 1.5 * c.N_N / (np.pi * np.where(c.a_m > 0.0, c.a_m * c.b_m, np.nan))
+    return np.max(np.nan_to_num(pressure), axis=1)
+
+
+def wheelset_channels(run, wheelset):
+    """What :meth:`wrcore.run.run.Run.wheel_forces` returns."""
+    columns, total = {}, 0.0
+    for side in SIDES:
+        vertical, lateral = wheel_forces(run, wheelset, side)
+        total = total + OUTWARDS[side] * lateral
+        columns |= {
+            f"Q_{side}_N": vertical,
+            f"Y_{side}_N": lateral,
+            f"Y_over_Q_{side}": quotient(vertical, lateral),
+            f"T_gamma_{side}_N": wear_number(run, wheelset, side),
+            f"T_gamma_spin_{side}_N": wear_number(run, wheelset, side, spin=True),
+            f"creep_power_{side}_W": creep_power(run, wheelset, side),
+            f"p_max_{side}_Pa": greatest_pressure(run, wheelset, side),
+        }
+    return pd.DataFrame(columns | {"sum_Y_N": total}, index=pd.Index(run.t, name="t_s"))
 
 
 def wheel_table(run, begin=0.0):

@@ -192,6 +192,31 @@ class Run:
                         if patch == 0 or not np.isnan(column).all():
                             yield (group, name, patch), column
 
+    def wheel_forces(self, wheelset: str = "wheelset") -> pd.DataFrame:
+        """Forces, wear and pressure of a wheelset's wheels over time.
+
+        Parameters
+        ----------
+        wheelset : str
+            Name of its group.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``t_s``; per side (``left``, ``right``) ``Q_left_N`` (vertical), ``Y_left_N`` (lateral, to the field
+            side), ``Y_over_Q_left``, ``T_gamma_left_N``, ``T_gamma_spin_left_N``, ``creep_power_left_W`` and
+            ``p_max_left_Pa``; ``sum_Y_N``, the lateral force on the track, to the left. Definitions:
+            :mod:`wrcore.analysis.wheels`.
+
+        Raises
+        ------
+        KeyError
+            If the run has no such wheelset.
+        """
+        from wrcore.analysis.wheels import wheelset_channels
+
+        return wheelset_channels(self, wheelset)
+
     def plot(self, *channels: str) -> Figure:
         """Draw the run over time.
 

@@ -1,0 +1,128 @@
+"""Filters against their own definitions, sections against the path, percentiles and limits of synthetic signals."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+import wrcore as wr
+from tests.synthetic import CONTACT
+from wrcore.analysis.assess import assess, low_pass, section_table, sliding_mean, track_sections
+from wrcore.cli import main
+from wrcore.errors import InputError
+from wrcore.run.run import Run
+
+RATE, SPEED, LOAD = 1000.0, 20.0, 60e3
+
+
+def synthetic(forces, path="tangent", duration=60.0):
+    """Run of one wheelset; ``forces`` gives Q and Y of the wheels over time as functions of time and side (+1, -1)."""
+    t = np.arange(int(duration * RATE) + 1) / RATE
+    groups = {"wheelset": {"x_m": SPEED * t, "s_m": SPEED * t, "vx_m_per_s": np.full_like(t, SPEED)}}
+    groups["wheelset"]["vy_m_per_s"] = np.zeros_like(t)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        channels = {name: np.zeros((len(t), 3)) for name in CONTACT}
+        for name in CONTACT:
+            channels[name][:, 1:] = np.nan
+        vertical, lateral = forces(t, sign)
+        channels["N_N"][:, 0] = vertical  # on a level contact plane
+        channels["Fy_N"][:, 0] = -sign * lateral
+        channels["a_m"][:, 0] = channels["b_m"][:, 0] = 5e-3
+        groups[f"wheelset/{side}"] = channels
+    scene = {"name": "synthetic", "speed": SPEED, "track": {"path": path}}
+    return Run(scene, "completed", "", t, groups)
+
+
+def test_low_pass_is_scipys_butterworth_and_starts_settled():
+    t = np.arange(20000) / RATE
+    for frequency in (5.0, 20.0, 60.0):
+        filtered = low_pass(7.0 + np.sin(2 * np.pi * frequency * t), RATE)
+        size = np.sqrt(2.0) * np.std(filtered[10000:])
+        sos = signal.butter(4, 20.0, fs=RATE, output="sos")
+        assert size == pytest.approx(abs(signal.sosfreqz(sos, [frequency], fs=RATE)[1][0]), rel=1e-3)
+    assert np.abs(low_pass(np.full(100, 7.0), RATE) - 7.0).max() < 1e-9
+    np.testing.assert_allclose(abs(signal.sosfreqz(sos, [20.0], fs=RATE)[1]), np.sqrt(0.5), rtol=1e-6)
+
+
+def test_sliding_mean_over_the_way():
+    s = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.03, 5000))  # uneven speed
+    np.testing.assert_allclose(sliding_mean(s, 3.0 * s + 1.0)[200:-200], (3.0 * s + 1.0)[200:-200], atol=3e-4)
+    wave = sliding_mean(s, np.sin(2 * np.pi * s / 5.0))
+    factor = np.sin(np.pi * 2.0 / 5.0) / (np.pi * 2.0 / 5.0)  # of a mean over 2 m of a wave of 5 m
+    np.testing.assert_allclose(wave[200:-200], factor * np.sin(2 * np.pi * s / 5.0)[200:-200], atol=1e-3)
+    gap = 3.0 * s + 1.0
+    gap[2000] = np.nan
+    assert np.isfinite(sliding_mean(s, gap)).all()
+
+
+def test_sections_of_a_path():
+    path = [{"tangent": 600.0}, {"transition": 80.0}, {"curve": 250.0, "radius": 300.0}, {"transition": 80.0},
+            {"curve": 90.0, "radius": -500.0}]  # fmt: skip
+    found = track_sections(path, 2000.0)
+    assert [(low, high) for low, high, _ in found[:2]] == [(0.0, 300.0), (300.0, 600.0)]
+    np.testing.assert_allclose(
+        [part[:2] for part in found[2:5]], 680.0 + 250.0 / 3 * np.array([[0, 1], [1, 2], [2, 3]])
+    )
+    assert found[5] == (1010.0, 1100.0, -500.0) and np.isinf(found[0][2])
+    assert len(track_sections("tangent", 1200.0)) == 4
+
+
+def test_percentiles_and_limits_of_a_triangular_wave():
+    """Its values are spread evenly: 99.85 % of them lie below 0.997 of the amplitude."""
+
+    def forces(t, sign):
+        wave = signal.sawtooth(2 * np.pi * t / 2.5, 0.5)
+        return LOAD + 5e3 * wave, np.full_like(t, 2e3 if sign > 0 else 5e3)
+
+    found = assess(synthetic(forces))
+    table = found.summary.set_index("quantity")
+    assert table.loc["Q", "value"] == pytest.approx(LOAD + 0.997 * 5e3, abs=60.0)  # the filter rounds the corners
+    assert table.loc["Q", "limit"] == pytest.approx(90e3 + LOAD, rel=1e-3)
+    assert table.loc["sum_Y", "value"] == pytest.approx(3e3, rel=1e-9)
+    assert table.loc["sum_Y", "limit"] == pytest.approx(10e3 + 2 * LOAD / 3, rel=1e-3)
+    assert set(table.index) == {"sum_Y", "Y_over_Q", "Q"}  # no curve, nothing quasi-static
+    assert "EN 14363" in repr(found)
+    freight = assess(synthetic(forces), freight=True).summary.set_index("quantity")
+    assert freight.loc["sum_Y", "limit"] == pytest.approx(0.85 * (10e3 + 2 * LOAD / 3), rel=1e-3)
+
+
+def test_quasi_static_values_are_medians_of_full_curves():
+    path = [{"tangent": 200.0}, {"transition": 50.0}, {"curve": 900.0, "radius": 600.0}]
+
+    def forces(t, sign):
+        curve = np.clip((SPEED * t - 200.0) / 50.0, 0.0, 1.0) + 0.3 * np.sin(2 * np.pi * t)
+        return LOAD - 8e3 * sign * curve, np.full_like(t, 3e3) + (20e3 * curve if sign < 0 else 0.0)
+
+    table = assess(synthetic(forces, path)).summary.set_index("quantity")
+    assert table.loc["Q_qst", "value"] == pytest.approx(LOAD + 8e3, rel=2e-3)
+    assert table.loc["Y_qst", "value"] == pytest.approx(23e3, rel=5e-3)
+    assert table.loc["Y_qst", "side"] == "right" and table.loc["Y_qst", "begin_m"] >= 250.0
+
+
+def test_channels_of_a_wheelset_by_name():
+    run = synthetic(lambda t, sign: (np.full_like(t, LOAD), np.full_like(t, 4e3 if sign > 0 else 1e3)), duration=1.0)
+    table = run.wheel_forces("wheelset")
+    assert table["Q_left_N"].iloc[5] == LOAD and table["Y_right_N"].iloc[5] == 1e3
+    assert table["sum_Y_N"].iloc[5] == 3e3 and table["Y_over_Q_left"].iloc[5] == pytest.approx(4e3 / LOAD)
+    assert table["p_max_left_Pa"].iloc[5] == pytest.approx(1.5 * LOAD / (np.pi * 25e-6))
+    with pytest.raises(KeyError, match="no group"):
+        run.wheel_forces("bogie")
+
+
+def test_a_run_without_what_it_takes_is_refused():
+    run = synthetic(lambda t, sign: (np.full_like(t, LOAD), np.zeros_like(t)), duration=1.0)
+    with pytest.raises(InputError, match="expected one of EN 14363, EN 12299"):
+        wr.assess(run, "UIC 518")
+    slow = Run(run.scene, "completed", "", run.t[::5], {})
+    with pytest.raises(InputError, match=r"output.rate.*at least 1000 1/s in the scene, got 200"):
+        section_table(slow)
+    with pytest.raises(InputError, match="channels of wheels"):
+        section_table(Run(run.scene, "completed", "", run.t, {}))
+
+
+def test_command_line(tmp_path, capsys):
+    run = synthetic(lambda t, sign: (np.full_like(t, LOAD), np.zeros_like(t)), duration=2.0)
+    run.save(tmp_path / "run.h5")
+    assert main(["assess", str(tmp_path / "run.h5"), "--out", str(tmp_path / "sections.csv")]) == 0
+    assert "sum_Y" in capsys.readouterr().out and (tmp_path / "sections.csv").read_text().startswith("section,")
+    assert main(["assess", str(tmp_path / "run.h5"), "--standard", "EN 1"]) == 2
+    assert "standard" in capsys.readouterr().err

@@ -1,0 +1,248 @@
+"""Assessment of a run by EN 14363: filters, sections of straight track and curves, percentiles, limits.
+
+What is evaluated, and where from: all recalled from EN 14363:2005 and its successor of 2016, not read.
+
+* sum Y (guiding forces of a wheelset): sliding mean over 2 m; limit K (10 kN + 2 Q0 / 3), K = 1, freight wagons 0.85.
+* Y/Q (leading wheel of safety): sliding mean over 2 m; limit 0.8.
+* Q (vertical force of a wheel): low-pass 20 Hz; limit 90 kN + Q0, at most 200 kN where 2 Q0 <= 225 kN.
+* Y_qst, Q_qst (quasi-static, full curves only): medians; limits 60 kN and 145 kN.
+
+The low-pass is a Butterworth filter of fourth order. A sliding mean over 2 m is one over the way the wheelset has gone.
+Percentiles are 0.15 %, 50 % and 99.85 % within a section; the largest absolute value of the outer two counts. What the
+standard adds, statistics over many sections, is not done: the worst section of the run is compared with the limit.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.motion import SIDES
+from wrcore.analysis.ride import rate_of, ride_table
+from wrcore.analysis.wheels import quotient, wheel_forces, wheelsets_of
+from wrcore.errors import InputError
+
+PERCENTILES = (0.15, 50.0, 99.85)
+WINDOW = 2.0
+"""Of the sliding means, m."""
+
+CUT = 20.0
+"""Of the low-pass, Hz."""
+
+LEAST_RATE = 1000.0
+"""What lies above half of the output rate comes back as lower frequencies: see reports/assessment.md, 1/s."""
+
+STRAIGHT_SECTION, WIDE_SECTION, TIGHT_SECTION, TIGHT = 250.0, 100.0, 70.0, 400.0
+"""Lengths of sections on straight track, in curves of at least the radius ``TIGHT`` and in tighter ones, m."""
+
+STANDARDS = ("EN 14363", "EN 12299")
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a run is worth by a standard; prints itself as a table."""
+
+    standard: str
+    summary: pd.DataFrame
+    """A row per quantity (EN 14363) or body (EN 12299)."""
+    sections: pd.DataFrame
+    """EN 14363: a row per section, wheelset or wheel and quantity; empty for EN 12299."""
+
+    def __repr__(self) -> str:
+        table = self.summary.to_string(index=False, float_format=lambda value: f"{value:.4g}")
+        return f"{self.standard}\n{table}"
+
+
+def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bool = False) -> Assessment:
+    """Assess a run.
+
+    Parameters
+    ----------
+    run : Run
+        With contact channels (EN 14363; at least 1000 1/s) or accelerations of bodies (EN 12299; at least 200 1/s).
+    standard : {"EN 14363", "EN 12299"}
+    begin : float
+        Start of the evaluation, s.
+    freight : bool
+        Limits of freight wagons.
+
+    Returns
+    -------
+    Assessment
+
+    Raises
+    ------
+    InputError
+        For an unknown standard, a run without the channels, or too low an output rate.
+
+    Examples
+    --------
+    ``print(wr.assess(wr.load_run("run.h5")))``
+    """
+    if standard not in STANDARDS:
+        raise InputError("assess", "standard", f"expected one of {', '.join(STANDARDS)}, got {standard!r}")
+    if standard == "EN 12299":
+        return Assessment(standard, ride_table(run, begin), pd.DataFrame())
+    sections, wheel_load = section_table(run, begin)
+    return Assessment(standard, _summary(sections, wheel_load, 0.85 if freight else 1.0), sections)
+
+
+def low_pass(values, rate, cut=CUT):
+    """Signal after a Butterworth low-pass of fourth order, as if it had always been at its first value.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+    rate, cut : float
+        Hz.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+    """
+    from scipy import signal
+
+    values = np.asarray(values, float)
+    filter_ = signal.butter(4, cut, fs=rate, output="sos")
+    return signal.sosfilt(filter_, values, zi=signal.sosfilt_zi(filter_) * values[0])[0]
+
+
+def sliding_mean(s, values, window=WINDOW):
+    """Mean over the way gone, a window centred at each place; at the ends over what there is of it.
+
+    Parameters
+    ----------
+    s : array_like, shape (n,)
+        Way gone, m, rising.
+    values : array_like, shape (n,)
+        NaN does not count.
+    window : float
+        m.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+    """
+    s, values = np.asarray(s, float), np.asarray(values, float)
+    known = np.isfinite(values)
+
+    def integral(y):  # over the way, by trapezoids
+        total = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(s))])
+        return np.interp(s + 0.5 * window, s, total) - np.interp(s - 0.5 * window, s, total)
+
+    way = integral(known.astype(float))
+    return np.divide(integral(np.where(known, values, 0.0)), way, out=np.full(s.shape, np.nan), where=way > 0.0)
+
+
+def track_sections(path, end):
+    """Straight stretches and full curves of a scene's path, cut into sections of the standard's length.
+
+    Parameters
+    ----------
+    path : str or list
+        ``track.path`` of a resolved scene.
+    end : float
+        Of the way gone, m: how far what follows the path's last segment counts.
+
+    Returns
+    -------
+    list of tuple
+        Begin and end (m) and radius (m, signed; infinite where it is straight). Stretches shorter than a section are
+        one; transitions belong to none.
+    """
+    sections, s = [], 0.0
+    if isinstance(path, str):
+        path = [{"tangent": max(end, 0.0)}]
+    for segment in path:
+        kind = next(kind for kind in ("tangent", "transition", "curve") if kind in segment)
+        length = float(segment[kind])
+        if kind != "transition":
+            radius = float(segment["radius"]) if kind == "curve" else np.inf
+            target = STRAIGHT_SECTION
+            if kind == "curve":
+                target = WIDE_SECTION if abs(radius) >= TIGHT else TIGHT_SECTION
+            count = max(int(length // target), 1)
+            edges = s + length * np.arange(count + 1) / count
+            sections += [(float(a), float(b), radius) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        s += length
+    return sections
+
+
+def section_table(run, begin=0.0):
+    """Percentiles of the filtered quantities in each section that a wheelset runs through.
+
+    Parameters
+    ----------
+    run : Run
+    begin : float
+        Start of the evaluation, s.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns section, begin_m, end_m, radius_m, quantity, wheelset, side, p0_15, p50, p99_85 (N; Y/Q a number).
+    wheel_load : float
+        Q0: mean of Q over all wheels and the whole run, N.
+
+    Raises
+    ------
+    InputError
+        For a run without wheels, or with too low a rate.
+    """
+    rate = rate_of(run, LEAST_RATE, "EN 14363")
+    if not wheelsets_of(run):
+        raise InputError("EN 14363", "run", "expected the channels of wheels, such as wheelset/left")
+    late, rows, loads = run.t >= begin, [], []
+    for name in wheelsets_of(run):
+        body = run[name]
+        s = body.s_m if "s_m" in body else body.x_m
+        sections = track_sections(run.scene.get("track", {}).get("path", "tangent"), s[-1])
+        forces = {side: wheel_forces(run, name, side) for side in SIDES}
+        loads += [np.mean(forces[side][0]) for side in SIDES]
+        for quantity, side, values in _filtered(forces, s, rate):
+            for number, (low, high, radius) in enumerate(sections):
+                inside = late & (s >= low) & (s <= high) & np.isfinite(values)
+                if quantity.endswith("_qst") and np.isinf(radius) or np.count_nonzero(inside) < 2:
+                    continue
+                found = np.percentile(values[inside], PERCENTILES)
+                place = (number, max(low, s[inside][0]), min(high, s[inside][-1]), radius)
+                rows.append((*place, quantity, name, side, *found))
+    columns = ["section", "begin_m", "end_m", "radius_m", "quantity", "wheelset", "side", "p0_15", "p50", "p99_85"]
+    return pd.DataFrame(rows, columns=columns), float(np.mean(loads))
+
+
+def _filtered(forces, s, rate):
+    """Quantity, side and filtered signal of a wheelset and its wheels."""
+    to_left = {"left": 1.0, "right": -1.0}
+    yield "sum_Y", "", sliding_mean(s, sum(to_left[side] * forces[side][1] for side in SIDES))
+    for side in SIDES:
+        vertical, lateral = forces[side]
+        yield "Y_over_Q", side, sliding_mean(s, quotient(vertical, lateral))
+        load = low_pass(vertical, rate)
+        yield "Q", side, load
+        yield "Q_qst", side, load
+        yield "Y_qst", side, low_pass(lateral, rate)
+
+
+def _summary(sections, wheel_load, freight):
+    """Worst value of each quantity, where it was found, and the limit."""
+    limits = {
+        "sum_Y": freight * (10e3 + 2.0 * wheel_load / 3.0),
+        "Y_over_Q": 0.8,
+        "Q": min(90e3 + wheel_load, 200e3) if 2.0 * wheel_load <= 225e3 else np.nan,
+        "Y_qst": 60e3,
+        "Q_qst": 145e3,
+    }
+    rows = []
+    for quantity, limit in limits.items():
+        part = sections[sections["quantity"] == quantity]
+        if part.empty:
+            continue
+        size = part["p50"].abs() if quantity.endswith("_qst") else part[["p0_15", "p99_85"]].abs().max(axis=1)
+        worst = part.loc[size.idxmax()]
+        rows.append(
+            {"quantity": quantity, "value": size.max(), "limit": limit, "share": size.max() / limit}
+            | {key: worst[key] for key in ("wheelset", "side", "begin_m", "end_m", "radius_m")}
+        )
+    return pd.DataFrame(rows)
