@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.wheels import wear_number as wear_number
     from wrcore.analysis.wheels import wheel_forces as wheel_forces
     from wrcore.analysis.wheels import wheel_table as wheel_table
+    from wrcore.analysis.wheels import wheelset_channels as wheelset_channels
     from wrcore.contact.conicity import conicity_curve as conicity_curve
     from wrcore.contact.first_touch import WheelsetOnTrack as WheelsetOnTrack
     from wrcore.contact.first_touch import first_touch as first_touch
@@ -96,6 +97,7 @@ _PUBLIC = {
     "wear_number": "wrcore.analysis.wheels",
     "wheel_forces": "wrcore.analysis.wheels",
     "wheel_table": "wrcore.analysis.wheels",
+    "wheelset_channels": "wrcore.analysis.wheels",
     "write_run": "wrcore.run.results",
 }
 __all__ = ["__version__", *_PUBLIC]

@@ -1,4 +1,4 @@
-"""Worst values by EN 14363 over the output rate: ``python -m tests.analysis.sampling`` prints reports/assessment.md's."""
+"""Worst values by EN 14363 over the output rate, for reports/assessment.md: ``python -m tests.analysis.sampling``."""
 
 from unittest import mock
 

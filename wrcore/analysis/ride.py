@@ -1,8 +1,8 @@
 """Ride of a run's bodies: frequency weightings of accelerations, comfort and Sperling's index.
 
-Sources, all recalled, none read: ISO 2631-1:1997 (Wk, Wd), EN 12299:2009 (Wb; mean comfort N_MV = 6 sqrt(sum of squares
-of the 95th percentiles of weighted rms values over 5 s)), Sperling and Betzhold (1956) in the form of Garg and Dukkipati
-(1984). The tests hold Wk and Wd against values of ISO 2631-1's table 3, recalled too.
+Sources, all recalled, none read: ISO 2631-1:1997 (Wk, Wd); EN 12299:2009 (Wb; mean comfort N_MV = 6 sqrt(sum of the
+squares of the 95th percentiles of weighted rms values over 5 s)); Sperling and Betzhold (1956) in the form of Garg and
+Dukkipati (1984). The tests hold Wk and Wd against values of ISO 2631-1's table 3, recalled too.
 """
 
 from typing import NamedTuple

@@ -87,7 +87,18 @@ def greatest_pressure(run, wheelset, side):
 
 
 def wheelset_channels(run, wheelset):
-    """What :meth:`wrcore.run.run.Run.wheel_forces` returns."""
+    """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+
+    Returns
+    -------
+    pandas.DataFrame
+        Index ``t_s``.
+    """
     columns, total = {}, 0.0
     for side in SIDES:
         vertical, lateral = wheel_forces(run, wheelset, side)

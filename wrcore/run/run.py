@@ -213,9 +213,7 @@ class Run:
         KeyError
             If the run has no such wheelset.
         """
-        from wrcore.analysis.wheels import wheelset_channels
-
-        return wheelset_channels(self, wheelset)
+        return wrcore.wheelset_channels(self, wheelset)
 
     def plot(self, *channels: str) -> Figure:
         """Draw the run over time.
