@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from wrcore.analysis.assess import Assessment as Assessment
     from wrcore.analysis.assess import assess as assess
     from wrcore.analysis.contact import contact_table as contact_table
+    from wrcore.analysis.evolve import evolve as evolve
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
+    from wrcore.analysis.local_wear import WheelWear as WheelWear
+    from wrcore.analysis.local_wear import local_wear as local_wear
     from wrcore.analysis.patch import patch as patch
     from wrcore.analysis.plot_contact import plot_pair as plot_pair
     from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
@@ -68,6 +71,7 @@ _PUBLIC = {
     "RollingContact": "wrcore.creep.halfspace",
     "Run": "wrcore.run.run",
     "Scene": "wrcore.scene.description",
+    "WheelWear": "wrcore.analysis.local_wear",
     "WheelsetOnTrack": "wrcore.contact.first_touch",
     "assess": "wrcore.analysis.assess",
     "conicity_curve": "wrcore.contact.conicity",
@@ -75,6 +79,7 @@ _PUBLIC = {
     "creep_force": "wrcore.creep.cases",
     "critical_speeds": "wrcore.analysis.stability",
     "ensure_table": "wrcore.creep.table",
+    "evolve": "wrcore.analysis.evolve",
     "first_touch": "wrcore.contact.first_touch",
     "hunting_frequency": "wrcore.run.motion",
     "limit_cycles": "wrcore.analysis.limit_cycles",
@@ -83,6 +88,7 @@ _PUBLIC = {
     "load_runs": "wrcore.run.results",
     "load_scene": "wrcore.scene.description",
     "load_sweep": "wrcore.sweep.plan",
+    "local_wear": "wrcore.analysis.local_wear",
     "modes": "wrcore.analysis.stability",
     "named_profile": "wrcore.geometry.standards",
     "patch": "wrcore.analysis.patch",

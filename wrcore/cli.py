@@ -74,6 +74,7 @@ def _parser():
     _add_creep(commands)
     _add_table(commands)
     _add_assess(commands)
+    _add_evolve(commands)
     command = commands.add_parser("profiles", help="list the named wheel and rail profiles")
     command.set_defaults(run=_profiles)
     return parser
@@ -106,6 +107,13 @@ def _add_assess(commands):
     command.add_argument("--freight", action="store_true", help="limits of freight wagons")
     command.add_argument("--out", metavar="sections.csv", help="write percentiles section by section (EN 14363)")
     command.set_defaults(run=_assess)
+
+
+def _add_evolve(commands):
+    command = commands.add_parser("evolve", help="wear a wheel profile over the distance of a plan, or go on with it")
+    command.add_argument("plan", metavar="PLAN.yaml")
+    command.add_argument("--out", required=True, metavar="FOLDER", help="profile_000.csv and so on, steps.csv")
+    command.set_defaults(run=_evolve)
 
 
 def _add_sweep(commands):
@@ -311,6 +319,15 @@ def _assess(options):
     print(assessment)
     if out:
         _write_csv(assessment.sections, out)
+    return 0
+
+
+def _evolve(options):
+    from wrcore.analysis.evolve import evolve
+
+    table = evolve(options.plan, options.out, partial(print, flush=True))
+    columns = ["distance_m", "worn_m", "Sh_m", "Sd_m", "qR_m", "equivalent_conicity"]
+    print(table[columns].to_string(index=False, float_format=lambda value: f"{value:.5g}"))
     return 0
 
 

@@ -1,0 +1,78 @@
+"""Profiles over a distance: flange numbers of S1002, books that balance, resumption, refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.analysis import evolve as ev
+from wrcore.cli import main
+from wrcore.errors import InputError
+
+PLAN = {
+    "name": "short", "scene": str(SCENES / "suspended_wheelset.yaml"), "distance": 3e5, "largest_step": 1e5,
+    "begin": 0.2, "rate": 100.0,
+    "scenes": [
+        {"share": 3.0, "set": {"speed": 30, "integration.duration": 0.6, "initial.y": 0.002}},
+        {"share": 1.0, "set": {"speed": 20, "integration.duration": 0.5, "initial.y": 0.004}},
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wear") / "short"
+    return folder, ev.evolve(PLAN, folder)
+
+
+def test_flange_of_s1002(s1002):
+    """28 mm high, 32.5 mm thick, qR 10.8 mm: EN 13715 and the drawings of UIC 510-2 (recalled)."""
+    found = ev.flange(s1002)
+    assert found["Sh_m"] == pytest.approx(28e-3, abs=5e-5) and found["Sd_m"] == pytest.approx(32.5e-3, abs=5e-5)
+    assert found["qR_m"] == pytest.approx(10.8e-3, abs=5e-5)
+
+
+def test_steps_add_up_to_the_distance_and_the_volume(worn):
+    folder, table = worn
+    assert table["step_m"].sum() == pytest.approx(3e5) and table["step_m"].iloc[-1] == 0.0
+    np.testing.assert_allclose(table["distance_m"], np.concatenate([[0.0], np.cumsum(table["step_m"])[:-1]]))
+    new, now = (ev._read_profile(folder, step)[1] for step in (0, len(table) - 1))
+    radius = 0.46  # of the wheels; their centres keep this height to 0.1 %
+    assert np.sum(now - new) * ev.POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
+    assert (now - new).min() >= -1e-15 and table["worn_m"].iloc[-1] == pytest.approx((now - new).max())
+    assert table["worn_m"].is_monotonic_increasing
+
+
+def test_going_on_changes_nothing(worn, tmp_path):
+    folder, table = worn
+    partly = tmp_path / "partly"
+    partly.mkdir()
+    for name in ("plan.json", "profile_000.csv", "profile_001.csv"):
+        (partly / name).write_bytes((folder / name).read_bytes())
+    table.iloc[:1].to_csv(partly / "steps.csv", index=False)
+    pd.testing.assert_frame_equal(ev.evolve(PLAN, partly), table, rtol=1e-12)
+    assert (partly / "profile_003.csv").read_bytes() == (folder / "profile_003.csv").read_bytes()
+
+
+def test_smoothing_keeps_the_sum():
+    values = np.zeros(400)
+    values[[3, 200, 397]] = 1.0
+    assert ev._smooth(values, 3e-3).sum() == pytest.approx(3.0)
+    np.testing.assert_array_equal(ev._smooth(values, 0.0), values)
+
+
+def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
+    folder, _ = worn
+    for changes, says in (
+        ({"scene": "nowhere.yaml"}, "scene: expected an existing file"),
+        ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
+        ({"begin": 0.55}, "begin: expected less than the duration"),
+        ({"law": "archard"}, "law: expected"),
+    ):
+        with pytest.raises(InputError, match=says):
+            ev.evolve(PLAN | changes, tmp_path / "never")
+        assert not (tmp_path / "never").exists()
+    with pytest.raises(InputError, match="a folder of this plan"):
+        ev.evolve(PLAN | {"distance": 4e5}, folder)
+    assert main(["evolve", str(tmp_path / "none.yaml"), "--out", str(tmp_path / "x")]) == 2
+    assert "none.yaml" in capsys.readouterr().err

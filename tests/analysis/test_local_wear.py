@@ -1,0 +1,112 @@
+"""Local wear against Hertz's numbers, exact sums of volume, mirror images and published branches of the law."""
+
+import numpy as np
+import pytest
+
+from tests.analysis.test_assess import synthetic
+from wrcore.analysis.local_wear import BIN, LAWS, friction_work, local_wear, sheffield
+from wrcore.creep.fastsim import FastsimData, fastsim
+from wrcore.creep.kalker import kalker_data
+from wrcore.errors import InputError
+from wrcore.run.wear import creep_work
+
+G, NU, MU = 8.2e10, 0.28, 0.3
+RADIUS = 0.46
+
+
+def patches(seed=0, count=40):
+    """Rows whose forces are FASTSIM's own."""
+    rng = np.random.default_rng(seed)
+    rows = {"a_m": rng.uniform(3e-3, 9e-3, count), "b_m": rng.uniform(2e-3, 9e-3, count), "N_N": np.full(count, 6e4)}
+    rows |= {
+        "xi": rng.normal(0, 3e-3, count),
+        "eta": rng.normal(0, 3e-3, count),
+        "phi_per_m": rng.normal(0, 0.5, count),
+    }
+    forces = []
+    for a, b, load, xi, eta, phi in zip(
+        *(rows[k] for k in ("a_m", "b_m", "N_N", "xi", "eta", "phi_per_m")), strict=True
+    ):
+        c = np.sqrt(a * b)
+        scale = G * a * b / (MU * load)
+        found = fastsim(FastsimData(100, 101, 0), kalker_data(NU), a / b, 0.0, xi * scale, eta * scale, phi * scale * c)
+        forces.append(MU * load * np.array(found) * [1.0, 1.0, c])
+    return rows | dict(zip(("Fx_N", "Fy_N", "Mz_Nm"), np.array(forces).T, strict=True))
+
+
+def test_work_is_that_of_the_forces_and_where_nothing_slides_none():
+    rows = patches()
+    y, dy, dx, work = friction_work(rows, MU, G, NU)
+    total = np.sum(np.sum(work, axis=-1) * dx * dy, axis=1)
+    known = creep_work(*(rows[k][:, None] for k in ("Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m")))[2]
+    np.testing.assert_allclose(total, known, rtol=1e-12)
+    assert work.min() >= 0.0 and y.shape == dx.shape and dy.shape == (40, 1)
+    leading = work[..., 0].sum() / work.sum()
+    assert leading < 0.5  # adhesion is at the leading edge
+
+
+def test_distribution_needs_little_scaling():
+    """FASTSIM's own work, before it is scaled, is that of its forces (what is left are its steps)."""
+    rows = patches(1)
+    fine = friction_work(rows, MU, G, NU, 51, 200)
+    coarse = friction_work(rows, MU, G, NU)
+    across = [np.sum(work, axis=-1) * dx for _, _, dx, work in (fine, coarse)]
+    centre = [np.sum(values * y, axis=1) / values.sum(axis=1) / rows["b_m"]
+              for values, (y, *_) in zip(across, (fine, coarse), strict=True)]  # fmt: skip
+    assert np.abs(centre[0] - centre[1]).max() < 0.03
+
+
+def test_full_sliding_wears_as_the_pressure_is_spread():
+    rows = {"a_m": [5e-3], "b_m": [4e-3], "N_N": [5e4], "xi": [0.05], "eta": [0.0], "phi_per_m": [0.0]}
+    rows = {name: np.array(values) for name, values in rows.items()}
+    rows |= {"Fx_N": np.array([-MU * 5e4]), "Fy_N": np.zeros(1), "Mz_Nm": np.zeros(1)}
+    y, dy, dx, work = friction_work(rows, MU, G, NU, 51, 200)
+    expected = (1 - (y / 4e-3) ** 2) ** 1.5  # a parabolic bound, summed along x
+    found = np.sum(work, axis=-1) * dx
+    np.testing.assert_allclose(found / found.max(), expected / expected.max(), atol=0.01)
+
+
+def test_branches_of_the_law():
+    ug = 1e-3  # kg/m/m^2 per ug/m/mm^2
+    np.testing.assert_allclose(sheffield(np.array([5e6, 10.4e6, 50e6, 77.2e6, 87.2e6])),
+                               ug * np.array([26.5, 55.12, 55.12, 55.12, 55.12 + 619.0]))  # fmt: skip
+    assert LAWS["energy"](50e6) == pytest.approx(ug * 265.0)
+
+
+def worn_run(left=3e-3, right=-2e-3):
+    run = synthetic(lambda t, sign: (np.full_like(t, 6e4), np.zeros_like(t)), duration=0.05)
+    run.scene["contact"] = {"friction": MU, "material": {"shear_modulus": G, "poisson_ratio": NU}}
+    run.groups["wheelset"]["z_m"] = np.full_like(run.t, RADIUS)
+    for side, xi, turn in (("left", 4e-3, 1.0), ("right", -4e-3, -1.0)):
+        channels = run.groups[f"wheelset/{side}"]
+        channels["xi"][:, 0], channels["Fx_N"][:, 0] = xi, -np.sign(xi) * 1.2e4
+        channels["u_wheel_m"][:, 0] = left + 1e-3 * np.sin(100 * run.t)
+        channels["u_rail_m"][:, 0] = right
+        channels["contact_angle_rad"][:, 0] = 0.5 * turn
+        channels["b_m"][:, 0] = 3e-3
+    return run
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_volume_is_the_sum_of_the_depths(law):
+    for wear in local_wear(worn_run(), law=law).values():
+        assert wear.volume > 0.0
+        assert wear.wheel_depth.sum() * BIN * 2 * np.pi * RADIUS == pytest.approx(wear.volume, rel=1e-9)
+        assert wear.rail_depth.sum() * BIN == pytest.approx(wear.volume, rel=1e-9)
+        assert wear.work == pytest.approx(1.2e4 * 4e-3, rel=1e-9)
+        width = np.ptp(wear.rail_edges[np.flatnonzero(wear.rail_depth > 1e-18)])
+        assert width == pytest.approx(2 * 3e-3 * np.cos(0.5), abs=3 * BIN)  # the patch, seen from above
+
+
+def test_mirrored_wheels_wear_alike():
+    found = local_wear(worn_run())
+    left, right = found["wheelset", "left"], found["wheelset", "right"]
+    np.testing.assert_allclose(left.wheel_edges, right.wheel_edges, atol=1e-12)
+    np.testing.assert_allclose(left.wheel_depth, right.wheel_depth, rtol=1e-6, atol=1e-9 * left.wheel_depth.max())
+
+
+def test_what_cannot_be_worn_is_refused():
+    with pytest.raises(InputError, match="expected one of sheffield, energy"):
+        local_wear(worn_run(), law="archard")
+    with pytest.raises(InputError, match="within the run"):
+        local_wear(worn_run(), begin=1.0)

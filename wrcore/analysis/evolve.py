@@ -1,0 +1,272 @@
+"""Wheel profiles over a distance: simulate, add wear, go on with the worn profile.
+
+A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
+wheel profile, averages the depths that all wheels lose (:mod:`wrcore.analysis.local_wear`), smooths them and goes on
+over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
+curves to both sides. The rail stays as it is.
+
+A folder holds the state: the profile at the start of each step, and a table with a row per step. A step counts when its
+row is there; whoever is killed goes on after the last one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from wrcore import __version__
+from wrcore.analysis.local_wear import BIN, local_wear
+from wrcore.contact.conicity import conicity_curve
+from wrcore.contact.first_touch import WheelsetOnTrack
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.new_files import appearing
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import Scene, load_scene
+
+POINTS = 2.5e-4
+"""Distance of the points of a stored profile, m."""
+
+AMPLITUDE = 3e-3
+"""Of the equivalent conicity in the table, m."""
+
+MOST_STEPS = 10_000
+TABLE = "steps.csv"
+
+
+def load_wear_plan(source: str | PathLike[str] | dict[str, Any]) -> tuple[dict[str, Any], list[Scene]]:
+    """Read and check a plan, with all its scenes.
+
+    Parameters
+    ----------
+    source : path-like or dict
+        File (schema ``wrcore/scene/schemas/wear.yaml``) or its content; then paths count from the working directory.
+
+    Returns
+    -------
+    data : dict
+        With defaults.
+    scenes : list of Scene
+        In the plan's order.
+
+    Raises
+    ------
+    InputError
+        One line that names file, field and expectation.
+    """
+    if isinstance(source, dict):
+        name, folder, data = "plan", Path(), source
+    else:
+        name, folder, data = str(source), Path(source).parent, read_yaml(source)
+    data = validate(data, "wear", name)
+    path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
+    if path is None:
+        raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
+    scenes = []
+    for i, part in enumerate(data["scenes"]):
+        try:
+            scene = load_scene(path, {**part.get("set", {}), "output.rate": data["rate"]})
+        except InputError as error:
+            raise InputError(name, f"scenes.{i}.set", str(error)) from None
+        if data["begin"] >= scene.data["integration"]["duration"]:
+            raise InputError(name, "begin", f"expected less than the duration of each run, got {data['begin']:g} s")
+        scenes.append(scene)
+    return data, scenes
+
+
+def evolve(
+    plan: str | PathLike[str] | dict[str, Any], folder: str | PathLike[str], say: Callable[[str], object] | None = None
+) -> pd.DataFrame:
+    """Wear a wheel profile over the distance of a plan, or go on with it.
+
+    Parameters
+    ----------
+    plan : path-like or dict
+        See `load_wear_plan`.
+    folder : path-like
+        Of ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` takes them) and
+        ``steps.csv``; created if needed.
+    say : callable, optional
+        Called with a line after each step.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``steps.csv``: a row per step, see `wear_row`. The last row is the end: its profile, and no step from there.
+
+    Raises
+    ------
+    InputError
+        For a bad plan, a folder of another plan, or a run that left the rails or failed.
+    """
+    data, scenes = load_wear_plan(plan)
+    folder = Path(folder)
+    _claim(folder, data, scenes)
+    shares = np.array([part["share"] for part in data["scenes"]])
+    shares /= shares.sum()
+    rows = _known_rows(folder)
+    if not rows:
+        _write_profile(folder, 0, *_points(scenes[0].wheel))
+    while not rows or rows[-1]["step_m"] > 0.0:
+        step = len(rows)
+        if step >= MOST_STEPS:
+            raise InputError(folder, "steps", f"expected at most {MOST_STEPS} steps: largest_wear is too small")
+        gone = rows[-1]["distance_m"] + rows[-1]["step_m"] if rows else 0.0
+        u, f = _read_profile(folder, step)
+        left = data["distance"] - gone
+        rate, volume = np.zeros(len(u)), 0.0
+        if left > 1e-9 * data["distance"]:
+            rate, volume = _wear_rate(data, scenes, shares, folder, step, u)
+        length = min(left, data["largest_step"], data["largest_wear"] / max(rate.max(), 1e-300)) if volume else left
+        length = length if left > 1e-9 * data["distance"] else 0.0
+        if length > 0.0:
+            _write_profile(folder, step + 1, u, f + rate * length)
+        rows.append(wear_row(scenes[0], folder, step, gone, length, rate, volume))
+        _write_table(folder, rows)
+        if say:
+            say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km")
+    return pd.DataFrame(rows)
+
+
+def wear_row(scene, folder, step, gone, length, rate, volume):
+    """What the table says of a step: the profile at its start, and what is worn off over it.
+
+    Returns
+    -------
+    dict
+        step, distance_m, step_m, worn_m (deepest loss of the ordinate since new), rate_max (m per m), volume_m3_per_m
+        (a wheel), worn_volume_m3 (a wheel, over the step), Sh_m, Sd_m, qR_m (flange height, thickness, slope as in EN
+        15313, recalled), equivalent_conicity (3 mm).
+    """
+    curve = ProfileCurve.from_points(*_read_profile(folder, step), "wheel", f"profile {step}")
+    new, now = _read_profile(folder, 0)[1], _read_profile(folder, step)[1]
+    vehicle = scene.vehicle
+    pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
+    return {
+        "step": step, "distance_m": gone, "step_m": length, "worn_m": float(np.max(now - new)),
+        "rate_max": float(rate.max()), "volume_m3_per_m": volume, "worn_volume_m3": volume * length,
+        **flange(curve),
+        "equivalent_conicity": float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0]),
+    }  # fmt: skip
+
+
+def flange(curve):
+    """Flange height, thickness and slope of a wheel profile whose inner face is 70 mm from the tape circle.
+
+    Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
+    Slope qR: along u from there to where the flange is 2 mm short of its tip. EN 15313, recalled.
+
+    Parameters
+    ----------
+    curve : ProfileCurve
+
+    Returns
+    -------
+    dict
+        Sh_m, Sd_m, qR_m; NaN where the profile does not reach as far.
+    """
+    below = curve.u < 0.0
+    u, f = curve.u[below], curve.f[below] - curve(0.0)
+    tip = int(np.argmin(f))
+
+    def flank(depth):  # between tip and tape circle the ordinate rises with u
+        inside = f[tip:]
+        return float(np.interp(-depth, inside, u[tip:])) if inside[0] <= -depth else float("nan")
+
+    height = -float(f[tip])
+    return {"Sh_m": height, "Sd_m": 0.070 + flank(0.010), "qR_m": flank(0.010) - flank(height - 0.002)}
+
+
+def _points(curve):
+    """The curve at the points that are stored."""
+    u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
+    return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
+
+
+def _profile_file(folder, step):
+    return folder / f"profile_{step:03d}.csv"
+
+
+def _write_profile(folder, step, u, f):
+    with appearing(_profile_file(folder, step)) as file:
+        lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
+        file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
+
+
+def _read_profile(folder, step):
+    path = _profile_file(folder, step)
+    try:
+        u, f = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
+    return u, f
+
+
+def _wear_rate(data, scenes, shares, folder, step, u):
+    """Rise of the ordinate at the stored points (m per m), smoothed, and volume (m^3 per m of a wheel)."""
+    total, volume = np.zeros(len(u)), 0.0
+    edges = np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS)
+    for share, scene in zip(shares, scenes, strict=True):
+        profile = {"points": str(_profile_file(folder, step).resolve()), "unit": "m"}
+        run = simulate(load_scene(scene, {"wheel.profile": profile}))
+        if run.status != "completed":
+            raise InputError(scene.source, "scenes", f"expected a run to its end, got {run.status}: {run.reason}")
+        wheels = local_wear(run, data["begin"], data["law"]).values()
+        for wheel in wheels:
+            worn = np.concatenate([[0.0], np.cumsum(wheel.wheel_depth) * BIN])
+            total += share / len(wheels) * np.diff(np.interp(edges, wheel.wheel_edges, worn)) / POINTS
+            volume += share / len(wheels) * wheel.volume
+    return _smooth(total, data["smoothing"]), volume
+
+
+def _smooth(values, width):
+    """Mean over a width (m) around each point, the sum kept: what would go beyond the ends stays at them."""
+    half = int(round(0.5 * width / POINTS))
+    if half == 0:
+        return values
+    padded = np.convolve(values, np.full(2 * half + 1, 1.0 / (2 * half + 1)))
+    inner = padded[half:-half].copy()
+    inner[0] += padded[:half].sum()
+    inner[-1] += padded[-half:].sum()
+    return inner
+
+
+def _claim(folder, data, scenes):
+    """Take a folder for a plan, or refuse one that holds another."""
+    described = [data, [scene.data for scene in scenes], [scene.vehicle.data for scene in scenes], __version__]
+    mark = hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
+    path = folder / "plan.json"
+    if path.exists():
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))["digest"]
+        except (OSError, ValueError, KeyError, TypeError):
+            found = ""
+        if found != mark:
+            raise InputError(folder, "", "expected a folder of this plan and version, or an empty one; remove it")
+        return
+    with appearing(path) as file:
+        file.write(json.dumps({"digest": mark, "plan": data}, indent=2, sort_keys=True).encode())
+
+
+def _known_rows(folder):
+    path = folder / TABLE
+    if not path.exists():
+        return []
+    try:
+        rows = pd.read_csv(path).to_dict("records")
+        return [row | {"step": int(row["step"])} for row in rows if np.isfinite(row["step_m"])]
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(path, "", f"expected the table that an earlier step has written: {error}") from None
+
+
+def _write_table(folder, rows):
+    with appearing(folder / TABLE) as file:
+        pd.DataFrame(rows).to_csv(file, index=False, lineterminator="\n")
