@@ -65,6 +65,7 @@ rule study:
         rules.critical_speed_study.input,
         rules.hard_cases_study.input,
         rules.sweeps.input,
+        rules.wear_study.input,
         rules.ivp_study.input,
         rules.speeds_study.input,
         rules.speed_against_error.output,

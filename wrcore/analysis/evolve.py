@@ -29,6 +29,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.profile import ProfileCurve
+from wrcore.kernels.cache import source_digest
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
 
@@ -42,13 +43,17 @@ MOST_STEPS = 10_000
 TABLE = "steps.csv"
 
 
-def load_wear_plan(source: str | PathLike[str] | dict[str, Any]) -> tuple[dict[str, Any], list[Scene]]:
+def load_wear_plan(
+    source: str | PathLike[str] | dict[str, Any], changes: dict[str, Any] | None = None
+) -> tuple[dict[str, Any], list[Scene]]:
     """Read and check a plan, with all its scenes.
 
     Parameters
     ----------
     source : path-like or dict
         File (schema ``wrcore/scene/schemas/wear.yaml``) or its content; then paths count from the working directory.
+    changes : dict, optional
+        Values of the plan's keys that replace those of the file; ``set`` changes all scenes.
 
     Returns
     -------
@@ -66,14 +71,14 @@ def load_wear_plan(source: str | PathLike[str] | dict[str, Any]) -> tuple[dict[s
         name, folder, data = "plan", Path(), source
     else:
         name, folder, data = str(source), Path(source).parent, read_yaml(source)
-    data = validate(data, "wear", name)
+    data = validate({**data, **(changes or {})}, "wear", name)
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
     scenes = []
     for i, part in enumerate(data["scenes"]):
         try:
-            scene = load_scene(path, {**part.get("set", {}), "output.rate": data["rate"]})
+            scene = load_scene(path, {**part.get("set", {}), **data["set"], "output.rate": data["rate"]})
         except InputError as error:
             raise InputError(name, f"scenes.{i}.set", str(error)) from None
         if data["begin"] >= scene.data["integration"]["duration"]:
@@ -83,13 +88,17 @@ def load_wear_plan(source: str | PathLike[str] | dict[str, Any]) -> tuple[dict[s
 
 
 def evolve(
-    plan: str | PathLike[str] | dict[str, Any], folder: str | PathLike[str], say: Callable[[str], object] | None = None
+    plan: str | PathLike[str] | dict[str, Any],
+    folder: str | PathLike[str],
+    say: Callable[[str], object] | None = None,
+    changes: dict[str, Any] | None = None,
 ) -> pd.DataFrame:
     """Wear a wheel profile over the distance of a plan, or go on with it.
 
     Parameters
     ----------
     plan : path-like or dict
+    changes : dict, optional
         See `load_wear_plan`.
     folder : path-like
         Of ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` takes them) and
@@ -107,7 +116,7 @@ def evolve(
     InputError
         For a bad plan, a folder of another plan, or a run that left the rails or failed.
     """
-    data, scenes = load_wear_plan(plan)
+    data, scenes = load_wear_plan(plan, changes)
     folder = Path(folder)
     _claim(folder, data, scenes)
     shares = np.array([part["share"] for part in data["scenes"]])
@@ -134,6 +143,18 @@ def evolve(
         if say:
             say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km")
     return pd.DataFrame(rows)
+
+
+def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Distance (m), u and f (m) at the start of each step in a folder of `evolve`."""
+    folder = Path(folder)
+    return [(row["distance_m"], *_read_profile(folder, row["step"])) for row in _known_rows(folder)]
+
+
+def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
+    """u and what the ordinate has lost there since new, m, at the last step in a folder of `evolve`."""
+    profiles = profiles_over_distance(folder)
+    return profiles[-1][1], profiles[-1][2] - profiles[0][2]
 
 
 def wear_row(scene, folder, step, gone, length, rate, volume):
@@ -239,10 +260,16 @@ def _smooth(values, width):
     return inner
 
 
+def plan_mark(data, scenes):
+    """What a folder belongs to: a digest of plan, scenes, vehicles and version."""
+    vehicles = [scene.vehicle.data for scene in scenes]
+    described = [data, [scene.data for scene in scenes], vehicles, __version__, source_digest()]
+    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
+
+
 def _claim(folder, data, scenes):
     """Take a folder for a plan, or refuse one that holds another."""
-    described = [data, [scene.data for scene in scenes], [scene.vehicle.data for scene in scenes], __version__]
-    mark = hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
+    mark = plan_mark(data, scenes)
     path = folder / "plan.json"
     if path.exists():
         try:

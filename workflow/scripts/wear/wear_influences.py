@@ -1,0 +1,26 @@
+"""Influences on worn profiles, each variant against the first."""
+
+import os
+import sys
+from pathlib import Path
+
+from study.wear.figures import fig_influences
+from study.wear.influences import influence_table, variant_depth
+from wrcore.analysis.evolve import load_wear_plan, plan_mark
+from wrcore.analysis.style import save_figure
+
+sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+plan, settings, found = snakemake.input.plan, snakemake.params.settings, {}
+table = {"contact.creep.table": os.path.abspath(snakemake.input.table[0])}
+for name, variant in settings["variants"].items():
+    changes = {"distance": settings["distance"], **variant.get("plan", {}), "set": variant.get("set", {}) | table}
+    copies = variant.get("copies", 1)
+    mark = plan_mark(*load_wear_plan(plan, changes))[:12]
+    folder = Path(snakemake.output.table).with_name("influences") / f"{mark}_{copies}"
+    found[name] = variant_depth(plan, changes, folder, copies)
+    print(name, found[name][2].iloc[-1].to_dict())
+influences = influence_table(found)
+influences.to_csv(snakemake.output.table, index=False)
+print(influences.to_string())
+figure = fig_influences({name: part[:2] for name, part in found.items()}, settings["distance"])
+save_figure(figure, snakemake.output.figure, snakemake.output.svg)

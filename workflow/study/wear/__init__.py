@@ -1,0 +1,1 @@
+"""What a distance does to wheel profiles, and what settings and models do to that."""

@@ -1,0 +1,94 @@
+"""Influences on worn profiles: each setting and model against the finest, with what it costs."""
+
+import time
+
+import numpy as np
+import pandas as pd
+
+from wrcore.analysis.evolve import POINTS, evolve, last_depth, load_wear_plan
+
+SEEDS = 100
+"""Further copies of a scene have seeds that differ by multiples of this."""
+
+
+def with_copies(plan, copies):
+    """Changes of a plan that put further copies of each scene beside it, on other irregularities of the same kind.
+
+    Parameters
+    ----------
+    plan : dict
+    copies : int
+        In all, at least 1.
+
+    Returns
+    -------
+    dict
+    """
+    scenes = []
+    for part in plan["scenes"]:
+        for k in range(copies):
+            changes = dict(part.get("set", {}))
+            track = changes.get("track.irregularity")
+            if track and "spectrum" in track:
+                spectrum = track["spectrum"] | {"seed": track["spectrum"].get("seed", 0) + SEEDS * k}
+                changes["track.irregularity"] = {**track, "spectrum": spectrum}
+            scenes.append({"share": part["share"] / copies, "set": changes})
+    return {"scenes": scenes}
+
+
+def variant_depth(source, changes, folder, copies=1):
+    """Depth that a plan with changes takes off a wheel.
+
+    Parameters
+    ----------
+    source : path-like
+        Wear plan.
+    changes : dict
+        Of the plan's keys.
+    folder : path-like
+    copies : int
+        See `with_copies`.
+
+    Returns
+    -------
+    u, depth : numpy.ndarray
+        m.
+    table : pandas.DataFrame
+        From `evolve`.
+    seconds : float
+        Processor time.
+    """
+    plan, _ = load_wear_plan(source, changes)
+    if copies > 1:
+        changes = changes | with_copies(plan, copies)
+    started = time.process_time()
+    table = evolve(source, folder, changes=changes)
+    seconds = time.process_time() - started
+    return *last_depth(folder), table, seconds
+
+
+def influence_table(found):
+    """Worn profiles beside the first of them.
+
+    Parameters
+    ----------
+    found : dict of str to tuple
+        What `variant_depth` returns, by name.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per variant: deepest loss (m), area of the loss (m^2), largest deviation from the first one's depth and
+        that of the area, both over the first one's, conicity at the end, steps, processor time (s).
+    """
+    u, first, _, _ = next(iter(found.values()))
+    rows = []
+    for name, (places, depth, table, seconds) in found.items():
+        there = np.interp(u, places, depth)
+        rows.append({
+            "variant": name, "worn_max_m": depth.max(), "worn_area_m2": np.sum(depth) * POINTS,
+            "depth_deviation": np.abs(there - first).max() / first.max(),
+            "area_deviation": np.sum(depth) / np.sum(first) - 1.0,
+            "equivalent_conicity": table["equivalent_conicity"].iloc[-1], "steps": len(table) - 1, "cpu_s": seconds,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
