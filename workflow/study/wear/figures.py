@@ -41,7 +41,10 @@ def fig_evolution(new, profiles, table):
         depth.plot(MM * u, MM * (f - new[1]), color=colour, label=label)
     shape.set(xlabel="u / mm, to the field side", ylabel="ordinate / mm", title="(a) wheel profile", aspect="equal")
     depth.set(xlabel="u / mm, to the field side", ylabel="worn off / mm", title="(b) loss of the ordinate")
-    depth.legend(fontsize=7)
+    worn_at = profiles[-1][1][profiles[-1][2] - new[1] > 0.0]
+    if worn_at.size:
+        depth.set_xlim(MM * worn_at.min() - 5.0, MM * worn_at.max() + 5.0)
+    depth.legend(fontsize=6, loc="upper center")
     way = KM * table["distance_m"]
     for name, style in (("Sh_m", "k-"), ("Sd_m", "C0--"), ("qR_m", "C1-.")):
         flange.plot(way, MM * (table[name] - table[name].iloc[0]), style, label=name.removesuffix("_m"))
