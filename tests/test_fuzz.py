@@ -38,7 +38,10 @@ POSES = "pose_id,y_m,yaw_rad,roll_rad,z_m\n1,0.001,0.002,,\n2,-0.003,0.0,0.0001,
 VEHICLES = ("wheelset", "suspended_wheelset", "trailer_vehicle", "metro_car")
 TRACK = {
     "gauge": 1.435, "rounding": 4.0,
-    "path": [{"tangent": 5.0}, {"transition": 30.0}, {"curve": 100.0, "radius": 400.0, "cant": 0.1, "widening": 0.0}],
+    "path": [{"tangent": 5.0}, {"transition": 30.0, "shape": "bloss"},
+             {"curve": 100.0, "radius": 400.0, "cant": 0.1, "widening": 0.0}],
+    "cant_about": "lower_rail", "gauge_depth": 0.014,
+    "gradients": [{"gradient": 0.0, "length": 60.0}, {"gradient": 0.01, "radius": 2000.0}],
     "irregularity": {"spectrum": {"level": "low", "seed": 3, "length": 200.0, "begin": -20.0}, "fade_in": 5.0},
 }  # fmt: skip
 

@@ -182,10 +182,12 @@ def _find(path, folder, source, field):
 def _with_points(track, folder, source):
     """The scene's track with the place of its measured irregularity, which is looked for as all other files are."""
     irregularity = track.get("irregularity")
-    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("points"), str):
+    points = irregularity.get("points") if isinstance(irregularity, dict) else None
+    names = [points] if isinstance(points, str) else points
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         return track
-    points = _find(irregularity["points"], folder, source, "track.irregularity.points")
-    return {**track, "irregularity": {**irregularity, "points": str(points.resolve())}}
+    found = [str(_find(name, folder, source, "track.irregularity.points").resolve()) for name in names]
+    return {**track, "irregularity": {**irregularity, "points": found[0] if isinstance(points, str) else found}}
 
 
 def _ratio(value, source, field):
