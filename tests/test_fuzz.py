@@ -96,6 +96,19 @@ def test_tracks(folder, track):
     simulate_text(folder, yaml.dump(base_scene() | {"track": track}))
 
 
+ONE_SIDED = {
+    "wheel": {"profile": "S1002", "left": {"profile": "cone:1/20", "rolling_radius": 0.4595},
+              "wheelsets": {"wheelset": {"right": {"rolling_radius": 0.46}}}},
+    "rail": {"profile": "UIC60-MBench", "inclination": "1/40", "right": {"profile": "60E1", "inclination": "1/20"}},
+}  # fmt: skip
+
+
+@examples(50)
+@given(pairs=spoiled(ONE_SIDED))
+def test_wheels_and_rails_that_differ(folder, pairs):
+    simulate_text(folder, yaml.dump(base_scene() | pairs))
+
+
 PATHOLOGIES = [
     b"", b"\n", b"# nothing\n", b"\t- a\n", b"a:\n\tb: 1\n", b"- 1\n- 2\n", b"just text\n", b"1.5\n",
     b"\xff\xfe\x00n\x00", b"name: \xe9\n", b"a: &a [*a]\n", b"&a a: *a\n", b"&a {b: *a}\n", b"a: &a {b: *a}\n",

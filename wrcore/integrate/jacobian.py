@@ -99,13 +99,15 @@ def reached_bodies(model):
 
 
 def own_state_bodies(model):
-    """For each force element with a state of its own the set of bodies whose accelerations it enters or follows."""
+    """For each own state the set of bodies whose accelerations it enters or follows."""
     elements, joined = model.elements, _links(model)[0]
     bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
         for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
             if elements.law[k, 4] >= 0:
                 bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
+    for wheelset, state in model.bodies.independent:
+        bodies[state] = joined[model.bodies.wheelsets[wheelset]]
     return bodies
 
 
