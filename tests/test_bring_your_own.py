@@ -61,6 +61,8 @@ def test_the_three_forms_of_a_profile_are_the_same_wheel(folder):
 def test_runs_feel_what_was_brought(folder):
     worn, rough, curve = (wr.load_run(folder / name) for name in ("worn.h5", "rough.h5", "curve.h5"))
     assert {run.status for run in (worn, rough, curve)} == {"completed"}
+    one_sided = wr.load_run(folder / "one_sided.h5")
+    assert one_sided.status == "completed" and np.abs(one_sided["wheelset"].y_m[-1] - worn["wheelset"].y_m[-1]) > 1e-4
     nominal = wr.simulate(ROOT / "config/scenes/suspended_wheelset.yaml", integration__duration=0.2)
     assert np.abs(worn["wheelset"].y_m - nominal["wheelset"].y_m).max() > 1e-5
     assert np.ptp(rough["wheelset"].z_m) > 1e-4

@@ -38,7 +38,10 @@ POSES = "pose_id,y_m,yaw_rad,roll_rad,z_m\n1,0.001,0.002,,\n2,-0.003,0.0,0.0001,
 VEHICLES = ("wheelset", "suspended_wheelset", "trailer_vehicle", "metro_car")
 TRACK = {
     "gauge": 1.435, "rounding": 4.0,
-    "path": [{"tangent": 5.0}, {"transition": 30.0}, {"curve": 100.0, "radius": 400.0, "cant": 0.1, "widening": 0.0}],
+    "path": [{"tangent": 5.0}, {"transition": 30.0, "shape": "bloss"},
+             {"curve": 100.0, "radius": 400.0, "cant": 0.1, "widening": 0.0}],
+    "cant_about": "lower_rail", "gauge_depth": 0.014,
+    "gradients": [{"gradient": 0.0, "length": 60.0}, {"gradient": 0.01, "radius": 2000.0}],
     "irregularity": {"spectrum": {"level": "low", "seed": 3, "length": 200.0, "begin": -20.0}, "fade_in": 5.0},
 }  # fmt: skip
 
@@ -91,6 +94,19 @@ def test_scenes_at_the_bounds_of_what_is_allowed(folder, data, keys):
 @given(track=spoiled(TRACK))
 def test_tracks(folder, track):
     simulate_text(folder, yaml.dump(base_scene() | {"track": track}))
+
+
+ONE_SIDED = {
+    "wheel": {"profile": "S1002", "left": {"profile": "cone:1/20", "rolling_radius": 0.4595},
+              "wheelsets": {"wheelset": {"right": {"rolling_radius": 0.46}}}},
+    "rail": {"profile": "UIC60-MBench", "inclination": "1/40", "right": {"profile": "60E1", "inclination": "1/20"}},
+}  # fmt: skip
+
+
+@examples(50)
+@given(pairs=spoiled(ONE_SIDED))
+def test_wheels_and_rails_that_differ(folder, pairs):
+    simulate_text(folder, yaml.dump(base_scene() | pairs))
 
 
 PATHOLOGIES = [

@@ -139,3 +139,50 @@ def test_a_curve_is_run_through_and_reported_in_the_tracks_frame():
     assert -0.006 < w.y_m[-1] < -0.001 and np.ptp(w.y_m[-100:]) < 1e-4
     u = [np.nanmean(run[f"wheelset/{side}"].u_wheel_m[-1]) for side in ("left", "right")]
     assert u[1] < u[0]  # the outer (right) wheel touches nearer to its flange, where its radius is larger
+
+
+def freely_rolling(gradients, duration):
+    """A centred free wheelset on straight track with gradients."""
+    track = json.dumps({"gradients": gradients})
+    overrides = [f"track={track}", "initial.y=0", f"integration.duration={duration}", "integration.rtol=1e-8"]
+    return simulate(load_scene(SCENES / "wheelset.yaml", overrides))
+
+
+def test_a_free_wheelset_rolls_down_a_gradient_with_g_sin_i():
+    # rolling couples speed and spin: m v' = m g sin(i) - F, I w' = F r, so v' = g sin(i) m / (m + I / r^2)
+    def acceleration(gradients):
+        run = freely_rolling(gradients, 4.0)
+        w, on = run["wheelset"], run.t > 2.0
+        assert run.status == "completed" and np.abs(w.y_m).max() < 1e-6
+        speed = np.hypot(w.vx_m_per_s, w.vz_m_per_s)[on]
+        return np.polyfit(run.t[on], speed, 1)[0], np.mean(speed / np.abs(w.wy_rad_per_s[on]))
+
+    slope = 0.03 / math.hypot(1.0, 0.03)
+    found, radius = acceleration([{"gradient": 0.0, "length": 20.0}, {"gradient": -0.03, "radius": 500.0}])
+    expected = 9.81 * slope * 1813.0 / (1813.0 + 112.0 / radius**2)
+    resistance, _ = acceleration([{"gradient": 0.0}])  # of the contacts' spin, on level track
+    assert -1e-4 < resistance < 0.0
+    assert found - resistance == pytest.approx(expected, rel=2e-5)
+
+
+@pytest.mark.parametrize("gradient", [0.05, -0.05])
+def test_vertical_curves_add_v_squared_over_r_to_the_load(gradient):
+    # in the curve: N = m (g cos i + v^2 / rho), rho the radius of the wheelset's centre, 0.46 m above the rails
+    run = freely_rolling([{"gradient": 0.0, "length": 60.0}, {"gradient": gradient, "radius": 1500.0}], 4.0)
+    load = sum(
+        np.nansum(run[f"wheelset/{side}"].N_N * np.cos(run[f"wheelset/{side}"].contact_angle_rad), axis=1)
+        + np.nansum(run[f"wheelset/{side}"].Fy_N * np.sin(run[f"wheelset/{side}"].contact_angle_rad), axis=1)
+        for side in ("left", "right")
+    )
+    w = run["wheelset"]
+    inside = (w.s_m > 45.0) & (w.s_m < 75.0)
+    incline = (
+        math.copysign(1.0, gradient) * (w.s_m[inside] - (60.0 - 0.5 * 1500.0 * 0.05 / math.hypot(1.0, 0.05))) / 1500.0
+    )
+    speed = np.hypot(w.vx_m_per_s, w.vz_m_per_s)[inside]
+    level = np.sqrt(1.0 - incline**2)
+    bend = math.copysign(1.0, gradient) / (1500.0 * level)
+    expected = 1813.0 * (9.81 * level + speed**2 * bend / (1.0 - 0.46 * bend))
+    extra = np.mean(load[inside] - 1813.0 * 9.81 * level)
+    assert extra == pytest.approx(np.mean(expected - 1813.0 * 9.81 * level), rel=2e-3)
+    assert np.max(np.abs(load[inside] - expected)) < 0.02 * abs(extra)

@@ -13,6 +13,7 @@ from wrcore.geometry.irregularity import (
     generate,
     irregularity_at,
     irregularity_data,
+    irregularity_end,
     no_irregularity,
     read_irregularity,
     spectrum,
@@ -64,7 +65,7 @@ def test_spline_converges_with_the_fourth_power_of_the_step():
 
 
 def test_spline_is_c2_everywhere_and_zero_outside(generated):
-    start, step, cells = generated.start, generated.step, len(generated.coefficients)
+    start, step, cells = generated.starts[0], generated.steps[0], len(generated.coefficients)
     scale = np.abs([at(generated, s) for s in np.arange(start, start + cells * step, step)]).max(0)
     for i in range(cells + 1):
         border = start + i * step
@@ -224,8 +225,10 @@ def test_unreadable_files_are_named(tmp_path):
 
 KEY = "track.irregularity"
 BAD_KEYS = [
-    ({}, KEY, "either points or spectrum"),
-    ({"points": "a.csv", "spectrum": SPECTRUM}, KEY, "either points or spectrum"),
+    ({}, KEY, "points or spectrum"),
+    ({"points": []}, f"{KEY}.points", "a CSV file"),
+    ({"points": ["a.csv", 3]}, f"{KEY}.points.1", "a CSV file"),
+    ({"points": ["none.csv"]}, f"{KEY}.points", "existing file"),
     ({"points": "missing.csv"}, f"{KEY}.points", "existing file"),
     ({"spectrum": {"level": "low", "length": 100.0}}, f"{KEY}.spectrum.seed", "key is missing"),
     ({"spectrum": {**SPECTRUM, "level": "medium"}}, f"{KEY}.spectrum.level", "'low' or 'high'"),
@@ -250,3 +253,25 @@ def test_bad_keys_are_named(tmp_path, keys, field, expected):
         build_track({"irregularity": keys}, "scene.yaml", tmp_path)
     assert (caught.value.source, caught.value.field) == ("scene.yaml", field)
     assert expected in caught.value.expected
+
+
+def test_several_files_and_a_spectrum_add_up_each_on_its_own_grid(tmp_path):
+    # 0.3 m and 0.25 m apart, over different stretches; each faded at its own ends
+    rng, names = np.random.default_rng(5), []
+    for k, (begin, step) in enumerate(((0.0, 0.3), (40.0, 0.25))):
+        s = begin + step * np.arange(300)
+        rows = "\n".join(
+            f"{a:.6f},{b:.9f},{c:.9f}" for a, b, c in zip(s, *(1e-3 * rng.normal(size=(2, 300))), strict=True)
+        )
+        (tmp_path / f"{k}.csv").write_text(f"s_m,alignment_m,level_m\n{rows}\n")
+        names.append(f"{k}.csv")
+    spectrum = {"level": "low", "seed": 2, "length": 100.0, "begin": -10.0}
+    both = {"points": names, "spectrum": spectrum}
+    whole, *parts = (
+        build_track({"irregularity": keys}, "test", tmp_path).irregularity
+        for keys in (both, {"points": names[0]}, {"points": names[1:]}, {"spectrum": spectrum})
+    )
+    for s in np.linspace(-30.0, 140.0, 501):
+        np.testing.assert_allclose(at(whole, s), sum(at(part, s) for part in parts), rtol=0.0, atol=1e-15)
+    assert irregularity_end(whole) == max(irregularity_end(part) for part in parts) == pytest.approx(114.75)
+    assert (at(whole, 300.0) == 0.0).all()

@@ -20,7 +20,8 @@ from wrcore.geometry.path import (
     tangent_path,
     track_frame,
 )
-from wrcore.geometry.path_pieces import CANT_BASE, _cosine_series, _rounded_ramp
+from wrcore.geometry.path_pieces import CANT_BASE, _cosine_series
+from wrcore.geometry.ramps import rounded_ramp
 from wrcore.geometry.track import Track, build_track
 
 # An S of two curves to the left and right with cant, widening and transitions between all parts.
@@ -202,10 +203,10 @@ def test_cant_and_widening_ramp_linearly_with_the_curvature(winding):
 def test_corner_is_rounded_by_the_hat_weighted_mean():
     # mean of max(x + v, 0) with weight (half - |v|) / half^2; at the corner itself half / 6
     half = 2.0
-    assert _rounded_ramp(0.0, half)[0] == pytest.approx(half / 6.0, rel=1e-15)
+    assert rounded_ramp(0.0, half)[0] == pytest.approx(half / 6.0, rel=1e-15)
     for x in (-1.9, -0.6, 0.3, 1.7):
         mean, _ = quad(lambda v, x=x: max(x + v, 0.0) * (half - abs(v)) / half**2, -half, half, points=[-x, 0.0])
-        assert _rounded_ramp(x, half)[0] == pytest.approx(mean, abs=1e-12)
+        assert rounded_ramp(x, half)[0] == pytest.approx(mean, abs=1e-12)
 
 
 def test_series_of_the_cosine_of_the_incline():

@@ -5,9 +5,10 @@ import pytest
 
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import centreline, rail_direction, track_frame
+from wrcore.geometry.profile import GAUGE_DEPTH
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.surface import SIDES, rail_surface
-from wrcore.geometry.track import GAUGE_DEPTH, Track, build_track
+from wrcore.geometry.track import Track, build_track
 
 CURVE = [
     {"tangent": 50.0},

@@ -9,6 +9,7 @@ from wrcore.contact.geometry import contact_geometry
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import load_scene
+from wrcore.scene.pairs import Pair
 
 METHODS = ("exact", "grid")
 
@@ -71,7 +72,7 @@ def patch(
                                ("load_by", load_by, ("vertical", "normal"))):  # fmt: skip
         if value not in known:
             raise InputError("patch", name, f"expected one of {', '.join(known)}, got {value!r}")
-    geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source)
+    geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source, side)
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
     numbers = {"y": (y, 0.1), "yaw": (yaw, 0.5), "roll": (roll, 0.5), "z": (z, 2.0), "omega": (omega, 4e3),
                "vy": (vy, 200.0), "yaw_rate": (yaw_rate, 1e3)}  # fmt: skip
@@ -100,13 +101,14 @@ def _of_pair(pair):
     return pair_geometry(pair), {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
 
 
-def _of_scene(source):
-    """The same of a scene."""
+def _of_scene(source, side):
+    """The same of a scene: of the first wheelset, if its wheels differ from others."""
     scene = load_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
-    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
+    own = dict(zip(SIDES, scene.pairs, strict=False)).get(side, Pair(scene.wheel, scene.rail, vehicle.rolling_radius))
+    geometry = contact_geometry(own.wheel, own.rail, scene.track, own.rolling_radius, vehicle.half_distance)
     detection = "planar" if scene.detection == "planar" else "spatial"
     load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])
     return geometry, {**contact["material"], "detection": detection}, {

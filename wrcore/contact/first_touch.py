@@ -18,8 +18,8 @@ import numpy as np
 
 from wrcore.contact.geometry import HALF_DISTANCES, RADII
 from wrcore.errors import InputError, check_number
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.track import GAUGE_DEPTH, GAUGES
+from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
+from wrcore.geometry.track import GAUGES
 from wrcore.kernels.jit import FAST, jit
 
 SCAN_STEP = 1e-4

@@ -17,6 +17,7 @@ from wrcore.contact.reduction import (
     SEMI_A,
     SEMI_B,
 )
+from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit
 
 Z_RANGE = 0.03
@@ -182,3 +183,38 @@ def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
         if high - low < 1e-13:
             break
     return 0.5 * (low + high), 0.5 * (left + right)
+
+
+def settle_apart(geometries, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
+    """As `settle`, for a left and a right wheel, or rail, that differ.
+
+    Parameters
+    ----------
+    geometries : sequence of ContactGeometry
+        Of the left and the right wheel.
+    hertz, modulus, y, yaw, spatial, reduction, load, nominal
+        As `wheel_at_rest` and `settle` take them.
+
+    Returns
+    -------
+    roll, z : float
+        rad and m; NaN where there is none.
+    """
+    from scipy.optimize import brentq  # its import takes longer than most starts
+
+    handles, patches = [Handle(geometry) for geometry in geometries], np.empty((MAX_PATCHES, PATCH_COLUMNS))
+
+    def heights(roll):
+        return [
+            height_at_load(handle, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches)
+            for handle, side in zip(handles, (1.0, -1.0), strict=True)
+        ]
+
+    def difference(roll):
+        left, right = heights(roll)
+        return left - right if math.isfinite(left - right) else -roll
+
+    if difference(-ROLL_RANGE) * difference(ROLL_RANGE) > 0.0:
+        return math.nan, math.nan
+    roll = brentq(difference, -ROLL_RANGE, ROLL_RANGE, xtol=1e-14)
+    return roll, float(np.mean(heights(roll)))

@@ -34,7 +34,7 @@ from wrcore.dynamics.suspension import (
     characteristic,
     pack_elements,
 )
-from wrcore.dynamics.system import Equations, derivatives_at
+from wrcore.dynamics.system import Equations, derivatives_at, independent_at
 from wrcore.dynamics.track import moving_frame
 from wrcore.dynamics.wheel import normal_contact
 from wrcore.kernels.jit import jit
@@ -163,6 +163,12 @@ def element_energies(elements, track, t, speed, state, rotations, turns):
     return stored, rate, lost, driven
 
 
+@jit(inline="always")
+def _wheels_inertia(bodies, j):
+    """Pitch moment of inertia (kg m^2) of the j-th wheelset with independent wheels."""
+    return bodies.inertia[bodies.wheelsets[bodies.independent[j, 0]], 1]
+
+
 @jit(allocates=False)
 def _fill_powers(times, states, equations, model, work, rate, powers):
     for i in range(times.shape[0]):
@@ -171,6 +177,9 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
         for b in range(work.wrenches.shape[0]):
             for k in range(6):
                 powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + 7 + k]
+        for j in range(model.bodies.independent.shape[0]):
+            inertia, at = _wheels_inertia(model.bodies, j), independent_at(model.bodies, j)
+            powers[i] += inertia * states[i, at] * rate[at]
 
 
 def _powers(times, states, model, work):
@@ -189,6 +198,8 @@ def _kinetic_and_gravitational(model, rotations, state):
         local = rotations[b].T.copy() @ state[at + 10 : at + 13]
         kinetic += 0.5 * mass * np.sum(state[at + 7 : at + 10] ** 2) + 0.5 * np.sum(model.bodies.inertia[b] * local**2)
         height, rise = height + mass * state[at + 2], rise + mass * state[at + 9]
+    for j in range(model.bodies.independent.shape[0]):
+        kinetic += 0.5 * _wheels_inertia(model.bodies, j) * state[independent_at(model.bodies, j)] ** 2
     return kinetic, model.gravity * height, model.gravity * rise
 
 

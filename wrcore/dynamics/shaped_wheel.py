@@ -19,7 +19,7 @@ import math
 from wrcore.contact.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHEEL
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
-from wrcore.dynamics.wheel import find_overlaps, patch_wrench
+from wrcore.dynamics.wheel import contact_of, find_overlaps, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -68,16 +68,17 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
         for wheel in range(2):
             m, w, rows = motions[i, wheel], wrenches[i, wheel], patches[i, wheel]
             side, ex, ey, ez = m[0], m[0] * m[3], m[0] * m[4], m[0] * m[5]
-            count, bound, spatial = find_overlaps(model, side, m[1], m[2], m[3], m[4], m[5], rows)
+            own = contact_of(model, i, wheel)
+            count, bound, spatial = find_overlaps(own, side, m[1], m[2], m[3], m[4], m[5], rows)
             counts[i, wheel], bounds[i, wheel] = count, bound
             pose = make_pose(side, m[1], m[2], ex, ey, ez, spatial)
             for k in range(6):
                 w[k] = 0.0
             for k in range(count):
                 row = rows[k]
-                slope = gap_at(model.geometry, pose, row[U_WHEEL])[1]
+                slope = gap_at(own.geometry, pose, row[U_WHEEL])[1]
                 half = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
-                skewness = overlap_skewness(model.geometry, pose, row[U_WHEEL], half / STEPS)
+                skewness = overlap_skewness(own.geometry, pose, row[U_WHEEL], half / STEPS)
                 row[PSI] = side * shape_number(skewness)
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
                     model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], row, row[PSI]

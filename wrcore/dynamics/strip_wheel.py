@@ -41,7 +41,7 @@ from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, surf
 from wrcore.contact.reduction import ANGLE, COSINE, MOMENT, PATCH_COLUMNS, PENETRATION, SINE, X, Y, Z
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import creep_force_at
-from wrcore.dynamics.wheel import wheel_wrenches
+from wrcore.dynamics.wheel import contact_of, wheel_wrenches
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -261,14 +261,13 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     for i in range(motions.shape[0]):
         for wheel in range(2):
             m, rows, w = motions[i, wheel], patches[i, wheel], wrenches[i, wheel]
+            own = contact_of(model, i, wheel)
             side, ex, ey, ez = m[0], m[3], m[4], m[5]
             bound, spatial = 0.0, model.detection == SPATIAL
             if model.detection == AUTO:
-                bound = planar_error_bound(model.geometry, side, m[1], m[2], side * ex, side * ey, side * ez)
+                bound = planar_error_bound(own.geometry, side, m[1], m[2], side * ex, side * ey, side * ez)
                 spatial = bound > model.detection_tolerance
-            count = find_patches(
-                model.geometry, side, m[1], m[2], side * ex, side * ey, side * ez, spatial, MOMENT, rows
-            )
+            count = find_patches(own.geometry, side, m[1], m[2], side * ex, side * ey, side * ez, spatial, MOMENT, rows)
             for k in range(6):
                 w[k] = 0.0
             first = kept = group = 0
@@ -276,7 +275,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 last = group_end(rows, count, first)
                 memory = work.memory[i, wheel, group] if work.warm[0] else work.spare
                 work.spare[0] = 0.0
-                _group_wrench(model, m, spatial, rows, first, last, work.out, w, counters, memory, work)
+                _group_wrench(own, m, spatial, rows, first, last, work.out, w, counters, memory, work)
                 group += 1
                 if work.out[reduction.NORMAL] > 0.0:
                     for column in range(PATCH_COLUMNS):

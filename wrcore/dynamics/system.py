@@ -19,7 +19,7 @@ from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inv
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
-from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, shaped, wheel_wrenches
+from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -35,6 +35,9 @@ class Bodies(NamedTuple):
     """(n,) int: 1 for a body of revolution about its y axis whose frame does not spin along."""
     wheelsets: np.ndarray
     """(k,) int: bodies with wheels."""
+    independent: np.ndarray = np.zeros((0, 2), np.int64)
+    """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
+    difference of their rolling rates, left less right (rad/s), among the own states."""
 
 
 class Model(NamedTuple):
@@ -133,6 +136,28 @@ def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     wrench[5] -= wx * hy - wy * hx
 
 
+@jit(inline="always")
+def independent_at(bodies, j):
+    """Place in the state of half the difference of rolling rates of the j-th wheelset with independent wheels."""
+    return STATE_SIZE * bodies.mass.shape[0] + bodies.independent[j, 1]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _turn_wheels_apart(bodies, work, rate):
+    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia.
+
+    The wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset.
+    """
+    for j in range(bodies.independent.shape[0]):
+        k = bodies.independent[j, 0]
+        body = bodies.wheelsets[k]
+        moment = 0.0
+        for i in range(3):
+            apart = work.rail_wrenches[k, 0, 3 + i] - work.rail_wrenches[k, 1, 3 + i]
+            moment += apart * work.rotations[body, i, 1]
+        rate[independent_at(bodies, j)] = moment / bodies.inertia[body, 1]
+
+
 @jit(allocates=False, fastmath=FUSED)
 def wheel_motions(model, state, work):
     """Fill the motions of all wheels in their rails' frames; the wheelsets' rotations are in ``work``."""
@@ -141,9 +166,10 @@ def wheel_motions(model, state, work):
         b = wheelsets[k]
         at, axle = STATE_SIZE * b, work.rotations[b]
         if not tangent:
+            left, right = contact_of(model.contact, k, 0), contact_of(model.contact, k, 1)
             work.arc_lengths[k] = rail_motions(
-                model.track, model.contact.geometry.rail_distance, state, at, axle, work.arc_lengths[k], work.frame,
-                work.irregularity, work.rails[k], work.shifts[k], work.motions[k],
+                model.track, (left.geometry.rail_distance, right.geometry.rail_distance), state, at, axle,
+                work.arc_lengths[k], work.frame, work.irregularity, work.rails[k], work.shifts[k], work.motions[k],
             )  # fmt: skip
             continue
         for wheel in range(2):
@@ -154,6 +180,12 @@ def wheel_motions(model, state, work):
             for i in range(6):
                 row[6 + i] = state[at + 7 + i]
             row[12] = row[13] = 0.0
+    for j in range(model.bodies.independent.shape[0]):
+        k, half = model.bodies.independent[j, 0], state[independent_at(model.bodies, j)]
+        for wheel in range(2):
+            row = work.motions[k, wheel]
+            for i in range(3):
+                row[9 + i] += row[0] * half * row[3 + i]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -207,6 +239,7 @@ def fill_derivatives(t, state, model, work, rate):
         wrench[2] = -model.gravity * bodies.mass[b]
     if bodies.wheelsets.shape[0] > 0:
         _add_rail_wrenches(model, state, work)
+        _turn_wheels_apart(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
@@ -245,13 +278,17 @@ def with_kernels(model, work):
     if contact.strips.strips:
         from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
 
-        fallback = Kernel(solve_on_grid, Handle(contact), work.motions[0, 0], work.strips.force)
+        alone = contact._replace(geometries=())
+        fallback = Kernel(solve_on_grid, Handle(alone), work.motions[0, 0], work.strips.force)
         contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
         wrenches = strip_wrenches
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 
         wrenches = shaped_wrenches
+    if contact.geometries:
+        alone = contact._replace(geometries=())
+        contact = alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
     kernel = Kernel(
         wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, Handle(work.strips),

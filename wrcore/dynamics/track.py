@@ -66,14 +66,14 @@ def _rail_frame(frame, lateral, vertical, out):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def rail_motions(track, rail_distance, state, at, axle, guess, frame, values, rails, shifts, motions):
+def rail_motions(track, distances, state, at, axle, guess, frame, values, rails, shifts, motions):
     """A wheelset's motion in the frames of its two rails.
 
     Parameters
     ----------
     track : TrackModel
-    rail_distance : float
-        Rail profile origin from the track's centre line, m.
+    distances : tuple of float
+        Profile origins of the left and the right rail from the track's centre line, m.
     state : numpy.ndarray
     at : int
         Start of the wheelset's state.
@@ -103,7 +103,7 @@ def rail_motions(track, rail_distance, state, at, axle, guess, frame, values, ra
         side, rail, row = 1.0 - 2.0 * wheel, rails[wheel], motions[wheel]
         shift = side * 0.5 * station.widening + values[0, 2 * wheel]
         lift = values[0, 2 * wheel + 1]
-        place = side * rail_distance
+        place = side * distances[wheel]
         slope_y = side * 0.5 * station.widening_rate + values[1, 2 * wheel]
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
         _rail_frame(frame, lateral, vertical, rail)

@@ -28,6 +28,7 @@ from wrcore.contact.reduction import (
     Z,
 )
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
+from wrcore.kernels.handles import one_of
 from wrcore.kernels.jit import FUSED, jit
 
 MOTION_COLUMNS = 14
@@ -60,6 +61,16 @@ class ContactModel(NamedTuple):
     """Rolling speed is not taken smaller than this in creepages, m/s."""
     strips: StripModel
     """Patches on strips, if the scene asks for them."""
+    geometries: tuple = ()
+    """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
+    wheels: tuple = ()
+    """The same as contact models, see `wrcore.dynamics.system.with_kernels`."""
+
+
+@jit(allocates=False, inline="always")
+def contact_of(model, wheelset, wheel):
+    """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
+    return one_of(model, "wheels", 2 * wheelset + wheel)
 
 
 def shaped(contact):
@@ -161,8 +172,8 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     if not held:
         for i in range(motions.shape[0]):
             for wheel in range(2):
-                m = motions[i, wheel]
-                count, bound, _ = find_overlaps(model, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+                m, own = motions[i, wheel], contact_of(model, i, wheel)
+                count, bound, _ = find_overlaps(own, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):
@@ -171,20 +182,9 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model,
-                    m[1],
-                    m[2],
-                    m[6],
-                    m[7],
-                    m[8],
-                    m[9],
-                    m[10],
-                    m[11],
-                    bend,
-                    bend_vertical,
-                    patches[i, wheel, k],
+                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], bend, bend_vertical, patches[i, wheel, k],
                     0.0,
-                )
+                )  # fmt: skip
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz
                 counters[1] += missed

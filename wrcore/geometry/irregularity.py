@@ -2,7 +2,8 @@
 
 Four channels: lateral (towards n, to the left positive) and vertical (towards b, up) deviation of the left and of the
 right rail. Between the nodes of a uniform grid runs a cubic spline, so that the curvature of the rails' lines is
-continuous. The deviation is faded in and out and is zero elsewhere.
+continuous. The deviation is faded in and out and is zero elsewhere. Several irregularities, each on a grid of its own,
+add up.
 
 Measured or generated quantities are combined into the channels as follows: alignment and level are the means of both
 rails' lateral and vertical deviation, cross level is left minus right height, gauge is the change of the gauge.
@@ -48,15 +49,17 @@ class IrregularityData(NamedTuple):
 
     coefficients: np.ndarray
     """(cells, 4, 4): powers 0 to 3 of the distance from the cell's beginning (m), four channels each."""
-    start: float
-    """Beginning of the first cell, m."""
-    step: float
-    """Length of a cell, m."""
+    starts: np.ndarray
+    """(n,): beginning of the first cell of each irregularity, m."""
+    steps: np.ndarray
+    """(n,): length of its cells, m."""
+    first: np.ndarray
+    """(n + 1,) int: where its cells begin, and where they end."""
 
 
 def no_irregularity():
     """IrregularityData of perfect rails."""
-    return IrregularityData(np.zeros((0, 4, 4)), 0.0, 1.0)
+    return IrregularityData(np.zeros((0, 4, 4)), np.zeros(0), np.zeros(0), np.zeros(1, np.int64))
 
 
 @jit
@@ -76,21 +79,22 @@ def irregularity_at(data, s, out):
     bool
         False for perfect rails: then ``out`` is left as it is.
     """
-    cells = data.coefficients.shape[0]
-    if cells == 0:
+    if data.coefficients.shape[0] == 0:
         return False
-    position = (s - data.start) / data.step
-    if not 0.0 <= position < cells:
-        out[:, :] = 0.0
-        return True
-    i = int(position)
-    d = (position - i) * data.step
-    for k in range(4):
-        c0, c1 = data.coefficients[i, 0, k], data.coefficients[i, 1, k]
-        c2, c3 = data.coefficients[i, 2, k], data.coefficients[i, 3, k]
-        out[0, k] = c0 + d * (c1 + d * (c2 + d * c3))
-        out[1, k] = c1 + d * (2.0 * c2 + 3.0 * d * c3)
-        out[2, k] = 2.0 * c2 + 6.0 * d * c3
+    out[:, :] = 0.0
+    for part in range(data.starts.shape[0]):
+        step, first = data.steps[part], data.first[part]
+        position = (s - data.starts[part]) / step
+        if not 0.0 <= position < data.first[part + 1] - first:
+            continue
+        i = first + int(position)
+        d = (position - (i - first)) * step
+        for k in range(4):
+            c0, c1 = data.coefficients[i, 0, k], data.coefficients[i, 1, k]
+            c2, c3 = data.coefficients[i, 2, k], data.coefficients[i, 3, k]
+            out[0, k] += c0 + d * (c1 + d * (c2 + d * c3))
+            out[1, k] += c1 + d * (2.0 * c2 + 3.0 * d * c3)
+            out[2, k] += 2.0 * c2 + 6.0 * d * c3
     return True
 
 
@@ -112,13 +116,24 @@ def irregularity_data(start, step, values):
     values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
     spline = CubicSpline(step * np.arange(len(values)), values, bc_type="clamped")
     coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
-    return IrregularityData(coefficients, float(start - _PADDING * step), float(step))
+    return IrregularityData(
+        coefficients,
+        np.array([start - _PADDING * step], float),
+        np.array([step], float),
+        np.array([0, len(coefficients)]),
+    )
+
+
+def sum_of(parts):
+    """IrregularityData of several ones that add up."""
+    sizes = [len(part.coefficients) for part in parts]
+    joined = (np.concatenate([getattr(part, name) for part in parts]) for name in ("coefficients", "starts", "steps"))
+    return IrregularityData(*joined, np.cumsum([0, *sizes]))
 
 
 def irregularity_end(data):
     """Arc length of the last sample, m: beyond it rails are perfect again; infinite without an irregularity."""
-    cells = len(data.coefficients)
-    return data.start + data.step * (cells - _PADDING) if cells else math.inf
+    return max(data.starts + data.steps * (np.diff(data.first) - _PADDING), default=math.inf)
 
 
 def combine(alignment, level, cross_level, gauge):

@@ -1,9 +1,10 @@
 """The track's path: its centre line and the frame [t n b] that travels along it, as functions of arc length.
 
-The path is cut into pieces on which the curvature is linear in the arc length s (straight line, clothoid, circle).
-A piece stores its centre line as polynomials in the distance from the piece's middle; pieces are so short that the
-heading hardly turns in one of them, which puts the truncation below the rounding error. A point
-and its tangent then cost two Horner schemes: no quadrature, no trigonometric function.
+The path is cut into pieces on which curvature, cant, height and widening are cubics of the arc length s (straight
+line, circle, clothoid, Bloss; a cosine transition is a spline of such pieces). A piece stores its centre line as
+polynomials in the distance from the piece's middle; pieces are so short that the heading hardly turns in one of them,
+which puts the truncation below the rounding error. A point and its tangent then cost two Horner schemes: no quadrature,
+no trigonometric function.
 
 Conventions
 -----------
@@ -11,9 +12,11 @@ Conventions
 * heading is the angle of t's projection onto the ground from the x axis, to the left positive; d heading/ds is the
   curvature.
 * cant h is the height of the right rail above the left one over `CANT_BASE`: positive in a canted left curve. The
-  frame's roll about t is -asin(h / CANT_BASE). The lower rail keeps its height: the centre line is raised by |h|/2.
-* The corners of cant, raise and widening, which are piecewise linear, are rounded: each corner is replaced over the
-  path's rounding length by a cubic spline. They are C2, t is C1, curvature is continuous.
+  frame's roll about t is -asin(h / CANT_BASE). What keeps its height is chosen: with the lower rail the centre line is
+  raised by |h|/2, so that t climbs in a ramp, and both rails with it.
+* The corners of linear ramps of cant, height and widening are rounded: each corner is replaced over the path's rounding
+  length by a cubic spline. They are C2, t is C1, curvature is continuous. Bloss and cosine ramps have no corners; at
+  their ends they are C1. Gradients joined by vertical curves (parabolas) are C2, too.
 """
 
 import math
@@ -25,7 +28,6 @@ from wrcore.geometry.path_pieces import (
     CENTRE,
     COLUMNS,
     CURVATURE,
-    CURVATURE_RATE,
     HEADING,
     RAISE,
     ROLL,
@@ -41,7 +43,7 @@ class PathData(NamedTuple):
     """A path for kernels. A tangent track has no pieces (``pieces.shape[0] == 0``) and x = s."""
 
     pieces: np.ndarray
-    """(n, 32): middle; polynomials of x, y; heading, curvature and its rate; cubics of sin(roll), raise, widening."""
+    """(n, 34): middle; polynomials of x, y; heading; cubics of curvature, sin(roll), height, widening."""
     starts: np.ndarray
     """(n,): arc length at which each piece begins, m. The first reaches back, the last on without end."""
     lookup: np.ndarray
@@ -93,7 +95,7 @@ def tangent_path():
     return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0)
 
 
-def path_data(knots, curvature, cant, widening, rounding):
+def path_data(knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None):
     """Cut a path into pieces.
 
     Parameters
@@ -102,16 +104,22 @@ def path_data(knots, curvature, cant, widening, rounding):
         Arc lengths of the joints, m, increasing. Before the first the path is straight, after the last all quantities
         keep their values.
     curvature, cant, widening : (k,) array_like
-        Values at the knots (1/m, m, m), linear in between; the first curvature must be 0. Cant positive: right rail
-        higher.
+        Values at the knots (1/m, m, m); the first curvature must be 0. Cant positive: right rail higher.
     rounding : float
         Length over which corners of cant and widening are rounded, m.
+    shapes : (k - 1,) sequence of str, optional
+        How they change from knot to knot, see `wrcore.geometry.ramps`; without: linearly.
+    cant_about : {"lower_rail", "inner_rail", "centreline"}
+        What keeps its height; inner_rail: that of the curve.
+    incline : wrcore.geometry.ramps.Incline, optional
+        Height of the alignment before cant, and its slope.
 
     Returns
     -------
     PathData
     """
-    pieces, borders = cut(np.asarray(knots, float), curvature, cant, widening, rounding)
+    knots = np.asarray(knots, float)
+    pieces, borders = cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
     starts = np.concatenate(([-math.inf], borders))
     cells = min(16 * len(pieces), 100_000)
     grid, step = np.linspace(borders[0], borders[-1], cells, endpoint=False, retstep=True)
@@ -167,7 +175,7 @@ def centreline(path, s):
     ----------
     path : PathData
     s : float
-        Arc length, m. Before the path it is straight; after it the last curvature, cant and widening stay.
+        Arc length, m. Before the path it is straight; after it the last curvature, cant, widening and gradient stay.
 
     Returns
     -------
@@ -179,10 +187,15 @@ def centreline(path, s):
     d = s - pieces[i, CENTRE]
     x, tx = _horner(pieces, i, X, d)
     y, ty = _horner(pieces, i, Y, d)
-    bend, bend_rate = pieces[i, CURVATURE], pieces[i, CURVATURE_RATE]
+    bend, bend_1 = pieces[i, CURVATURE], pieces[i, CURVATURE + 1]
+    bend_2, bend_3 = pieces[i, CURVATURE + 2], pieces[i, CURVATURE + 3]
     if i == pieces.shape[0] - 1 and bend != 0.0:
         x, y, tx, ty = _on_last_circle(pieces[i, X], pieces[i, Y], pieces[i, X + 1], pieces[i, Y + 1], bend, d)
-    heading = pieces[i, HEADING] + d * (bend + 0.5 * bend_rate * d)
+    heading = pieces[i, HEADING] + d * (bend + d * (0.5 * bend_1 + d * (bend_2 / 3.0 + d * (0.25 * bend_3))))
+    curvature, curvature_rate = (
+        bend + d * (bend_1 + d * (bend_2 + d * bend_3)),
+        bend_1 + d * (2.0 * bend_2 + 3.0 * bend_3 * d),
+    )
     sin_roll, sin_rate, sin_second = _cubic(pieces, i, ROLL, d)
     z, slope, slope_rate = _cubic(pieces, i, RAISE, d)
     widening, widening_rate, _ = _cubic(pieces, i, WIDENING, d)
@@ -190,7 +203,7 @@ def centreline(path, s):
     secant = 1.0 / cos_roll
     roll_rate = sin_rate * secant
     return Station(
-        x, y, z, tx, ty, slope, math.sqrt(1.0 - slope * slope), slope_rate, heading, bend + bend_rate * d, bend_rate,
+        x, y, z, tx, ty, slope, math.sqrt(1.0 - slope * slope), slope_rate, heading, curvature, curvature_rate,
         sin_roll, cos_roll, roll_rate, (sin_second + sin_roll * roll_rate * roll_rate) * secant, widening,
         widening_rate,
     )  # fmt: skip

@@ -15,14 +15,14 @@ from wrcore.geometry.irregularity import (
     generate,
     no_irregularity,
     read_irregularity,
+    sum_of,
 )
 from wrcore.geometry.path import PathData, path_data, tangent_path
+from wrcore.geometry.profile import GAUGE_DEPTH
+from wrcore.geometry.ramps import STEEPEST, incline
 
 GAUGES = 0.5, 2.0
 """Gauges of which there are tracks, m; others are taken for another unit."""
-
-GAUGE_DEPTH = 0.014
-"""Height below the rail top at which the gauge is measured, m (Manchester contact benchmark)."""
 
 LEAST_RADIUS = 20.0
 """Smaller radii are taken for another unit, m."""
@@ -34,6 +34,12 @@ MOST_SAMPLES = 2_000_000
 """More samples of a generated irregularity take too much memory."""
 
 _KINDS = ("tangent", "transition", "curve")
+_OWN_KEYS = {
+    "tangent": set(),
+    "transition": {"shape", "radius", "cant", "widening"},
+    "curve": {"radius", "cant", "widening"},
+}
+_SYNONYMS = {"hermite": "bloss"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +49,20 @@ class Track:
     Parameters
     ----------
     gauge : float
-        Distance between the innermost points of the rails within ``GAUGE_DEPTH`` of their tops, m; where the path
+        Distance between the innermost points of the rails within the gauge depth of their tops, m; where the path
         has a widening, it is added.
     path : PathData
         Centre line, cant and widening; without it the track is straight and level.
     irregularity : IrregularityData
         Deviation of the rails; without it they are perfect.
+    gauge_depth : float
+        Height below the rail top down to which the gauge is measured, m.
     """
 
     gauge: float = 1.435
     path: PathData = field(default_factory=tangent_path, repr=False)
     irregularity: IrregularityData = field(default_factory=no_irregularity, repr=False)
+    gauge_depth: float = GAUGE_DEPTH
 
     @cached_property
     def tangent(self):
@@ -70,7 +79,7 @@ class Track:
         rail : ProfileCurve
             Rail profile in the pose in which it lies in the track.
         """
-        return 0.5 * self.gauge + rail.gauge_offset(GAUGE_DEPTH)
+        return 0.5 * self.gauge + rail.gauge_offset(self.gauge_depth)
 
 
 def build_track(data, source, folder="."):
@@ -98,46 +107,62 @@ def build_track(data, source, folder="."):
         data = validate(data, "track", source)
     except InputError as error:
         raise InputError(source, f"track.{error.field}".rstrip("."), error.expected) from None
-    if data["path"] == "tangent":
-        path = tangent_path()
-    elif isinstance(data["path"], str):
-        raise InputError(source, "track.path", f"expected 'tangent' or a list of segments, got {data['path']!r}")
-    else:
-        path = path_data(*_knots(data["path"], data["rounding"], source), data["rounding"])
+    segments = [] if data["path"] == "tangent" else data["path"]
+    if isinstance(segments, str):
+        raise InputError(source, "track.path", f"expected 'tangent' or a list of segments, got {segments!r}")
+    path = tangent_path()
+    if segments or data["gradients"]:
+        climb = _incline(data["gradients"], data["rounding"], source) if data["gradients"] else None
+        knots, values, shapes = _knots(segments or [{"tangent": 1.0}], data["rounding"], source)
+        path = path_data(knots, *values, data["rounding"], shapes, data["cant_about"], climb)
     irregularity = no_irregularity()
     if "irregularity" in data:
         irregularity = _irregularity(data["irregularity"], source, Path(folder))
-    return Track(float(data["gauge"]), path, irregularity)
+    return Track(float(data["gauge"]), path, irregularity, float(data["gauge_depth"]))
 
 
 def _knots(segments, rounding, source):
-    """Arc lengths of the joints, and curvature, cant (right rail higher) and widening there."""
+    """Arc lengths of the joints; curvature, cant (right rail higher) and widening there; and the segments' shapes."""
     kinds = [_kind(i, segment, source) for i, segment in enumerate(segments)]
-    values = [_values(i, kind, segment, source) for i, (kind, segment) in enumerate(zip(kinds, segments, strict=True))]
+    followers = [*kinds[1:], ""]
+    values = [_values(i, *item, source) for i, item in enumerate(zip(kinds, segments, followers, strict=True))]
+    shapes = [_SYNONYMS.get(shape, shape) for shape in (segment.get("shape", "linear") for segment in segments)]
     joints = [np.zeros(3)]
     for i, kind in enumerate(kinds):
-        after = values[i + 1] if i + 1 < len(kinds) else None
-        joints.append(_joint(i, kind, values[i], after, joints[-1], source))
+        if values[i] is None:
+            values[i] = values[i + 1]
+        if kind != "transition" and np.any(values[i] != joints[-1]):
+            expected = f"expected a transition before this {kind}: curvature, cant or widening would jump"
+            raise InputError(source, f"track.path.{i}.{kind}", expected)
+        joints.append(values[i])
         if kind == "transition":
-            _check_ramp(i, segments[i]["transition"], joints[-1] - joints[-2], rounding, source)
+            _check_ramp(i, segments[i], joints[-1] - joints[-2], shapes[i], rounding, source)
     lengths = [segment[kind] for kind, segment in zip(kinds, segments, strict=True)]
-    return np.concatenate(([0.0], np.cumsum(lengths))), *np.array(joints).T
+    return np.concatenate(([0.0], np.cumsum(lengths))), np.array(joints).T, shapes
 
 
 def _kind(i, segment, source):
     kinds = [kind for kind in _KINDS if kind in segment]
     if len(kinds) != 1:
         raise InputError(source, f"track.path.{i}", f"expected one of {', '.join(_KINDS)}, got {sorted(segment)}")
-    extra = sorted(set(segment) - {kinds[0]} - ({"radius", "cant", "widening"} if kinds[0] == "curve" else set()))
+    extra = sorted(set(segment) - {kinds[0]} - _OWN_KEYS[kinds[0]])
     if extra:
         raise InputError(source, f"track.path.{i}.{extra[0]}", f"expected no such key in a {kinds[0]}")
     return kinds[0]
 
 
-def _values(i, kind, segment, source):
-    """Curvature, cant and widening of a segment; None for a transition."""
-    if kind != "curve":
-        return np.zeros(3) if kind == "tangent" else None
+def _values(i, kind, segment, after, source):
+    """Curvature, cant and widening at the end of a segment; None for a transition to those of the next one."""
+    own = [key for key in ("radius", "cant", "widening") if key in segment]
+    if kind == "tangent":
+        return np.zeros(3)
+    if kind == "transition" and after in ("tangent", "curve"):
+        if own:
+            raise InputError(source, f"track.path.{i}.{own[0]}", f"expected no such key in a transition to a {after}")
+        return None
+    if kind == "transition" and not own:
+        expected = "expected a tangent or a curve after a transition, or a radius of its own at its end"
+        raise InputError(source, f"track.path.{i}.transition", expected)
     if "radius" not in segment:
         raise InputError(source, f"track.path.{i}.radius", "expected a radius in m, but the key is missing")
     radius = segment["radius"]
@@ -147,41 +172,49 @@ def _values(i, kind, segment, source):
     return np.array([1.0 / radius, cant, segment.get("widening", 0.0)])
 
 
-def _joint(i, kind, here, after, before, source):
-    """Values at the end of segment i; they may change in a transition only."""
-    if kind == "transition":
-        if after is None:
-            raise InputError(source, f"track.path.{i}.transition", "expected a tangent or a curve after a transition")
-        return after
-    if np.any(here != before):
-        expected = f"expected a transition before this {kind}: curvature, cant or widening would jump"
-        raise InputError(source, f"track.path.{i}.{kind}", expected)
-    return here
-
-
-def _check_ramp(i, length, change, rounding, source):
-    field_name = f"track.path.{i}.transition"
-    if np.any(change[1:] != 0.0) and length < rounding:
+def _check_ramp(i, segment, change, shape, rounding, source):
+    field_name, length = f"track.path.{i}.transition", segment["transition"]
+    if shape == "linear" and np.any(change[1:] != 0.0) and length < rounding:
         expected = f"expected at least the rounding length of {rounding:g} m where cant or widening changes"
         raise InputError(source, field_name, f"{expected}, got {length!r}")
-    if abs(change[1]) > STEEPEST_RAMP * length:
+    if STEEPEST[shape] * abs(change[1]) > STEEPEST_RAMP * length:
         got = f"got {abs(change[1]):g} m over {length!r} m"
         raise InputError(source, field_name, f"expected a cant ramp of at most {STEEPEST_RAMP:g} m/m, {got}")
+
+
+def _incline(gradients, rounding, source):
+    """Height along the key ``track.gradients``."""
+    last = len(gradients) - 1
+    for i, item in enumerate(gradients):
+        for key, needed in (("length", i < last), ("radius", i > 0)):
+            if (key in item) != needed:
+                place = {"length": "last", "radius": "first"}[key]
+                expected = f"expected a {key} in m in all but the {place} gradient, and none there"
+                raise InputError(source, f"track.gradients.{i}.{key}", expected)
+    lengths, radii = ([item.get(key, 0.0) for item in gradients] for key in ("length", "radius"))
+    climb = incline(lengths, [item["gradient"] for item in gradients], radii, 0.5 * rounding)
+    overlap = np.flatnonzero(np.diff(climb.slope.knots)[1::2] < 0.0)
+    if overlap.size:
+        expected = "expected a length that holds half of the vertical curve at either end"
+        raise InputError(source, "track.gradients", f"{expected}, got overlapping vertical curves")
+    return climb
 
 
 def _irregularity(data, source, folder):
     """IrregularityData of the key ``track.irregularity``."""
     key = "track.irregularity"
-    if ("points" in data) == ("spectrum" in data):
-        raise InputError(source, key, "expected either points or spectrum")
-    if "points" in data:
-        found = [base / data["points"] for base in (folder, folder.parent) if os.path.isfile(base / data["points"])]
+    if "points" not in data and "spectrum" not in data:
+        raise InputError(source, key, "expected points or spectrum")
+    points = data.get("points", [])
+    sampled = []
+    for name in [points] if isinstance(points, str) else points:
+        found = [base / name for base in (folder, folder.parent) if os.path.isfile(base / name)]
         if not found:
-            raise InputError(source, f"{key}.points", f"expected an existing file, got {data['points']!r}")
-        s, values = read_irregularity(found[0])
-    else:
-        s, values = _generated(data["spectrum"], source, f"{key}.spectrum")
-    return faded_irregularity(s, values, data["fade_in"], data["fade_out"], source, key)
+            raise InputError(source, f"{key}.points", f"expected an existing file, got {name!r}")
+        sampled.append(read_irregularity(found[0]))
+    if "spectrum" in data:
+        sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))
+    return sum_of([faded_irregularity(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled])
 
 
 def _generated(data, source, key):

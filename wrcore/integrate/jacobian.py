@@ -122,13 +122,15 @@ def reached_bodies(model):
 
 
 def own_state_bodies(model):
-    """For each force element with a state of its own the set of bodies whose accelerations it enters or follows."""
+    """For each own state the set of bodies whose accelerations it enters or follows."""
     elements, joined = model.elements, _links(model)[0]
     bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
         for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
             if elements.law[k, 4] >= 0:
                 bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
+    for wheelset, state in model.bodies.independent:
+        bodies[state] = joined[model.bodies.wheelsets[wheelset]]
     return bodies
 
 
@@ -359,7 +361,9 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW)
-    strips, wheels = model.contact.strips.strips > 0, model.bodies.wheelsets.shape[0] > 0
+    # wheels that turn independently are own states, whose rows and columns the wheelset's wrench alone does not give
+    strips = model.contact.strips.strips > 0
+    wheels = model.bodies.wheelsets.shape[0] > 0 and model.bodies.independent.shape[0] == 0
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses
         work.strips.cheap[0] = 1
@@ -371,7 +375,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     last = sweep.starts.shape[0] - 1
     for i in range(0 if whole else last, last + 1):
         in_time = i == last
-        work.strips.held[0] = 0 if in_time else WRENCHES_HELD
+        work.strips.held[0] = WRENCHES_HELD if wheels and not in_time else 0
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time

@@ -84,8 +84,8 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
     clock, counters = memory.clock, memory.counters
     age, step = counters[AGE], clock[NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
-        wheels = model.bodies.wheelsets.shape[0] > 0
-        whole = age < 0 or not wheels or counters[SINCE_FULL] >= CONTACT_REFRESHES
+        alone = model.bodies.wheelsets.shape[0] > 0 and model.bodies.independent.shape[0] == 0
+        whole = age < 0 or not alone or counters[SINCE_FULL] >= CONTACT_REFRESHES
         if whole:
             counters[SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[EVALUATIONS] += refresh_jacobian(

@@ -50,7 +50,7 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     Returns
     -------
     numpy.ndarray, shape (size,)
-        m, 1, m/s, rad/s, and m for the force elements' own states.
+        m, 1, m/s, rad/s, and m for the force elements' own states (rad/s for wheels that turn independently).
     """
     n, rate = len(model.bodies.mass), RATE
     if len(model.bodies.wheelsets):
@@ -61,6 +61,8 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2
     bodies[:, VELOCITY:OMEGA] = rate
     bodies[:, OMEGA:] = rate / lever
+    for wheelset, state in model.bodies.independent:
+        weights[STATE_SIZE * n + state] = rate / lever[model.bodies.wheelsets[wheelset], 0]
     return (atol + rtol * LENGTH) * SHARE.get(method, 1.0) * weights
 
 

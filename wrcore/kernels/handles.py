@@ -113,6 +113,22 @@ def _pack(kind, value, begin, memory):
     return begin + numbers.nbytes, numbers.itemsize
 
 
+@intrinsic(prefer_literal=True)
+def one_of(_, whole, name, k):
+    """Reference to the k-th of the equal named tuples in the field ``name``; where that is empty, ``whole`` itself."""
+    target = whole.target if isinstance(whole, Reference) else whole
+    field = target.fields.index(name.literal_value)
+    members = target.types[field]
+    if not len(members):
+        return whole(whole, name, k), lambda context, builder, call, arguments: arguments[0]
+
+    def generate(context, builder, call, arguments):
+        place = builder.gep(arguments[0], [_INDEX(0), _INDEX(field)])
+        return builder.gep(place, [ir.IntType(64)(0), builder.sext(arguments[2], ir.IntType(64))])
+
+    return Reference(members.dtype)(whole, name, types.int64), generate
+
+
 class Handle:
     """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing.
 

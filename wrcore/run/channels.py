@@ -34,6 +34,8 @@ DESCRIPTIONS = {
     "wx_rad_per_s": "angular velocity about x",
     "wy_rad_per_s": "angular velocity about y",
     "wz_rad_per_s": "angular velocity about z",
+    "rolling_rate_left_rad_per_s": "rate at which a left wheel turns that does so independently of the right one",
+    "rolling_rate_right_rad_per_s": "rate at which a right wheel turns that does so independently of the left one",
     "planar_error_left_m": "bound of the penetration that planar detection misses, left wheel",
     "planar_error_right_m": "bound of the penetration that planar detection misses, right wheel",
     "spatial_left": "1 where detection auto chose spatial for the left wheel, else 0",

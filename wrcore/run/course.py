@@ -11,10 +11,10 @@ import numpy as np
 
 import wrcore
 from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE, angles
+from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.outputs import evaluations_at
-from wrcore.dynamics.system import Equations, Model, Workspace, workspace
+from wrcore.dynamics.system import Equations, Model, Workspace, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
@@ -176,6 +176,8 @@ class Course:
             groups[name] = _body_channels(states[:, own], rates[:, own], poses[:, body], wanted)
             if "pose" in wanted and not model.track.tangent:
                 groups[name]["s_m"] = poses[:, body, 0]
+            if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
+                groups[name] |= self._rolling_rates(states, body)
             if "contact" in wanted and body in wheelsets:
                 k = int(np.flatnonzero(wheelsets == body)[0])
                 for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
@@ -194,6 +196,15 @@ class Course:
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
         return groups, limits | {"beyond_irregularity": int(beyond)}
+
+    def _rolling_rates(self, states, body):
+        """Channels of the rolling rates of wheels that turn independently, rad/s."""
+        bodies = self.model.bodies
+        j = int(np.flatnonzero(bodies.wheelsets[bodies.independent[:, 0]] == body)[0])
+        own = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        mean = np.array([matrix_of(part[3:7])[:, 1] @ part[10:13] for part in own])
+        half = states[:, independent_at(bodies, j)]
+        return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
 
     def _workspace(self):
         work = workspace(self.model)

@@ -97,7 +97,12 @@ def _write_end(group, run):
     """The last valid state, and all that a run needs to go on from there."""
     for name, value, unit, text in (
         ("t", run.end_t, "s", "time of the last valid state"),
-        ("state", run.end_state, "SI", "13 numbers per body, then the force elements' own states"),
+        (
+            "state",
+            run.end_state,
+            "SI",
+            "13 numbers per body, then own states of force elements and of wheels",
+        ),
     ):
         dataset = group.create_dataset(name, data=value)
         dataset.attrs["units"], dataset.attrs["description"] = unit, text

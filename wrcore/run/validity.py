@@ -52,6 +52,9 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
+_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")
+"""Those that look at the profiles."""
+
 
 def exceeded(contact, patches, roll, yaw):
     """Count the limits that patches and poses at the output times exceed.
@@ -69,6 +72,8 @@ def exceeded(contact, patches, roll, yaw):
     dict of str to int
         ``patches`` that were looked at, and the counts by name.
     """
+    if contact.geometries:
+        return _exceeded_by_each(contact, patches, roll, yaw)
     present = np.isfinite(patches[..., reduction.NORMAL])
     rows = patches[present]
     geometry, width = contact.geometry, rows[:, reduction.SEMI_B]
@@ -91,6 +96,22 @@ def exceeded(contact, patches, roll, yaw):
         "hollow_ahead": int(np.sum(1.0 - ahead + hollow * ahead < 0.0)),
         "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }
+
+
+def _exceeded_by_each(contact, patches, roll, yaw):
+    """The same where wheels or rails differ: wheel by wheel, on its own profiles."""
+    total = exceeded(contact._replace(geometries=()), patches, roll, yaw)
+    for name in _OF_PROFILES:
+        total[name] = 0
+    for i, geometry in enumerate(contact.geometries):
+        k, wheel = divmod(i, 2)
+        alone = np.full_like(patches[:, k : k + 1], np.nan)
+        alone[:, 0, wheel] = patches[:, k, wheel]
+        one = contact._replace(geometries=(), geometry=geometry)
+        counts = exceeded(one, alone, roll[:, k : k + 1], yaw[:, k : k + 1])
+        for name in _OF_PROFILES:
+            total[name] += counts[name]
+    return total
 
 
 def _profile(nodes, start, step, u):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -27,17 +26,14 @@ from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
-from wrcore.errors.checked_yaml import parse_ratio, parse_value, plain_tree, read_yaml, validate
+from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
+from wrcore.scene.pairs import Pair, find_file, own_pairs, pair_geometries, wheel_and_rail
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
-
-POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
-"""Endings by which a profile given as plain text is taken for a point file."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,6 +49,8 @@ class Scene:
     vehicle : Vehicle
     wheel, rail : ProfileCurve
     track : Track
+    pairs : tuple of Pair
+        Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
     """
 
     data: dict[str, Any]
@@ -61,6 +59,7 @@ class Scene:
     wheel: ProfileCurve
     rail: ProfileCurve
     track: Track
+    pairs: tuple[Pair, ...] = ()
 
     @property
     def detection(self) -> str:
@@ -126,24 +125,24 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     for key, value in _flat(changes):
         _set(data, key, value, source)
     data = validate(data, "scene", source)
-    parameters = _find(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
+    parameters = find_file(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
-    wheel = _profile(data, "wheel", folder, source)
-    rail = _profile(data, "rail", folder, source, _ratio(data["rail"].get("inclination"), source, "rail.inclination"))
+    wheel, rail = wheel_and_rail(data, folder, source)
+    pairs = own_pairs(data, vehicle, wheel, rail, folder, source)
     data["contact"]["creep"].setdefault("tolerance", DEFAULT_TOLERANCE)
     if data["contact"]["creep"]["planes"] == "sdec" and (
         data["contact"]["patch"] != "moment" or data["contact"]["creep"]["model"] != "table"
     ):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     if "table" in data["contact"]["creep"]:
-        table = _find(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
+        table = find_file(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
         data["contact"]["creep"]["table"] = str(table)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
-    return Scene(data, source, vehicle, wheel, rail, track)
+    return Scene(data, source, vehicle, wheel, rail, track, pairs)
 
 
 def _flat(changes, prefix=""):
@@ -171,50 +170,15 @@ def _set(data, key, value, source):
     data[last] = value
 
 
-def _find(path, folder, source, field):
-    """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
-    for base in (folder, folder.parent, Path()):
-        if os.path.isfile(base / path):  # Path.is_file raises where a name is too long or a folder is closed
-            return base / path
-    raise InputError(source, field, f"expected an existing file, got {path!r}")
-
-
 def _with_points(track, folder, source):
     """The scene's track with the place of its measured irregularity, which is looked for as all other files are."""
     irregularity = track.get("irregularity")
-    if not isinstance(irregularity, dict) or not isinstance(irregularity.get("points"), str):
+    points = irregularity.get("points") if isinstance(irregularity, dict) else None
+    names = [points] if isinstance(points, str) else points
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         return track
-    points = _find(irregularity["points"], folder, source, "track.irregularity.points")
-    return {**track, "irregularity": {**irregularity, "points": str(points.resolve())}}
-
-
-def _ratio(value, source, field):
-    """Inclination as a ratio: a number or a fraction such as '1/40'; None where none is given."""
-    if value is None:
-        return None
-    ratio = parse_ratio(value)
-    if math.isnan(ratio):
-        raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}")
-    if abs(ratio) > 0.2:
-        raise InputError(source, field, f"expected a ratio within 1/5, got {value!r}")
-    return ratio
-
-
-def _profile(data, kind, folder, source, inclination=None):
-    """The scene's wheel or rail profile; files count from the scene's folder."""
-    spec = data[kind]["profile"]
-    field = f"{kind}.profile"
-    if isinstance(spec, dict) and isinstance(spec.get("points"), str):
-        spec = {**spec, "points": str(_find(spec["points"], folder, source, f"{field}.points"))}
-    elif isinstance(spec, str) and Path(spec).suffix.lower() in POINT_FILES:
-        spec = str(_find(spec, folder, source, field))
-    try:
-        return named_profile(spec, kind, inclination)
-    except InputError as error:
-        if error.source in (kind, "profile"):  # not a fault inside a file: name the scene
-            named = f"{kind}.inclination" if error.field == "inclination" else field
-            raise InputError(source, named, error.expected) from None
-        raise
+    found = [str(find_file(name, folder, source, "track.irregularity.points").resolve()) for name in names]
+    return {**track, "irregularity": {**irregularity, "points": found[0] if isinstance(points, str) else found}}
 
 
 def announce(text):
@@ -280,6 +244,9 @@ def compile_scene(
             float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"]),
+            _once(shared, "geometries", parts, lambda: pair_geometries(
+                scene.pairs, scene.track, vehicle.half_distance
+            )),
         ),
         vehicle.elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
@@ -303,7 +270,7 @@ def _once(shared, name, key, make):
 
 def _parts(scene):
     """What a scene is made of, by identity."""
-    return tuple(_Same(part) for part in (scene.vehicle, scene.wheel, scene.rail, scene.track))
+    return tuple(_Same(part) for part in (scene.vehicle, scene.wheel, scene.rail, scene.track, scene.pairs))
 
 
 class _Same:

@@ -13,12 +13,12 @@ import numpy as np
 
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
-from wrcore.contact.statics import settle
+from wrcore.contact.statics import settle, settle_apart
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
 from wrcore.dynamics.equilibrium import FRICTIONLESS, Equilibrium, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
-from wrcore.dynamics.system import Equations, state_size
+from wrcore.dynamics.system import Equations, independent_at, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
@@ -60,7 +60,7 @@ def rest(scene, model):
         If there is none near the nominal position.
     """
     vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
-    unit = vehicle.unit
+    unit = None if model.contact.geometries else vehicle.unit
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
@@ -77,7 +77,10 @@ def rest(scene, model):
                 raise InputError(
                     scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 )
-            state[at + 2] = _settled(scene, model, 0.0, 0.0, load)[1]
+            k = int(np.flatnonzero(wheelsets == body)[0])
+            roll, state[at + 2] = _settled(scene, model, k, 0.0, 0.0, load)
+            if contact.geometries:
+                state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
     try:
         equilibrium = solve_equilibrium(level, state)
@@ -112,8 +115,8 @@ def static_equilibrium(scene, model):
     """
     at_rest = rest(scene, model)
     state = _moving_ahead(model, at_rest)
-    for body in scene.vehicle.bodies.wheelsets:
-        _roll_as_it_stands(scene, model, state[STATE_SIZE * body : STATE_SIZE * (body + 1)])
+    for k in range(len(model.bodies.wheelsets)):
+        _roll_as_it_stands(scene, model, k, state)
     return dataclasses.replace(at_rest, state=state)
 
 
@@ -124,30 +127,42 @@ def _moving_ahead(model, at_rest):
     return state
 
 
-def _roll_as_it_stands(scene, model, part):
-    """Let a wheelset roll without slip in the pose that its part of the state holds."""
+def _roll_as_it_stands(scene, model, k, state):
+    """Let the k-th wheelset roll without slip in its pose in the state, independent wheels each by itself."""
+    body = model.bodies.wheelsets[k]
+    part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
     roll, _, yaw = angles(part[3:7])
-    part[10:13] = _rolling(scene, model, part[1], part[2], float(roll), float(yaw))
+    left, right = _radii(scene, model, k, part[1], part[2], float(roll), float(yaw))
+    radius = sum(left + right) / len(left + right)
+    part[10:13] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
+    for j in np.flatnonzero(model.bodies.independent[:, 0] == k):
+        half = 0.5 * (len(left) / sum(left) - len(right) / sum(right)) if left and right else 0.0
+        state[independent_at(model.bodies, j)] = model.speed * half
 
 
-def _rolling(scene, model, y, z, roll, yaw):
-    """Angular velocity (rad/s, track axes) of a wheelset in some pose that rolls at the scene's speed without slip."""
+def _geometries(model, k):
+    """`ContactGeometry` of the left and the right wheel of the k-th wheelset."""
+    return model.contact.geometries[2 * k : 2 * k + 2] or (model.contact.geometry,) * 2
+
+
+def _radii(scene, model, k, y, z, roll, yaw):
+    """Rolling radii (m) of the left and the right wheel's patches, for the k-th wheelset in some pose."""
     detection = "planar" if scene.detection == "planar" else "spatial"
-    patches = detect(
-        model.contact.geometry, y, z, roll, yaw, detection, "maximum" if model.contact.reduction == 0 else "moment"
-    )
-    radius = sum(z - patch.z_m for patch in patches) / len(patches)
-    return rotation(roll, yaw)[:, 1] * model.speed / radius
+    reduction = "maximum" if model.contact.reduction == 0 else "moment"
+    sides = dict(zip(("left", "right"), _geometries(model, k), strict=True))
+    found = {id(one): detect(one, y, z, roll, yaw, detection, reduction) for one in sides.values()}
+    return [[z - patch.z_m for patch in found[id(one)] if patch.side == side] for side, one in sides.items()]
 
 
-def _settled(scene, model, y, yaw, load):
-    """Roll and height of a wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
+def _settled(scene, model, k, y, yaw, load):
+    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
     contact = model.contact
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
-    roll, z = settle(
-        Handle(contact.geometry), contact.hertz, modulus, y, yaw, scene.detection != "planar", contact.reduction, load,
-        scene.vehicle.rolling_radius,
-    )  # fmt: skip
+    spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
+    if sides[0] is sides[1]:
+        roll, z = settle(Handle(sides[0]), contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
+    else:
+        roll, z = settle_apart(sides, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
     if not math.isfinite(z):
         raise InputError(
             scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
@@ -180,9 +195,9 @@ def initial_state(scene, model, at_rest=None):
     for k, body in enumerate(vehicle.bodies.wheelsets):
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         if y or yaw:
-            roll, z = _settled(scene, model, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
+            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
-        _roll_as_it_stands(scene, model, part)
+        _roll_as_it_stands(scene, model, k, state)
     if y or yaw:
         for body, name in enumerate(vehicle.body_names):
             state[STATE_SIZE * body + 1] += y * (vehicle.data["bodies"][name]["kind"] == "body")
@@ -221,7 +236,7 @@ def _steady(vehicle, model, state):
 
     The vehicles of a train do not act on each other: the first one's is that of all.
     """
-    unit = vehicle.unit
+    unit = None if model.contact.geometries else vehicle.unit
     if unit is not None:
         size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
         first = np.concatenate([state[: size - own], state[STATE_SIZE * len(vehicle.body_names) :][:own]])

@@ -19,7 +19,7 @@ GRAVITY = 9.81
 """m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
 
 BODY_KEYS = {
-    "wheelset": (("rolling_radius", "tape_circle_half_distance"), ()),
+    "wheelset": (("rolling_radius", "tape_circle_half_distance"), ("independent_wheels",)),
     "body": ((), ()),
     "axle_box": (("wheelset",), ()),
 }
@@ -122,11 +122,7 @@ def compile_vehicle(data, source):
     parts = [data["bodies"][name] for name in layout.names]
     wheelsets = np.flatnonzero(layout.spins)
     wheelsets = wheelsets[np.argsort(-layout.positions[wheelsets, 0], kind="stable")]  # numbered from the front
-    bodies = Bodies(
-        layout.mass,
-        np.array([[part["inertia"][k] for k in ("roll", "pitch", "yaw")] for part in parts], float),
-        layout.spins.astype(np.int64), wheelsets,
-    )  # fmt: skip
+    apart = [k for k, body in enumerate(wheelsets) if parts[body].get("independent_wheels")]
     first = parts[wheelsets[0]] if wheelsets.size else {}
     joints = data["joints"] + [
         {"name": name, "kind": "revolute", "bodies": [part["wheelset"], name], "axis": "y",
@@ -135,10 +131,17 @@ def compile_vehicle(data, source):
         for name, part in zip(layout.names, parts, strict=True) if part["kind"] == "axle_box"
     ]  # fmt: skip
     compiled = _joints(joints, layout, source)
+    elements = compile_elements(data["elements"], layout, joints, GRAVITY)
+    own = np.stack((np.array(apart, np.int64), elements.states + np.arange(len(apart))), axis=-1)
+    bodies = Bodies(
+        layout.mass,
+        np.array([[part["inertia"][k] for k in ("roll", "pitch", "yaw")] for part in parts], float),
+        layout.spins.astype(np.int64), wheelsets, own,
+    )  # fmt: skip
     return Vehicle(
         data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
         float(first.get("tape_circle_half_distance", np.nan)), bodies,
-        compile_elements(data["elements"], layout, joints, GRAVITY), compiled, data,
+        elements._replace(states=elements.states + len(apart)), compiled, data,
     )  # fmt: skip
 
 

@@ -1,0 +1,280 @@
+"""What changes along a path: curvature, cant, height and widening as cubics between breaks.
+
+A quantity goes from one knot's value to the next in one of three shapes over u = 0 to 1:
+
+    linear   u                     curvature: a clothoid
+    bloss    3 u^2 - 2 u^3         the cubic Hermite blend of its ends
+    cosine   (1 - cos pi u)/2      as a C2 cubic spline of `COSINE_CELLS` cells, within 3e-9 of the change
+
+Linear ramps meet with corners, which are rounded: each one is replaced by its mean under a hat of the rounding length.
+The other shapes begin and end level, without a corner; there the second derivative jumps, as their definitions have it.
+
+References
+----------
+EN 13803, Track alignment design parameters, annex on transition curves (clothoid, Bloss, cosine).
+"""
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+STEEPEST = {"linear": 1.0, "bloss": 1.5, "cosine": 0.5 * math.pi}
+"""Shapes, and their largest slope over the mean one."""
+
+COSINE_CELLS = 128
+
+
+@cache
+def blend(shape):
+    """Piecewise cubic from 0 to 1 over 0 to 1 (`scipy.interpolate.PPoly`) of a shape other than linear."""
+    from scipy.interpolate import CubicHermiteSpline, CubicSpline  # not needed where ramps are linear
+
+    if shape == "bloss":
+        return CubicHermiteSpline([0.0, 1.0], [0.0, 1.0], [0.0, 0.0])
+    u = np.linspace(0.0, 1.0, COSINE_CELLS + 1)
+    return CubicSpline(u, 0.5 - 0.5 * np.cos(math.pi * u), bc_type="clamped")
+
+
+class Broken(NamedTuple):
+    """A piecewise linear function, constant outside its knots."""
+
+    knots: np.ndarray
+    values: np.ndarray
+
+    def slopes(self):
+        """Slope before each knot and after the last, (k + 1,)."""
+        return np.concatenate(([0.0], np.diff(self.values) / np.diff(self.knots), [0.0]))
+
+    def corners(self):
+        """Arc lengths and slope jumps of the corners."""
+        jumps = np.diff(self.slopes())
+        real = np.abs(jumps) > 1e-15
+        return self.knots[real], jumps[real]
+
+    def line(self, s):
+        """Value at s and slope of the straight part around s."""
+        return np.interp(s, self.knots, self.values), self.slopes()[np.searchsorted(self.knots, s)]
+
+    def integral(self, s):
+        """Integral from the first knot to s."""
+        i = max(np.searchsorted(self.knots, s) - 1, 0)
+        means = 0.5 * (self.values[1:] + self.values[:-1])
+        rest = 0.5 * (self.values[i] + self.line(s)[0]) * (s - self.knots[i])
+        return np.dot(means[:i], np.diff(self.knots)[:i]) + rest
+
+    def taylor(self, s, half):
+        """Taylor coefficients (4,) about s of the function whose corners are rounded over +-half."""
+        at, jumps = self.corners()
+        near = np.abs(at - s) < half
+        if not near.any():
+            return np.array([*self.line(s), 0.0, 0.0])
+        first = at[near][0]
+        slope = self.slopes()[np.searchsorted(self.knots, first)]
+        coefficients = np.array([np.interp(first, self.knots, self.values) + slope * (s - first), slope, 0.0, 0.0])
+        for corner, jump in zip(at[near], jumps[near], strict=True):
+            coefficients += jump * rounded_ramp(s - corner, half)
+        return coefficients
+
+
+def rounded_ramp(x, half):
+    """Taylor coefficients of max(x, 0), rounded over +-half (its mean weighted by a hat function)."""
+    return _rounding(x, half) + (np.array([x, 1.0, 0.0, 0.0]) if x > 0.0 else 0.0)
+
+
+def _rounding(x, half):
+    """What rounding adds to max(x, 0), within +-half."""
+    r = half - abs(x)
+    sign = -1.0 if x > 0.0 else 1.0
+    return np.array([r**3, sign * 3.0 * r**2, 3.0 * r, sign]) / (6.0 * half**2)
+
+
+class Change(NamedTuple):
+    """What a quantity changes by over one segment in a shape other than linear.
+
+    Before ``crossing`` it follows ``size`` times the shape, after it ``size_after`` times the shape, towards ``total``:
+    the fold of a height whose cant changes sign, rounded like a corner.
+    """
+
+    start: float
+    length: float
+    shape: str
+    size: float
+    total: float
+    crossing: float = math.inf
+    size_after: float = 0.0
+
+    def breaks(self, half):
+        """Arc lengths at which the cubic changes."""
+        fold = self.crossing + half * np.array([-1.0, 0.0, 1.0])
+        return np.concatenate((self.start + self.length * blend(self.shape).x, fold[np.isfinite(fold)]))
+
+    def taylor(self, s, half):
+        """Taylor coefficients (4,) about s."""
+        u = (s - self.start) / self.length
+        if u <= 0.0:
+            found = np.zeros(4)
+        elif u >= 1.0:
+            found = np.array([self.total, 0.0, 0.0, 0.0])
+        else:
+            found = np.array([blend(self.shape)(u, n) / (self.length**n * math.factorial(n)) for n in range(4)])
+            found = self.size * found if s < self.crossing else self.size_after * (found - np.eye(4)[0])
+            found[0] += self.total if s >= self.crossing else 0.0
+        if abs(s - self.crossing) < half:
+            steepness = blend(self.shape)((self.crossing - self.start) / self.length, 1) / self.length
+            found += (self.size_after - self.size) * steepness * _rounding(s - self.crossing, half)
+        return found
+
+    def integral(self, s):
+        """Integral up to s of a change without a fold."""
+        u = (s - self.start) / self.length
+        inner = float(blend(self.shape).antiderivative()(min(max(u, 0.0), 1.0)))
+        return self.size * self.length * (inner + max(u - 1.0, 0.0))
+
+
+class Ramps(NamedTuple):
+    """A quantity along the path: linear ramps, whose corners are rounded over +-half, and other changes."""
+
+    linear: Broken
+    changes: tuple
+    half: float
+
+    def breaks(self):
+        """Arc lengths at which the cubic changes."""
+        corners = [self.linear.corners()[0] + shift for shift in (-self.half, 0.0, self.half)]
+        return np.concatenate([*corners, *(change.breaks(self.half) for change in self.changes)])
+
+    def taylor(self, s):
+        """Taylor coefficients (4,) about s."""
+        return sum((change.taylor(s, self.half) for change in self.changes), self.linear.taylor(s, self.half))
+
+    def integral(self, s):
+        """Integral from the first knot to s."""
+        return sum((change.integral(s) for change in self.changes), self.linear.integral(s))
+
+
+def ramps(knots, values, shapes, half):
+    """The ramps between values at knots.
+
+    Parameters
+    ----------
+    knots, values : (k,) ndarray
+    shapes : sequence of str
+        Of the k - 1 segments, see `STEEPEST`.
+    half : float
+        Half the rounding length of corners, m; 0: corners stay.
+
+    Returns
+    -------
+    Ramps
+    """
+    changes = [
+        Change(knots[i], knots[i + 1] - knots[i], shapes[i], size, size)
+        for i, size in enumerate(np.diff(values))
+        if shapes[i] != "linear" and size != 0.0
+    ]
+    return Ramps(Broken(knots, values - _others(values, shapes)), tuple(changes), half)
+
+
+def height(knots, cant, raised, shapes, half):
+    """Height of the centre line, from its values ``raised`` at the knots.
+
+    Between knots it changes with the cant. Where this changes sign, the rail that keeps its height is another one
+    before and after: the height goes by way of zero.
+    """
+    shapes = list(shapes)
+    crossed = cant[:-1] * cant[1:] < 0.0
+    linear = np.array([shape == "linear" for shape in shapes])
+    i = np.flatnonzero(crossed & linear)
+    zeros = knots[i] + np.diff(knots)[i] * cant[i] / (cant[i] - cant[i + 1])
+    order = np.argsort(np.concatenate((knots, zeros)))
+    others = _others(raised, shapes)
+    values = np.concatenate((raised - others, -others[i]))[order]
+    plain = ramps(knots, raised, shapes, half).changes
+    changes = tuple(_folded(change, knots, cant, raised) for change in plain)
+    changes += tuple(
+        _fold(k, knots, cant, raised, shapes[k])
+        for k in np.flatnonzero(crossed & ~linear & (np.diff(raised) == 0.0) & (raised[1:] != 0.0))
+    )
+    return Ramps(Broken(np.concatenate((knots, zeros))[order], values), changes, half)
+
+
+def _folded(change, knots, cant, raised):
+    """A change of height, folded if the cant changes sign in it."""
+    k = int(np.searchsorted(knots, change.start, side="right")) - 1
+    return _fold(k, knots, cant, raised, change.shape) if cant[k] * cant[k + 1] < 0.0 else change
+
+
+def _fold(k, knots, cant, raised, shape):
+    """The change of height in segment k, in which the cant changes sign."""
+    from scipy.optimize import brentq
+
+    length, change = knots[k + 1] - knots[k], cant[k + 1] - cant[k]
+    u = brentq(lambda u: cant[k] + change * blend(shape)(u), 0.0, 1.0, xtol=1e-15)
+    before, after = raised[k] / cant[k] * change, raised[k + 1] / cant[k + 1] * change
+    return Change(knots[k], length, shape, before, raised[k + 1] - raised[k], knots[k] + u * length, after)
+
+
+def _others(values, shapes):
+    """What shapes other than linear have added up to at each knot."""
+    steps = np.where([shape == "linear" for shape in shapes], 0.0, np.diff(values))
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+class Incline(NamedTuple):
+    """Height along gradients that vertical curves join: dz/ds is a broken line whose corners are rounded over +-half.
+
+    A vertical curve is a parabola: dz/ds is linear in the arc length. Rounded, its curvature begins and ends over the
+    rounding length instead of at once.
+    """
+
+    slope: Broken
+    half: float
+
+    def breaks(self):
+        """Arc lengths at which the cubic changes."""
+        at = self.slope.corners()[0]
+        return np.concatenate((at - self.half, at + self.half))
+
+    def taylor(self, s):
+        """Taylor coefficients (4,) of the height about s; 0 at s = 0 if the first gradient reaches there."""
+        first = self.slope.values[0]
+        found = np.array([first * s, first, 0.0, 0.0])
+        for corner, jump in zip(*self.slope.corners(), strict=True):
+            x = s - corner
+            r = x + self.half
+            if r > 2.0 * self.half:
+                found += jump * np.array([0.5 * x * x + self.half**2 / 6.0, x, 0.5, 0.0])
+            elif r > 0.0:
+                found += jump * np.array([r**3, 3.0 * r**2, 3.0 * r, 1.0]) / (12.0 * self.half)
+        return found
+
+
+def incline(lengths, gradients, radii, half):
+    """Height along gradients.
+
+    Parameters
+    ----------
+    lengths : (n,) array_like
+        Arc lengths from one change of gradient to the next, m; the first begins at 0, the last has no end.
+    gradients : (n,) array_like
+        Rise over horizontal distance.
+    radii : (n,) array_like
+        Of the vertical curve between each gradient and the one before it, m; it lies half to either side.
+    half : float
+        Half the rounding length, m.
+
+    Returns
+    -------
+    Incline
+    """
+    slopes = np.sin(np.arctan(np.asarray(gradients, float)))
+    reach = 0.5 * np.asarray(radii, float)[1:] * np.abs(np.diff(slopes))
+    changes = np.cumsum(np.asarray(lengths, float)[:-1])
+    real = reach > 0.0
+    knots = np.stack((changes - reach, changes + reach), axis=-1)[real].ravel()
+    values = np.stack((slopes[:-1], slopes[1:]), axis=-1)[real].ravel()
+    if not knots.size:
+        knots, values = np.array([0.0, 1.0]), np.full(2, slopes[0])
+    return Incline(Broken(knots, values), half)

@@ -1,0 +1,163 @@
+"""Profiles of wheels and rails, and which wheel of which wheelset has what where they differ."""
+
+import math
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from wrcore.contact.geometry import contact_geometry
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.standards import named_profile
+
+POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
+"""Endings by which a profile given as plain text is taken for a point file."""
+
+SIDES = ("left", "right")
+
+LARGEST_WEAR = 0.05
+"""Radii that differ by more than this from the vehicle's are taken for a mistake, m."""
+
+
+class Pair(NamedTuple):
+    """A wheel and its rail."""
+
+    wheel: ProfileCurve
+    rail: ProfileCurve
+    rolling_radius: float
+    """At the tape circle, m."""
+
+
+def find_file(path, folder, source, field):
+    """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
+    for base in (folder, folder.parent, Path()):
+        if os.path.isfile(base / path):  # Path.is_file raises where a name is too long or a folder is closed
+            return base / path
+    raise InputError(source, field, f"expected an existing file, got {path!r}")
+
+
+def wheel_and_rail(data, folder, source):
+    """The scene's wheel and rail profile, those of all wheels that are not said to differ.
+
+    Parameters
+    ----------
+    data : dict
+        The scene's content.
+    folder : Path
+        Files count from here.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    wheel, rail : ProfileCurve
+    """
+    wheel, rail = (_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))
+    return wheel, rail
+
+
+def own_pairs(data, vehicle, wheel, rail, folder, source):
+    """Wheel, rail and radius of each wheel of a scene.
+
+    Parameters
+    ----------
+    data : dict
+        The scene's content.
+    vehicle : Vehicle
+    wheel, rail : ProfileCurve
+        Of the wheels that are not said to differ.
+    folder : Path
+    source : str
+
+    Returns
+    -------
+    tuple of Pair
+        Left and right of wheelset after wheelset from the front; empty where all are the same.
+    """
+    single = data["wheel"].get("wheelsets", {})
+    unknown = sorted(set(single) - set(vehicle.wheelset_names))
+    if unknown:
+        expected = f"expected one of the wheelsets {', '.join(vehicle.wheelset_names)}"
+        raise InputError(source, f"wheel.wheelsets.{unknown[0]}", expected)
+    if not single and not any(side in data[kind] for kind in ("wheel", "rail") for side in SIDES):
+        return ()
+    sides = []
+    for side in SIDES:
+        pair = Pair(wheel, _rail_of(data["rail"], side, rail, folder, source), vehicle.rolling_radius)
+        sides.append(_wheel_of(data["wheel"].get(side, {}), f"wheel.{side}", pair, folder, source))
+    return tuple(
+        _wheel_of(single.get(name, {}).get(side, {}), f"wheel.wheelsets.{name}.{side}", pair, folder, source)
+        for name in vehicle.wheelset_names
+        for side, pair in zip(SIDES, sides, strict=True)
+    )
+
+
+def _rail_of(spec, side, rail, folder, source):
+    """The rail of one side; its inclination is that of both unless it has one of its own."""
+    if not spec.get(side):
+        return rail
+    both = {key: spec[key] for key in ("profile", "inclination") if key in spec}
+    return _profile({**both, **spec[side]}, "rail", f"rail.{side}", folder, source)
+
+
+def _wheel_of(spec, field, pair, folder, source):
+    """A pair with what is said to differ of its wheel."""
+    if "profile" in spec:
+        pair = pair._replace(wheel=_profile(spec, "wheel", field, folder, source))
+    radius = float(spec.get("rolling_radius", pair.rolling_radius))
+    if abs(radius - pair.rolling_radius) > LARGEST_WEAR:
+        expected = f"expected a radius within {LARGEST_WEAR:g} m of {pair.rolling_radius:g} m, got {radius:g}"
+        raise InputError(source, f"{field}.rolling_radius", expected)
+    return pair._replace(rolling_radius=radius)
+
+
+def pair_geometries(pairs, track, half_distance):
+    """`ContactGeometry` of each pair; equal pairs share one.
+
+    Parameters
+    ----------
+    pairs : sequence of Pair
+    track : Track
+    half_distance : float
+        Tape circle from the wheelset's centre, m.
+
+    Returns
+    -------
+    tuple of ContactGeometry
+    """
+    made = {}
+    for pair in pairs:
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius
+        if key not in made:
+            made[key] = contact_geometry(pair.wheel, pair.rail, track, pair.rolling_radius, half_distance)
+    return tuple(made[id(pair.wheel), id(pair.rail), pair.rolling_radius] for pair in pairs)
+
+
+def _ratio(value, source, field):
+    """Inclination as a ratio: a number or a fraction such as '1/40'; None where none is given."""
+    if value is None:
+        return None
+    ratio = parse_ratio(value)
+    if math.isnan(ratio):
+        raise InputError(source, field, f"expected a ratio such as 1/40, got {value!r}")
+    if abs(ratio) > 0.2:
+        raise InputError(source, field, f"expected a ratio within 1/5, got {value!r}")
+    return ratio
+
+
+def _profile(spec, kind, where, folder, source):
+    """The profile that the mapping under the key ``where`` names; files count from the scene's folder."""
+    field, profile = f"{where}.profile", spec["profile"]
+    inclination = _ratio(spec.get("inclination"), source, f"{where}.inclination") if kind == "rail" else None
+    if isinstance(profile, dict) and isinstance(profile.get("points"), str):
+        profile = {**profile, "points": str(find_file(profile["points"], folder, source, f"{field}.points"))}
+    elif isinstance(profile, str) and Path(profile).suffix.lower() in POINT_FILES:
+        profile = str(find_file(profile, folder, source, field))
+    try:
+        return named_profile(profile, kind, inclination)
+    except InputError as error:
+        if error.source in (kind, "profile"):  # not a fault inside a file: name the scene
+            named = f"{where}.inclination" if error.field == "inclination" else field
+            raise InputError(source, named, error.expected) from None
+        raise
