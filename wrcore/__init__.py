@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from wrcore.analysis.assess import Assessment as Assessment
     from wrcore.analysis.assess import assess as assess
     from wrcore.analysis.contact import contact_table as contact_table
+    from wrcore.analysis.damage import damage_table as damage_table
+    from wrcore.analysis.damage import plot_shakedown as plot_shakedown
     from wrcore.analysis.evolve import evolve as evolve
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
     from wrcore.analysis.local_wear import WheelWear as WheelWear
@@ -78,6 +80,7 @@ _PUBLIC = {
     "contact_table": "wrcore.analysis.contact",
     "creep_force": "wrcore.creep.cases",
     "critical_speeds": "wrcore.analysis.stability",
+    "damage_table": "wrcore.analysis.damage",
     "ensure_table": "wrcore.creep.table",
     "evolve": "wrcore.analysis.evolve",
     "first_touch": "wrcore.contact.first_touch",
@@ -95,6 +98,7 @@ _PUBLIC = {
     "plot_creep_force": "wrcore.analysis.plot_creep",
     "plot_pair": "wrcore.analysis.plot_contact",
     "plot_run": "wrcore.analysis.plot_run",
+    "plot_shakedown": "wrcore.analysis.damage",
     "run_sweep": "wrcore.sweep.batch",
     "simulate": "wrcore.run.simulate",
     "simulate_many": "wrcore.run.simulate",

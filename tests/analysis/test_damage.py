@@ -1,0 +1,50 @@
+"""Damage against the corners of its law, the index of surface fatigue against Hertz and the shakedown limit."""
+
+import numpy as np
+import pytest
+
+from tests.analysis.test_assess import synthetic
+from wrcore.analysis.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
+from wrcore.errors import InputError
+
+K = 300e6
+
+
+@pytest.fixture
+def run():
+    made = synthetic(lambda t, sign: (np.full_like(t, 8e4), np.zeros_like(t)), duration=0.1)
+    left = made.groups["wheelset/left"]
+    left["Fx_N"][:, 0], left["xi"][:, 0] = -2.4e4, 65.0 / 2.4e4
+    late = made.t >= 0.05
+    left["N_N"][late, 0], left["a_m"][late, 0] = 2e4, 8e-3
+    left["Fx_N"][late, 0] = -2e3
+    return made
+
+
+def test_corners_of_the_law():
+    np.testing.assert_allclose(rcf_damage([0, 15, 40, 65, 120, 175, 1e4]), [0, 0, 5e-6, 1e-5, 5e-6, 0, 0])
+
+
+def test_index_is_zero_on_the_limit_of_shakedown(run):
+    pressure = 1.5 * 8e4 / (np.pi * 5e-3**2)
+    assert utilised_friction(run, "wheelset", "left")[0] == pytest.approx(0.3)
+    assert fatigue_index(run, "wheelset", "left", K)[0] == pytest.approx(0.3 - K / pressure, rel=1e-12)
+    assert fatigue_index(run, "wheelset", "left", 0.3 * pressure)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_table_of_a_run(run):
+    table = damage_table(run).set_index("side")
+    assert table.loc["left", "rcf_damage_mean"] == pytest.approx(5e-6, rel=0.03)
+    assert table.loc["left", "share_above_shakedown"] == pytest.approx(0.5, abs=0.02)
+    assert table.loc["right", "rcf_damage_mean"] == 0.0 and table.loc["right", "share_above_shakedown"] == 0.0
+    assert table.loc["left", "T_gamma_mean_N"] == pytest.approx(0.5 * (65.0 + 2e3 * 65.0 / 2.4e4), rel=0.03)
+    assert damage_table(run, begin=0.05).set_index("side").loc["left", "FI_max"] < 0.0
+    with pytest.raises(InputError, match="channels of wheels"):
+        damage_table(run, begin=1.0)
+
+
+def test_map_holds_all_wheels_and_the_limit(run):
+    axes = plot_shakedown(run).axes[0]
+    assert len(axes.lines) == 3 and axes.get_ylim()[1] >= 5.0
+    friction, pressure = axes.lines[-1].get_data()
+    np.testing.assert_allclose(friction * pressure, 1.0)

@@ -1,0 +1,134 @@
+"""Rolling contact fatigue: damage by the wear number, and the index of surface fatigue on the shakedown map.
+
+Sources, recalled, not read. Damage per passage over T gamma, whole life rail model: Burstow (RSSB, 2003/2004): none
+below 15 N, most, 1e-5, at 65 N, none at 175 N, beyond which wear takes cracks away faster than they grow (0 here; the
+model's negative branch is left out). Index of surface fatigue: Ekberg, Kabo and Andersson, Fatigue and Fracture of
+Engineering Materials and Structures 25 (2002) 899-909: FI = |T|/N - 2 pi a b k/(3 N) = |T|/N - k/p_max, above 0 where
+the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24).
+"""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wrcore.analysis.motion import SIDES
+from wrcore.analysis.style import styled
+from wrcore.analysis.wheels import greatest_pressure, wear_number, wheelsets_of
+from wrcore.errors import InputError
+
+YIELD_IN_SHEAR = 300e6
+"""Of a wheel or rail steel that has hardened, Pa (chosen)."""
+
+BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)
+"""Whole life rail model: N, and damage per passage."""
+
+
+def rcf_damage(wear_number):
+    """Damage that a passage with a wear number does, 1e-5 at most.
+
+    Parameters
+    ----------
+    wear_number : array_like
+        T gamma, N.
+
+    Returns
+    -------
+    numpy.ndarray
+        Share of the life to the first cracks; 0 also where wear prevails.
+
+    Examples
+    --------
+    >>> rcf_damage([10.0, 40.0, 65.0, 120.0, 300.0]).tolist()
+    [0.0, 5e-06, 1e-05, 5e-06, 0.0]
+    """
+    return np.interp(wear_number, BREAKS, DAMAGE)
+
+
+def utilised_friction(run, wheelset, side):
+    """Largest |T|/N over a wheel's patches over time, shape (n,); 0 without contact."""
+    c = run[f"{wheelset}/{side}"]
+    share = np.hypot(c.Fx_N, c.Fy_N) / np.where(c.N_N > 0.0, c.N_N, np.nan)
+    return np.max(np.nan_to_num(share), axis=1)
+
+
+def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
+    """Index of surface fatigue FI of a wheel over time, shape (n,); -inf without contact.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+    shear_yield : float
+        k, Pa.
+    """
+    pressure = greatest_pressure(run, wheelset, side)
+    less = np.divide(shear_yield, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0.0)
+    return utilised_friction(run, wheelset, side) - less
+
+
+def damage_table(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
+    """Rolling contact fatigue of each wheel and the rail under it over a run.
+
+    Parameters
+    ----------
+    run : Run
+    begin : float
+        Start of the evaluation, s.
+    shear_yield : float
+        k, Pa.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share of the time with
+        FI above 0, p_max_Pa.
+
+    Raises
+    ------
+    InputError
+        For a run without wheels, or nothing after ``begin``.
+    """
+    if not wheelsets_of(run) or not np.any(run.t >= begin):
+        raise InputError("damage_table", "run", f"expected the channels of wheels after {begin:g} s")
+    late, rows = run.t >= begin, []
+    for wheelset in wheelsets_of(run):
+        for side in SIDES:
+            number = wear_number(run, wheelset, side)[late]
+            index = fatigue_index(run, wheelset, side, shear_yield)[late]
+            rows.append({
+                "wheelset": wheelset, "side": side, "T_gamma_mean_N": number.mean(),
+                "rcf_damage_mean": rcf_damage(number).mean(), "FI_max": index.max(),
+                "share_above_shakedown": np.mean(index > 0.0),
+                "p_max_Pa": greatest_pressure(run, wheelset, side)[late].max(),
+            })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+@styled
+def plot_shakedown(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
+    """Shakedown map: greatest pressure over k against utilised friction, all wheels and times.
+
+    Parameters
+    ----------
+    run, begin, shear_yield
+        As for `damage_table`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(5.2, 4.2), layout="constrained")
+    axes, late, top = figure.subplots(), run.t >= begin, 0.0
+    for wheelset in wheelsets_of(run):
+        for side, mark in zip(SIDES, ("o", "^"), strict=True):
+            pressure = greatest_pressure(run, wheelset, side)[late] / shear_yield
+            axes.plot(utilised_friction(run, wheelset, side)[late], pressure, mark, markersize=2.5, alpha=0.5,
+                      markeredgewidth=0.0, label=f"{wheelset.replace('_', ' ')}, {side}")  # fmt: skip
+            top = max(top, pressure.max())
+    friction = np.linspace(0.1, 0.6, 200)
+    axes.plot(friction, 1.0 / friction, "k-", label="shakedown limit of the surface")
+    axes.set(xlabel="utilised friction |T|/N", ylabel="greatest pressure over k", xlim=(0.0, 0.6),
+             ylim=(0.0, max(5.0, 1.1 * top)))  # fmt: skip
+    figure.legend(fontsize=7, ncols=3, loc="outside upper center")
+    return figure
