@@ -33,6 +33,8 @@ JOINTS = {
     "axle box named first": Joint("j", "revolute", (1, WHEELSET), [OFF_AXLE, ON_AXLE], axis=1),
     "wheelset in fixed bearings": Joint("j", "revolute", (FRAME, WHEELSET), [(0.1, 0.2, 0.3), ON_AXLE], axis=1),
     "revolute to the frame": Joint("j", "revolute", (0, FRAME), [OFF_AXLE, (0.1, 0.2, 0.3)], axis=1),
+    "no turn about y": Joint("j", "no_turn", (0, 1), [OFF_AXLE, (0.6, 0.1, -0.2)], axis=1),
+    "no turn about z against the frame": Joint("j", "no_turn", (FRAME, 0), [OFF_AXLE, (0.1, 0.2, 0.3)], axis=2),
     "rigid link": Joint("j", "rigid_link", (0, 1), [OFF_AXLE, (0.6, 0.1, -0.2)], length=1.3),
     "rigid link on a wheelset": Joint("j", "rigid_link", (WHEELSET, 0), [ON_AXLE, OFF_AXLE], length=0.4),
     "rigid link to the frame": Joint("j", "rigid_link", (FRAME, 0), [(0.1, 0.2, 0.3), OFF_AXLE], length=0.7),
@@ -188,3 +190,33 @@ def test_conical_pendulum_on_a_rigid_link(contact):  # noqa: F811
     result = run(model, state, 2 * math.pi / w)
     np.testing.assert_allclose(np.hypot(*result.states[:, :2].T), radius, atol=1e-7)
     np.testing.assert_allclose(result.states[-1, :3], (radius, 0, depth), atol=1e-7)
+
+
+def test_welded_bodies_move_as_one(contact):  # noqa: F811
+    # 1000 kg and 500 kg, 3 m apart, on a spring to the frame, against one body of 1500 kg on the same spring
+    first, second = np.array([300.0, 400.0, 500.0]), np.array([50.0, 80.0, 90.0])
+    whole = first + second + np.array([0.0, 3000.0, 3000.0])  # 1000 (1 m)^2 + 500 (2 m)^2
+    weld = [Joint("w", kind, (0, 1), [(-0.5, 0.2, 0.1), (2.5, 0.2, 0.1)], 1) for kind in ("no_turn", "revolute")]
+
+    def held(marker):
+        nothing = 0.0, 0.0, 0.0
+        return [((0, FRAME), (marker, (0.3, 0.8, 1.0)), (4e4, 5e4, 6e4), (20.0, 0.0, 0.0), nothing, nothing)]
+
+    pair = make_model(contact, [1000.0, 500.0], [first, second], held((0.2, 0.8, -0.3)))
+    pair = pair._replace(joints=build_joints(weld, pair.bodies.spins))
+    single = make_model(contact, [1500.0], [whole], held((1.2, 0.8, -0.3)))
+    turn, omega = (0.1, -0.05, 0.2), np.array([0.4, -0.3, 0.5])
+    A = matrix_of(body_state(angles=turn)[3:7])
+    centre, velocity = np.array([0.0, 0.1, 0.2]), np.array([0.3, -0.1, 0.2])
+    start = body_state(centre, turn, velocity, omega)
+    parts = [
+        body_state(centre + A @ arm, turn, velocity + np.cross(omega, A @ arm), omega)
+        for arm in ([1, 0, 0], [-2, 0, 0])
+    ]
+    one, both = run(single, start, 3.0), run(pair, np.concatenate(parts), 3.0)
+    arms = np.array([matrix_of(row[3:7])[:, 0] for row in one.states])
+    np.testing.assert_allclose(both.states[:, :3], one.states[:, :3] + arms, atol=2e-7)
+    np.testing.assert_allclose(both.states[:, 13:16], one.states[:, :3] - 2.0 * arms, atol=2e-7)
+    np.testing.assert_allclose(both.states[:, 3:7], one.states[:, 3:7], atol=2e-7)
+    assert np.ptp(one.states[:, 3]) > 0.05
+    assert pair.joints.equations == 6

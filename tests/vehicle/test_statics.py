@@ -139,3 +139,24 @@ def test_a_link_and_an_inclined_rod_carry_weight():
         "at": [[0, 0, 1], [-3**0.5, 0, 0]],
     }  # fmt: skip
     assert statics_of(bodies, [spring(["beam", "frame"], [0, 0, 1]), rod])["s0"] == pytest.approx(9e3, rel=1e-9)
+
+
+def test_a_welded_body_is_carried_like_a_part():
+    # the gate of above, welded: springs of the beam alone carry both, moments included
+    bodies = {"beam": ((0, 0, 1), 400.0), "gate": ((3, 0, 1), 100.0)}
+    weld = {"kind": "rigid", "bodies": ["beam", "gate"], "at": [2, 0, 1]}
+    shares = statics_of(bodies, [spring(["beam", "frame"], [x, y, 0.5]) for x in (1, -1) for y in (0.5, -0.5)], [weld])
+    assert shares["s0"] + shares["s1"] - shares["s2"] - shares["s3"] == pytest.approx(3 * 1e3, rel=1e-9)
+    assert sum(shares.values()) == pytest.approx(5e3, rel=1e-9)
+
+
+def test_a_wheelset_cannot_be_welded(trailer):
+    weld = {"name": "weld", "kind": "rigid", "bodies": ["wheelset_1", "bogie_1"], "at": [10.78, 0.0, 0.46]}
+    trailer["joints"] = [weld | {"at": element_at(trailer)}]
+    with pytest.raises(InputError, match="joints.weld.bodies: expected no wheelset"):
+        build_vehicle(trailer, "test", axle_boxes=False)
+
+
+def element_at(data):
+    """The centre of the first wheelset."""
+    return data["bodies"]["wheelset_1"]["position"]

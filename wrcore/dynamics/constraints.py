@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.joint import MOST_EQUATIONS, JointState, evaluate_joints, joint_state
+from wrcore.dynamics.joint import MOST_EQUATIONS, NO_TURN, JointState, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.vector import cross, dot, load, minus, store
 from wrcore.kernels.jit import FUSED, jit
@@ -185,8 +185,9 @@ def _assemble(joints, scratch, p, size):
         values.about[p, 0], scratch.inverse_inertia[i], scratch.mobile[p, 0],
         values.about[p, 1], scratch.inverse_inertia[j], scratch.mobile[p, 1], tile, size,
     )  # fmt: skip
-    for i in range(min(joints.size[p], 3)):  # the rows of S are unit vectors, perpendicular to each other
-        tile[i, i] += push
+    if joints.kind[p] != NO_TURN:
+        for i in range(min(joints.size[p], 3)):  # the rows of S are unit vectors, perpendicular to each other
+            tile[i, i] += push
     for i in range(joints.size[p], size):
         tile[i, i] = 1.0
     for i in range(size):

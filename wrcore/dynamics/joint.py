@@ -17,6 +17,8 @@ the blocks of D for the two bodies are D_i = [S, R_i] and D_j = -[S, R_j] in eve
     columns of body j's.  Phi_4 = e . a, Phi_4' = (w_i x e) . a + e . (w_j x a) = (w_i - w_j) . n with n = e x a.
     S = 0, R_i = R_j = n^T.  gamma_4 = -(w_i - w_j) . n'; with n' = (w_i x e) x a + e x (w_j x a) and W = w_i - w_j
     gamma_4 = -(W . e)(w_i . a) + (W . a)(w_j . e) + (W . W) Phi_4.  Phi_5 the same with b.
+*no_turn*: the bodies do not turn against each other about axis k: the equation above for e, column k + 1 of body i, and
+    a, column k + 2 of body j, alone.  S = 0. With a revolute joint about k it welds both bodies together.
 *rigid_link*: a rod without mass keeps the markers at the distance L; lambda is its tension.
     Phi = |d| - L, u = d / |d|.  S = u^T, R = (s x u)^T.  gamma = -u . c - (d' . d' - (u . d')^2) / |d|.
 
@@ -36,9 +38,12 @@ from wrcore.dynamics.vector import cross, dot, load, minus, store
 from wrcore.errors import InputError
 from wrcore.kernels.jit import jit
 
-COORDINATE, SPHERICAL, REVOLUTE, RIGID_LINK = 0, 1, 2, 3
-KINDS = {"coordinate": COORDINATE, "spherical": SPHERICAL, "revolute": REVOLUTE, "rigid_link": RIGID_LINK}
-EQUATIONS = {"coordinate": 1, "spherical": 3, "revolute": 5, "rigid_link": 1}
+COORDINATE, SPHERICAL, REVOLUTE, RIGID_LINK, NO_TURN = 0, 1, 2, 3, 4
+KINDS = {
+    "coordinate": COORDINATE, "spherical": SPHERICAL, "revolute": REVOLUTE, "rigid_link": RIGID_LINK,
+    "no_turn": NO_TURN,
+}  # fmt: skip
+EQUATIONS = {"coordinate": 1, "spherical": 3, "revolute": 5, "rigid_link": 1, "no_turn": 1}
 MOST_EQUATIONS = 5
 
 ON_AXLE = 1e-9
@@ -59,7 +64,8 @@ class Joint(NamedTuple):
     markers: np.ndarray
     """(2, 3): the joint's point in the axes of each body, m; for the frame, from its origin."""
     axis: int = 0
-    """coordinate: track axis. revolute: axis of both bodies, whose axes are parallel in nominal position. 0, 1, 2."""
+    """coordinate: track axis. revolute and no_turn: axis of both bodies, whose axes are parallel in nominal position.
+    0, 1, 2."""
     length: float = 0.0
     """Of a rigid link, m."""
 
@@ -137,6 +143,8 @@ def _checked(item, spins, field, source):
             raise InputError(source, f"{field}.bodies", "expected one wheelset at most in a revolute joint")
         if item.axis != 1:
             raise InputError(source, f"{field}.axis", "expected y, the axle, for a revolute joint of a wheelset")
+    if item.kind == "no_turn" and any(turns):
+        raise InputError(source, f"{field}.bodies", "expected no wheelset, which turns, in a rigid joint")
     for turn, marker in zip(turns, item.markers, strict=True):
         if turn and max(abs(marker[0]), abs(marker[2])) > ON_AXLE:
             raise InputError(source, f"{field}.at", "expected a point on the wheelset's axle")
@@ -243,6 +251,9 @@ def evaluate_joints(joints, t, speed, state, rotations, out):
                 axis = joints.axis[k]
                 _axis_row(rotations[i], rotations[j], axis, (axis + 1) % 3, wi, wj, k, 3, out)
                 _axis_row(rotations[i], rotations[j], axis, (axis + 2) % 3, wi, wj, k, 4, out)
+        elif kind == NO_TURN:
+            axis = joints.axis[k]
+            _axis_row(rotations[i], rotations[j], (axis + 1) % 3, (axis + 2) % 3, wi, wj, k, 0, out)
         else:
             along, curvature = out.along[k, 0], 0.0
             out.phi[k, 0] = distance[joints.axis[k]]

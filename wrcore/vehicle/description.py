@@ -242,5 +242,9 @@ def _joints(joints, layout, source):
                 raise InputError(source, f"{field}.at", "expected two points at least 1 mm apart")
             markers = [layout.marker(point, body, field) for point, body in zip(at[[0, -1]], bodies, strict=True)]
         axis = "xyz".index(item.get("axis", "x"))
-        items.append(Joint(item["name"], item["kind"], tuple(bodies), np.array(markers), axis, length))
+        if item["kind"] == "rigid":
+            kinds, axis = ("no_turn", "revolute"), 1
+        else:
+            kinds = (item["kind"],)
+        items += [Joint(item["name"], kind, tuple(bodies), np.array(markers), axis, length) for kind in kinds]
     return build_joints(items, layout.spins, source)

@@ -7,6 +7,19 @@ from wrcore.errors import InputError
 KEYS = {
     "spring_damper": (("at",), ("stiffness", "damping", "rotation_stiffness", "rotation_damping", "preload")),
     "shear_spring": (("at", "stiffness"), ("damping", "bending_stiffness", "preload")),
+    "air_spring": (
+        ("at", "effective_area", "volume"),
+        (
+            "reservoir",
+            "orifice_damping",
+            "orifice_exponent",
+            "area_change",
+            "polytropic_exponent",
+            "shear_stiffness",
+            "bending_stiffness",
+            "preload",
+        ),
+    ),
     "damper": (("at",), ("direction", "damping", "characteristic", "series_stiffness")),
     "friction": (("at", "direction", "force", "series_stiffness"), ()),
     "bump_stop": (("at", "direction"), ("characteristic", "gap", "stiffness")),
@@ -18,6 +31,7 @@ KEYS = {
 VECTORS = {
     "spring_damper": ("stiffness", "damping", "preload"),
     "shear_spring": ("stiffness", "damping", "preload"),
+    "air_spring": ("preload",),
 }
 """Keys with a value per axis; elsewhere the same key holds one number."""
 
@@ -38,6 +52,10 @@ def check_element(item, source):
             _check_quantity(item, key, f"{field}.{key}", source)
     if kind == "spring_damper" and not any(key in item for key in optional):
         raise InputError(source, field, f"expected one of {', '.join(optional)}")
+    if kind == "air_spring" and ("reservoir" in item) != ("orifice_damping" in item):
+        raise InputError(source, field, "expected both a reservoir and its orifice_damping, or neither")
+    if "orifice_exponent" in item and "reservoir" not in item:
+        raise InputError(source, f"{field}.orifice_exponent", "expected a reservoir")
     if kind == "damper":
         _check_damper(item, field, source)
     given = {key for key in ("characteristic", "gap", "stiffness") if key in item}

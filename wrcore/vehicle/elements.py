@@ -6,6 +6,8 @@ kind                      acts
 spring_damper             along the three axes of the second body, and against relative rotation about them
 shear_spring              like spring_damper at mid-height between its two ends, with a bending stiffness: the elastic
                           beam of shear force Q and end moments Q h/2 +- k_bend (relative rotation)
+air_spring                a shear_spring whose vertical stiffness is that of the air, on request with a reservoir behind
+                          an orifice, see `wrcore.vehicle.air_spring`
 damper                    along one direction (or linear along all three): linear or by a characteristic (force over
                           speed), on request in series with a spring (Maxwell), with the damper's displacement as own
                           state
@@ -21,8 +23,8 @@ import numpy as np
 from wrcore.dynamics import suspension
 from wrcore.dynamics.marker import FRAME
 from wrcore.errors import InputError
+from wrcore.vehicle.air_spring import inflated
 from wrcore.vehicle.element_data import end_points, rotational, single_elements
-from wrcore.vehicle.statics import preloads
 
 DIRECTIONS = {"x": 0, "y": 1, "z": 2, "line": suspension.LINE}
 
@@ -52,8 +54,7 @@ def compile_elements(items, layout, joints, gravity):
     Elements
     """
     springs, directed, turning = [], [], []
-    items = single_elements(items, layout)
-    found = preloads(items, layout, joints, gravity)
+    items, found = inflated(items, single_elements, layout, joints, gravity)
     for item in items:
         field = f"elements.{item['name']}"
         first, second = layout.ends(item, field)

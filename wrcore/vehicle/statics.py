@@ -147,5 +147,6 @@ def _constraints(item, layout):
     motion = _point_motion(first, at[0], layout) - _point_motion(second, at[-1], layout)
     if item["kind"] == "rigid_link":
         return ((at[0] - at[1]) / np.linalg.norm(at[0] - at[1]))[None, :] @ motion[:3]
-    turns = [k for k in range(3, 6) if item["kind"] == "revolute" and k != 3 + "xyz".index(item["axis"])]
+    free = {"revolute": {item.get("axis")}, "rigid": set()}.get(item["kind"], set("xyz"))
+    turns = [3 + k for k, axis in enumerate("xyz") if axis not in free]
     return motion[[0, 1, 2, *turns]]
