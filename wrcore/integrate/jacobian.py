@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.drive import drive_links, drive_state_bodies
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.integrate.engine import copy_into
@@ -32,6 +33,9 @@ DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 FINE_BELOW = 1e-3
 """Where creepages are divided by a least speed below this (m/s), differences of velocities shrink in proportion:
 friction saturates at creepages of some 1e-3, and a difference must not come near that."""
+
+USUAL = 0.3
+"""The same below this coefficient of friction."""
 
 MOMENT = 1e-7
 """Difference of time, s."""
@@ -86,7 +90,7 @@ def _links(model):
             joined[i] |= joined[j]
             for body in joined[i]:
                 joined[body] = joined[i]
-    for i, j in [*model.elements.pairs, *model.joints.bodies]:
+    for i, j in [*model.elements.pairs, *model.joints.bodies, *drive_links(model)]:
         if i != FRAME and j != FRAME:
             linked[i].add(int(j))
             linked[j].add(int(i))
@@ -99,14 +103,14 @@ def reached_bodies(model):
 
 
 def own_state_bodies(model):
-    """For each force element with a state of its own the set of bodies whose accelerations it enters or follows."""
+    """For each state of a force element or controller the set of bodies whose accelerations it enters or follows."""
     elements, joined = model.elements, _links(model)[0]
     bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
         for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
             if elements.law[k, 4] >= 0:
                 bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
-    return bodies
+    return bodies + [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
 
 
 def _groups(reach):
@@ -298,7 +302,7 @@ def refresh_jacobian(sweep, jacobian, t, state, rate, trial, slope, differences,
     axes = turn_of(jacobian)
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
-    fine = min(1.0, model.contact.least_speed / FINE_BELOW)
+    fine = min(1.0, model.contact.least_speed / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
     evaluations, strips = sweep.starts.shape[0], model.contact.strips.strips > 0
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses

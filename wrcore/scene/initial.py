@@ -14,11 +14,11 @@ import numpy as np
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle
-from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
-from wrcore.dynamics.equilibrium import FRICTIONLESS, Equilibrium, solve_equilibrium, stand_on_rails
+from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
-from wrcore.dynamics.system import Equations, state_size
+from wrcore.dynamics.system import Equations, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
@@ -59,14 +59,13 @@ def rest(scene, model):
     InputError
         If there is none near the nominal position.
     """
-    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
+    vehicle, wheelsets, model = scene.vehicle, scene.vehicle.bodies.wheelsets, undriven(model)
     unit = vehicle.unit
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
-    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
     track = TrackModel(True, model.track.path, model.track.irregularity)
-    level = model._replace(track=track, contact=contact, speed=REST_SPEED)
+    level = frictionless(model)._replace(track=track, speed=REST_SPEED)
     state = np.zeros(state_size(model))
     for body, position in enumerate(vehicle.positions):
         at = STATE_SIZE * body
@@ -83,7 +82,7 @@ def rest(scene, model):
         equilibrium = solve_equilibrium(level, state)
     except np.linalg.LinAlgError as error:
         raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
-    limit = LARGEST_REST_ON_STRIPS if contact.strips.strips else LARGEST_REST
+    limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
     if not (equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0)):
         raise InputError(
             scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
@@ -103,7 +102,8 @@ def static_equilibrium(scene, model):
     Returns
     -------
     Equilibrium
-        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
+        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip. Its state
+        is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`).
 
     Raises
     ------
@@ -159,7 +159,8 @@ def _settled(scene, model, y, yaw, load):
 def initial_state(scene, model, at_rest=None):
     """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
-    Where rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles.
+    Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
+    rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles.
 
     Parameters
     ----------
@@ -170,10 +171,11 @@ def initial_state(scene, model, at_rest=None):
 
     Returns
     -------
-    numpy.ndarray, shape (13 n + states,)
+    numpy.ndarray, shape (state_size(model),)
     """
     vehicle, data = scene.vehicle, scene.data
-    at_rest = at_rest or rest(scene, model)
+    at_rest, driven = at_rest or rest(scene, model), model
+    model = undriven(model)
     y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
     state = _moving_ahead(model, at_rest)
     level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
@@ -194,7 +196,7 @@ def initial_state(scene, model, at_rest=None):
         state = _with_axle_boxes(vehicle, state)
         for part, (s, _, _) in zip(_parts(vehicle, state), vehicle.positions, strict=True):
             part[:] = _on_path(model.track.path, s, part)
-    return state
+    return np.concatenate([state, np.zeros(own_states(driven) - own_states(model))])
 
 
 def _parts(vehicle, state):
