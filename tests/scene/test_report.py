@@ -33,5 +33,12 @@ def test_each_block_is_a_part_of_a_scene_that_runs(block):
 
 def test_each_key_is_in_the_report():
     drive = _schema("scene")["properties"]["drive"]["properties"]
-    keys = {*drive, *drive["controller"]["properties"], *drive["motors"]["items"]["properties"]}
+    initial = _schema("scene")["properties"]["initial"]["properties"]
+    keys = {
+        *initial,
+        *initial["bodies"]["additionalProperties"]["properties"],
+        *drive,
+        *drive["controller"]["properties"],
+        *drive["motors"]["items"]["properties"],
+    }
     assert [key for key in sorted(keys) if not re.search(rf"\b{key}\b", TEXT)] == []

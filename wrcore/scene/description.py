@@ -31,6 +31,7 @@ from wrcore.errors.checked_yaml import parse_ratio, parse_value, plain_tree, rea
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import Track, build_track
+from wrcore.scene.bodies import check_bodies
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
@@ -145,6 +146,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     data["track"] = validate(data["track"], "track", source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
+    check_bodies(data["initial"]["bodies"], vehicle, source)
     read_friction(data["contact"]["friction"], source)
     read_drive(data.get("drive"), vehicle, source)
     return Scene(data, source, vehicle, wheel, rail, track)

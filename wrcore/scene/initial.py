@@ -24,6 +24,7 @@ from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.track import rotation
 from wrcore.kernels.handles import Handle
+from wrcore.scene.bodies import put_bodies
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
@@ -160,7 +161,8 @@ def initial_state(scene, model, at_rest=None):
     """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
-    rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles.
+    rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
+    ``initial.bodies`` says of single bodies comes last and holds.
 
     Parameters
     ----------
@@ -176,7 +178,7 @@ def initial_state(scene, model, at_rest=None):
     vehicle, data = scene.vehicle, scene.data
     at_rest, driven = at_rest or rest(scene, model), model
     model = undriven(model)
-    y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
+    y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
     state = _moving_ahead(model, at_rest)
     level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
     for k, body in enumerate(vehicle.bodies.wheelsets):
@@ -190,13 +192,30 @@ def initial_state(scene, model, at_rest=None):
             state[STATE_SIZE * body + 1] += y * (vehicle.data["bodies"][name]["kind"] == "body")
     else:
         state = _steady(vehicle, level, state)
+    if moved:
+        _move(scene, model, moved, at_rest, state)
     state = _balanced(vehicle, level, state)
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
         state = _with_axle_boxes(vehicle, state)
-        for part, (s, _, _) in zip(_parts(vehicle, state), vehicle.positions, strict=True):
-            part[:] = _on_path(model.track.path, s, part)
+    put_bodies(moved, vehicle, state)
+    if not model.track.tangent:
+        for name, part, (s, _, _) in zip(vehicle.body_names, _parts(vehicle, state), vehicle.positions, strict=True):
+            part[:] = _on_path(model.track.path, moved.get(name, {}).get("x", s), part)
     return np.concatenate([state, np.zeros(own_states(driven) - own_states(model))])
+
+
+def _move(scene, model, moved, at_rest, state):
+    """Put bodies where the scene wants them; wheelsets that are moved stand on the rails, and all still roll."""
+    for k, body in enumerate(scene.vehicle.bodies.wheelsets):
+        part, own = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
+        if own.keys() & {"y", "yaw"}:
+            y, yaw = own.get("y", part[1]), own.get("yaw", float(angles(part[3:7])[2]))
+            roll, z = _settled(scene, model, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
+            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
+            _roll_as_it_stands(scene, model, part)
+        part[10:13] *= own.get("vx", part[7]) / part[7]
+    put_bodies(moved, scene.vehicle, state)
 
 
 def _parts(vehicle, state):
