@@ -166,17 +166,29 @@ SHORT = 0.004
 """Duration of the runs, s."""
 
 
+FRICTION = {"left": 0.3, "right": {"arc_length": [0.0, 1.0], "mu": [0.3, 0.2]}, "falling": {"ratio": 0.4, "decay": 0.6}}
+DRIVE = {
+    "motors": [{"name": "motor", "bodies": ["wheelset", "frame"]}],
+    "brakes": [{"name": "brake", "bodies": ["wheelset", "frame"], "torque": {"time": [0, 1], "torque": [1.0, 2.0]}}],
+    "controller": {
+        "body": "wheelset", "speed": {"arc_length": [0.0, 1.0], "speed": [20.0, 21.0]}, "proportional": 1e3,
+        "integral": 10.0, "limit": 1e3, "brake_limit": 0.0,
+    },
+}  # fmt: skip
+
+
 @cache
 def base_scene():
     """A scene that is over in no time, with every key that a scene can have."""
     data = read_yaml(SCENES / "suspended_wheelset.yaml")
-    data["contact"] |= {"creep": {"model": "she", "least_speed": 1e-3}, "friction": 0.3, "detection_tolerance": 1e-7}
+    data["contact"] |= {"creep": {"model": "she", "least_speed": 1e-3}, "detection_tolerance": 1e-7}
+    data["contact"] |= {"friction": FRICTION}
     data["contact"] |= {"material": {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}}
     data["integration"] |= {"duration": SHORT, "rtol": 1e-3, "longest_step": 0.01, "step": 0.0, "method": "tsit5"}
     data["integration"] |= {"baumgarte": {"alpha": 5.0, "beta": 5.0}}
     data["output"] = {"rate": 500, "channels": ["pose", "velocity", "contact"]}
-    data["initial"] = {"y": 0.001, "yaw": 0.0}
-    return data
+    data["initial"] = {"y": 0.001, "yaw": 0.0, "bodies": {"wheelset": {"vy": 0.01, "x": 0.0, "roll": 1e-4}}}
+    return data | {"drive": DRIVE}
 
 
 def bounded(data):

@@ -73,7 +73,7 @@ def test_force_of_two_half_ellipses_against_the_solution_on_strips(psi, creepage
     model, _ = compile_scene(wr.load_scene(SCENE, SDEC))
     speed, (xi, eta, phi), row = 20.0, creepages, np.zeros(PATCH_COLUMNS)
     row[[Z, PENETRATION, CURVATURE_X, CURVATURE_Y, COSINE]] = -0.46, 6e-5, 1.1, 1.4, 1.0
-    motion = speed, eta * speed, 0.0, 0.0, (1.0 - xi) * speed / 0.46, phi * speed, 0.0, 0.0
+    motion = speed, eta * speed, 0.0, 0.0, (1.0 - xi) * speed / 0.46, phi * speed, 0.0, 0.0, 0.3
     patch_wrench(Handle(model.contact), 0.0, 0.0, *motion, row, psi)
     a, b, load, limit = row[SEMI_A], row[SEMI_B], row[NORMAL], 0.3 * row[NORMAL]
     edges = np.linspace(-1.0, 1.0, 25) * b + 0.25 * b * psi  # the middle, seen from the load's centroid

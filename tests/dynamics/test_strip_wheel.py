@@ -87,6 +87,7 @@ def test_the_grid_gives_the_same_forces(exact):
     place[:3] = state[1], state[2], 1.0
     place[3], place[4] = row[columns.COSINE], row[columns.SINE]
     place[5] = row[columns.X]
+    place[11] = model.contact.friction
     place[6], place[7] = row[columns.Y] - model.contact.geometry.rail_distance, row[columns.Z]
     solve_on_grid(Handle(model.contact), work.motions[0, 0], place)
     limit = model.contact.friction * row[columns.NORMAL]

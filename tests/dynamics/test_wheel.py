@@ -25,7 +25,7 @@ def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
     v, w = np.array([20.0, 0.03, -0.01]), np.array([0.02, 43.6, 0.05])
     axle = rotation(roll, yaw)[:, 1]
     z = next(z for z in np.arange(0.4625, 0.4590, -2e-5) if _loaded(model, side, y, z, axle))
-    wrench, rows, _ = one_wheel(model, [side, y, z, *axle, *v, *w, 0.0, 0.0])
+    wrench, rows, _ = one_wheel(model, [side, y, z, *axle, *v, *w, 0.0, 0.0, 0.3])
     assert len(rows) >= 1
     force, moment = np.zeros(3), np.zeros(3)
     for row in rows:
@@ -67,7 +67,7 @@ def one_wheel(model, motion):
 
 
 def _loaded(model, side, y, z, axle):
-    return one_wheel(model, [side, y, z, *axle, 20.0, 0, 0, 0, 43.6, 0, 0.0, 0.0])[0][2] > 4e4
+    return one_wheel(model, [side, y, z, *axle, 20.0, 0, 0, 0, 43.6, 0, 0.0, 0.0, 0.3])[0][2] > 4e4
 
 
 @pytest.mark.parametrize("detection", ["spatial", "planar", "auto"])
@@ -88,6 +88,7 @@ def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
             *(rng.normal(size=3) * 0.1 + [0, 43.6, 0]),
             1e-3,
             1e-4,
+            0.3,
         )
     motions = motions.reshape(20, 2, MOTION_COLUMNS)
     patches = np.zeros((20, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))

@@ -9,6 +9,7 @@ from wrcore.contact.geometry import contact_geometry
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import load_scene
+from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import Pair
 
 METHODS = ("exact", "grid")
@@ -105,6 +106,7 @@ def _of_scene(source, side):
     """The same of a scene: of the first wheelset, if its wheels differ from others."""
     scene = load_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
+    friction = read_friction(contact["friction"], scene.source).largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
     own = dict(zip(SIDES, scene.pairs, strict=False)).get(side, Pair(scene.wheel, scene.rail, vehicle.rolling_radius))
@@ -112,5 +114,5 @@ def _of_scene(source, side):
     detection = "planar" if scene.detection == "planar" else "spatial"
     load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])
     return geometry, {**contact["material"], "detection": detection}, {
-        "load": load, "speed": scene.data["speed"] or 1.0, "mu": contact["friction"],
+        "load": load, "speed": scene.data["speed"] or 1.0, "mu": friction,
     }  # fmt: skip

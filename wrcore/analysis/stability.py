@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 from wrcore.analysis.modes import NEUTRAL, energy_table, linear_modes, shape_table
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
+from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError, check_number
 from wrcore.scene.description import compile_scene, static_equilibrium
@@ -33,10 +34,11 @@ def straight_ahead(scene):
     Returns
     -------
     model : Model
+        Without motors, brakes and controller: they have no steady state.
     state : numpy.ndarray
     """
     model, _ = compile_scene(scene)
-    return model, static_equilibrium(scene, model).state
+    return undriven(model), static_equilibrium(scene, model).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):

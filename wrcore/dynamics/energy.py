@@ -3,7 +3,7 @@
 Sorted by what they do to the energy E = kinetic + gravitational + springs + elastic contact, the forces of the
 equations of motion have the powers
 
-    E' = P_frame + P_joints - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
+    E' = P_frame + P_joints + P_motors - P_brakes - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
 
 The rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
 
@@ -21,10 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import FRICTIONLESS
+from wrcore.dynamics.drive import BRAKE, undriven
+from wrcore.dynamics.equilibrium import frictionless
 from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.suspension import (
     DISPLACEMENT,
     LINE,
@@ -45,6 +46,9 @@ CHANNELS = (
     "dissipated_by_contact_damping_W", "stored_by_springs_W", "stored_by_gravity_W", "stored_by_elastic_contact_W",
 )  # fmt: skip
 """Names of the channels: stores, inputs, losses, and the powers that go into the stores."""
+
+DRIVE_CHANNELS = ("input_by_motors_W", "dissipated_by_brakes_W")
+"""Further ones where a scene has motors or brakes."""
 
 
 class EnergyBalance(NamedTuple):
@@ -261,8 +265,9 @@ def energy_channels(model, work, times, states):
         powers in W.
     """
     times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
-    touching = model._replace(elements=pack_elements(), joints=model.joints._replace(equations=0), gravity=0.0)
-    smooth = touching._replace(contact=model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"]))
+    loose = model.joints._replace(equations=0)
+    touching = undriven(model)._replace(elements=pack_elements(), joints=loose, gravity=0.0)
+    smooth = frictionless(touching)
     undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
     begin, parts = work.arc_lengths.copy(), []
     for variant in (model, touching, smooth, undamped):
@@ -272,12 +277,22 @@ def energy_channels(model, work, times, states):
     work.arc_lengths[:] = begin
     rows = _energies(times, states, Equations(model, work).arguments, model, work)
     kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
+    work.arc_lengths[:] = begin
+    drives = _drive_powers(model, work, times, states) if len(model.drive.rows) else {}
     work.counters[1] = outside
     elastic = -0.5 * (1.0 + model.contact.damping) * hertz
-    joints = whole + rise - contact - (driven - stretching - damped)
+    torques = sum(drives[name] * (1.0 if name.startswith("input") else -1.0) for name in drives)
+    joints = whole + rise - contact - (driven - stretching - damped) - torques
     rows = (kinetic, height, stored, pressed, driven, joints, damped, normal - contact, -normal - elastic,
             stretching, rise, elastic)  # fmt: skip
-    return dict(zip(CHANNELS, rows, strict=True))
+    return dict(zip(CHANNELS, rows, strict=True)) | drives
+
+
+def _drive_powers(model, work, times, states):
+    """Channels `DRIVE_CHANNELS`."""
+    torques, rates, _ = drive_history(model, work, times, states)
+    powers, brakes = torques * rates, model.drive.rows[:, 3] == BRAKE
+    return dict(zip(DRIVE_CHANNELS, (powers[:, ~brakes].sum(axis=1), -powers[:, brakes].sum(axis=1)), strict=True))
 
 
 def energy_balance(channels, times):
@@ -300,11 +315,12 @@ def energy_balance(channels, times):
         return cumulative_simpson(channels[name], x=times, initial=0.0)
 
     stores = sum(channels[name] - channels[name][0] for name in ("kinetic_J", "gravitational_J", "springs_J"))
-    losses = sum(gone(name) for name in CHANNELS if name.startswith("dissipated"))
-    inputs = sum(gone(name) for name in CHANNELS if name.startswith("input"))
+    losses = sum(gone(name) for name in channels if name.startswith("dissipated"))
+    inputs = sum(gone(name) for name in channels if name.startswith("input"))
     contact = gone("stored_by_elastic_contact_W")
-    powers = np.array([channels[name] for name in CHANNELS if name.endswith("_W")])
-    kinetic = -powers[2:].sum(axis=0) + powers[:2].sum(axis=0)
+    names = [name for name in channels if name.endswith("_W")]
+    powers = np.array([channels[name] for name in names])
+    kinetic = np.array([1.0 if name.startswith("input") else -1.0 for name in names]) @ powers
     turned_over = 0.5 * cumulative_simpson(np.abs(powers).sum(axis=0) + np.abs(kinetic), x=times, initial=0.0)
     remainder = channels["elastic_contact_J"] - channels["elastic_contact_J"][0] - contact
     return EnergyBalance(turned_over, stores + contact + losses - inputs, remainder)

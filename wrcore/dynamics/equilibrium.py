@@ -13,8 +13,9 @@ import numpy as np
 from wrcore.contact import reduction
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.schedule import pack_schedules
 from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Equations
+from wrcore.dynamics.system import Equations, own_states
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path
 
@@ -70,6 +71,12 @@ def displaced(state, model, displacement):
     return out
 
 
+def frictionless(model):
+    """The model with next to no friction anywhere, in the creep law that costs least."""
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    return model._replace(contact=contact, friction=pack_schedules([]))
+
+
 def _turned(p, turn):
     """Euler parameters after a further rotation by a rotation vector in track axes."""
     angle = np.linalg.norm(turn)
@@ -85,7 +92,7 @@ def _turned(p, turn):
 
 def _unknowns(model):
     """Mask (6 n + states,) of the displacements that are unknown: all but a wheelset's rotation about its axle."""
-    unknown = np.ones(6 * len(model.bodies.mass) + model.elements.states, bool)
+    unknown = np.ones(6 * len(model.bodies.mass) + own_states(model), bool)
     unknown[6 * np.flatnonzero(model.bodies.spins) + 4] = False
     return unknown
 
@@ -167,10 +174,9 @@ def stand_on_rails(model, state, loads):
     loads : numpy.ndarray, shape (k, 2)
         Of left and right wheels, N; each wheelset's mean is what both of its wheels get.
     """
-    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
     joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
-    bare = model._replace(elements=pack_elements(), joints=joints, track=track, contact=contact)
-    equations, base, deviations = Equations(bare), contact.geometry.rail_distance, np.zeros((3, 4))
+    bare = frictionless(model)._replace(elements=pack_elements(), joints=joints, track=track)
+    equations, base, deviations = Equations(bare), model.contact.geometry.rail_distance, np.zeros((3, 4))
     for k, body in enumerate(model.bodies.wheelsets):
         at, load = STATE_SIZE * body, np.mean(loads[k])
         irregularity_at(track.irregularity, state[at], deviations)

@@ -18,7 +18,7 @@ from scipy.linalg import block_diag
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.equilibrium import RESIDUAL
 from wrcore.dynamics.joint import joint_jacobian
-from wrcore.dynamics.system import Equations
+from wrcore.dynamics.system import Equations, own_states
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""
@@ -83,7 +83,7 @@ def linearise(model, state):
     equations = Equations(model)
     equations(0.0, state)  # leaves the joints' Jacobian
     places, speeds = _independent_motions(model, state, equations.work)
-    basis = block_diag(places, speeds, np.eye(model.elements.states))
+    basis = block_diag(places, speeds, np.eye(own_states(model)))
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
@@ -116,7 +116,7 @@ def steady_running(model, state, iterations=10):
     """
     best = linearise(model, state)
     places, size = best.places, len(best.matrix)
-    own = size - model.elements.states
+    own = size - own_states(model)
     columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
     for _ in range(iterations):
         if np.max(np.abs(best.residual)) < RESIDUAL:

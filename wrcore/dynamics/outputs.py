@@ -1,6 +1,9 @@
 """What an evaluation of the equations of motion leaves besides the rates, at many states."""
 
-from wrcore.dynamics.system import derivatives_at
+import numpy as np
+
+from wrcore.dynamics.drive import fill_drive
+from wrcore.dynamics.system import Equations, derivatives_at
 from wrcore.kernels.jit import jit
 
 
@@ -32,3 +35,35 @@ def evaluations_at(times, states, equations, model, work, rates, patches, bounds
                 for patch in range(work.counts[k, side]):
                     for column in range(patches.shape[4]):
                         patches[i, k, side, patch, column] = work.patches[k, side, patch, column]
+
+
+@jit(allocates=False)
+def _fill_drives(times, states, equations, model, work, rate, torques, rates, control):
+    for i in range(times.shape[0]):
+        derivatives_at(equations, times[i], states[i], model, work, rate)
+        fill_drive(model, times[i], states[i], work, torques[i], rates[i], control[i])
+
+
+def drive_history(model, work, times, states):
+    """What motors, brakes and the speed controller did at given states.
+
+    Parameters
+    ----------
+    model : Model
+    work : Workspace
+        Of this model; overwritten.
+    times : numpy.ndarray, shape (n,)
+        s.
+    states : numpy.ndarray, shape (n, state_size(model))
+
+    Returns
+    -------
+    torques, rates : numpy.ndarray, shape (n, m)
+        On the wheelsets along their axles (N m), and the relative rotation rates about these (rad/s).
+    control : numpy.ndarray, shape (n, 2)
+        The controller's force at the rims (N) and the speed that it wants (m/s); zeros without one.
+    """
+    shape = len(times), len(model.drive.rows)
+    torques, rates, control = np.zeros(shape), np.zeros(shape), np.zeros((len(times), 2))
+    _fill_drives(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), torques, rates, control)
+    return torques, rates, control

@@ -19,7 +19,7 @@ import math
 from wrcore.contact.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHEEL
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
-from wrcore.dynamics.wheel import contact_of, find_overlaps, patch_wrench
+from wrcore.dynamics.wheel import FRICTION, contact_of, find_overlaps, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -81,7 +81,7 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
                 skewness = overlap_skewness(own.geometry, pose, row[U_WHEEL], half / STEPS)
                 row[PSI] = side * shape_number(skewness)
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], row, row[PSI]
+                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], m[FRICTION], row, row[PSI]
                 )
                 w[0], w[1], w[2] = w[0] + gx, w[1] + gy, w[2] + gz
                 w[3], w[4], w[5] = w[3] + nx, w[4] + ny, w[5] + nz

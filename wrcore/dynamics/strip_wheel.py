@@ -18,7 +18,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.normal import damping_factor, inverse_cube_root
 from wrcore.contact.patch.gap import creepage_slip, frame_of_overlaps, group_end, rigid_slip
-from wrcore.contact.patch.grid import grid_normal, grid_rolling
+from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.rolling import AUTO as ANY_METHOD
 from wrcore.contact.patch.rolling import rolling_force
 from wrcore.contact.patch.solve import (
@@ -41,7 +41,7 @@ from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, surf
 from wrcore.contact.reduction import ANGLE, COSINE, MOMENT, PATCH_COLUMNS, PENETRATION, SINE, X, Y, Z
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import creep_force_at
-from wrcore.dynamics.wheel import contact_of, wheel_wrenches
+from wrcore.dynamics.wheel import FRICTION, contact_of, falling, wheel_wrenches
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -65,8 +65,8 @@ def solve_on_grid(model, motion, place):
     motion : numpy.ndarray, shape (MOTION_COLUMNS,)
     place : numpy.ndarray
         y and z of the wheelset (m), whether detection is spatial, the frame's cosine, sine, x, ur and z, and the
-        creepages. Overwritten: Fx, Fs, Mn about the origin, N, means over the pressure of x and s, semi-axes of the
-        ellipse of equal moments, greatest pressure.
+        creepages, and the coefficient of friction. Overwritten: Fx, Fs, Mn about the origin, N, means over the
+        pressure of x and s, semi-axes of the ellipse of equal moments, greatest pressure.
     """
     side, y, z, cosine, sine = motion[0], place[0], place[1], place[3], motion[0] * place[4]
     pose = make_pose(side, y, z, side * motion[3], side * motion[4], side * motion[5], place[2] > 0.0)
@@ -80,7 +80,12 @@ def solve_on_grid(model, motion, place):
         speed = max(abs(motion[6]), model.least_speed)
         turning = Motion(motion[6], motion[7], motion[8], motion[9], motion[10], motion[11], speed)
         surface_slip(pose, plane, turning, grid.x, grid.s, grid.height, wx, ws)
-    found = grid_rolling(grid, wx, ws, model.friction, model.shear_modulus, model.poisson_ratio, GRID_TOLERANCE)
+    ahead, rolling = 1.0, grid
+    if motion[6] < 0.0:  # rolling is always towards x: the mirror image of a wheel that rolls back
+        ahead, x, pressure = -1.0, -grid.x[::-1].copy(), grid.pressure[::-1].copy()
+        rolling = GridPatch(x, grid.s, grid.dx, grid.ds, grid.gap, grid.height, pressure)
+        wx, ws = wx[::-1].copy(), -ws[::-1].copy()
+    found = grid_rolling(rolling, wx, ws, place[11], model.shear_modulus, model.poisson_ratio, GRID_TOLERANCE)
     load = xm = sm = xx = ss = top = 0.0
     for i in range(grid.x.size):
         for j in range(grid.s.size):
@@ -90,7 +95,7 @@ def solve_on_grid(model, motion, place):
             xx, ss = xx + p * grid.x[i] ** 2, ss + p * grid.s[j] ** 2
     load = max(load, 1e-30)
     xm, sm = xm / load, sm / load
-    place[0], place[1], place[2], place[3] = found.fx, found.fs, found.mn, load * grid.dx * grid.ds
+    place[0], place[1], place[2], place[3] = found.fx, ahead * found.fs, found.mn, load * grid.dx * grid.ds
     place[4], place[5], place[8] = xm, sm, top
     place[6] = math.sqrt(5.0 * max(xx / load - xm * xm, 1e-14))
     place[7] = math.sqrt(5.0 * max(ss / load - sm * sm, 1e-14))
@@ -127,7 +132,7 @@ def _lifted(model, side, y, z, ex, ey, ez, spatial, u, rows):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _creep_by_law(model, strips, slip, count, sums, xi_eta_phi):
+def _creep_by_law(model, friction, strips, slip, count, sums):
     """Creep force of the scene's law at the ellipse of equal moments: Fx, Fs, Mn about the origin, look-ups missed."""
     mean_x, mean_s = sums[MEAN_X], sums[MEAN_S]
     a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
@@ -138,8 +143,7 @@ def _creep_by_law(model, strips, slip, count, sums, xi_eta_phi):
         xi += share * slip[0, i]
         eta += share * (slip[2, i] + slip[3, i] * (mean_x - strips[MIDDLE, i]))
         phi += share * slip[3, i]
-    xi_eta_phi[0], xi_eta_phi[1], xi_eta_phi[2] = xi, eta, phi
-    limit, c = model.friction * sums[LOAD], math.sqrt(a * b)
+    limit, c = friction * sums[LOAD], math.sqrt(a * b)
     scale = model.shear_modulus * c * c / limit
     f1, f2, m3, missed = creep_force_at(
         model.law, model.creep, math.log(a / b), a / b, 0.0, xi * scale, eta * scale, phi * scale * c
@@ -149,26 +153,34 @@ def _creep_by_law(model, strips, slip, count, sums, xi_eta_phi):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _roll_at(model, library, work, strips, slip, count):
+def _roll_at(model, friction, library, work, strips, slip, count):
     """Creep force on the strips at a library's resolution: Fx, Fs, Mn."""
     fx, fs, mn, _, _ = rolling_force(
         strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
         strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
-        model.shear_modulus, model.friction, library, work, ANY_METHOD,
+        model.shear_modulus, friction, library, work, ANY_METHOD,
     )  # fmt: skip
     return fx, fs, mn
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _roll(model, settings, strips, slip, count, slender, windows, work):
+def _roll(model, friction, settings, strips, slip, count, slender, windows, work):
     """Creep force on the strips with the library whose ellipses have as many."""
     if slender:
-        return _roll_at(model, settings.slender, work.slender, strips, slip, count)
+        return _roll_at(model, friction, settings.slender, work.slender, strips, slip, count)
     if windows == 1 and count == settings.wider.level.strips:
-        return _roll_at(model, settings.wider, work.rolling, strips, slip, count)
+        return _roll_at(model, friction, settings.wider, work.rolling, strips, slip, count)
     if windows == 1 and count == settings.widest.level.strips:
-        return _roll_at(model, settings.widest, work.rolling, strips, slip, count)
-    return _roll_at(model, settings.library, work.rolling, strips, slip, count)
+        return _roll_at(model, friction, settings.widest, work.rolling, strips, slip, count)
+    return _roll_at(model, friction, settings.library, work.rolling, strips, slip, count)
+
+
+@jit(allocates=False)
+def _mirror(strips, slip, sums, count):
+    """Turn a patch round: x points back, and slips across change their sign, as forces across do."""
+    sums[MEAN_X] = -sums[MEAN_X]
+    for i in range(count):
+        strips[MIDDLE, i], slip[1, i], slip[2, i] = -strips[MIDDLE, i], -slip[1, i], -slip[2, i]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -192,6 +204,7 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, m
     xi, eta, phi, approach = creepages(
         m[6], m[7], m[8], m[9], m[10], m[11], frame.x, py, pz, frame.cosine, side * frame.sine, speed
     )
+    friction = falling(model, m[FRICTION], xi, eta, speed)
     factor = damping_factor(approach, model.damping, model.damping_speed)
     lift = (1.0 - factor * inverse_cube_root(factor)) * depth
     windows = 0
@@ -212,7 +225,7 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, m
         f = work.force
         f[0], f[1], f[2] = y - lift * side * frame.sine, z + lift * frame.cosine, 1.0 if spatial else 0.0
         f[3], f[4], f[5], f[6], f[7] = frame.cosine, frame.sine, frame.x, frame.ur, frame.z
-        f[8], f[9], f[10] = xi, eta, phi
+        f[8], f[9], f[10], f[11] = xi, eta, phi, friction
         call_address(settings.fallback, model, m, f)
         fx, fs, mn, normal, mean_x, mean_s, a, b, top = f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8]
     else:
@@ -229,11 +242,15 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, m
             )  # fmt: skip
         a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
         b = math.sqrt(5.0 * max(sums[MEAN_SS] - mean_s * mean_s, 1e-14))
+        if m[6] < 0.0:  # rolling is always towards x
+            _mirror(strips, slip, sums, count)
         if settings.rolling == 0:
-            fx, fs, mn, missed = _creep_by_law(model, strips, slip, count, sums, work.force)
+            fx, fs, mn, missed = _creep_by_law(model, friction, strips, slip, count, sums)
             counters[1] += missed
         else:
-            fx, fs, mn = _roll(model, settings, strips, slip, count, a > SLENDER * b, windows, work)
+            fx, fs, mn = _roll(model, friction, settings, strips, slip, count, a > SLENDER * b, windows, work)
+        if m[6] < 0.0:
+            fs = -fs
     cosine, sine = frame.cosine, side * frame.sine
     out[ANGLE], out[COSINE], out[SINE] = math.atan2(sine, cosine), cosine, sine
     out[X] = frame.x + mean_x

@@ -16,10 +16,13 @@ from wrcore.contact.patch.model import WRENCHES_HELD, StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
+from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.joint import Joints
+from wrcore.dynamics.rail_friction import fill_rail_friction
+from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
-from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
+from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -59,6 +62,14 @@ class Model(NamedTuple):
     """Address of the kernel that finds the rails' wrenches, see `with_kernels`."""
     reactions: int = 0
     """Address of the kernel that adds the joints' reactions."""
+    friction: Schedules = pack_schedules([])
+    """Over arc length, for the left and the right rail, where friction is not the same everywhere; else empty."""
+    rail_friction: int = 0
+    """Address of the kernel that looks it up."""
+    drive: Drive = no_drive()
+    """Motors, brakes and speed controller."""
+    torques: int = 0
+    """Address of the kernel that adds their torques."""
 
 
 class Workspace(NamedTuple):
@@ -96,8 +107,13 @@ class Workspace(NamedTuple):
 
 
 def state_size(model):
-    """Length of the state vector: 13 numbers per body and the force elements' own states."""
-    return STATE_SIZE * len(model.bodies.mass) + model.elements.states
+    """Length of the state vector: 13 numbers per body, the force elements' own states, the speed controller's one."""
+    return STATE_SIZE * len(model.bodies.mass) + own_states(model)
+
+
+def own_states(model):
+    """Number of states that belong to no body: those of force elements, then that of the speed controller."""
+    return model.elements.states + len(model.drive.control)
 
 
 def workspace(model):
@@ -171,6 +187,7 @@ def wheel_motions(model, state, work):
                 model.track, (left.geometry.rail_distance, right.geometry.rail_distance), state, at, axle,
                 work.arc_lengths[k], work.frame, work.irregularity, work.rails[k], work.shifts[k], work.motions[k],
             )  # fmt: skip
+            work.motions[k, 0, FRICTION] = work.motions[k, 1, FRICTION] = model.contact.friction
             continue
         for wheel in range(2):
             row = work.motions[k, wheel]
@@ -179,7 +196,9 @@ def wheel_motions(model, state, work):
                 row[3 + i] = axle[i, 1]
             for i in range(6):
                 row[6 + i] = state[at + 7 + i]
-            row[12] = row[13] = 0.0
+            row[12], row[13], row[FRICTION] = 0.0, 0.0, model.contact.friction
+    if model.rail_friction != 0:
+        call_address(model.rail_friction, model, state, work)
     for j in range(model.bodies.independent.shape[0]):
         k, half = model.bodies.independent[j, 0], state[independent_at(model.bodies, j)]
         for wheel in range(2):
@@ -216,7 +235,7 @@ def fill_derivatives(t, state, model, work, rate):
         Time, s.
     state : numpy.ndarray, shape (state_size(model),)
         Per body: position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the force
-        elements' own states (m).
+        elements' own states (m) and the speed controller's integral (m).
     model : Model
     work : Workspace
         Overwritten; patches and counts belong to this evaluation afterwards.
@@ -241,6 +260,8 @@ def fill_derivatives(t, state, model, work, rate):
         _add_rail_wrenches(model, state, work)
         _turn_wheels_apart(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
+    if model.torques != 0:
+        call_address(model.torques, model, t, state, work, rate)
     for b in range(n):
         _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
@@ -268,10 +289,16 @@ def fill_many(equations, t, states, model, work, rates):
 
 
 def with_kernels(model, work):
-    """The model with the addresses of the kernels of its wheels and joints: only what a scene runs is compiled."""
+    """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
     if model.joints.equations:
         kernel = Kernel(add_reactions, Handle(model), 0.0, np.empty(0), Handle(work))
         model = model._replace(reactions=kernel.address)
+    if len(model.drive.rows):
+        kernel = Kernel(add_drive, Handle(model), 0.0, np.empty(0), Handle(work), np.empty(0))
+        model = model._replace(torques=kernel.address)
+    if len(model.friction.points):
+        kernel = Kernel(fill_rail_friction, Handle(model), np.empty(0), Handle(work))
+        model = model._replace(rail_friction=kernel.address)
     if not len(model.bodies.wheelsets):
         return model
     wrenches, contact = wheel_wrenches, model.contact

@@ -31,7 +31,9 @@ from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.kernels.handles import one_of
 from wrcore.kernels.jit import FUSED, jit
 
-MOTION_COLUMNS = 14
+MOTION_COLUMNS = 15
+FRICTION = 14
+"""Column of a wheel's motion with the coefficient of friction of the rail under it."""
 
 
 class ContactModel(NamedTuple):
@@ -52,7 +54,7 @@ class ContactModel(NamedTuple):
     """G, Pa."""
     poisson_ratio: float
     friction: float
-    """Coulomb's mu."""
+    """Coulomb's mu at no slip; of rails that differ, or along which it changes, the largest one."""
     damping: float
     """c_e of Eq. (7)'s damping factor; 1 means none."""
     damping_speed: float
@@ -61,6 +63,10 @@ class ContactModel(NamedTuple):
     """Rolling speed is not taken smaller than this in creepages, m/s."""
     strips: StripModel
     """Patches on strips, if the scene asks for them."""
+    friction_ratio: float = 1.0
+    """A: friction at large slip velocity over that at none; 1: it does not fall."""
+    friction_decay: float = 0.0
+    """B: rate at which friction falls with slip velocity, s/m."""
     geometries: tuple = ()
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
     wheels: tuple = ()
@@ -111,11 +117,25 @@ def find_overlaps(model, side, y, z, ex, ey, ez, rows):
     return find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, model.reduction, rows), bound, spatial
 
 
+@jit(allocates=False, forceinline=True)
+def falling(model, friction, xi, eta, speed):
+    """Coefficient of friction mu0 ((1 - A) exp(-B w) + A) at the slip velocity w of a patch (Polach, Wear 258 (2005)
+    992): that of its reference point, without spin."""
+    ratio = model.friction_ratio
+    if ratio == 1.0:
+        return friction
+    slip = speed * math.sqrt(xi * xi + eta * eta)
+    return friction * ((1.0 - ratio) * math.exp(-model.friction_decay * slip) + ratio)
+
+
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, row, psi):
+def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, friction, row, psi):
     """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
 
-    ``psi`` is the patch's shape number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`.
+    ``friction`` is the rail's coefficient at no slip, ``psi`` the patch's shape number, 0 for an ellipse; see
+    `wrcore.dynamics.shaped_wheel`. Creep laws and tables are those of a wheel that rolls ahead; one that rolls back is
+    the mirror image of one that rolls ahead with the opposite spin. Below the least speed spin goes to and fro through
+    zero, so that nothing jumps at standstill.
     """
     px, py, pz = row[X], row[Y] - y, row[Z] - z
     cosine, sine = row[COSINE], row[SINE]
@@ -125,15 +145,16 @@ def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, 
     normal, a, b, axis_ratio, log_axis_ratio = _normal_contact(
         model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach
     )
-    limit = model.friction * normal
+    limit = falling(model, friction, xi, eta, speed) * normal
+    ahead = 1.0 if vx >= speed else vx / speed
     square = a * b
     c = math.sqrt(square)
     scale, aside = model.shear_modulus * square / limit, 0.25 * psi * b
     f1, f2, m3, missed = creep_force_at(
-        model.law, model.creep, log_axis_ratio, axis_ratio, psi,
-        (xi - phi * aside) * scale, eta * scale, phi * scale * c,
+        model.law, model.creep, log_axis_ratio, axis_ratio, ahead * psi,
+        (xi - phi * aside) * scale, eta * scale, ahead * phi * scale * c,
     )  # fmt: skip
-    f1, f2, m3 = limit * f1, limit * f2, limit * c * m3
+    f1, f2, m3 = limit * f1, limit * f2, ahead * limit * c * m3
     m3 -= aside * f1
     gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
     row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
@@ -156,7 +177,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     motions : numpy.ndarray, shape (k, 2, MOTION_COLUMNS)
         Of left and right wheels: side (+1 left, -1 right); y and z of the wheelset's centre (m); axle direction,
         pointing left (3); velocity of the centre (m/s, 3) and angular velocity (rad/s, 3); curvature of the rail's line
-        towards y and towards z (1/m; 0 on a tangent track).
+        towards y and towards z (1/m; 0 on a tangent track); the rail's coefficient of friction at no slip.
     patches : numpy.ndarray, shape (k, 2, MAX_PATCHES, PATCH_COLUMNS)
         Filled: the wheels' patches; rows beyond their counts keep old content.
     counts, bounds : numpy.ndarray, shape (k, 2)
@@ -182,8 +203,8 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], bend, bend_vertical, patches[i, wheel, k],
-                    0.0,
+                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], bend, bend_vertical, m[FRICTION],
+                    patches[i, wheel, k], 0.0,
                 )  # fmt: skip
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz

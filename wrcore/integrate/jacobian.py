@@ -20,6 +20,7 @@ import numpy as np
 
 from wrcore.contact.patch.model import WRENCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.drive import drive_links, drive_state_bodies
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import cross, dot
@@ -39,6 +40,9 @@ from wrcore.kernels.jit import jit
 FINE_BELOW = 1e-3
 """Where creepages are divided by a least speed below this (m/s), differences of velocities shrink in proportion:
 friction saturates at creepages of some 1e-3, and a difference must not come near that."""
+
+USUAL = 0.3
+"""The same below this coefficient of friction."""
 
 MOMENT = 1e-7
 """Difference of time, s."""
@@ -109,7 +113,7 @@ def _links(model):
             joined[i] |= joined[j]
             for body in joined[i]:
                 joined[body] = joined[i]
-    for i, j in [*model.elements.pairs, *model.joints.bodies]:
+    for i, j in [*model.elements.pairs, *model.joints.bodies, *drive_links(model)]:
         if i != FRAME and j != FRAME:
             linked[i].add(int(j))
             linked[j].add(int(i))
@@ -131,7 +135,7 @@ def own_state_bodies(model):
                 bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
     for wheelset, state in model.bodies.independent:
         bodies[state] = joined[model.bodies.wheelsets[wheelset]]
-    return bodies
+    return bodies + [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
 
 
 def _groups(reach):
@@ -360,7 +364,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     axes = turn_of(jacobian)
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
-    fine = min(1.0, model.contact.least_speed / FINE_BELOW)
+    fine = min(1.0, model.contact.least_speed / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
     # wheels that turn independently are own states, whose rows and columns the wheelset's wrench alone does not give
     strips = model.contact.strips.strips > 0
     wheels = model.bodies.wheelsets.shape[0] > 0 and model.bodies.independent.shape[0] == 0

@@ -18,6 +18,7 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 import numpy as np
 
 from wrcore.dynamics.body import EULER, OMEGA, POSITION, STATE_SIZE, VELOCITY
+from wrcore.dynamics.system import own_states
 
 LENGTH = 0.01
 """Travel that ``rtol`` refers to, m: about the play of a wheelset between the flanges."""
@@ -50,12 +51,12 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     Returns
     -------
     numpy.ndarray, shape (size,)
-        m, 1, m/s, rad/s, and m for the force elements' own states (rad/s for wheels that turn independently).
+        m, 1, m/s, rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently).
     """
     n, rate = len(model.bodies.mass), RATE
-    if len(model.bodies.wheelsets):
-        rate = min(RATE, model.speed / HALF_GAUGE)
-    weights = np.ones(STATE_SIZE * n + model.elements.states)
+    if len(model.bodies.wheelsets):  # a driven vehicle does not keep its speed, and may come to a standstill
+        rate = min(RATE, (model.contact.least_speed if len(model.drive.rows) else model.speed) / HALF_GAUGE)
+    weights = np.ones(STATE_SIZE * n + own_states(model))
     bodies, lever = weights[: STATE_SIZE * n].reshape(n, STATE_SIZE), gyration(model.bodies)[:, None]
     bodies[:, POSITION:EULER] = 1.0
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2

@@ -162,6 +162,8 @@ def plain_wheelset(scene, creep, step=NODE_DISTANCE):
         raise InputError(scene.source, "vehicle", "expected one wheelset and no other body for the plain equations")
     if not scene.track.tangent:
         raise InputError(scene.source, "track", "expected a tangent, perfect track for the plain equations")
+    if isinstance(scene.data["contact"]["friction"], dict) or "drive" in scene.data:
+        raise InputError(scene.source, "contact.friction", "expected a number, and no drive, for the plain equations")
     if scene.detection == "auto":
         raise InputError(scene.source, "contact.detection", "expected planar or spatial for the plain equations")
     if others := sorted({item["kind"] for item in data["elements"]} - {"spring_damper"}):

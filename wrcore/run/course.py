@@ -13,7 +13,7 @@ import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.energy import energy_channels
-from wrcore.dynamics.outputs import evaluations_at
+from wrcore.dynamics.outputs import drive_history, evaluations_at
 from wrcore.dynamics.system import Equations, Model, Workspace, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
@@ -192,6 +192,7 @@ class Course:
                     groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
         if energies is not None:
             groups["energy"] = energies
+        groups |= self._drive_channels(trajectory)
         standing = poses[:, wheelsets]
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
@@ -205,6 +206,20 @@ class Course:
         mean = np.array([matrix_of(part[3:7])[:, 1] @ part[10:13] for part in own])
         half = states[:, independent_at(bodies, j)]
         return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
+
+    def _drive_channels(self, trajectory):
+        """Torque and power of motors and brakes, force and speed of the controller, if the scene has any."""
+        spec = self.scene.data.get("drive")
+        if not spec:
+            return {}
+        torques, rates, control = drive_history(self.model, self._workspace(), trajectory.t, trajectory.states)
+        groups = {
+            f"drive/{item['name']}": {"torque_Nm": torques[:, i], "power_W": torques[:, i] * rates[:, i]}
+            for i, item in enumerate([*spec["motors"], *spec["brakes"]])
+        }
+        if "controller" in spec:
+            groups["drive/controller"] = {"force_N": control[:, 0], "wanted_m_per_s": control[:, 1]}
+        return groups
 
     def _workspace(self):
         work = workspace(self.model)

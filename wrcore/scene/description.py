@@ -29,6 +29,9 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import Track, build_track
+from wrcore.scene.bodies import check_bodies
+from wrcore.scene.drive import read_drive
+from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
 from wrcore.scene.pairs import Pair, find_file, own_pairs, pair_geometries, wheel_and_rail
@@ -142,14 +145,21 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     data["track"] = validate(data["track"], "track", source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
+    check_bodies(data["initial"]["bodies"], vehicle, source)
+    read_friction(data["contact"]["friction"], source)
+    read_drive(data.get("drive"), vehicle, source)
     return Scene(data, source, vehicle, wheel, rail, track, pairs)
 
 
+WHOLE = (".profile", ".friction", ".controller.speed")
+"""Ends of the key paths at which a mapping stands for one value."""
+
+
 def _flat(changes, prefix=""):
-    """Pairs of a key path and a plain value; mappings are entered, but for those that stand for one value."""
+    """Pairs of a key path and a plain value; mappings are entered, but for those at `WHOLE`."""
     for key, value in changes.items():
         path = prefix + key.replace("__", ".")
-        if isinstance(value, Mapping) and not path.endswith(".profile"):
+        if isinstance(value, Mapping) and not path.endswith(WHOLE):
             yield from _flat(value, f"{path}.")
         else:
             yield path, json.loads(json.dumps(value, default=_plain))
@@ -231,6 +241,7 @@ def compile_scene(
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
+    friction = read_friction(contact["friction"], scene.source)
     model = Model(
         vehicle.bodies,
         ContactModel(
@@ -241,9 +252,10 @@ def compile_scene(
             _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
-            float(material["shear_modulus"]), float(material["poisson_ratio"]), float(contact["friction"]),
+            float(material["shear_modulus"]), float(material["poisson_ratio"]), friction.largest,
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"]),
+            friction.ratio, friction.decay,
             _once(shared, "geometries", parts, lambda: pair_geometries(
                 scene.pairs, scene.track, vehicle.half_distance
             )),
@@ -252,6 +264,7 @@ def compile_scene(
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
+        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source),
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

@@ -14,16 +14,17 @@ import numpy as np
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle, settle_apart
-from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
-from wrcore.dynamics.equilibrium import FRICTIONLESS, Equilibrium, solve_equilibrium, stand_on_rails
+from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
-from wrcore.dynamics.system import Equations, independent_at, state_size
+from wrcore.dynamics.system import Equations, independent_at, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.track import rotation
 from wrcore.kernels.handles import Handle
+from wrcore.scene.bodies import put_bodies
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 
@@ -59,14 +60,13 @@ def rest(scene, model):
     InputError
         If there is none near the nominal position.
     """
-    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
+    vehicle, wheelsets, model = scene.vehicle, scene.vehicle.bodies.wheelsets, undriven(model)
     unit = None if model.contact.geometries else vehicle.unit
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
-    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
     track = TrackModel(True, model.track.path, model.track.irregularity)
-    level = model._replace(track=track, contact=contact, speed=REST_SPEED)
+    level = frictionless(model)._replace(track=track, speed=REST_SPEED)
     state = np.zeros(state_size(model))
     for body, position in enumerate(vehicle.positions):
         at = STATE_SIZE * body
@@ -79,14 +79,14 @@ def rest(scene, model):
                 )
             k = int(np.flatnonzero(wheelsets == body)[0])
             roll, state[at + 2] = _settled(scene, model, k, 0.0, 0.0, load)
-            if contact.geometries:
+            if model.contact.geometries:
                 state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
     try:
         equilibrium = solve_equilibrium(level, state)
     except np.linalg.LinAlgError as error:
         raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
-    limit = LARGEST_REST_ON_STRIPS if contact.strips.strips else LARGEST_REST
+    limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
     if not (equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0)):
         raise InputError(
             scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
@@ -106,7 +106,8 @@ def static_equilibrium(scene, model):
     Returns
     -------
     Equilibrium
-        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
+        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip. Its state
+        is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`).
 
     Raises
     ------
@@ -174,7 +175,9 @@ def _settled(scene, model, k, y, yaw, load):
 def initial_state(scene, model, at_rest=None):
     """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
-    Where rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles.
+    Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
+    rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
+    ``initial.bodies`` says of single bodies comes last and holds.
 
     Parameters
     ----------
@@ -185,11 +188,12 @@ def initial_state(scene, model, at_rest=None):
 
     Returns
     -------
-    numpy.ndarray, shape (13 n + states,)
+    numpy.ndarray, shape (state_size(model),)
     """
     vehicle, data = scene.vehicle, scene.data
-    at_rest = at_rest or rest(scene, model)
-    y, yaw = float(data["initial"]["y"]), float(data["initial"]["yaw"])
+    at_rest, driven = at_rest or rest(scene, model), model
+    model = undriven(model)
+    y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
     state = _moving_ahead(model, at_rest)
     level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
     for k, body in enumerate(vehicle.bodies.wheelsets):
@@ -203,13 +207,30 @@ def initial_state(scene, model, at_rest=None):
             state[STATE_SIZE * body + 1] += y * (vehicle.data["bodies"][name]["kind"] == "body")
     else:
         state = _steady(vehicle, level, state)
+    if moved:
+        _move(scene, model, moved, at_rest, state)
     state = _balanced(vehicle, level, state)
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
         state = _with_axle_boxes(vehicle, state)
-        for part, (s, _, _) in zip(_parts(vehicle, state), vehicle.positions, strict=True):
-            part[:] = _on_path(model.track.path, s, part)
-    return state
+    put_bodies(moved, vehicle, state)
+    if not model.track.tangent:
+        for name, part, (s, _, _) in zip(vehicle.body_names, _parts(vehicle, state), vehicle.positions, strict=True):
+            part[:] = _on_path(model.track.path, moved.get(name, {}).get("x", s), part)
+    return np.concatenate([state, np.zeros(own_states(driven) - own_states(model))])
+
+
+def _move(scene, model, moved, at_rest, state):
+    """Put bodies where the scene wants them; wheelsets that are moved stand on the rails, and all still roll."""
+    for k, body in enumerate(scene.vehicle.bodies.wheelsets):
+        part, own = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
+        if own.keys() & {"y", "yaw"}:
+            y, yaw = own.get("y", part[1]), own.get("yaw", float(angles(part[3:7])[2]))
+            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
+            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
+            _roll_as_it_stands(scene, model, k, state)
+        part[10:13] *= own.get("vx", part[7]) / part[7]
+    put_bodies(moved, scene.vehicle, state)
 
 
 def _parts(vehicle, state):

@@ -71,10 +71,14 @@ class Vehicle:
     def nominal_wheel_load(self, body):
         """Rough vertical load of a wheel of a wheelset in nominal position, N.
 
-        All bodies' weight in equal parts where springs carry bodies, else the wheelset's own weight less its preloads.
+        All bodies' weight in equal parts where springs carry bodies (without those that joints hold at their height),
+        else the wheelset's own weight less its preloads.
         """
         if len(self.bodies.mass) > len(self.bodies.wheelsets):
-            return float(np.sum(self.bodies.mass)) * GRAVITY / (2 * len(self.bodies.wheelsets))
+            joints = [(item["kind"], item.get("axis"), item["bodies"][0]) for item in self.data["joints"]]
+            held = {body for kind, axis, body in joints if kind == "coordinate" and axis == "z"}
+            carried = np.sum(self.bodies.mass[[name not in held for name in self.body_names]])
+            return float(carried) * GRAVITY / (2 * len(self.bodies.wheelsets))
         pair = np.repeat(self.elements.pairs[:, 0], np.diff(self.elements.first_spring))
         return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, 14]))
 

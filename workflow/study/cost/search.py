@@ -11,7 +11,7 @@ from wrcore.contact.detection import PLANAR, SPATIAL, axle_direction
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
 from wrcore.contact.statics import height_at_load
-from wrcore.dynamics.wheel import MOTION_COLUMNS
+from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS
 from wrcore.kernels.handles import Handle
 
 PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.0078), (-0.015, 0.015))}
@@ -46,7 +46,9 @@ def loaded_wheels(contact, place, count):
             contact.geometry.rolling_radius, rows,
         )  # fmt: skip
         motions.append([1.0, y, z, *axle_direction(0.0, yaw)])
-    return np.pad(motions, ((0, 0), (0, MOTION_COLUMNS - len(motions[0]))))
+    padded = np.pad(motions, ((0, 0), (0, MOTION_COLUMNS - len(motions[0]))))
+    padded[:, FRICTION] = contact.friction
+    return padded
 
 
 def search_costs(contact, count, passes):

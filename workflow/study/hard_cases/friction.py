@@ -1,13 +1,13 @@
 """Hard cases of the tangential contact: friction from none to 0.8, its jumps, creep laws out of their usual range."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
-from study.hard_cases.cases import Check, computed, contacts, joined, prepare, refused, rows, run, sound
+from study.hard_cases.cases import Check, computed, contacts, prepare, refused, rows, run, sound
 from wrcore.contact import reduction
 from wrcore.creep.laws import LAWS, creep_forces
+from wrcore.dynamics.body import STATE_SIZE
 from wrcore.scene.description import load_scene
 
 TABLE_ERROR = 0.01
@@ -16,12 +16,15 @@ TABLE_ERROR = 0.01
 FRICTIONLESS = 1e-9
 """Friction coefficient that stands for none."""
 
+STEP = 1e-3
+"""Length over which friction changes, m."""
+
 UNBOUNDED = "linear theory knows no friction limit"
 NO_SPIN_IN_BOUND = "Shen-Hedrick-Elkins and Polach reduce linear forces; the power of a large spin may come out wrong"
 
 
 def used_friction(patches, friction):
-    """Largest creep force of all patches over the friction limit."""
+    """Largest creep force of all patches over the friction limit; friction by patch, or one for all."""
     force = np.hypot(patches[..., reduction.FX], patches[..., reduction.FY])
     return float(np.nanmax(force / (friction * patches[..., reduction.NORMAL])))
 
@@ -82,7 +85,7 @@ def frictionless(vehicles, name, duration, detections, methods):
 
 
 def friction_step(vehicles, names, values, part, detections, methods):
-    """A track whose friction changes suddenly: the run goes on from the state at each change.
+    """A track whose friction changes from part to part within `STEP`.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def friction_step(vehicles, names, values, part, detections, methods):
     values : sequence of float
         Friction of the parts.
     part : float
-        Length of a part, s.
+        Time in which a wheelset passes a part, s.
     detections, methods : sequence of str
 
     Returns
@@ -102,20 +105,21 @@ def friction_step(vehicles, names, values, part, detections, methods):
     found = []
     for name, detection, method in product(names, detections, methods):
         changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.004}
-        setting = prepare(vehicles, name, changes)
-        done, used, state = [], [], setting.state
-        for index, value in enumerate(values):
-            model = setting.model._replace(contact=setting.model.contact._replace(friction=value))
-            here = replace(setting, model=model, state=state)
-            done.append(run(here, part, 1000.0, index * part))
-            used.append(used_friction(contacts(model, done[-1].t, done[-1].states), value))
-            if done[-1].status != "completed":
-                break
-            state = done[-1].states[-1]
-        trajectory = joined(done)
+        usual = prepare(vehicles, name, changes)
+        speed, begin = usual.model.speed, usual.scene.vehicle.positions[0, 0]
+        ends = begin + part * speed * np.arange(1, len(values))
+        table = {
+            "arc_length": [float(s) for end in ends for s in (end, end + STEP)],
+            "mu": [float(mu) for pair in zip(values, values[1:], strict=False) for mu in pair],
+        }
+        setting = prepare(vehicles, name, {**changes, "contact.friction": table})
+        trajectory = run(setting, len(values) * part, 1000.0)
+        patches = contacts(setting.model, trajectory.t, trajectory.states)
+        places = trajectory.states[:, STATE_SIZE * setting.model.bodies.wheelsets]
+        used = used_friction(patches, np.interp(places, *table.values())[..., None, None])
         checks = [
             *sound(setting, trajectory),
-            Check("largest creep force over mu N", max(used), 1.0 + TABLE_ERROR, "1", "Coulomb on every part"),
+            Check("largest creep force over mu N", used, 1.0 + TABLE_ERROR, "1", "Coulomb on every part"),
         ]
         condition = " to ".join(f"{value:g}" for value in values)
         found += rows("friction", "step along the track", condition, setting, trajectory, checks)

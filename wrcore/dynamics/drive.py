@@ -1,0 +1,172 @@
+"""Motors, brakes and a speed controller: torques about axles, against the bodies that carry motors and calipers.
+
+A torque M along the axle e (pointing left: M > 0 drives ahead) acts on a wheelset, its opposite on the body that takes
+the reaction, so that the pair gains no angular momentum, and the power put in is M times the relative rotation rate
+omega = e . (w_wheelset - w_body). With the moving frame as that body the reaction leaves the vehicle.
+
+*Motor*: M by a table. *Brake*: M = -M_b tanh(omega/`GRIP`), with M_b by a table: a friction brake whose sign changes
+within some `GRIP`, so that it holds at standstill and takes energy at every instant. *Controller*: proportional and
+integral, on the speed v of a body along its own x axis, with limits of the force at the wheels' rims,
+
+    F = clip(F*, -brake limit, limit),   F* = Kp (v* - v) + Ki z,   z' = v* - v - (F* - F)/Kp,
+
+shared equally among the motors that state no torque of their own. Where a limit holds, the last term lets the
+integral follow it (back-calculation): nothing winds up.
+
+References
+----------
+Astrom, Hagglund, PID Controllers: Theory, Design, and Tuning (1995), section 3.5 (back-calculation; here with the
+tracking time Kp/Ki over the integral's own gain).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.rail_friction import arc_length_at
+from wrcore.dynamics.schedule import Schedules, pack_schedules, scheduled
+from wrcore.kernels.jit import jit
+
+MOTOR, BRAKE, CONTROLLED = range(3)
+"""Kinds of actuators."""
+
+TIME, ARC_LENGTH = range(2)
+"""What a table is over."""
+
+GRIP = 0.05
+"""Relative rotation rate at which a brake has tanh(1) = 76 % of its torque, rad/s. Chosen: some 2 cm/s at the rim."""
+
+
+class Drive(NamedTuple):
+    """Motors, brakes and controller, for kernels."""
+
+    rows: np.ndarray
+    """(m, 6) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
+    kind, table, what that is over."""
+    lever: np.ndarray
+    """(m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)."""
+    control: np.ndarray
+    """(c, 4) int, c = 0 or 1: body whose speed counts, number of the wheelset whose arc length does, table, what that
+    is over."""
+    gains: np.ndarray
+    """(c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)."""
+    tables: Schedules
+
+
+def no_drive():
+    """A `Drive` of nothing."""
+    return Drive(
+        np.zeros((0, 6), np.int64), np.zeros(0), np.zeros((0, 4), np.int64), np.zeros((0, 4)), pack_schedules([])
+    )
+
+
+def undriven(model):
+    """The model without motors, brakes and controller: its state ends with those of the force elements."""
+    return model._replace(drive=no_drive(), torques=0)
+
+
+def drive_links(model):
+    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration.
+
+    A speed profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link
+    from one wheelset to all others would double the cost of a Jacobian.
+    """
+    pairs = [(row[0], row[1]) for row in model.drive.rows if row[1] != FRAME]
+    for body in model.drive.control[:, 0]:
+        pairs += [(body, end) for end in _controlled(model) if end != body]
+    return pairs
+
+
+def drive_state_bodies(model):
+    """For the controller's integral, if there is one, the set of bodies that it acts on or follows."""
+    return [{int(body)} | _controlled(model) for body in model.drive.control[:, 0]]
+
+
+def _controlled(model):
+    """Bodies that the controller's force acts on."""
+    return {int(end) for row in model.drive.rows if row[3] == CONTROLLED for end in row[:2] if end != FRAME}
+
+
+@jit(allocates=False)
+def _table_value(model, table, over, k, t, state, work):
+    """Value of a table at the time, or at the arc length of the k-th wheelset."""
+    return scheduled(model.drive.tables, table, arc_length_at(model, state, work, k) if over == ARC_LENGTH else t)
+
+
+@jit(allocates=False)
+def controlled_force(model, t, state, work):
+    """The controller's force at the rims (N), the speed that it wants (m/s), and the rate of its integral (m/s)."""
+    if model.drive.control.shape[0] == 0:
+        return 0.0, 0.0, 0.0
+    row, gains, n = model.drive.control[0], model.drive.gains[0], model.bodies.mass.shape[0]
+    axes, at = work.rotations[row[0]], STATE_SIZE * row[0] + 7
+    speed = axes[0, 0] * state[at] + axes[1, 0] * state[at + 1] + axes[2, 0] * state[at + 2]
+    wanted = _table_value(model, row[2], row[3], row[1], t, state, work)
+    asked = gains[0] * (wanted - speed) + gains[1] * state[STATE_SIZE * n + model.elements.states]
+    force = min(max(asked, gains[2]), gains[3])
+    return force, wanted, wanted - speed - (asked - force) / gains[0]
+
+
+@jit(allocates=False)
+def actuator(model, i, force, t, state, work):
+    """Torque of the i-th actuator along the axle of its wheelset (N m), and the relative rotation rate (rad/s)."""
+    row, axes = model.drive.rows[i], work.rotations[model.drive.rows[i, 0]]
+    rate = 0.0
+    for k in range(3):
+        turn = state[STATE_SIZE * row[0] + 10 + k]
+        if row[1] != FRAME:
+            turn -= state[STATE_SIZE * row[1] + 10 + k]
+        rate += axes[k, 1] * turn
+    value = force if row[3] == CONTROLLED else _table_value(model, row[4], row[5], row[2], t, state, work)
+    torque = model.drive.lever[i] * value
+    return (-torque * math.tanh(rate / GRIP) if row[3] == BRAKE else torque), rate
+
+
+@jit(allocates=False)
+def add_drive(model, t, state, work, rate):
+    """Add the torques of motors and brakes to the wrenches of the bodies, and write the rate of the integral.
+
+    Parameters
+    ----------
+    model : Model
+    t : float
+        s.
+    state : numpy.ndarray, shape (size,)
+    work : Workspace
+        With the rotations and arc lengths of this state; its wrenches are added to.
+    rate : numpy.ndarray, shape (size,)
+        Written at the integral's place: m/s.
+    """
+    force, _, change = controlled_force(model, t, state, work)
+    if model.drive.control.shape[0] > 0:
+        rate[STATE_SIZE * model.bodies.mass.shape[0] + model.elements.states] = change
+    for i in range(model.drive.rows.shape[0]):
+        wheelset, body = model.drive.rows[i, 0], model.drive.rows[i, 1]
+        torque, _ = actuator(model, i, force, t, state, work)
+        for k in range(3):
+            moment = torque * work.rotations[wheelset, k, 1]
+            work.wrenches[wheelset, 3 + k] += moment
+            if body != FRAME:
+                work.wrenches[body, 3 + k] -= moment
+
+
+@jit(allocates=False)
+def fill_drive(model, t, state, work, torques, rates, control):
+    """Torques and relative rotation rates of all actuators; the controller's force and the speed that it wants.
+
+    Parameters
+    ----------
+    model : Model
+    t, state, work
+        Of an evaluation that has just been made.
+    torques, rates : numpy.ndarray, shape (m,)
+        Filled: N m and rad/s.
+    control : numpy.ndarray, shape (2,)
+        Filled: force at the rims (N), speed wanted (m/s).
+    """
+    control[0], control[1], _ = controlled_force(model, t, state, work)
+    for i in range(torques.shape[0]):
+        torques[i], rates[i] = actuator(model, i, control[0], t, state, work)

@@ -1,0 +1,56 @@
+"""Where a scene puts single bodies at the start, and how fast."""
+
+import numpy as np
+
+from wrcore.dynamics.body import STATE_SIZE, angles, euler_parameters, matrix_of
+from wrcore.errors import InputError
+
+PLACES, ANGLES, RATES = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("vx", "vy", "vz", "wx", "wy", "wz")
+"""Keys of a body, named like the channels of runs."""
+
+
+def check_bodies(bodies, vehicle, source):
+    """Raise an InputError that names the body if ``initial.bodies`` asks for what a vehicle does not have."""
+    for name, values in bodies.items():
+        field = f"initial.bodies.{name}"
+        if name not in vehicle.body_names:
+            raise InputError(source, field, f"expected one of {', '.join(vehicle.body_names)} as the body's name")
+        if vehicle.data["bodies"][name]["kind"] == "axle_box":
+            raise InputError(source, field, "expected no axle box: it follows its wheelset")
+        if name in vehicle.wheelset_names and "pitch" in values:
+            raise InputError(source, f"{field}.pitch", "expected no pitch of a wheelset: its rotation is wy")
+
+
+def put_bodies(bodies, vehicle, state):
+    """Write what a scene says of its bodies into a state on a tangent track; all else stays.
+
+    Parameters
+    ----------
+    bodies : dict of str to dict
+        Values by name of the body and key: m, rad, m/s and rad/s in the track's axes.
+    vehicle : Vehicle
+    state : numpy.ndarray
+        Changed in place.
+    """
+    for name, values in bodies.items():
+        at = STATE_SIZE * vehicle.body_names.index(name)
+        part = state[at : at + STATE_SIZE]
+        part[:3] = [values.get(key, now) for key, now in zip(PLACES, part[:3], strict=True)]
+        if values.keys() & set(ANGLES):
+            turned = np.array(angles(part[3:7]))
+            part[3:7] = euler_parameters(*(values.get(key, now) for key, now in zip(ANGLES, turned, strict=True)))
+        part[7:] = [values.get(key, now) for key, now in zip(RATES, part[7:], strict=True)]
+        _carry_boxes(name, vehicle, state)
+
+
+def _carry_boxes(wheelset, vehicle, state):
+    """Let the axle boxes of a wheelset go along with its axle, without turning about it."""
+    parts = dict(zip(vehicle.body_names, state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, 13), strict=True))
+    places, axle = dict(zip(vehicle.body_names, vehicle.positions, strict=True)), parts[wheelset]
+    axes = matrix_of(axle[3:7])
+    turn = axle[10:13] - (axle[10:13] @ axes[:, 1]) * axes[:, 1]
+    for name, box in parts.items():
+        if vehicle.data["bodies"][name].get("wheelset") == wheelset:
+            arm = axes @ (places[name] - places[wheelset])
+            box[:3], box[3:7] = axle[:3] + arm, axle[3:7]
+            box[7:10], box[10:13] = axle[7:10] + np.cross(turn, arm), turn

@@ -1,0 +1,98 @@
+"""A scene's motors, brakes and speed controller."""
+
+import numpy as np
+
+from wrcore.dynamics.drive import BRAKE, CONTROLLED, MOTOR, Drive, no_drive
+from wrcore.dynamics.marker import FRAME
+from wrcore.dynamics.schedule import pack_schedules
+from wrcore.errors import InputError
+from wrcore.scene.schedule import read_schedule
+from wrcore.vehicle.layout import FRAME_NAME
+
+OVER = ("time", "arc_length")
+"""What tables are over, in the order of the constants in `wrcore.dynamics.drive`."""
+
+
+def read_drive(spec, vehicle, source):
+    """Motors, brakes and controller from ``drive`` of a scene.
+
+    Parameters
+    ----------
+    spec : dict or None
+        Checked against the schema; None where the scene has none.
+    vehicle : Vehicle
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Drive
+
+    Raises
+    ------
+    InputError
+        That names the motor or brake and the key.
+    """
+    if spec is None:
+        return no_drive()
+    items = [("motors", item) for item in spec["motors"]] + [("brakes", item) for item in spec["brakes"]]
+    names = [item["name"] for _, item in items]
+    for name in {name for name in names if names.count(name) > 1} | {"controller"} & set(names):
+        raise InputError(source, "drive", f"expected another name, got {name!r} twice or for what it is not")
+    rows, levers = [], []
+    tables: list[np.ndarray] = []
+    for group, item in items:
+        row, lever = _actuator(group, item, vehicle, source, tables)
+        rows.append(row)
+        levers.append(lever)
+    controlled = [row[3] == CONTROLLED for row in rows]
+    if any(controlled) != ("controller" in spec):
+        expected = "expected a controller exactly where motors state neither torque nor force"
+        raise InputError(source, "drive.controller", expected)
+    levers = [lever / sum(controlled) if shares else lever for lever, shares in zip(levers, controlled, strict=True)]
+    control, gains = _controller(spec["controller"], rows, vehicle, source, tables) if any(controlled) else ([], [])
+    return Drive(
+        np.array(rows, np.int64).reshape(-1, 6), np.array(levers, float), np.array(control, np.int64).reshape(-1, 4),
+        np.array(gains, float).reshape(-1, 4), pack_schedules(tables),
+    )  # fmt: skip
+
+
+def _actuator(group, item, vehicle, source, tables):
+    """Row and lever of a motor or brake; its table is added to the others."""
+    field, (wheelset, body) = f"drive.{group}.{item['name']}", item["bodies"]
+    if wheelset not in vehicle.wheelset_names:
+        known = ", ".join(vehicle.wheelset_names)
+        raise InputError(source, f"{field}.bodies", f"expected first one of {known}, got {wheelset!r}")
+    carrier = FRAME if body == FRAME_NAME else _body(body, vehicle, source, f"{field}.bodies")
+    if body in vehicle.wheelset_names:
+        raise InputError(source, f"{field}.bodies", f"expected a body or {FRAME_NAME} as the second one")
+    given = [key for key in ("torque", "force") if key in item]
+    if len(given) > 1 or (group == "brakes" and not given):
+        raise InputError(source, field, "expected either torque or force")
+    number, k = vehicle.body_names.index(wheelset), vehicle.wheelset_names.index(wheelset)
+    lever = 1.0 if given == ["torque"] else vehicle.rolling_radius
+    if not given:
+        return [number, carrier, k, CONTROLLED, 0, 0], lever
+    over, points = read_schedule(item[given[0]], given[0], OVER, source, f"{field}.{given[0]}")
+    if group == "brakes" and np.any(points[:, 1] < 0.0):
+        raise InputError(source, f"{field}.{given[0]}", "expected no negative value: a brake acts against the rotation")
+    tables.append(points)
+    return [number, carrier, k, BRAKE if group == "brakes" else MOTOR, len(tables) - 1, over], lever
+
+
+def _controller(spec, rows, vehicle, source, tables):
+    """Row and gains of the controller; what it is over counts at the foremost of its wheelsets."""
+    body = _body(spec["body"], vehicle, source, "drive.controller.body")
+    over, points = read_schedule(spec["speed"], "speed", OVER, source, "drive.controller.speed")
+    tables.append(points)
+    foremost = min(row[2] for row in rows if row[3] == CONTROLLED)
+    return [body, foremost, len(tables) - 1, over], [
+        spec["proportional"], spec["integral"], -spec.get("brake_limit", spec["limit"]), spec["limit"],
+    ]  # fmt: skip
+
+
+def _body(name, vehicle, source, field):
+    """Number of a body."""
+    if name not in vehicle.body_names:
+        raise InputError(source, field, f"expected one of {', '.join(vehicle.body_names)}, got {name!r}")
+    return vehicle.body_names.index(name)
