@@ -151,7 +151,7 @@ def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, 
     c = math.sqrt(square)
     scale, aside = model.shear_modulus * square / limit, 0.25 * psi * b
     f1, f2, m3, missed = creep_force_at(
-        model.law, model.creep, log_axis_ratio, axis_ratio, ahead * psi,
+        model.law, model.creep, log_axis_ratio, axis_ratio, ahead * psi if psi != 0.0 else 0.0,
         (xi - phi * aside) * scale, eta * scale, ahead * phi * scale * c,
     )  # fmt: skip
     f1, f2, m3 = limit * f1, limit * f2, ahead * limit * c * m3
