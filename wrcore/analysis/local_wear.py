@@ -25,6 +25,7 @@ from wrcore.analysis.motion import SIDES
 from wrcore.analysis.wheels import OUTWARDS, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
+from wrcore.scene.friction import read_friction
 
 DENSITY = 7850.0
 """Of steel, kg/m^3."""
@@ -114,7 +115,9 @@ def _wheel_wear(contact, late, body, outwards, scene, law, width):
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
     radius = np.broadcast_to(body["z_m"][late][:, None], there.shape)[there] if "z_m" in body else np.array([])
-    places, dy, dx, work = friction_work(rows, scene["contact"]["friction"], *_material(scene))
+    # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
+    friction = read_friction(scene["contact"]["friction"], "scene").largest
+    places, dy, dx, work = friction_work(rows, friction, *_material(scene))
     share = 1.0 / np.count_nonzero(late)
     across = np.sum(LAWS[law](work) * dx[..., None], axis=-1) / DENSITY * share  # m per passage, mean over the run
     volume = float(np.sum(across * dy))
