@@ -86,6 +86,6 @@ def test_the_integrator_takes_no_checkpoint_of_other_sizes(run):
     for end in spoiled:
         with pytest.raises(InputError, match="start: "):
             integrate(model, end, [0.05, 0.1])
-    wild = linear.full._replace(rows=linear.full.rows + 2**40)  # indices are the model's own
-    again = integrate(model, replace(run.end, linear=linear._replace(full=wild)), [0.05, 0.1])
+    wild = linear.sweep._replace(rows=linear.sweep.rows + 2**40)  # indices are the model's own
+    again = integrate(model, replace(run.end, linear=linear._replace(sweep=wild)), [0.05, 0.1])
     np.testing.assert_array_equal(again.states, integrate(model, run.end, [0.05, 0.1]).states)

@@ -290,6 +290,21 @@ def fill_many(equations, t, states, model, work, rates):
 
 def with_kernels(model, work):
     """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
+    wrenches, contact = wheel_wrenches, model.contact
+    if contact.strips.strips:
+        from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
+
+        fallback = Kernel(solve_on_grid, Handle(contact._replace(geometries=())), work.motions[0, 0], work.strips.force)
+        contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
+        wrenches = strip_wrenches
+    elif shaped(contact):
+        from wrcore.dynamics.shaped_wheel import shaped_wrenches
+
+        wrenches = shaped_wrenches
+    if contact.geometries:
+        alone = contact._replace(geometries=())
+        contact = alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
+    model = model._replace(contact=contact)  # what follows is compiled for the model as it will be
     if model.joints.equations:
         kernel = Kernel(add_reactions, Handle(model), 0.0, np.empty(0), Handle(work))
         model = model._replace(reactions=kernel.address)
@@ -301,26 +316,11 @@ def with_kernels(model, work):
         model = model._replace(rail_friction=kernel.address)
     if not len(model.bodies.wheelsets):
         return model
-    wrenches, contact = wheel_wrenches, model.contact
-    if contact.strips.strips:
-        from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
-
-        alone = contact._replace(geometries=())
-        fallback = Kernel(solve_on_grid, Handle(alone), work.motions[0, 0], work.strips.force)
-        contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
-        wrenches = strip_wrenches
-    elif shaped(contact):
-        from wrcore.dynamics.shaped_wheel import shaped_wrenches
-
-        wrenches = shaped_wrenches
-    if contact.geometries:
-        alone = contact._replace(geometries=())
-        contact = alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
     kernel = Kernel(
         wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, Handle(work.strips),
     )  # fmt: skip
-    return model._replace(contact=contact, wheels=kernel.address)
+    return model._replace(wheels=kernel.address)
 
 
 class Equations:
