@@ -227,7 +227,7 @@ def test_all_unknowns_after_ten_seconds(problem):
 
 def test_two_solvers_agree_over_a_short_run(problem):
     times = [0.0, 0.5]
-    pair, other = (solve(problem, method, 1e-11, 5.0, 5.0, times).state for method in ("rk45", ADAPTER))
+    pair, other = (solve(problem, method, 1e-12, 5.0, 5.0, times).state for method in ("rk45", ADAPTER))
     assert pair == pytest.approx(other, abs=1e-11)
     assert abs(pair - problem.state).max() > 1e-3
 
