@@ -54,6 +54,21 @@ def test_going_on_changes_nothing(worn, tmp_path):
     assert (partly / "profile_003.csv").read_bytes() == (folder / "profile_003.csv").read_bytes()
 
 
+@pytest.mark.parametrize(("name", "text"), [
+    ("steps.csv", "step,distance_m\n0,0\n"), ("steps.csv", "step,distance_m,step_m\n0,0,nan\n"),
+    ("steps.csv", "step,distance_m,step_m\n1,0,1e5\n"), ("profile_001.csv", "u_m,f_m\n0,0\n1,nan\n"),
+    ("profile_001.csv", "u_m,f_m\n0,0\n1e-3,0\n1.1e-3,0\n"),
+])  # fmt: skip
+def test_a_damaged_folder_is_refused(worn, tmp_path, name, text):
+    folder, table = worn
+    for part in ("plan.json", "profile_000.csv", "profile_001.csv"):
+        (tmp_path / part).write_bytes((folder / part).read_bytes())
+    table.iloc[:1].to_csv(tmp_path / "steps.csv", index=False)
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=f"{name}: expected"):
+        ev.evolve(PLAN, tmp_path)
+
+
 def test_smoothing_keeps_the_sum():
     values = np.zeros(400)
     values[[3, 200, 397]] = 1.0

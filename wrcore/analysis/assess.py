@@ -20,7 +20,7 @@ import pandas as pd
 
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.ride import rate_of, ride_table
-from wrcore.analysis.wheels import quotient, wheel_forces, wheelsets_of
+from wrcore.analysis.wheels import OUTWARDS, quotient, wheel_forces, wheelsets_of
 from wrcore.errors import InputError
 
 PERCENTILES = (0.15, 50.0, 99.85)
@@ -214,8 +214,7 @@ def section_table(run, begin=0.0):
 
 def _filtered(forces, s, rate):
     """Quantity, side and filtered signal of a wheelset and its wheels."""
-    to_left = {"left": 1.0, "right": -1.0}
-    yield "sum_Y", "", sliding_mean(s, sum(to_left[side] * forces[side][1] for side in SIDES))
+    yield "sum_Y", "", sliding_mean(s, sum(OUTWARDS[side] * forces[side][1] for side in SIDES))
     for side in SIDES:
         vertical, lateral = forces[side]
         yield "Y_over_Q", side, sliding_mean(s, quotient(vertical, lateral))

@@ -225,10 +225,12 @@ def _write_profile(folder, step, u, f):
 def _read_profile(folder, step):
     path = _profile_file(folder, step)
     try:
-        u, f = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
+        points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except (OSError, ValueError) as error:
         raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
-    return u, f
+    if points.shape[1] != 2 or not np.isfinite(points).all() or np.ptp(np.diff(points[:, 0])) > 1e-6 * POINTS:
+        raise InputError(path, "", f"expected a profile that an earlier step has written, points every {POINTS:g} m")
+    return points[:, 0], points[:, 1]
 
 
 def _wear_rate(data, scenes, shares, folder, step, u):
@@ -288,10 +290,13 @@ def _known_rows(folder):
     if not path.exists():
         return []
     try:
-        rows = pd.read_csv(path).to_dict("records")
-        return [row | {"step": int(row["step"])} for row in rows if np.isfinite(row["step_m"])]
+        table = pd.read_csv(path)
+        numbers = table[["step", "distance_m", "step_m"]].to_numpy(float)
     except (OSError, ValueError, KeyError) as error:
         raise InputError(path, "", f"expected the table that an earlier step has written: {error}") from None
+    if not (np.isfinite(numbers).all() and (numbers >= 0.0).all() and (numbers[:, 0] == np.arange(len(table))).all()):
+        raise InputError(path, "", "expected the table that an earlier step has written, a row per step from 0 on")
+    return table.to_dict("records")
 
 
 def _write_table(folder, rows):

@@ -101,6 +101,8 @@ def local_wear(run, begin=0.0, law="sheffield", width=BIN):
         raise InputError("local_wear", "law", f"expected one of {', '.join(LAWS)}, got {law!r}")
     if not wheelsets_of(run):
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
+    if any("z_m" not in run[name] for name in wheelsets_of(run)):
+        raise InputError("local_wear", "output.channels", "expected the channels of poses, for the rolling radius")
     if not np.any(run.t >= begin):
         raise InputError("local_wear", "begin", f"expected a time within the run, got {begin:g} s")
     late = run.t >= begin
@@ -114,7 +116,7 @@ def local_wear(run, begin=0.0, law="sheffield", width=BIN):
 def _wheel_wear(contact, late, body, outwards, scene, law, width):
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
-    radius = np.broadcast_to(body["z_m"][late][:, None], there.shape)[there] if "z_m" in body else np.array([])
+    radius = np.broadcast_to(body["z_m"][late][:, None], there.shape)[there]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
     places, dy, dx, work = friction_work(rows, friction, *_material(scene))
@@ -184,9 +186,8 @@ def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, s
         px, py = px * cut, py * cut
         work[..., k] = cut * lost / dx
     dy = 2.0 * b / strips
-    total = np.sum(work, axis=-1) * dx * dy
+    total = np.sum(np.sum(work, axis=-1) * dx * dy, axis=1)
     known = -(rows["Fx_N"] * rows["xi"] + rows["Fy_N"] * rows["eta"] + rows["Mz_Nm"] * rows["phi_per_m"])
-    total = np.sum(total, axis=1)
     scale = np.divide(np.maximum(known, 0.0), total, out=np.zeros(total.shape), where=total > 0.0)
     return y, dy, dx, work * scale[:, None, None]
 
