@@ -20,7 +20,7 @@ PATCHES = ("maximum", "moment", "strips", "exact")
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
-FORCE_ROWS = 16
+FORCE_ROWS = 21
 
 PATCHES_HELD, WRENCHES_HELD = 1, 2
 """What `StripWork.held` says."""
