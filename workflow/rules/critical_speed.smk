@@ -39,6 +39,7 @@ rule root_locus:
         "<benchmarks>/root_locus/{vehicle}.tsv"
     params:
         speeds=CRITICAL["speeds"],
+        search=CRITICAL["search"],
         shown=CRITICAL["shown"],
         variants={name: changes(entry) for name, entry in CRITICAL["variants"].items()},
     script:
