@@ -26,7 +26,7 @@ resolution, whose 99 % error was found to be 0.0027); planar detection changes i
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
-_SCHEMA = "wrcore creep table 2"
+SCHEMA = "wrcore creep table 2"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def _write_datasets(file, table):
         dataset = file.create_dataset(name, data=errors)
         dataset.attrs["units"] = "1"
         dataset.attrs["description"] = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
-    file.attrs.update(schema=_SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
+    file.attrs.update(schema=SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
     file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
     for name, value in axes._asdict().items():
         file.attrs[f"axes.{name}"] = value
@@ -166,8 +166,8 @@ def load_table(path):
     """
     with checked_hdf5(path, "a creep table in HDF5") as (file, signed):
         found = file.attrs.get("schema")
-        if found != _SCHEMA or not signed:
-            expected = f"expected {_SCHEMA!r} with its digest, got {found!r}"
+        if found != SCHEMA or not signed:
+            expected = f"expected {SCHEMA!r} with its digest, got {found!r}"
             raise InputError(path, "schema", f"{expected}; 'wrcore table build' makes a new one")
         return _read_datasets(path, file)
 
@@ -215,7 +215,7 @@ def show_progress(patches):
 
 def creep_digest():
     """Digest (16 hex digits) of everything in this room that the numbers in a table depend on, and of their form."""
-    digest = hashlib.sha256(_SCHEMA.encode())
+    digest = hashlib.sha256(SCHEMA.encode())
     room = files("wrcore.creep")
     for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
         digest.update(room.joinpath(name).read_bytes())
