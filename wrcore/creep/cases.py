@@ -5,7 +5,7 @@ import numpy as np
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_csv import read_csv_table
 
 MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
@@ -139,7 +139,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
 
     source = source or frame.attrs.get("source", "cases")
     if model not in MODELS:
-        raise InputError(source, "model", f"expected one of {', '.join(MODELS)}, got {model!r}")
+        raise InputError(source, "model", one_of(MODELS, model))
     columns = check_cases(frame, source)
     g, psi, creepages, c = nondimensional(columns)
     if model == "exact":

@@ -15,7 +15,7 @@ from wrcore import __version__
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import table_folder, warn
 
@@ -111,7 +111,7 @@ def _promising(planes, tolerance):
 
 def _check_arguments(nu, planes, tolerance):
     if planes not in RESOLUTIONS:
-        raise InputError("creep table", "planes", f"expected one of {', '.join(RESOLUTIONS)}, got {planes!r}")
+        raise InputError("creep table", "planes", one_of(RESOLUTIONS, planes))
     if not 0 <= nu <= 0.5:
         raise InputError("creep table", "nu", f"expected 0 to 0.5, got {nu}")
     if not 0 < tolerance < 1:
