@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from wrcore.run.simulate import simulate_many as simulate_many
     from wrcore.scene.description import Scene as Scene
     from wrcore.scene.description import load_scene as load_scene
+    from wrcore.scene.examples import example as example
     from wrcore.sweep.batch import run_sweep as run_sweep
     from wrcore.sweep.plan import load_sweep as load_sweep
 
@@ -81,6 +82,7 @@ _PUBLIC = {
     "creep_force": "wrcore.creep.cases",
     "critical_speeds": "wrcore.analysis.stability",
     "damage_table": "wrcore.analysis.damage",
+    "example": "wrcore.scene.examples",
     "ensure_table": "wrcore.creep.table",
     "evolve": "wrcore.analysis.evolve",
     "first_touch": "wrcore.contact.first_touch",
