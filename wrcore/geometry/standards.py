@@ -3,6 +3,7 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -154,7 +155,13 @@ def cone_sections(slope):
     return (Line(low, slope * low, high, slope * high),)
 
 
-def named_profile(spec, kind, inclination=None, window=WINDOW, spacing=SPACING):
+def named_profile(
+    spec: str | Path | dict[str, Any],
+    kind: str,
+    inclination: float | None = None,
+    window: float = WINDOW,
+    spacing: float = SPACING,
+) -> ProfileCurve:
     """Profile by name, analytic form or file.
 
     Parameters
@@ -236,7 +243,7 @@ def _number(spec, value, low, high):
     return number
 
 
-def list_profiles():
+def list_profiles() -> list[dict[str, str]]:
     """Table of the named profiles.
 
     Returns

@@ -81,6 +81,11 @@ Source = Scene | str | PathLike[str] | Mapping[str, Any]
 """What stands for a scene: a checked one, its file, or the file's content."""
 
 
+def as_scene(scene: Source) -> Scene:
+    """A scene as it is, or what stands for one as :func:`load_scene` reads it."""
+    return scene if isinstance(scene, Scene) else load_scene(scene)
+
+
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
     """Read and check a scene.
 
