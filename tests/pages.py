@@ -1,4 +1,4 @@
-"""Pages of `reports/` that are run as they stand: files are written, commands and lines of Python run, in their order."""
+"""Pages of `reports/` that are run as they stand: files written, commands and lines of Python run, in their order."""
 
 import re
 import shlex
