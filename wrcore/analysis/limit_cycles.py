@@ -47,6 +47,12 @@ class Settling:
     method : str
     rtol : float
         Integration method and tolerance, see `wrcore.integrate.integrator.integrate`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wr.Settling(longest=10.0).window
+    2.0
     """
 
     window: float = 2.0

@@ -39,6 +39,14 @@ def hunting_frequency(t: ArrayLike, y: ArrayLike) -> float:
     -------
     float
         Frequency, Hz; NaN with fewer than three crossings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import wrcore as wr
+    >>> t = np.linspace(0.0, 2.0, 401)
+    >>> round(wr.hunting_frequency(t, 1e-3 * np.cos(2 * np.pi * 3.0 * t)), 3)
+    3.0
     """
     when = zero_crossings(t, y)
     return float(0.5 * (when.size - 1) / (when[-1] - when[0])) if when.size > 2 else np.nan

@@ -54,6 +54,15 @@ class Scene:
     track : Track
     pairs : tuple of Pair
         Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("metro_car"), speed=25)
+    >>> scene
+    Scene 'metro_car': metro car, S1002 on UIC60-MBench, 25 m/s, spatial detection, 10 s
+    >>> scene.vehicle.wheelset_names
+    ('wheelset_1', 'wheelset_2', 'wheelset_3', 'wheelset_4')
     """
 
     data: dict[str, Any]
