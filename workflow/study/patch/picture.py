@@ -32,10 +32,11 @@ def fig_wheel_on_rail(pair, load, y, rolling):
     matplotlib.figure.Figure
     """
     (*_, patch) = sorted(wr.patch(pair, y, load=load, speed=rolling["speed"], mu=rolling["friction"]), key=_normal)
-    figure = Figure(figsize=(8.4, 3.9), layout="constrained")
-    section, field = figure.subplots(1, 2, width_ratios=[1.0, 1.1])
+    figure = Figure(figsize=(5.6, 6.6), layout="constrained")
+    section, field = figure.subplots(2, 1, height_ratios=[1.1, 1.0])
     _draw_section(section, pair, patch)
     patch.plot(field)
+    field.set_title("")
     field.set_title(f"the patch: {1e-6 * patch.p_max:.0f} MPa at most, {1e6 * patch.area:.0f} mm²", loc="left")
     return figure
 
