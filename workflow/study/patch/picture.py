@@ -31,7 +31,9 @@ def fig_wheel_on_rail(pair, load, y, rolling):
     -------
     matplotlib.figure.Figure
     """
-    (*_, patch) = sorted(wr.patch(pair, y, load=load, speed=rolling["speed"], mu=rolling["friction"]), key=_normal)
+    (*_, patch) = sorted(
+        wr.patch(pair, y, load=load, speed=rolling["speed"], mu=rolling["friction"], resolution="fine"), key=_normal
+    )
     figure = Figure(figsize=(5.6, 6.6), layout="constrained")
     section, field = figure.subplots(2, 1, height_ratios=[1.1, 1.0])
     _draw_section(section, pair, patch)
