@@ -123,8 +123,8 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     --------
     >>> import wrcore as wr
     >>> table, shapes = wr.modes(wr.example("suspended_wheelset"), 40.0)
-    >>> table.set_index("name").loc["wheelset hunting", ["frequency_Hz", "damping_ratio"]].astype(float).round(1).tolist()
-    [4.8, 0.1]
+    >>> table.set_index("name").loc["wheelset hunting", "frequency_Hz"].round(1).item()
+    4.8
     """
     scene, (speed,) = as_scene(scene), rising([speed])
     table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
