@@ -17,15 +17,21 @@ branch joined to the second without a step (as printed it begins at zero). Energ
 Pearce and Sherratt, Wear 144 (1991) 343-351, as a law of one coefficient, which is Sheffield's of mild wear here.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.wheels import OUTWARDS, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.scene.friction import read_friction
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 DENSITY = 7850.0
 """Of steel, kg/m^3."""
@@ -59,6 +65,14 @@ class WheelWear:
     """Wear of one wheel and of the rail under it.
 
     Depths over the bins between ``edges`` of the lateral coordinate u of their profile, positive to the field side.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wear = wr.local_wear(run)["wheelset", "left"]
+    >>> wear.wheel_depth.shape[0] == wear.wheel_edges.shape[0] - 1, wear.volume > 0.0
+    (True, True)
     """
 
     wheel_edges: np.ndarray
@@ -74,7 +88,9 @@ class WheelWear:
     """Friction's work in the patches, J/m."""
 
 
-def local_wear(run, begin=0.0, law="sheffield", width=BIN):
+def local_wear(
+    run: Run, begin: float = 0.0, law: str = "sheffield", width: float = BIN
+) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
     Parameters
@@ -96,9 +112,16 @@ def local_wear(run, begin=0.0, law="sheffield", width=BIN):
     ------
     InputError
         For an unknown law, a run without wheels, or nothing after ``begin``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> sorted(wr.local_wear(run))
+    [('wheelset', 'left'), ('wheelset', 'right')]
     """
     if law not in LAWS:
-        raise InputError("local_wear", "law", f"expected one of {', '.join(LAWS)}, got {law!r}")
+        raise InputError("local_wear", "law", one_of(LAWS, law))
     if not wheelsets_of(run):
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 
 if TYPE_CHECKING:
@@ -53,6 +53,14 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     ------
     InputError
         For a channel that the run does not have.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> figure = wr.plot_run(run, ["wheelset.y_m", "wheelset/left.N_N"])
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['y / mm', 'N / kN']
     """
     panels = [(channel.rpartition(".")[2], {channel: _values(run, channel)}) for channel in channels] or _overview(run)
     figure = Figure(figsize=(WIDTH, 0.7 + HEIGHT * len(panels)), layout="constrained")
@@ -67,8 +75,9 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
 def _values(run: Run, channel: str) -> np.ndarray:
     group, _, name = channel.rpartition(".")
     if name not in run.groups.get(group, {}):
-        known = ", ".join(f"{group}.{name}" for group, names in run.groups.items() for name in names)
-        raise InputError("plot", channel, f"expected a channel of the run: {known}")
+        known = [f"{group}.{name}" for group, names in run.groups.items() for name in names]
+        expected = f"expected a channel of the run: {', '.join(known)}{similar(channel, known)}"
+        raise InputError("plot", channel, expected)
     return run.groups[group][name]
 
 

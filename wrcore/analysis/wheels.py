@@ -6,12 +6,19 @@ number T gamma: |Fx xi + Fy eta| summed over the patches (N), and with spin |Fx 
 friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed over the patches (W); see :mod:`wrcore.run.wear`.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from wrcore.analysis.motion import SIDES
 from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.wear import creep_work
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 OUTWARDS = {"left": 1.0, "right": -1.0}
 
@@ -29,7 +36,7 @@ def wheelsets_of(run):
     return [name for name in run.groups if f"{name}/left" in run.groups]
 
 
-def wheel_forces(run, wheelset, side):
+def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.ndarray]:
     """Forces of a wheel on its rail.
 
     Parameters
@@ -42,6 +49,14 @@ def wheel_forces(run, wheelset, side):
     -------
     Q, Y : numpy.ndarray, shape (n,)
         Vertical (downwards) and lateral (to the field side) force, N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> Q, Y = wr.wheel_forces(run, "wheelset", "left")
+    >>> round(1e-3 * Q.mean())
+    55
     """
     contact = run[f"{wheelset}/{side}"]
     vertical, lateral = np.zeros(len(run.t)), np.zeros(len(run.t))
@@ -59,15 +74,54 @@ def _creep_work(run, wheelset, side):
     return creep_work(c.Fx_N, c.Fy_N, c.Mz_Nm, c.xi, c.eta, c.phi_per_m)
 
 
-def wear_number(run, wheelset, side, spin=False):
-    """Wear number T gamma of a wheel over time, N, shape (n,); without or with the spin's part."""
+def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.ndarray:
+    """Wear number T gamma of a wheel over time, without or with the spin's part.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+    spin : bool
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.wear_number(run, "wheelset", "left", spin=True).shape == run.t.shape
+    True
+    """
     return _creep_work(run, wheelset, side)[int(spin)]
 
 
-def creep_power(run, wheelset, side):
-    """Power that a wheel's creep dissipates over time, W, shape (n,).
+def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
+    """Power that a wheel's creep dissipates over time.
 
     Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        W.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> power = wr.creep_power(run, "wheelset", "left")
+    >>> power.shape == run.t.shape, bool(power.min() >= 0.0)
+    (True, True)
     """
     body = run[wheelset]
     speed = np.hypot(body.vx_m_per_s, body.vy_m_per_s) if "vx_m_per_s" in body else run.scene["speed"]
@@ -86,7 +140,7 @@ def greatest_pressure(run, wheelset, side):
     return np.max(np.nan_to_num(pressure), axis=1)
 
 
-def wheelset_channels(run, wheelset):
+def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
 
     Parameters
@@ -98,6 +152,13 @@ def wheelset_channels(run, wheelset):
     -------
     pandas.DataFrame
         Index ``t_s``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
+    ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
     columns, total = {}, 0.0
     for side in SIDES:
@@ -115,7 +176,7 @@ def wheelset_channels(run, wheelset):
     return pd.DataFrame(columns | {"sum_Y_N": total}, index=pd.Index(run.t, name="t_s"))
 
 
-def wheel_table(run, begin=0.0):
+def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     """Loads, guiding forces and wear of each wheel.
 
     Parameters
@@ -129,6 +190,13 @@ def wheel_table(run, begin=0.0):
     pandas.DataFrame
         A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
         without and with spin (N) and mean creep power (W).
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> (1e-3 * wr.wheel_table(run).set_index("side")["Q_mean_N"]).round().to_dict()
+    {'left': 55.0, 'right': 55.0}
     """
     late = run.t >= begin
     rows = []
