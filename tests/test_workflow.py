@@ -61,6 +61,12 @@ def test_every_figure_is_there_as_png_and_svg(smoke, name):
     assert "<svg" in found(smoke, f"{name}.svg").read_text()[:2000]
 
 
+def test_every_text_of_every_figure_can_be_read(smoke):
+    logs = sorted((ROOT / "logs" / "smoke").rglob("*.log"))
+    said = [line for log in logs for line in log.read_text("utf-8").splitlines() if "UserWarning: figure " in line]
+    assert len(logs) > 40 and said == []
+
+
 def test_smoke_runs_every_rule_of_the_study(smoke):
     rules = []
     for extra in (["--configfile", "config/smoke.yaml"], []):

@@ -90,7 +90,7 @@ rule fig_growth:
     message:
         "Figure: growth of cost"
     input:
-        core=CORE["cost"] + sources(STYLE),
+        core=CORE["cost"] + sources(*STYLE),
         wheelsets=rules.cost_growth.output.wheelsets,
         runs=rules.cost_growth.output.runs,
         simultaneous=rules.cost_growth.output.simultaneous,
@@ -112,7 +112,7 @@ rule cost_stages:
     message:
         "Time, operations and bytes of one right-hand side by stage"
     input:
-        core=CORE["cost"] + sources(STYLE),
+        core=CORE["cost"] + sources(*STYLE),
         scenes=SCENES,
     output:
         stages=report(

@@ -5,7 +5,7 @@ HUNTING = list(CRITICAL["vehicles"])
 CORE["critical_speed"] = CORE["simulation"] + sources(
     "analysis/motion", "analysis/modes", "analysis/stability", "analysis/limit_cycles"
 )  # fmt: skip
-CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(STYLE, "study/critical_speed")
+CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "study/critical_speed")
 
 
 wildcard_constraints:

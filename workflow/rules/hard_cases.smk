@@ -71,7 +71,7 @@ rule fig_hard_cases:
     message:
         "Hard cases: figures"
     input:
-        core=CORE["hard_cases"] + sources(STYLE),
+        core=CORE["hard_cases"] + sources(*STYLE),
         curves=expand(rules.hard_cases.output.curves, family=FAMILIES),
     output:
         **{

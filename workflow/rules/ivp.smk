@@ -2,7 +2,7 @@
 
 IVP = config["ivp"]
 CORE["ivp"] = sources("kernels", "integrate", "study/ivp/problem", "study/ivp/wheelset", "study/ivp/runs")
-CORE["ivp_figures"] = CORE["ivp"] + sources(STYLE, "study/ivp/figures")
+CORE["ivp_figures"] = CORE["ivp"] + sources(*STYLE, "study/ivp/figures")
 
 
 rule ivp_wheelset:

@@ -80,6 +80,7 @@ rule vehicle_guiding_forces:
     input:
         core=CORE["vehicle_figures"],
         run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
+        linear="<results>/critical_speed/{vehicle}_linear.csv",
     output:
         report(
             "<results>/speeds/vehicle_guiding_forces_{vehicle}.png",
@@ -106,6 +107,7 @@ rule vehicle_over_speed:
     input:
         core=CORE["vehicle_figures"],
         speeds=expand(rules.sweep_speeds.output.speeds, vehicle=VEHICLES),
+        linear=expand("<results>/critical_speed/{vehicle}_linear.csv", vehicle=VEHICLES),
         benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
     output:
         report(

@@ -1,7 +1,7 @@
 # Wear: a wheel profile over a distance, and what settings and models do to it.
 
 WEAR = config["wear"]
-CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", *VEHICLE, STYLE, "study/wear")
+CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", *VEHICLE, *STYLE, "study/wear")
 
 
 rule wear_evolution:

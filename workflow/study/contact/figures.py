@@ -9,6 +9,7 @@ nowhere before: lengths to mm, angles to mrad, forces to kN.
 import numpy as np
 from matplotlib.colors import LogNorm, TwoSlopeNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from study.contact.tables import first_order_law, over_contact_angle
 from wrcore.analysis.style import MM, styled
@@ -256,7 +257,8 @@ def fig_lateral_sweep(sweep):
         force.plot(y, values, label=name, rasterized=True, **style)
         change = np.maximum(np.abs(np.diff(values)) * per_micrometre, 1e-6)
         steps.semilogy(0.5 * (y[1:] + y[:-1]), change, label=name, rasterized=True, **style)
-    force.set(ylabel="vertical force of both wheels / kN", xmargin=0)
+    force.set(ylabel="vertical force / kN", yscale="log", xmargin=0, title="both wheels at fixed height")
+    force.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     steps.set(xlabel="lateral shift y, to the left / mm", ylabel="change per µm / kN", ylim=(1e-4, 1e3))
     force.legend(fontsize=8)
     return figure

@@ -82,7 +82,7 @@ def fig_modes(table, title):
     rows = np.flatnonzero(table["damping_ratio"] < OVERDAMPED)
     parts = table.iloc[rows, table.columns.get_loc("part") + 1 :]
     parts = parts.loc[:, parts.max() >= LEAST_ENERGY]
-    figure = Figure(figsize=(2.6 + 0.27 * parts.shape[1], 1.2 + 0.16 * len(rows)), layout="constrained")
+    figure = Figure(figsize=(max(2.6 + 0.27 * parts.shape[1], 4.6), 1.5 + 0.16 * len(rows)), layout="constrained")
     axes = figure.subplots()
     axes.imshow(parts, cmap="Greys", vmin=0.0, vmax=1.8, aspect="auto")
     for (row, column), part in np.ndenumerate(parts.to_numpy()):
@@ -97,8 +97,7 @@ def fig_modes(table, title):
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     axes.grid(False)
-    axes.set_title(title, loc="left")
-    axes.set_xlabel("kinetic energy by coordinate / %", fontsize=8)
+    figure.suptitle(f"{title}: kinetic energy by coordinate / %", fontsize=9, x=0.01, ha="left")
     return figure
 
 

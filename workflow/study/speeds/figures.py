@@ -7,18 +7,26 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wrcore.analysis.motion import SIDES
-from wrcore.analysis.style import LINES, MM, derailed_at, shared_legend, styled
-from wrcore.analysis.wheels import quotient, wheel_forces, wheelsets_of
+from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from wrcore.analysis.wheels import hunting, quotient, wheel_forces, wheelsets_of
 
 KN = 1e-3
 
 VEHICLES = ({"marker": "o", "markersize": 3.5}, {"marker": "s", "markersize": 3.5, "markerfacecolor": "white"})
 """Markers of the vehicles that one figure compares, in order."""
 
+CRITICAL = ({"linestyle": "-."}, {"linestyle": ":"})
+"""Lines at the linear critical speeds of those vehicles."""
+
+SWINGS = 10
+"""Oscillations of the leading wheelset that its motion is drawn for: more would run together."""
+
 
 @styled
 def lateral_motion(runs):
     """Lateral position of every wheelset over time, planar and spatial, one column per speed.
+
+    Drawn are the first `SWINGS` oscillations of the leading wheelset; the title says so where the run goes on.
 
     Parameters
     ----------
@@ -30,29 +38,41 @@ def lateral_motion(runs):
     matplotlib.figure.Figure
     """
     names = wheelsets_of(next(iter(next(iter(runs.values())).values())))
-    figure = Figure(figsize=(0.6 + 3.1 * len(runs), 0.9 + 1.15 * len(names)), layout="constrained")
+    figure = Figure(figsize=(0.6 + 3.1 * len(runs), 1.1 + 1.15 * len(names)), layout="constrained")
     panels = figure.subplots(len(names), len(runs), squeeze=False, sharex="col", sharey="col")
     for column, (title, pair) in enumerate(runs.items()):
+        shown, whole = _swings(pair["spatial"], names[0])
+        part = f"first {shown:.2g} of {whole:g} s" if shown < whole else f"{whole:g} s"
         for row, name in enumerate(names):
             axes = panels[row, column]
             for detection, line in LINES.items():
-                axes.plot(pair[detection].t, MM * pair[detection][name].y_m, label=detection, **line)
+                seen = pair[detection].t <= shown
+                axes.plot(pair[detection].t[seen], MM * pair[detection][name].y_m[seen], label=detection, **line)
             axes.set(xmargin=0)
-            axes.set_title(f"{name.replace('_', ' ')}, {title}", loc="left")
+            axes.set_title(name.replace("_", " ") if row else f"{title}, {part}\n{name.replace('_', ' ')}", loc="left")
             axes.set_ylabel("y / mm")
         panels[-1, column].set_xlabel("time / s")
     shared_legend(figure, panels.ravel())
     return figure
 
 
+def _swings(run, wheelset):
+    """Time that `SWINGS` oscillations of a wheelset take, and that of the whole run, s."""
+    frequency, _, _ = hunting(run.t, run[wheelset].y_m)
+    whole = float(run.t[-1])
+    return (min(SWINGS / frequency, whole) if frequency > 0.0 else whole), whole
+
+
 @styled
-def guiding_forces(run, title):
+def guiding_forces(run, title, critical=None):
     """Vertical force Q, lateral force Y and Y/Q of every wheel of a run over time.
 
     Parameters
     ----------
     run : Run
     title : str
+    critical : float, optional
+        Linear critical speed of the vehicle, m/s; the title says on which side of it the run is.
 
     Returns
     -------
@@ -72,7 +92,10 @@ def guiding_forces(run, title):
         panels[row, 0].set_title(name.replace("_", " "), loc="left")
     for axes in panels[-1]:
         axes.set_xlabel("time / s")
-    figure.suptitle(title)
+    if critical is not None:
+        side = "above" if run.scene["speed"] > critical else "below"
+        title += f", {side} the linear critical speed" + (f" of {critical:.1f} m/s" if np.isfinite(critical) else "")
+    figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     shared_legend(figure, panels.ravel())
     return figure
 
@@ -95,7 +118,7 @@ RESPONSE = (
 
 
 @styled
-def over_speed(tables, track, quantities):
+def over_speed(tables, track, quantities, critical=None):
     """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are crosses at the top.
 
     Parameters
@@ -106,6 +129,8 @@ def over_speed(tables, track, quantities):
         Which of the tables' tracks to show.
     quantities : sequence of (column, factor, label)
         One panel each: ``HUNTING`` or ``RESPONSE``.
+    critical : dict of str to float, optional
+        Linear critical speed by vehicle, m/s: marked, as runs beyond it hunt whatever the track.
 
     Returns
     -------
@@ -123,6 +148,9 @@ def over_speed(tables, track, quantities):
                     style = {**line, **marker, "markevery": 2}
                     axes.plot(part["speed_m_per_s"], values, label=f"{vehicle}, {detection}", **style)
                 derailed_at(axes, part.loc[part["status"] == "derailed", "speed_m_per_s"], line["color"])
+        for look, (vehicle, speed) in zip(CRITICAL, (critical or {}).items(), strict=False):
+            if np.isfinite(speed):
+                axes.axvline(speed, color=ACCENT, linewidth=0.9, label=f"{vehicle}, linear critical", **look)
         axes.set(ylabel=label)
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")
