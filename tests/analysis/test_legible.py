@@ -73,7 +73,8 @@ def twice(axes):
 @pytest.mark.parametrize(
     ("fault", "found"),
     [
-        (cut, "leaves the page"), (overlapping, "'one text' and 'another' overlap"), (rotated, "'aside' and 'force / kN' overlap"),
+        (cut, "leaves the page"), (overlapping, "'one text' and 'another' overlap"),
+        (rotated, "'aside' and 'force / kN' overlap"),
         (legend_on_line, "the legend covers the line 'falling'"), (legend_on_marks, "covers the marks 'marks'"),
         (legend_on_bars, "the legend covers the bar"), (fixed_text_on_line, "'on the line' covers the line 'line'"),
         (twice, "the legend says 'line' twice"),
