@@ -21,7 +21,7 @@ import pandas as pd
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.ride import rate_of, ride_table
 from wrcore.analysis.wheels import OUTWARDS, quotient, wheel_forces, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 PERCENTILES = (0.15, 50.0, 99.85)
 WINDOW = 2.0
@@ -81,7 +81,7 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     ``print(wr.assess(wr.load_run("run.h5")))``
     """
     if standard not in STANDARDS:
-        raise InputError("assess", "standard", f"expected one of {', '.join(STANDARDS)}, got {standard!r}")
+        raise InputError("assess", "standard", one_of(STANDARDS, standard))
     if standard == "EN 12299":
         return Assessment(standard, ride_table(run, begin), pd.DataFrame())
     sections, wheel_load = section_table(run, begin)

@@ -24,7 +24,7 @@ import numpy as np
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.wheels import OUTWARDS, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.scene.friction import read_friction
 
 DENSITY = 7850.0
@@ -98,7 +98,7 @@ def local_wear(run, begin=0.0, law="sheffield", width=BIN):
         For an unknown law, a run without wheels, or nothing after ``begin``.
     """
     if law not in LAWS:
-        raise InputError("local_wear", "law", f"expected one of {', '.join(LAWS)}, got {law!r}")
+        raise InputError("local_wear", "law", one_of(LAWS, law))
     if not wheelsets_of(run):
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):

@@ -6,7 +6,7 @@ from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Rolling, Strips
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import load_scene
 from wrcore.scene.friction import read_friction
@@ -72,7 +72,7 @@ def patch(
     for name, value, known in (("method", method, METHODS), ("side", side, SIDES), ("resolution", resolution, GRIDS),
                                ("load_by", load_by, ("vertical", "normal"))):  # fmt: skip
         if value not in known:
-            raise InputError("patch", name, f"expected one of {', '.join(known)}, got {value!r}")
+            raise InputError("patch", name, one_of(known, value))
     geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source, side)
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
     numbers = {"y": (y, 0.1), "yaw": (yaw, 0.5), "roll": (roll, 0.5), "z": (z, 2.0), "omega": (omega, 4e3),

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 
 if TYPE_CHECKING:
@@ -71,8 +71,9 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
 def _values(run: Run, channel: str) -> np.ndarray:
     group, _, name = channel.rpartition(".")
     if name not in run.groups.get(group, {}):
-        known = ", ".join(f"{group}.{name}" for group, names in run.groups.items() for name in names)
-        raise InputError("plot", channel, f"expected a channel of the run: {known}")
+        known = [f"{group}.{name}" for group, names in run.groups.items() for name in names]
+        expected = f"expected a channel of the run: {', '.join(known)}{similar(channel, known)}"
+        raise InputError("plot", channel, expected)
     return run.groups[group][name]
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.surface import SIDES
 from wrcore.run.run import Run
 from wrcore.run.simulate import simulate
@@ -110,7 +110,7 @@ def simulate_to_accuracy(
     (True, True)
     """
     if of not in QUANTITIES:
-        raise InputError("--accuracy-of", str(of), f"expected one of {', '.join(QUANTITIES)}")
+        raise InputError("--accuracy-of", "", one_of(QUANTITIES, of))
     check_number(accuracy, 1e-300, 1e300, "--accuracy", "", QUANTITIES[of])
     if not {"pose", "contact"} <= set(scene.data["output"]["channels"]):
         raise InputError(scene.source, "output.channels", "expected pose and contact among them")

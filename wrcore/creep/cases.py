@@ -5,12 +5,15 @@ import numpy as np
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_csv import read_csv_table
 
 MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
-NUMBERS = (*POSITIVE, "nu", "ux", "uy", "phi_per_m")
+NUMBERS = (*POSITIVE, "nu", "xi", "eta", "phi_per_m")
+OTHER_NAMES = {"ux": "xi", "uy": "eta"}
+"""Columns that are read, too, where the usual ones are missing."""
+
 _SAME_NU = 1e-9
 
 
@@ -43,7 +46,8 @@ def check_cases(frame, source="cases"):
     Parameters
     ----------
     frame : pandas.DataFrame
-        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, ux, uy, phi_per_m; others are ignored.
+        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m; others are
+        ignored.
     source : str
         Name of the file, for messages.
 
@@ -57,6 +61,7 @@ def check_cases(frame, source="cases"):
         On a missing column, on a value that is not a finite number, not positive where it must be, or nu outside
         0 to 0.5. Rows are counted from 1, without the header.
     """
+    frame = frame.rename(columns={other: name for other, name in OTHER_NAMES.items() if name not in frame})
     missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
     if missing:
         raise InputError(source, ", ".join(missing), f"expected columns case_id, {', '.join(NUMBERS)}; not found")
@@ -93,7 +98,7 @@ def nondimensional(columns):
     -------
     g, psi : (n,) ndarray
     creepages : (n, 3) ndarray
-        ux', uy', phi'.
+        xi', eta', phi'.
     c : (n,) ndarray
         sqrt(a b), b the mean of b_neg and b_pos, m.
     """
@@ -101,7 +106,7 @@ def nondimensional(columns):
     psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
     c = np.sqrt(columns["a_m"] * b)
     factor = columns["G_Pa"] * c**2 / (columns["mu"] * columns["N_N"])
-    creepages = np.stack([columns["ux"], columns["uy"], columns["phi_per_m"] * c], axis=1) * factor[:, None]
+    creepages = np.stack([columns["xi"], columns["eta"], columns["phi_per_m"] * c], axis=1) * factor[:, None]
     return columns["a_m"] / b, psi, creepages, c
 
 
@@ -139,7 +144,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
 
     source = source or frame.attrs.get("source", "cases")
     if model not in MODELS:
-        raise InputError(source, "model", f"expected one of {', '.join(MODELS)}, got {model!r}")
+        raise InputError(source, "model", one_of(MODELS, model))
     columns = check_cases(frame, source)
     g, psi, creepages, c = nondimensional(columns)
     if model == "exact":
@@ -217,7 +222,7 @@ def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8
     """
     import pandas as pd
 
-    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "ux", "uy", "phi_per_m")
+    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "xi", "eta", "phi_per_m")
     values = np.broadcast_arrays(a, b, b, normal_force, mu, shear_modulus, nu, xi, eta, phi)
     frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))

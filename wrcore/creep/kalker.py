@@ -1,6 +1,6 @@
 """Kalker's linear theory of rolling contact: the coefficients C11, C22, C23, C33 and the law.
 
-    fx = -C11 ux',   fy = -C22 uy' - C23 phi',   mz = +C23 uy' - C33 phi'
+    fx = -C11 xi',   fy = -C22 eta' - C23 phi',   mz = +C23 eta' - C33 phi'
 
 in the nondimensional form of the package (`halfspace.RollingContact`), i.e. Fx = -G a b C11 xi and so on. The
 coefficients come from this package's own half-space operator with adhesion everywhere, extrapolated in the panel

@@ -15,7 +15,7 @@ from wrcore import __version__
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import table_folder, warn
 
@@ -26,7 +26,7 @@ resolution, whose 99 % error was found to be 0.0027); planar detection changes i
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
-_SCHEMA = "wrcore creep table 2"
+SCHEMA = "wrcore creep table 2"
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _promising(planes, tolerance):
 
 def _check_arguments(nu, planes, tolerance):
     if planes not in RESOLUTIONS:
-        raise InputError("creep table", "planes", f"expected one of {', '.join(RESOLUTIONS)}, got {planes!r}")
+        raise InputError("creep table", "planes", one_of(RESOLUTIONS, planes))
     if not 0 <= nu <= 0.5:
         raise InputError("creep table", "nu", f"expected 0 to 0.5, got {nu}")
     if not 0 < tolerance < 1:
@@ -142,7 +142,7 @@ def _write_datasets(file, table):
         dataset = file.create_dataset(name, data=errors)
         dataset.attrs["units"] = "1"
         dataset.attrs["description"] = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
-    file.attrs.update(schema=_SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
+    file.attrs.update(schema=SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
     file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
     for name, value in axes._asdict().items():
         file.attrs[f"axes.{name}"] = value
@@ -166,8 +166,8 @@ def load_table(path):
     """
     with checked_hdf5(path, "a creep table in HDF5") as (file, signed):
         found = file.attrs.get("schema")
-        if found != _SCHEMA or not signed:
-            expected = f"expected {_SCHEMA!r} with its digest, got {found!r}"
+        if found != SCHEMA or not signed:
+            expected = f"expected {SCHEMA!r} with its digest, got {found!r}"
             raise InputError(path, "schema", f"{expected}; 'wrcore table build' makes a new one")
         return _read_datasets(path, file)
 
@@ -215,7 +215,7 @@ def show_progress(patches):
 
 def creep_digest():
     """Digest (16 hex digits) of everything in this room that the numbers in a table depend on, and of their form."""
-    digest = hashlib.sha256(_SCHEMA.encode())
+    digest = hashlib.sha256(SCHEMA.encode())
     room = files("wrcore.creep")
     for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
         digest.update(room.joinpath(name).read_bytes())

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry import profile_files
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
@@ -221,8 +221,9 @@ def _sections(spec, kind):
     elif form == "circle" and value:
         found, build, source = "rail", lambda: circle_sections(_number(name, value, 0.01, 100.0)), "analytic"
     else:
-        known = ", ".join(row["name"] for row in list_profiles() if row["kind"] == kind)
-        raise InputError(kind, "profile", f"expected a point file or one of {known}, got {spec!r}")
+        known = [row["name"] for row in list_profiles() if row["kind"] == kind]
+        expected = f"expected a point file or one of {', '.join(known)}, got {spec!r}{similar(spec, known)}"
+        raise InputError(kind, "profile", expected)
     if found != kind:
         raise InputError(kind, "profile", f"expected a {kind} profile, got {spec!r}, which is a {found}")
     return build(), source

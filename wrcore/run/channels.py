@@ -1,6 +1,8 @@
 """What the channels of a run are: unit by the end of the name, and meaning."""
 
 UNIT_SUFFIXES = {
+    "_m3_per_m": "m^2",
+    "_m3": "m^3",
     "_m_per_s2": "m/s^2",
     "_m_per_s": "m/s",
     "_rad_per_s": "rad/s",

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from wrcore import __version__
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
@@ -244,7 +244,7 @@ def _check_format(path, file, signed):
 def _check_run(path, run):
     """What every other part of the package relies on."""
     if run.status not in STATUSES or not isinstance(run.reason, str):
-        raise InputError(path, "attribute status", f"expected one of {', '.join(STATUSES)}, got {run.status!r}")
+        raise InputError(path, "attribute status", one_of(STATUSES, run.status))
     for name in ("scene", "settings", "counters"):
         if not isinstance(getattr(run, name), dict):
             raise InputError(path, f"attribute {name}", "expected a JSON object")

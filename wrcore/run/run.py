@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import wrcore
+from wrcore.errors import similar
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 
 if TYPE_CHECKING:
@@ -35,7 +36,9 @@ class Channels(Mapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._channels:
-            raise KeyError(f"no channel {name!r} in {self._group!r}; it has {', '.join(self._channels)}")
+            raise KeyError(
+                f"no channel {name!r} in {self._group!r}; it has {', '.join(self._channels)}{similar(name, self)}"
+            )
         return self._channels[name]
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -126,7 +129,9 @@ class Run:
     def __getitem__(self, group: str) -> Channels:
         """Channels of one group as attributes; KeyError names the groups that exist."""
         if group not in self.groups:
-            raise KeyError(f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}")
+            raise KeyError(
+                f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}{similar(group, self)}"
+            )
         return Channels(group, self.groups[group])
 
     def __contains__(self, group: object) -> bool:

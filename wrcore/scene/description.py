@@ -117,16 +117,18 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
         source, folder, data = "scene", Path("."), plain_tree(dict(scene), "scene")
     else:
         source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
-    if isinstance(overrides, Mapping):
-        changes = {**overrides, **changes}
-    else:
-        for text in overrides:
-            key, equals, value = text.partition("=")
-            if not equals or not key.strip():
-                raise InputError("--set", text, "expected key.path=value")
-            _set(data, key.strip(), parse_value(value), "--set")
-    for key, value in _flat(changes):
-        _set(data, key, value, source)
+    texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
+    asked = [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
+    for option, key, value in asked:
+        _set(data, key, value, option)
+    try:
+        return _checked(data, source, folder)
+    except InputError as error:
+        raise _blamed(error, source, asked) from None
+
+
+def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
+    """The scene of a file's content, with whatever other files it names."""
     data = validate(data, "scene", source)
     parameters = find_file(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
@@ -149,6 +151,23 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     read_friction(data["contact"]["friction"], source)
     read_drive(data.get("drive"), vehicle, source)
     return Scene(data, source, vehicle, wheel, rail, track, pairs)
+
+
+def _blamed(error, source, asked):
+    """A fault of a scene's file, or of what has been asked for instead of what is written there."""
+    for option, key, _ in reversed(asked):
+        near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")
+        if error.source == source and near:
+            return InputError(option, error.field, error.expected)
+    return error
+
+
+def _pair(text):
+    """Key path and value of ``key.path=value``."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError("--set", text, "expected key.path=value")
+    return key.strip(), parse_value(value)
 
 
 WHOLE = (".profile", ".friction", ".controller.speed")

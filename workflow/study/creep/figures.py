@@ -35,17 +35,17 @@ CONTACT_STYLE = {"CONTACT": {"color": "0.35", "marker": "o"}, "its FASTSIM": {"c
 TRACTION_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.65, 256)))
 
 CURVES = (
-    ("longitudinal", "ux", "fx", "(a) longitudinal"),
-    ("lateral", "uy", "fy", "(b) lateral"),
+    ("longitudinal", "xi", "fx", "(a) longitudinal"),
+    ("lateral", "eta", "fy", "(b) lateral"),
     ("spin", "phi", "fy", "(c) pure spin: lateral force"),
-    ("combined", "uy", "fy", "(d) lateral with spin: force"),
-    ("lateral", "uy", "mz", "(e) lateral: moment"),
+    ("combined", "eta", "fy", "(d) lateral with spin: force"),
+    ("lateral", "eta", "mz", "(e) lateral: moment"),
     ("spin", "phi", "mz", "(f) pure spin: moment"),
 )
 
 SYMBOLS = {
-    "ux": r"$\xi' = \xi\,G c^2/(\mu N)$ / 1",
-    "uy": r"$\eta' = \eta\,G c^2/(\mu N)$ / 1",
+    "xi": r"$\xi' = \xi\,G c^2/(\mu N)$ / 1",
+    "eta": r"$\eta' = \eta\,G c^2/(\mu N)$ / 1",
     "phi": r"$\varphi' = \varphi\,G c^3/(\mu N)$ / 1",
     "fx": r"$F_x/(\mu N)$ / 1",
     "fy": r"$F_y/(\mu N)$ / 1",

@@ -39,7 +39,7 @@ from wrcore.contact.patch.solve import (
 )
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.geometry.surface import SIDES
 
 RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}
@@ -129,7 +129,7 @@ class NormalContact:
         for name, value, known in (("resolution", resolution, RESOLUTIONS), ("model", model, MODELS),
                                    ("detection", detection, ("planar", "spatial"))):  # fmt: skip
             if value not in known:
-                raise InputError("NormalContact", name, f"expected one of {', '.join(known)}, got {value!r}")
+                raise InputError("NormalContact", name, one_of(known, value))
         if not 0.0 < modulus < math.inf:
             raise InputError("NormalContact", "modulus", f"expected a contact modulus in Pa, got {modulus!r}")
         self.geometry, self.modulus, self.spatial = geometry, float(modulus), detection == "spatial"
