@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.contact import contact_table as contact_table
     from wrcore.analysis.damage import damage_table as damage_table
     from wrcore.analysis.damage import plot_shakedown as plot_shakedown
+    from wrcore.analysis.draw import draw as draw
     from wrcore.analysis.evolve import evolve as evolve
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
     from wrcore.analysis.local_wear import WheelWear as WheelWear
@@ -81,6 +82,7 @@ _PUBLIC = {
     "creep_force": "wrcore.creep.cases",
     "critical_speeds": "wrcore.analysis.stability",
     "damage_table": "wrcore.analysis.damage",
+    "draw": "wrcore.analysis.draw",
     "ensure_table": "wrcore.creep.table",
     "evolve": "wrcore.analysis.evolve",
     "first_touch": "wrcore.contact.first_touch",

@@ -1,7 +1,9 @@
 # Wear: a wheel profile over a distance, and what settings and models do to it.
 
 WEAR = config["wear"]
-CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", *VEHICLE, *STYLE, "study/wear")
+CORE["wear"] = CORE["simulation"] + sources(
+    "analysis/evolve", "analysis/local_wear", "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
+)  # fmt: skip
 
 
 rule wear_evolution:
