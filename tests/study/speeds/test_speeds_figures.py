@@ -46,6 +46,9 @@ def test_guiding_forces_show_both_wheels_in_kN(runs):
     assert len(figure.axes) == 6
     assert [len(axes.lines) for axes in figure.axes] == [2] * 6
     assert figure.axes[0].lines[0].get_ydata()[0] == pytest.approx(8.9 * np.cos(0.03))
+    run = copy.deepcopy(runs["spatial"])
+    run.t = 2.0 * run.t
+    assert guiding_forces(run, "any").axes[0].lines[0].get_xdata()[[0, -1]].tolist() == [4.0, 8.0]
     assert {"Q / kN", "Y / kN", "Y/Q", "time / s"} == set(labels(figure))
 
 

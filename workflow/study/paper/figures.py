@@ -99,19 +99,19 @@ def _coordinate_lines(axes, scene, side, point, lift):
     _line(axes, _wheel_points(scene, side, u_w, np.linspace(0.0, s_w, 50), **wheel), **blue)
     _line(axes, _rail_points(scene, side, _inside(scene.rail, 200), 0.0), **red)
     _line(axes, _rail_points(scene, side, u_r, np.linspace(0.0, s_r, 20)), **red)
-    for name, at, style in (
-        ("Q ($u_w$, $s_w$)", _wheel_points(scene, side, u_w, s_w, **wheel), blue),
-        ("P ($u_r$, $s_r$)", _rail_points(scene, side, u_r, s_r), red),
+    for name, at, style, aside in (
+        ("Q ($u_w$, $s_w$)", _wheel_points(scene, side, u_w, s_w, **wheel), blue, "right"),
+        ("P ($u_r$, $s_r$)", _rail_points(scene, side, u_r, s_r), red, "left"),
     ):
         axes.scatter(*(MM * at), color=style["color"], s=16, zorder=6, depthshade=False)
-        axes.text(*(MM * at + np.array([0.0, 0.0, 6.0])), name, color=style["color"], zorder=7)
+        axes.text(*(MM * at + np.array([0.0, 0.0, 6.0])), name, color=style["color"], zorder=7, ha=aside)
 
 
 def _axis_arrows(axes, length):
     for name, direction in (("x forward", (1, 0, 0)), ("y left", (0, 1, 0)), ("z up", (0, 0, 1))):
         end = length * np.array(direction)
         axes.quiver(0, 0, 0, *end, color="k", linewidth=1.0, arrow_length_ratio=0.12, zorder=8)
-        axes.text(*(1.1 * end), name, zorder=8)
+        axes.text(*(1.1 * end + np.array([0.0, 0.0, 25.0])), name, zorder=8)
 
 
 @styled

@@ -21,6 +21,12 @@ CRITICAL = ({"linestyle": "-."}, {"linestyle": ":"})
 SWINGS = 10
 """Oscillations of the leading wheelset that its motion is drawn for: more would run together."""
 
+LAST = 4.0
+"""Time at the end of a run that forces are drawn for, s."""
+
+WIDE = (20.0, 1e5)
+"""Values whose largest and smallest differ by a factor between these are drawn on a logarithmic axis."""
+
 
 @styled
 def lateral_motion(runs):
@@ -65,7 +71,7 @@ def _swings(run, wheelset):
 
 @styled
 def guiding_forces(run, title, critical=None):
-    """Vertical force Q, lateral force Y and Y/Q of every wheel of a run over time.
+    """Vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run.
 
     Parameters
     ----------
@@ -81,13 +87,14 @@ def guiding_forces(run, title, critical=None):
     names = wheelsets_of(run)
     figure = Figure(figsize=(7.2, 0.9 + 1.35 * len(names)), layout="constrained")
     panels = figure.subplots(len(names), 3, squeeze=False, sharex=True, sharey="col")
+    shown = run.t >= run.t[-1] - LAST
     lines = {"left": {"color": "0.1"}, "right": {"color": "0.55", "linestyle": (0, (4, 2))}}
     for row, name in enumerate(names):
         for side in SIDES:
             vertical, lateral = wheel_forces(run, name, side)
             series = (KN * vertical, KN * lateral, quotient(vertical, lateral))
             for axes, values, label in zip(panels[row], series, ("Q / kN", "Y / kN", "Y/Q"), strict=True):
-                axes.plot(run.t, values, label=f"{side} wheel", **lines[side])
+                axes.plot(run.t[shown], values[shown], label=f"{side} wheel", **lines[side])
                 axes.set(ylabel=label, xmargin=0)
         panels[row, 0].set_title(name.replace("_", " "), loc="left")
     for axes in panels[-1]:
@@ -96,7 +103,7 @@ def guiding_forces(run, title, critical=None):
         side = "above" if run.scene["speed"] > critical else "below"
         title += f", {side} the linear critical speed" + (f" of {critical:.1f} m/s" if np.isfinite(critical) else "")
     figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-    shared_legend(figure, panels.ravel())
+    shared_legend(figure, panels.ravel(), loc="outside lower right")
     return figure
 
 
@@ -151,8 +158,16 @@ def over_speed(tables, track, quantities, critical=None):
         for look, (vehicle, speed) in zip(CRITICAL, (critical or {}).items(), strict=False):
             if np.isfinite(speed):
                 axes.axvline(speed, color=ACCENT, linewidth=0.9, label=f"{vehicle}, linear critical", **look)
-        axes.set(ylabel=label)
+        axes.set(ylabel=label, yscale="log" if _wide(axes) else "linear")
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")
     shared_legend(figure, np.ravel(panels), ncols=2)
     return figure
+
+
+def _wide(axes):
+    """Whether small values of a panel would be lost beside its large ones, and all are above zero."""
+    drawn = [line.get_ydata() for line in axes.lines if line.get_transform() == axes.transData]
+    values = np.concatenate([[], *drawn])
+    values = values[np.isfinite(values)]
+    return bool(values.size) and values.min() > 0.0 and WIDE[0] < values.max() / values.min() < WIDE[1]

@@ -24,9 +24,11 @@ def fig_influences(found, distance):
     matplotlib.figure.Figure
     """
     figure = Figure(figsize=(6.8, 4.6), layout="constrained")
-    axes = figure.subplots()
+    axes, worn = figure.subplots(), []
     for (name, (u, depth)), look in zip(found.items(), LOOKS * (1 + len(found) // len(LOOKS)), strict=False):
         axes.plot(MM * u, MM * depth, look, label=name, linewidth=1.0)
+        worn.extend(MM * u[depth > 0.005 * depth.max()])
     axes.set(xlabel="u / mm, to the field side", ylabel="worn off / mm", title=f"after {KM * distance:.0f} km")
-    axes.legend(fontsize=7, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    axes.set_xlim(min(worn) - 3.0, max(worn) + 3.0)
+    figure.legend(fontsize=7, ncols=2, loc="outside lower center")
     return figure
