@@ -16,7 +16,7 @@ rule patch_costs:
         report(
             "<results>/patch/costs.csv",
             caption="../report/patch/patch_costs.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "cost of a patch"},
         ),
     log:
@@ -46,25 +46,25 @@ rule patch_errors:
         conicity=report(
             "<results>/patch/conicity.csv",
             caption="../report/patch/patch_conicity.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "equivalent conicity under load"},
         ),
         summary=report(
             "<results>/patch/summary.csv",
             caption="../report/patch/patch_errors.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "errors of patch models"},
         ),
         errors_figure=report(
             "<results>/patch/patch_errors.png",
             caption="../report/patch/patch_errors.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"figure": "errors of patch models"},
         ),
         patches_figure=report(
             "<results>/patch/patch_fields.png",
             caption="../report/patch/patch_fields.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"figure": "patches"},
         ),
         svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields"]),
@@ -90,7 +90,7 @@ rule patch_reference:
         summary=report(
             "<results>/patch/contact.csv",
             caption="../report/patch/patch_reference.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "patch models against CONTACT"},
         ),
     log:
@@ -154,7 +154,7 @@ rule patch_models:
         report(
             "<results>/patch/models.csv",
             caption="../report/patch/patch_models.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"table": "vehicles with every patch model"},
         ),
     log:

@@ -66,7 +66,7 @@ rule sweep_table:
         figure=report(
             "<results>/sweeps/sweep_{sweep}.png",
             caption="../report/sweeps/sweep.rst",
-            category="11 Sweeps",
+            category="12 Sweeps",
             labels={"figure": "{sweep}"},
         ),
         svg="<results>/sweeps/sweep_{sweep}.svg",
