@@ -73,8 +73,9 @@ def results(tmp_path, monkeypatch):
 
 
 def items(*changes):
-    one = {"rule": "critical_speeds", "pattern": "results/critical_speed/critical_speeds.csv", "labels": {"table": "all"},
-           "category": "07 Hunting: critical speeds", "caption": "critical_speed/critical_speeds.rst", "params": {}}  # fmt: skip
+    one = {"rule": "critical_speeds", "pattern": "results/critical_speed/critical_speeds.csv", "params": {},
+           "labels": {"table": "all"}, "category": "07 Hunting: critical speeds",
+           "caption": "critical_speed/critical_speeds.rst"}  # fmt: skip
     return [one | change for change in changes]
 
 

@@ -1,7 +1,7 @@
 """The report as plain pages in one reading order, for any browser, without a network and without scripts.
 
-A page per category of results: its answer first, then figures and tables with their captions, at the end the command that
-makes them again. Pictures stay where the study has written them.
+A page per category of results: its answer first, then figures and tables with their captions, at the end the command
+that makes them again. Pictures stay where the study has written them.
 """
 
 import os
