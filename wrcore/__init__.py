@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.patch import patch as patch
     from wrcore.analysis.plot_contact import plot_pair as plot_pair
     from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
+    from wrcore.analysis.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
     from wrcore.analysis.plot_run import plot_run as plot_run
     from wrcore.analysis.stability import critical_speeds as critical_speeds
     from wrcore.analysis.stability import modes as modes
@@ -101,6 +102,7 @@ _PUBLIC = {
     "plot_pair": "wrcore.analysis.plot_contact",
     "plot_run": "wrcore.analysis.plot_run",
     "plot_shakedown": "wrcore.analysis.damage",
+    "plot_wheel_on_rail": "wrcore.analysis.plot_patch",
     "run_sweep": "wrcore.sweep.batch",
     "simulate": "wrcore.run.simulate",
     "simulate_many": "wrcore.run.simulate",

@@ -11,9 +11,12 @@ from tests.synthetic import hunting_run
 from wrcore.analysis.damage import plot_shakedown
 from wrcore.analysis.legible import findings
 from wrcore.analysis.plot_creep import plot_creep_force
+from wrcore.analysis.plot_patch import plot_wheel_on_rail
 from wrcore.analysis.plot_run import plot_run
 from wrcore.analysis.style import save_figure
+from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.patch.result import Patch
+from wrcore.errors import InputError
 
 
 def panel():
@@ -137,3 +140,21 @@ def test_pictures_for_users_have_no_findings(draw):
     figure = draw()
     assert findings(figure) == []
     plt.close("all")
+
+
+def test_pressure_of_a_wheel_on_its_rail_stands_on_the_contact_line(s1002, uic60):
+    pair = WheelsetOnTrack.alike(s1002, uic60)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        figure = plot_wheel_on_rail(pair, side, y=sign * 0.003, load=5e4)
+        assert findings(figure) == []
+        section = figure.axes[0]
+        wheel, rail = (line.get_xydata() for line in section.lines)
+        (hill,) = [part.get_xy() for part in section.patches if (part.get_label() or "").startswith("pressure")]
+        foot = hill[: len(hill) // 2]
+        for body in (wheel, rail):  # within the penetration of both profiles, along the whole patch
+            order = np.argsort(body[:, 0])
+            assert np.abs(np.interp(foot[:, 0], *body[order].T) - foot[:, 1]).max() < 0.15
+        height = np.linalg.norm(hill[len(hill) // 2 : -1][::-1] - foot, axis=1)
+        assert height.max() == pytest.approx(12.0, rel=0.2) and height[0] == height[-1] == 0.0
+    with pytest.raises(InputError, match="a pose in which the wheel touches"):
+        plot_wheel_on_rail(pair, z=0.48, load=5e4)

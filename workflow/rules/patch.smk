@@ -33,6 +33,29 @@ rule patch_costs:
         "../scripts/patch/patch_costs.py"
 
 
+rule wheel_on_rail:
+    message:
+        "Figure: a loaded wheel on its rail, with its patch"
+    input:
+        core=CORE["patch"] + sources("analysis/patch", "analysis/plot_patch"),
+    output:
+        report(
+            "<results>/patch/wheel_on_rail_patch.png",
+            caption="../report/patch/wheel_on_rail.rst",
+            category="04 The real patch",
+            labels={"figure": "wheel on rail"},
+        ),
+        "<results>/patch/wheel_on_rail_patch.svg",
+    log:
+        "<logs>/wheel_on_rail.log",
+    params:
+        pair=next(iter(config["contact"]["pairs"].values())),
+        shown=PATCH["shown"],
+        rolling={name: PATCH["rolling"][name] for name in ("speed", "friction")},
+    script:
+        "../scripts/patch/wheel_on_rail.py"
+
+
 rule patch_errors:
     message:
         "Patch models against exact contact, pose by pose"
@@ -190,4 +213,5 @@ rule patch_study:
         rules.patch_models.output,
         rules.patch_reference.output,
         rules.patch_costs.output,
+        rules.wheel_on_rail.output,
         rules.patch_errors.output,
