@@ -165,7 +165,7 @@ rule accuracy_requests:
 
 rule claims:
     message:
-        "What the README promises: medians and worst cases"
+        "What reports/accuracy.md promises: medians and worst cases"
     input:
         core=CORE["accuracy_figures"],
         contact=rules.contact_reductions.output.cases,

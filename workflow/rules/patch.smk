@@ -90,7 +90,13 @@ rule patch_errors:
             category="04 The real patch",
             labels={"figure": "patches"},
         ),
-        svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields"]),
+        picture=report(
+            "<results>/patch/wheel_on_rail_patch.png",
+            caption="../report/patch/wheel_on_rail_patch.rst",
+            category="03 The real patch",
+            labels={"figure": "a wheel on its rail"},
+        ),
+        svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields", "wheel_on_rail_patch"]),
     log:
         "<logs>/patch_errors.log",
     benchmark:

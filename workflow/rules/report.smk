@@ -1,8 +1,12 @@
 # The notebooks, the study as a whole, and its report.
 
+<<<<<<< HEAD
 from snakemake.io import get_flag_value
 
 NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb") if p.stem != "first_light")
+=======
+NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb"))
+>>>>>>> d05319aa85fb4592dcf1a1ae7b2c9028641d87f9
 CORE["notebooks"] = sources("", "study/")
 
 
@@ -32,22 +36,6 @@ rule notebooks:
         expand(rules.notebook.output, notebook=NOTEBOOKS),
 
 
-rule first_light_notebook:
-    message:
-        "Notebook: loads runs, redraws Fig. 4"
-    input:
-        core=CORE["figures"],
-        notebook="notebooks/first_light.ipynb",
-        runs=expand([rules.simulate.output.planar, rules.simulate.output.spatial], case=CASES),
-        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
-    output:
-        "<results>/notebooks/first_light.ipynb",
-    log:
-        "<logs>/first_light_notebook.log",
-    script:
-        "../scripts/report/first_light_notebook.py"
-
-
 rule study:
     input:
         rules.contact_geometry.output,
@@ -59,7 +47,6 @@ rule study:
         rules.motion_table.output,
         rules.timing_table.output,
         rules.comparison_table.output,
-        rules.first_light_notebook.output,
         rules.notebooks.input,
         rules.creep_study.input,
         rules.contact_study.input,

@@ -17,7 +17,10 @@ branch joined to the second without a step (as printed it begins at zero). Energ
 Pearce and Sherratt, Wear 144 (1991) 343-351, as a law of one coefficient, which is Sheffield's of mild wear here.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +29,9 @@ from wrcore.analysis.wheels import OUTWARDS, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError, one_of
 from wrcore.scene.friction import read_friction
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 DENSITY = 7850.0
 """Of steel, kg/m^3."""
@@ -74,7 +80,9 @@ class WheelWear:
     """Friction's work in the patches, J/m."""
 
 
-def local_wear(run, begin=0.0, law="sheffield", width=BIN):
+def local_wear(
+    run: Run, begin: float = 0.0, law: str = "sheffield", width: float = BIN
+) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
     Parameters

@@ -1,5 +1,7 @@
 """The real contact patch of one wheel, with pressure, traction, slip and adhesion: ``wr.patch``."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -7,10 +9,11 @@ from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Rolling, Strips
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.patch.result import Patch
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.surface import SIDES
-from wrcore.scene.description import load_scene
+from wrcore.scene.description import Source, as_scene
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import Pair
 
@@ -18,9 +21,11 @@ METHODS = ("exact", "grid")
 
 
 def patch(
-    source, y=0.0, yaw=0.0, roll=None, z=None, load=None, side="left", speed=None, omega=None, vy=0.0, yaw_rate=0.0,
-    mu=None, method="exact", resolution="middle", slip="surfaces", load_by="vertical",
-):  # fmt: skip
+    source: Source | WheelsetOnTrack, y: float = 0.0, yaw: float = 0.0, roll: float | None = None,
+    z: float | None = None, load: float | None = None, side: str = "left", speed: float | None = None,
+    omega: float | None = None, vy: float = 0.0, yaw_rate: float = 0.0, mu: float | None = None, method: str = "exact",
+    resolution: str = "middle", slip: str = "surfaces", load_by: str = "vertical",
+) -> list[Patch]:  # fmt: skip
     """Contact patches of one wheel, solved on the real surfaces.
 
     Parameters
@@ -143,7 +148,7 @@ def _of_pair(pair):
 
 def _of_scene(source, side):
     """The same of a scene: of the first wheelset, if its wheels differ from others."""
-    scene = load_scene(source)
+    scene = as_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
     friction = read_friction(contact["friction"], scene.source).largest
     if not len(vehicle.bodies.wheelsets):

@@ -2,9 +2,10 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.first_touch import first_touch
+from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
 from wrcore.geometry.surface import SIDES
 
 LIFT = 0.020
@@ -69,7 +70,7 @@ def _label_shifts(axes, shifts, across, height):
             written.append(across[k])
 
 
-def plot_pair(pair, shifts=None):
+def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
     """Draw a pair of profiles with its contact points as the wheelset moves sideways.
 
     Parameters

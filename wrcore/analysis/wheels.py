@@ -6,12 +6,19 @@ number T gamma: |Fx xi + Fy eta| summed over the patches (N), and with spin |Fx 
 friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed over the patches (W); see :mod:`wrcore.run.wear`.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from wrcore.analysis.motion import SIDES
 from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.wear import creep_work
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 OUTWARDS = {"left": 1.0, "right": -1.0}
 
@@ -29,7 +36,7 @@ def wheelsets_of(run):
     return [name for name in run.groups if f"{name}/left" in run.groups]
 
 
-def wheel_forces(run, wheelset, side):
+def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.ndarray]:
     """Forces of a wheel on its rail.
 
     Parameters
@@ -59,15 +66,39 @@ def _creep_work(run, wheelset, side):
     return creep_work(c.Fx_N, c.Fy_N, c.Mz_Nm, c.xi, c.eta, c.phi_per_m)
 
 
-def wear_number(run, wheelset, side, spin=False):
-    """Wear number T gamma of a wheel over time, N, shape (n,); without or with the spin's part."""
+def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.ndarray:
+    """Wear number T gamma of a wheel over time, without or with the spin's part.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+    spin : bool
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        N.
+    """
     return _creep_work(run, wheelset, side)[int(spin)]
 
 
-def creep_power(run, wheelset, side):
-    """Power that a wheel's creep dissipates over time, W, shape (n,).
+def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
+    """Power that a wheel's creep dissipates over time.
 
     Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        W.
     """
     body = run[wheelset]
     speed = np.hypot(body.vx_m_per_s, body.vy_m_per_s) if "vx_m_per_s" in body else run.scene["speed"]
@@ -86,7 +117,7 @@ def greatest_pressure(run, wheelset, side):
     return np.max(np.nan_to_num(pressure), axis=1)
 
 
-def wheelset_channels(run, wheelset):
+def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
 
     Parameters
@@ -115,7 +146,7 @@ def wheelset_channels(run, wheelset):
     return pd.DataFrame(columns | {"sum_Y_N": total}, index=pd.Index(run.t, name="t_s"))
 
 
-def wheel_table(run, begin=0.0):
+def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     """Loads, guiding forces and wear of each wheel.
 
     Parameters

@@ -4,15 +4,25 @@ Exit status 0 only when the result was produced; 2 for bad input, with one line 
 what was expected.
 """
 
+import os
 import sys
+from contextlib import suppress
 
 from wrcore import __version__
+<<<<<<< HEAD
 from wrcore.cli import assess, conicity, contact, creep, draw, evolve, keys, profiles, simulate, sweep, table
+=======
+from wrcore.cli import assess, conicity, contact, creep, evolve, init, keys, profiles, simulate, sweep, table
+>>>>>>> d05319aa85fb4592dcf1a1ae7b2c9028641d87f9
 from wrcore.cli.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
+<<<<<<< HEAD
 COMMANDS = (simulate, sweep, assess, draw, evolve, contact, conicity, creep, table, profiles, keys)
+=======
+COMMANDS = (init, simulate, sweep, assess, evolve, contact, conicity, creep, table, profiles, keys)
+>>>>>>> d05319aa85fb4592dcf1a1ae7b2c9028641d87f9
 """Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over."""
 
 
@@ -51,8 +61,14 @@ def main(arguments=None):
         Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 4 an accuracy that was not reached or is that
         of a derailment, 128 and its number for a signal.
     """
+    whole = parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next: eval "$(register-python-argcomplete wrcore)"
+        with suppress(ImportError):
+            import argcomplete
+
+            argcomplete.autocomplete(whole)
     try:
-        options = parser().parse_args(arguments)
+        options = whole.parse_args(arguments)
         return options.run(options)
     except InputError as error:
         print(f"wrcore: {error}", file=sys.stderr)

@@ -10,7 +10,7 @@ Creep tables: exact rolling contact, solved once on patches of all shapes. Scene
 def add(commands):
     """The command's parser."""
     command = commands.add_parser("table", help="build or describe a creep table", description=ABOUT)
-    actions = command.add_subparsers(metavar="ACTION", required=True)
+    actions = command.add_subparsers(metavar="ACTION", required=True, help="what to do")
     build = actions.add_parser(
         "build", help="refine until a random check meets the tolerance",
         description="Build a creep table and refine it until a random check meets the tolerance: seconds to minutes.",

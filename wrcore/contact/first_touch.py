@@ -10,17 +10,23 @@ both wheels touch, or left at zero, so that each side is searched by itself: the
 the second kind.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrcore.contact.geometry import HALF_DISTANCES, RADII
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
 from wrcore.geometry.track import GAUGES
 from wrcore.kernels.jit import FAST, jit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCAN_STEP = 1e-4
 """Distance of the wheel's nodes in the search for the first touch, m."""
@@ -86,7 +92,14 @@ class WheelsetOnTrack:
                 raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")
 
     @classmethod
-    def alike(cls, wheel, rail, gauge=1.435, rolling_radius=0.46, half_distance=0.75):
+    def alike(
+        cls,
+        wheel: ProfileCurve,
+        rail: ProfileCurve,
+        gauge: float = 1.435,
+        rolling_radius: float = 0.46,
+        half_distance: float = 0.75,
+    ) -> WheelsetOnTrack:
         """The usual case: the right side is the mirror image of the left one."""
         side = WheelOnRail(wheel, rail, rolling_radius)
         return cls(side, side, half_distance, gauge)
@@ -237,7 +250,7 @@ def _tabulate(left, right, shifts, solve_roll, rolls, found):
         rolls[i] = _touch_both(left, right, shifts[i], solve_roll, buffers, found[i])
 
 
-def first_touch(pair, shifts, roll=True):
+def first_touch(pair: WheelsetOnTrack, shifts: ArrayLike, roll: bool = True) -> pd.DataFrame:
     """Where a rigid wheelset without yaw touches the rails, and the rolling radius difference.
 
     Parameters

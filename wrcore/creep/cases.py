@@ -1,6 +1,12 @@
 """Creep forces of a list of cases in SI units: the work behind ``wrcore creep``."""
 
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
@@ -187,8 +193,21 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
 
 
-def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8.2e10, nu=0.28, table=None):
-    """Creep force of any law on elliptic patches, in physical units; scalars and arrays broadcast.
+def creep_force(
+    model: str,
+    a: ArrayLike,
+    b: ArrayLike,
+    normal_force: ArrayLike,
+    xi: ArrayLike,
+    eta: ArrayLike,
+    phi: ArrayLike,
+    mu: ArrayLike = 0.3,
+    shear_modulus: ArrayLike = 8.2e10,
+    nu: ArrayLike = 0.28,
+    table: CreepTable | str | PathLike[str] | None = None,
+    psi: ArrayLike = 0.0,
+) -> tuple[Any, Any, Any]:
+    """Creep force of any law in physical units; scalars and arrays broadcast.
 
     Parameters
     ----------
@@ -203,6 +222,9 @@ def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8
         Friction coefficient, shear modulus (Pa), Poisson's ratio.
     table : CreepTable or path, optional
         For the model "table"; left out: the cached table for nu, built first if need be.
+    psi : float or array_like
+        Shape number of a double ellipse, which spans ``b (1 + psi)`` to the left and ``b (1 - psi)`` to the right; of
+        an ellipse 0. Only "table", "exact" and "fastsim" know it.
 
     Returns
     -------
@@ -222,8 +244,9 @@ def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8
     """
     import pandas as pd
 
+    left, right = np.multiply(b, np.add(1.0, psi)), np.multiply(b, np.subtract(1.0, psi))
     names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "xi", "eta", "phi_per_m")
-    values = np.broadcast_arrays(a, b, b, normal_force, mu, shear_modulus, nu, xi, eta, phi)
+    values = np.broadcast_arrays(a, right, left, normal_force, mu, shear_modulus, nu, xi, eta, phi)
     frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))
     forces = solve_cases(frame, model, table, source="creep_force")

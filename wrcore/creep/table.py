@@ -5,12 +5,18 @@ patches (five). Its error is measured, not assumed: random patches and creepages
 finer table is built until the 99 % quantile of the force error is below the tolerance. The numbers stay in the file.
 """
 
+from __future__ import annotations
+
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+import wrcore
 from wrcore import __version__
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
@@ -31,7 +37,7 @@ SCHEMA = "wrcore creep table 2"
 
 @dataclass(frozen=True)
 class CreepTable:
-    """A creep table with what is known about it.
+    """A creep table with what is known about it; called, it gives forces in physical units.
 
     Attributes
     ----------
@@ -60,6 +66,23 @@ class CreepTable:
     def nu(self):
         """Poisson's ratio."""
         return self.data.kalker.nu
+
+    def __call__(
+        self,
+        a: ArrayLike,
+        b: ArrayLike,
+        normal_force: ArrayLike,
+        xi: ArrayLike,
+        eta: ArrayLike,
+        phi: ArrayLike,
+        mu: ArrayLike = 0.3,
+        shear_modulus: ArrayLike = 8.2e10,
+        psi: ArrayLike = 0.0,
+    ) -> tuple[Any, Any, Any]:
+        """Fx, Fy (N) and Mz (N m) by this table; arguments as for :func:`wrcore.creep_force`."""
+        return wrcore.creep_force(
+            "table", a, b, normal_force, xi, eta, phi, mu, shear_modulus, self.nu, table=self, psi=psi
+        )
 
     def kernel_data(self):
         """The `CreepTableData` to hand to kernels."""
@@ -227,7 +250,12 @@ def table_path(nu, planes, tolerance):
     return table_folder() / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
 
 
-def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
+def ensure_table(
+    nu: float = 0.28,
+    planes: str = "ellipse",
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable | None = None,
+) -> CreepTable:
     """The table from the cache; built and cached first where it is not there yet, or is damaged or another one.
 
     Two processes that need the same table at once both build it and the later rename wins, with equal content.

@@ -18,6 +18,15 @@ class InputError(ValueError):
     Notes
     -----
     ``str(error)`` is always one line. The command line prints it and ends with status 2.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> try:
+    ...     wr.simulate(wr.example("wheelset"), sped=30)
+    ... except wr.InputError as error:
+    ...     print(str(error).split(";")[0])
+    changes: sped: unknown key
     """
 
     def __init__(self, source, field, expected):

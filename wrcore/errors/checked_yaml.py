@@ -2,6 +2,7 @@
 
 import copy
 import math
+import os
 import re
 from functools import cache
 from importlib.resources import files
@@ -223,7 +224,7 @@ def validate(data, schema_name, source):
 
 
 def plain_tree(data, source):
-    """A copy of nested data that holds nothing but what JSON knows.
+    """A copy of nested data that holds nothing but what JSON knows; paths become text.
 
     Parameters
     ----------
@@ -259,6 +260,8 @@ def plain_tree(data, source):
                     raise InputError(source, ".".join(path), f"expected keys that are text, got {_short(key)}")
                 copied(key, path, above)
             return {key: copied(item, (*path, key), above) for key, item in value.items()}
+        if isinstance(value, os.PathLike):
+            value = os.fspath(value)
         fault = _fault(value)
         if fault:
             raise InputError(source, ".".join(path), fault)

@@ -54,6 +54,15 @@ class Scene:
     track : Track
     pairs : tuple of Pair
         Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("metro_car"), speed=25)
+    >>> scene
+    Scene 'metro_car': metro car, S1002 on UIC60-MBench, 25 m/s, spatial detection, 10 s
+    >>> scene.vehicle.wheelset_names
+    ('wheelset_1', 'wheelset_2', 'wheelset_3', 'wheelset_4')
     """
 
     data: dict[str, Any]
@@ -79,6 +88,11 @@ class Scene:
 
 Source = Scene | str | PathLike[str] | Mapping[str, Any]
 """What stands for a scene: a checked one, its file, or the file's content."""
+
+
+def as_scene(scene: Source) -> Scene:
+    """A scene as it is, or what stands for one as :func:`load_scene` reads it."""
+    return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:

@@ -1,4 +1,4 @@
-"""What the README promises: medians and worst cases of stated cases."""
+"""What reports/accuracy.md promises: medians and worst cases of stated cases."""
 
 import pandas as pd
 import pytest
