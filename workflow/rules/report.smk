@@ -1,12 +1,8 @@
 # The notebooks, the study as a whole, and its report.
 
-<<<<<<< HEAD
 from snakemake.io import get_flag_value
 
-NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb") if p.stem != "first_light")
-=======
 NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb"))
->>>>>>> d05319aa85fb4592dcf1a1ae7b2c9028641d87f9
 CORE["notebooks"] = sources("", "study/")
 
 
