@@ -41,15 +41,15 @@ rule wheel_on_rail:
     output:
         report(
             "<results>/patch/wheel_on_rail_patch.png",
-            caption="../report/patch/wheel_on_rail.rst",
+            caption="../report/patch/wheel_on_rail_patch.rst",
             category="04 The real patch",
-            labels={"figure": "wheel on rail"},
+            labels={"figure": "a wheel on its rail"},
         ),
         "<results>/patch/wheel_on_rail_patch.svg",
     log:
         "<logs>/wheel_on_rail.log",
     params:
-        pair=next(iter(config["contact"]["pairs"].values())),
+        pair=CONTACT_PAIR,
         shown=PATCH["shown"],
         rolling={name: PATCH["rolling"][name] for name in ("speed", "friction")},
     script:
@@ -90,13 +90,7 @@ rule patch_errors:
             category="04 The real patch",
             labels={"figure": "patches"},
         ),
-        picture=report(
-            "<results>/patch/wheel_on_rail_patch.png",
-            caption="../report/patch/wheel_on_rail_patch.rst",
-            category="03 The real patch",
-            labels={"figure": "a wheel on its rail"},
-        ),
-        svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields", "wheel_on_rail_patch"]),
+        svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields"]),
     log:
         "<logs>/patch_errors.log",
     benchmark:

@@ -129,7 +129,7 @@ def pair_of(source, side="left"):
     if isinstance(source, WheelsetOnTrack):
         one = getattr(source, side)
         return Placed(one.wheel, one.rail, one.rolling_radius, source.half_distance, source.rail_distance(one))
-    scene = load_scene(source)
+    scene = as_scene(source)
     own = _own_pair(scene, side)
     distance = scene.track.rail_distance(own.rail)
     return Placed(own.wheel, own.rail, own.rolling_radius, scene.vehicle.half_distance, distance)

@@ -12,6 +12,9 @@ from wrcore.geometry.surface import SIDES
 TALLEST = 12.0
 """Height that the greatest pressure is drawn with, mm."""
 
+ARROW = 24.0
+"""Length of the arrow of the most loaded patch's force, mm."""
+
 BODY = 14.0
 """Depth to which rail and wheel are filled beyond their profiles, mm."""
 
@@ -74,6 +77,7 @@ def _section(axes, pair, side, patches):
         axes.add_patch(Polygon(body, facecolor="0.88" if out < 0 else "0.95", edgecolor="none", zorder=0))
         axes.plot(*edge.T, color=color, linewidth=1.6, label=name)
     _pressure(axes, patches)
+    _forces(axes, patches)
     axes.set(xlabel="y, to the left / mm", ylabel="z / mm", aspect="equal", xmargin=0)
     if sign > 0:
         axes.invert_xaxis()  # from behind, the left wheel's field side lies on the left
@@ -96,3 +100,15 @@ def _pressure(axes, patches):
         label = f"pressure, up to {1e-6 * top:.0f} MPa" if number == 0 else None
         outline = MM * np.vstack([foot, crest[::-1]])
         axes.add_patch(Polygon(outline, facecolor=ACCENT, edgecolor=ACCENT, alpha=0.7, linewidth=0.8, label=label))
+
+
+def _forces(axes, patches):
+    """The force on the wheel at each patch, in the cross-section."""
+    forces = [one.track_force[1:] for one in patches]
+    longest = max(np.hypot(*force) for force in forces)
+    for one, force in zip(patches, forces, strict=True):
+        foot, tip = MM * np.array(one.origin[1:]), MM * np.array(one.origin[1:]) + ARROW * force / longest
+        arrow = {"arrowstyle": "-|>", "color": "k", "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", tip, foot, arrowprops=arrow)
+        text = {"textcoords": "offset points", "fontsize": 8, "va": "center"}
+        axes.annotate(f"{1e-3 * np.hypot(*force):.0f} kN", tip, (6, 0), **text)
