@@ -1,23 +1,33 @@
 """Pictures of what a person has at hand: ``wr.draw``."""
 
+from __future__ import annotations
+
 import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
+from matplotlib.figure import Figure
 
-from wrcore.analysis.animation import animate
+from wrcore.analysis.animation import Animation, animate
 from wrcore.analysis.evolve import TABLE, profiles_over_distance
 from wrcore.analysis.plot_vehicle import plot_vehicle
 from wrcore.analysis.plot_wear import plot_evolution
 from wrcore.errors import InputError
 from wrcore.run.results import load_run
 from wrcore.run.run import Run
-from wrcore.scene.description import Scene, load_scene
+from wrcore.scene.description import Scene, Source, as_scene, load_scene
 
 
-def draw(source, scene=None, factor=None, begin=0.0, end=math.inf):
+def draw(
+    source: Source | Run,
+    scene: Source | None = None,
+    factor: float | None = None,
+    begin: float = 0.0,
+    end: float = math.inf,
+) -> Figure | Animation:
     """Draw a scene's vehicle, put a run in motion, or show how a profile wears.
 
     Parameters
@@ -49,33 +59,25 @@ def draw(source, scene=None, factor=None, begin=0.0, end=math.inf):
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['z, up / m', 'y, to the left / m', '']
     """
-    run = _run_of(source)
-    if run is not None:
-        return animate(run, _scene_of(run, scene), factor, begin, end)
-    for name, value in (("scene", scene), ("factor", factor), ("begin", begin or None)):
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".h5", ".hdf5"):
+        source = load_run(source)
+    if isinstance(source, Run):
+        return animate(source, _scene_of(source, scene), factor, begin, end)
+    options: dict[str, Any] = {"scene": scene, "factor": factor, "begin": begin or None}
+    for name, value in options.items():
         if value is not None:
             raise InputError("draw", name, "expected this with a run only")
-    if isinstance(source, Scene | Mapping):
-        return plot_vehicle(load_scene(source))
-    if os.path.isdir(source):
+    if not isinstance(source, Scene | Mapping) and os.path.isdir(source):
         if not (Path(source) / TABLE).is_file():
             raise InputError("draw", source, f"expected a folder of evolve, with {TABLE}")
         return plot_evolution(profiles_over_distance(source), pd.read_csv(Path(source) / TABLE))
-    return plot_vehicle(load_scene(source))
-
-
-def _run_of(source):
-    """A run, from its file where it is one."""
-    if isinstance(source, Run):
-        return source
-    named = isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".h5", ".hdf5")
-    return load_run(source) if named else None
+    return plot_vehicle(as_scene(source))
 
 
 def _scene_of(run, scene):
     """The scene of a run."""
     if scene is not None:
-        return load_scene(scene)
+        return as_scene(scene)
     try:
         return load_scene(run.scene)
     except InputError as error:

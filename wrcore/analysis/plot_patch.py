@@ -1,13 +1,17 @@
 """Picture of a loaded wheel on its rail: both profiles, the pressure between them, and the patch from above."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from wrcore.analysis.patch import pair_of, patch
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
+from wrcore.scene.description import Source
 
 TALLEST = 12.0
 """Height that the greatest pressure is drawn with, mm."""
@@ -20,7 +24,7 @@ BODY = 14.0
 
 
 @styled
-def plot_wheel_on_rail(source, side="left", **pose):
+def plot_wheel_on_rail(source: Source | WheelsetOnTrack, side: str = "left", **pose: Any) -> Figure:
     """Draw a wheel on its rail under load, from behind, and its contact patch from above.
 
     Parameters
