@@ -50,7 +50,7 @@ def plot_wheel_on_rail(source: Source | WheelsetOnTrack, side: str = "left", **p
     >>> import wrcore as wr
     >>> figure = wr.plot_wheel_on_rail("config/scenes/trailer_vehicle.yaml", y=0.003)
     >>> [axes.get_xlabel() for axes in figure.axes[:2]]
-    ['y, to the left / mm', 'x, rolling direction (mm)']
+    ['y, to the left / mm', 'x, rolling direction / mm']
     """
     patches = patch(source, side=side, **pose)
     if not patches:

@@ -151,8 +151,8 @@ class Patch:
         self._draw_arrows(axes)
         axes.set_aspect("equal")
         axes.autoscale_view()
-        axes.set_xlabel("x, rolling direction (mm)")
-        axes.set_ylabel("s, to the left (mm)")
+        axes.set_xlabel("x, rolling direction / mm")
+        axes.set_ylabel("s, to the left / mm")
         forces = " kN, ".join(f"{name} {1e-3 * f:.2f}" for name, f in (("N", self.normal), ("Fx", self.fx)))
         axes.set_title(f"{forces} kN, Fs {1e-3 * self.fs:.2f} kN", fontsize="medium")
         return figure
@@ -174,7 +174,7 @@ class Patch:
         axes.add_collection(cells)
         style = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
         axes.add_collection(PolyCollection(boxes[slips], hatch="////", **style))
-        figure.colorbar(cells, ax=axes, label="pressure (MPa)")
+        figure.colorbar(cells, ax=axes, label="pressure / MPa")
         swatches = Swatch(fc="0.8", label="adhesion"), Swatch(fc="0.8", ec="C0", lw=0.0, hatch="////", label="slip")
         axes.legend(handles=list(swatches), loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, frameon=False)
 
