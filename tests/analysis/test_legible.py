@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from tests.synthetic import hunting_run
 from wrcore.analysis.damage import plot_shakedown
@@ -68,6 +69,11 @@ def fixed_text_on_line(axes):
     axes.text(0.45, 0.45, "on the line", transform=axes.transAxes)
 
 
+def without_numbers(axes):
+    axes.set(yscale="log", ylim=(2.0, 8.0))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
 def twice(axes):
     axes.plot([0.9, 1.0], [0.0, 0.0], label="line")
     axes.legend(loc="upper left")
@@ -80,7 +86,7 @@ def twice(axes):
         (rotated, "'aside' and 'force / kN' overlap"),
         (legend_on_line, "the legend covers the line 'falling'"), (legend_on_marks, "covers the marks 'marks'"),
         (legend_on_bars, "the legend covers the bar"), (fixed_text_on_line, "'on the line' covers the line 'line'"),
-        (twice, "the legend says 'line' twice"),
+        (twice, "the legend says 'line' twice"), (without_numbers, "y axis of 'force / kN' has no numbers"),
     ],
 )  # fmt: skip
 def test_each_fault_is_found_and_said_when_saved(fault, found, tmp_path):

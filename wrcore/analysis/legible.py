@@ -23,7 +23,8 @@ def findings(figure):
     -------
     list of str
         One line each: a text beyond the page, two that overlap, a legend or a text at a fixed place of its panel that
-        covers a line or mark, an entry that stands twice in one legend. Empty for a good figure.
+        covers a line or mark, an entry that stands twice in one legend, an axis without numbers. Empty for a good
+        figure.
     """
     figure.draw_without_rendering()
     border = BORDER * figure.dpi / 72.0
@@ -38,6 +39,7 @@ def findings(figure):
         entries = [text.get_text() for text in legend.get_texts()]
         found += [f"the legend says {entry!r} twice" for entry in sorted(set(entries)) if entries.count(entry) > 1]
     for axes in figure.axes:
+        found += [f"{name} axis of {axes.get_ylabel()!r} has no numbers" for name in "xy" if _mute(axes, name)]
         fixed = [("the legend", legend.get_window_extent()) for legend in legends if legend.axes is axes]
         fixed += [
             (repr(_words(text)), _box(text))
@@ -91,6 +93,20 @@ def _undrawn(axes, axis):
             yield from (tick.label1, tick.label2)
     if not axes.axison or not axes.get_visible():
         yield from (axis.label, axis.get_offset_text())
+
+
+def _mute(axes, name):
+    """Whether an axis with ticks shows no number, though its labels are not switched off, as in inner panels."""
+    axis = axes.xaxis if name == "x" else axes.yaxis
+    side = ("bottom", "top") if name == "x" else ("left", "right")
+    asked = [axis.get_tick_params(which="major").get(f"label{end}", False) for end in side]
+    if hasattr(axes, "get_zlim") or not (axes.axison and axes.get_visible() and axis.get_visible() and any(asked)):
+        return False
+    hidden, ticks = set(_undrawn(axes, axis)), [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+    labels = [label for tick in ticks for label in (tick.label1, tick.label2)]
+    return bool(ticks) and not any(
+        label.get_visible() and label.get_text().strip() and label not in hidden for label in labels
+    )
 
 
 def _shown(text):
