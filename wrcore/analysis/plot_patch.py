@@ -16,11 +16,11 @@ from wrcore.scene.description import Source
 TALLEST = 12.0
 """Height that the greatest pressure is drawn with, mm."""
 
-ARROW = 24.0
+ARROW = 22.0
 """Length of the arrow of the most loaded patch's force, mm."""
 
-BODY = 14.0
-"""Depth to which rail and wheel are filled beyond their profiles, mm."""
+SEEN = (-34.0, 30.0)
+"""Heights between which wheel and rail are shown, mm."""
 
 
 @styled
@@ -55,12 +55,13 @@ def plot_wheel_on_rail(source: Source | WheelsetOnTrack, side: str = "left", **p
     patches = patch(source, side=side, **pose)
     if not patches:
         raise InputError("patch", "z", "expected a pose in which the wheel touches")
-    figure = Figure(figsize=(9.4, 4.4), layout="constrained")
+    figure = Figure(figsize=(9.4, 3.9), layout="constrained")
     section, plan = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
     _section(section, pair_of(source, side), side, patches)
     most = max(patches, key=lambda one: one.normal)
     most.plot(plan)
     y = f"{MM * most.pose[0]:.3g}".replace("-", "\N{MINUS SIGN}")
+    figure.legend(*section.get_legend_handles_labels(), loc="outside lower left", ncols=3, fontsize=8)
     section.set_title(f"{side} wheel from behind, wheelset at y = {y} mm", fontsize=9)
     plan.set_title(f"patch from above\n{plan.get_title()}", fontsize=9)
     return figure
@@ -74,19 +75,16 @@ def _section(axes, pair, side, patches):
     wheel = y + across * np.cos(roll) - height * np.sin(roll), z + across * np.sin(roll) + height * np.cos(roll)
     u = np.linspace(pair.rail.u[0], pair.rail.u[-1], 600)
     rail = sign * (pair.rail_distance + u), pair.rail(u)
-    for (across, height), out, color, name in ((wheel, BODY, WHEEL, "wheel"), (rail, -BODY, RAIL, "rail")):
-        ends = MM * height.max() + out if out > 0 else MM * height.min() + out
+    for (across, height), ends, color, name in ((wheel, SEEN[1], WHEEL, "wheel"), (rail, SEEN[0], RAIL, "rail")):
         edge = np.column_stack([MM * across, MM * height])
         body = np.vstack([[edge[0, 0], ends], edge, [edge[-1, 0], ends]])
-        axes.add_patch(Polygon(body, facecolor="0.88" if out < 0 else "0.95", edgecolor="none", zorder=0))
+        axes.add_patch(Polygon(body, facecolor="0.88" if ends < 0.0 else "0.95", edgecolor="none", zorder=0))
         axes.plot(*edge.T, color=color, linewidth=1.6, label=name)
     _pressure(axes, patches)
     _forces(axes, patches)
-    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", aspect="equal", xmargin=0)
-    if sign > 0:
-        axes.invert_xaxis()  # from behind, the left wheel's field side lies on the left
+    axes.set(xlabel="y, to the left / mm", ylabel="z / mm", aspect="equal", xmargin=0, ylim=SEEN)
+    axes.invert_xaxis()  # from behind, left is on the left
     axes.grid(False)
-    axes.legend(loc="upper center", ncols=3, fontsize=8)
 
 
 def _pressure(axes, patches):

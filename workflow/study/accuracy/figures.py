@@ -76,14 +76,15 @@ def speed_against_error(tables, finest, doubts=None, resolved=None):
         front = pareto_front(own)
         label = "fastest with moment, fine table" if apart else "best of all"
         axes.plot(front["y_rms_m"], front["real_time_factor"], color=ACCENT, lw=1.0, label=label)
-        if doubts:
+        least = 0.5 * _least_error(done)
+        if doubts and doubts[title] > least:
             axes.axvline(doubts[title], color="0.3", ls=":", lw=0.9, label="difference of the references")
         if resolved and title in resolved:
             axes.axvline(resolved[title], color=MODEL, ls="--", lw=0.9, label="resolution of exact contact")
         axes.set(xscale="log", yscale="log", xlabel="error of y, rms / m", ylabel="real-time factor / 1")
         if doubts:  # often far below all marks: the range is theirs
-            axes.set_xlabel(f"error of y, rms / m (references differ by {doubts[title]:.0e})")
-            axes.set_xlim(left=0.5 * _least_error(done))
+            axes.set_xlabel(f"error of y, rms / m (references differ by {doubts[title]:.0e} m)")
+            axes.set_xlim(left=least)
         axes.set_title(title, loc="left")
     for axes in panels[len(tables) :]:
         axes.remove()
