@@ -156,11 +156,12 @@ def test_pressure_of_a_wheel_on_its_rail_stands_on_the_contact_line(s1002, uic60
         section = figure.axes[0]
         wheel, rail = (line.get_xydata() for line in section.lines)
         (hill,) = [part.get_xy() for part in section.patches if (part.get_label() or "").startswith("pressure")]
-        foot = hill[: len(hill) // 2]
+        half = len(hill) // 2
+        foot, crest = hill[:half], hill[half : 2 * half][::-1]
         for body in (wheel, rail):  # within the penetration of both profiles, along the whole patch
             order = np.argsort(body[:, 0])
             assert np.abs(np.interp(foot[:, 0], *body[order].T) - foot[:, 1]).max() < 0.15
-        height = np.linalg.norm(hill[len(hill) // 2 : -1][::-1] - foot, axis=1)
+        height = np.linalg.norm(crest - foot, axis=1)
         assert height.max() == pytest.approx(12.0, rel=0.2) and height[0] == height[-1] == 0.0
     with pytest.raises(InputError, match="a pose in which the wheel touches"):
         plot_wheel_on_rail(pair, z=0.48, load=5e4)

@@ -372,8 +372,8 @@ def fig_creep_smoothness(lines, table):
         column[1].set_xlabel(label)
         column[1].locator_params(axis="x", nbins=4)
     panels[0, 0].set_ylabel("force, moment / 1")
-    panels[1, 0].set_ylabel("its slope along $x$ / 1")
-    panels[0, 2].text(0.04, 0.06, _axis_text(table), transform=panels[0, 2].transAxes, fontsize=7)
+    panels[1, 0].set_ylabel("slope along $x$ / 1")
+    panels[1, 2].set_title(_axis_text(table), fontsize=7)
     handles = [Line2D([], [], **style) for style in OUTPUTS.values()]
     handles.append(Line2D([], [], color="0.4", marker=".", linestyle="none", label="exact solver"))
     _legend_below(figure, handles, 4, handlelength=3)
@@ -382,7 +382,7 @@ def fig_creep_smoothness(lines, table):
 
 def _axis_text(table):
     rows = table[(table["line"] == "axis") & (table["output"] == "fx")].set_index("source")["variation"]
-    return f"slope of $F_x$\nvaries by\n{PERCENT * rows['table']:.1f} %\n(exact {PERCENT * rows['exact']:.1f} %)"
+    return f"slope of $F_x$ varies by\n{PERCENT * rows['table']:.1f} % (exact {PERCENT * rows['exact']:.1f} %)"
 
 
 def _smooth_pair(column, part, output, style, centred):
