@@ -1,7 +1,8 @@
-# make study    set up .venv, run the whole study: results/<question>, results/report.zip
+# make study    set up .venv, run the whole study: results/<question>, results/report/index.html, results/report.zip
 # make test     set up .venv, run the smoke workflow and all tests
 # make smoke    the reduced study alone: results/smoke
-# make report   the study's report anew: results/report.zip
+# make report   the study's report anew: results/report/index.html, results/report.zip
+# make figures  the study's pictures into reports/figures, those that are there by name
 # make lint     ruff, mypy;   make bench   speed measurements;   make clean   remove everything generated
 #
 # PYTHON=python3.12 chooses the interpreter for a new .venv, CORES=4 the cores for the workflow.
@@ -12,7 +13,7 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-.PHONY: study test smoke report lint bench clean
+.PHONY: study test smoke report figures lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
@@ -24,7 +25,10 @@ smoke: $(STAMP)
 	$(SNAKEMAKE) --configfile config/smoke.yaml
 
 report: $(STAMP)
-	$(SNAKEMAKE) --forcerun report_archive
+	$(SNAKEMAKE) --forcerun report_pages report_archive
+
+figures:
+	for name in $(notdir $(wildcard reports/figures/*.png)); do cp results/*/$$name reports/figures/ || exit 1; done
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.contact import contact_table as contact_table
     from wrcore.analysis.damage import damage_table as damage_table
     from wrcore.analysis.damage import plot_shakedown as plot_shakedown
+    from wrcore.analysis.draw import draw as draw
     from wrcore.analysis.evolve import evolve as evolve
     from wrcore.analysis.limit_cycles import Settling as Settling
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from wrcore.analysis.patch import patch as patch
     from wrcore.analysis.plot_contact import plot_pair as plot_pair
     from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
+    from wrcore.analysis.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
     from wrcore.analysis.plot_run import plot_run as plot_run
     from wrcore.analysis.stability import critical_speeds as critical_speeds
     from wrcore.analysis.stability import modes as modes
@@ -85,6 +87,7 @@ _PUBLIC = {
     "creep_power": "wrcore.analysis.wheels",
     "critical_speeds": "wrcore.analysis.stability",
     "damage_table": "wrcore.analysis.damage",
+    "draw": "wrcore.analysis.draw",
     "ensure_table": "wrcore.creep.table",
     "evolve": "wrcore.analysis.evolve",
     "example": "wrcore.scene.examples",
@@ -104,6 +107,7 @@ _PUBLIC = {
     "plot_pair": "wrcore.analysis.plot_contact",
     "plot_run": "wrcore.analysis.plot_run",
     "plot_shakedown": "wrcore.analysis.damage",
+    "plot_wheel_on_rail": "wrcore.analysis.plot_patch",
     "run_sweep": "wrcore.sweep.batch",
     "simulate": "wrcore.run.simulate",
     "simulate_many": "wrcore.run.simulate",

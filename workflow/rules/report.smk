@@ -1,5 +1,7 @@
 # The notebooks, the study as a whole, and its report.
 
+from snakemake.io import get_flag_value
+
 NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb"))
 CORE["notebooks"] = sources("", "study/")
 
@@ -55,6 +57,40 @@ rule study:
         rules.accuracy_requests.output,
         rules.claims.output,
         rules.cost_study.input,
+
+
+def report_items(wildcards):
+    """What the rules mark for the report, in their order; params only where they are plain values."""
+    items = []
+    for rule in workflow.rules:
+        plain = {name: value for name, value in rule.params.items() if not callable(value)}
+        for path in rule.output:
+            flag = get_flag_value(path, "report")
+            if flag:
+                caption = Path(flag.caption.get_path_or_uri(secret_free=True)).resolve()
+                items.append({
+                    "rule": rule.name, "pattern": str(path), "category": flag.category, "labels": dict(flag.labels),
+                    "caption": caption.relative_to(HERE / "workflow/report").as_posix(), "params": plain,
+                })  # fmt: skip
+    return items
+
+
+rule report_pages:
+    message:
+        "Report as pages: {output}"
+    input:
+        rules.study.input,
+        core=sources("study/report"),
+        captions=sorted(str(p.relative_to(HERE)) for p in (HERE / "workflow/report").rglob("*.rst")),
+    output:
+        "<results>/report/index.html",
+    log:
+        "<logs>/report_pages.log",
+    params:
+        marked=report_items,
+        config=config,
+    script:
+        "../scripts/report/report_pages.py"
 
 
 rule report_archive:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Rolling, Strips
@@ -10,6 +11,7 @@ from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.result import Patch
 from wrcore.errors import InputError, check_number, one_of
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import Source, as_scene
 from wrcore.scene.friction import read_friction
@@ -102,6 +104,43 @@ def patch(
     return [one.patch for one in found]
 
 
+class Placed(NamedTuple):
+    """Profiles of a wheel and its rail, and where they lie, m."""
+
+    wheel: ProfileCurve
+    rail: ProfileCurve
+    rolling_radius: float
+    half_distance: float
+    rail_distance: float
+
+
+def pair_of(source, side="left"):
+    """Wheel and rail of a source of `patch`: of a scene those of its first wheelset.
+
+    Parameters
+    ----------
+    source, side
+        As for `patch`.
+
+    Returns
+    -------
+    Placed
+    """
+    if isinstance(source, WheelsetOnTrack):
+        one = getattr(source, side)
+        return Placed(one.wheel, one.rail, one.rolling_radius, source.half_distance, source.rail_distance(one))
+    scene = as_scene(source)
+    own = _own_pair(scene, side)
+    distance = scene.track.rail_distance(own.rail)
+    return Placed(own.wheel, own.rail, own.rolling_radius, scene.vehicle.half_distance, distance)
+
+
+def _own_pair(scene, side):
+    """Wheel and rail of a side of the first wheelset."""
+    alike = Pair(scene.wheel, scene.rail, scene.vehicle.rolling_radius)
+    return dict(zip(SIDES, scene.pairs, strict=False)).get(side, alike)
+
+
 def _of_pair(pair):
     """Geometry, material and usual values of a pair."""
     return pair_geometry(pair), {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
@@ -114,7 +153,7 @@ def _of_scene(source, side):
     friction = read_friction(contact["friction"], scene.source).largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
-    own = dict(zip(SIDES, scene.pairs, strict=False)).get(side, Pair(scene.wheel, scene.rail, vehicle.rolling_radius))
+    own = _own_pair(scene, side)
     geometry = contact_geometry(own.wheel, own.rail, scene.track, own.rolling_radius, vehicle.half_distance)
     detection = "planar" if scene.detection == "planar" else "spatial"
     load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])

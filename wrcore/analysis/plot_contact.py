@@ -49,7 +49,8 @@ def _location(axes, pair, table, side):
     u_wheel, u_rail = table[f"u_wheel_{side}_m"].to_numpy(), table[f"u_rail_{side}_m"].to_numpy()
     y = sign * MM * np.array([from_wheel + u_wheel, from_rail + u_rail])
     z = MM * np.array([LIFT + one.wheel(u_wheel), one.rail(u_rail)])
-    axes.plot(y, z, color=ACCENT, linewidth=0.6)
+    joints = axes.plot(y, z, color=ACCENT, linewidth=0.6)
+    joints[0].set_label("contact at the shift in mm")
     _label_shifts(axes, MM * table.y_m.to_numpy(), y[0], z[0])
     inner, outer = np.nanmin(np.abs(y)) - 12.0, np.nanmax(np.abs(y)) + 12.0
     axes.set(xlabel="y, to the left / mm", ylabel="z / mm", ylim=(-20, MM * LIFT + 14))

@@ -7,13 +7,11 @@ import pandas as pd
 
 from study.contact.tables import pair_geometry, study_pair
 from study.patch import figures, tables
-from study.patch.picture import fig_wheel_on_rail
 from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output
-wheelset = study_pair(snakemake.params.pair)
-geometry = pair_geometry(wheelset)
+geometry = pair_geometry(study_pair(snakemake.params.pair))
 models, rolling, shown = settings["models"], settings["rolling"], settings["shown"]
 shifts = np.linspace(**settings["shifts"])
 places, forces = tables.pose_errors(geometry, models, settings["loads"], shifts, rolling)
@@ -29,6 +27,5 @@ how = {"speed": rolling["speed"], "friction": rolling["friction"], "creepage": s
 for path, figure in (
     (output.errors_figure, figures.fig_patch_errors(places, shown["load"])),
     (output.patches_figure, figures.fig_patches(geometry, pair, shown["load"], shown["shifts"], how)),
-    (output.picture, fig_wheel_on_rail(wheelset, shown["load"], shown["picture"], rolling)),
 ):
     save_figure(figure, path, path.replace(".png", ".svg"))
