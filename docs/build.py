@@ -26,13 +26,21 @@ TUTORIALS = (
     "first_light",
 )
 FINDINGS = (
-    ("comparison", "Comparison with the paper and with other published values"),
-    ("patch", "One patch"),
-    ("patch", "Vehicles"),
-    ("cost", "Pairs"),
-    ("stability", "Known limits"),
+    ("Does it reproduce the paper?", "comparison", "Comparison with the paper and with other published values"),
+    ("What does the patch model matter, pose by pose?", "patch", "One patch"),
+    ("And in runs of vehicles?", "patch", "Vehicles"),
+    ("What costs what?", "cost", "Pairs"),
+    ("Where do the methods break?", "stability", "Known limits"),
 )
-"""Sections of reports that the page of findings quotes."""
+"""Questions, and the sections of reports that answer them."""
+PICTURES = (
+    ("The paper's Fig. 4: a free wheelset, planar and spatial. Beyond the prediction horizon (shaded) only statistics "
+     "can be compared.", "fig4_lateral_position"),
+    ("Creep laws and tables: cost against error, with CONTACT's own points.", "creep_cost"),
+    ("Hunting of wheelset and trailer vehicle: linear critical speeds and limit cycles.", "limit_cycles"),
+    ("Where the time of one right-hand side goes, against the machine's limit.", "cost_breakdown"),
+)  # fmt: skip
+"""Captions and committed figures."""
 
 
 def section(text, heading):
@@ -59,19 +67,21 @@ def findings():
 
     parts = [
         "# What the study found\n",
-        "Each section is quoted from the page that it names, where the commands stand that make its numbers. The whole "
-        "study with all figures is `results/report.zip` (`make study`), to be read in a browser.\n",
-        "## Speed against error\n\n"
-        "![Speed against error of every choice, in six scenes](../figures/speed_against_error.png)\n\n"
+        "Quoted from the pages that are named; they have the commands that make their numbers. The whole study is "
+        "`results/report.zip` (`make study`), to be read in a browser.\n",
+        "## What does an accuracy cost?\n",
+        "![Speed against error of every choice, in six scenes](../figures/speed_against_error.png)\n",
         "The fastest choice for an accuracy of the lateral position (`snakemake speed_against_error`, kept in "
         f"`wrcore/run/accuracy_front.csv`):\n\n{front_markdown()}\n",
-        "## The paper's Fig. 4\n\n![Lateral position, planar and spatial](../figures/fig4_lateral_position.png)\n",
-        "## Creep laws\n\n![Cost and error of creep laws](../figures/creep_cost.png)\n",
-        "## Hunting\n\n![Critical speeds and limit cycles](../figures/limit_cycles.png)\n",
     ]
-    for name, heading in FINDINGS:
-        text = (ROOT / "reports" / f"{name}.md").read_text("utf-8")
-        parts.append(f"## {heading}\n\nFrom [{name}]({name}.md).\n\n{section(text, heading)}\n")
+    for question, name, heading in FINDINGS:
+        text = section((ROOT / f"reports/{name}.md").read_text("utf-8"), heading)
+        parts.append(f"## {question}\n\n{text}\n\nFrom [{name}]({name}.md).\n")
+    parts.append("## Pictures\n")
+    parts += [
+        f"{caption} (Rule in [gallery](gallery.md).)\n\n![{caption}](../figures/{name}.png)\n"
+        for caption, name in PICTURES
+    ]
     return "\n".join(parts)
 
 
@@ -83,6 +93,7 @@ def lay_out(folder):
     folder : Path
         Empty or not yet there.
     """
+    from figures import draw_figures
     from reference import write_reference
 
     shutil.copytree(ROOT / "docs", folder, ignore=shutil.ignore_patterns("__pycache__"))
@@ -98,6 +109,7 @@ def lay_out(folder):
     (guides / "index.md").write_text(f"# How to\n\n{toctree(names)}", "utf-8")
     names = [_tutorial(path, tutorials) for path in (ROOT / "notebooks").glob("*.ipynb")]
     (tutorials / "index.md").write_text(f"# Tutorials\n\n{toctree(ordered(names, TUTORIALS))}", "utf-8")
+    draw_figures(folder / "theory")
     write_reference(folder / "reference")
 
 

@@ -21,6 +21,7 @@ LAID_OUT = {
     "reference": ("docs/reference", ".md", {"index", "api", "modules", "cli", "files", "names"}),
 }
 """Folders of the site that `docs/build.py` fills: from where, and pages that it makes itself."""
+FIGURES = (ROOT / "docs/figures.py").read_text("utf-8")
 TOOLS = [name for name in ("sphinx", "myst_parser", "furo", "latex2mathml") if not importlib.util.find_spec(name)]
 NEEDS_TOOLS = pytest.mark.skipif(bool(TOOLS), reason=f"pip install .[docs]: {', '.join(TOOLS)} not installed")
 
@@ -45,6 +46,8 @@ def lost(page, target):
     path, _, anchor = target.partition("#")
     place = (page.parent / path) if path else page
     parts = place.resolve().relative_to(ROOT).parts if place.resolve().is_relative_to(ROOT) else ()
+    if parts[:2] == ("docs", "theory") and place.suffix == ".png":
+        return "" if f"def {place.stem}()" in FIGURES else f"{relative(page)}: {target}: not drawn"
     if parts[:1] == ("docs",) and len(parts) == 3 and parts[1] in LAID_OUT:
         folder, ending, made = LAID_OUT[parts[1]]
         if place.stem in made:
@@ -76,6 +79,7 @@ def test_paths_in_code_style_exist(page):
 def test_a_lost_link_is_found():
     page = ROOT / "docs/index.md"
     assert lost(page, "guide/nothing.md").endswith("no such file") and lost(page, "nothing.md")
+    assert not lost(page, "theory/overlap.png") and lost(page, "theory/nothing.png").endswith("not drawn")
     assert lost(page, "theory/creep.md#nothing").endswith("no such heading") and not lost(page, "guide/tracks.md")
 
 
