@@ -13,6 +13,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathm
 html_theme, html_title = "furo", f"wrcore {release}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
 html_copy_source = html_show_sphinx = False
+html_show_search_summary = False  # summaries are fetched, which pages opened as files may not do
 exclude_patterns = ["_static"]
 
 myst_enable_extensions = ["dollarmath", "deflist"]

@@ -147,5 +147,6 @@ def test_the_site_builds_without_a_warning_and_without_a_network(tmp_path):
         if "//" in url
     ]
     assert loaded == []
+    assert "SHOW_SEARCH_SUMMARY: false" in (tmp_path / "site/_static/documentation_options.js").read_text("utf-8")
     index = (tmp_path / "site/searchindex.js").read_text("utf-8").lower()
     assert all(word in index for word in ("polach", "baumgart", "simulate_to_accuraci", "clothoid", "conic"))
