@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.report.evidence import PAGE, page, read
+from study.report.evidence import PAGE, ROOT, page, read
 from study.report.evidence import test_source as source_of
 
 ROWS = [row for section in read()["sections"] for row in section["rows"]]
@@ -16,6 +16,13 @@ def test_named_tests_assert_what_the_page_says(row):
     assert "assert" in source
     assert [piece for piece in row["code"] if piece not in source] == []
     assert bool(row.get("absent")) == any(name in source for name in ABSENT)
+
+
+def test_what_is_said_to_be_reached_stands_in_a_report():
+    pages = [ROOT / "README.md", *(path for path in (ROOT / "reports").glob("*.md") if path != PAGE)]
+    text = " ".join(" ".join(path.read_text("utf-8").split()) for path in pages)
+    quoted = [row["reached"] for row in ROWS if "reached" in row]
+    assert len(quoted) > 5 and [quote for quote in quoted if quote not in text] == []
 
 
 def test_the_page_is_that_of_the_table():
