@@ -91,6 +91,56 @@ def test_equations_have_labels_of_their_own_and_references_lead_to_one():
     assert set(re.findall(r"\{eq\}`([^`]+)`", text)) <= set(labels)
 
 
+def test_numbers_in_the_theory_are_those_of_the_code():
+    """Constants that a reader will rely on, each as its page prints it."""
+    from wrcore.analysis.to_accuracy import MARGIN, TIGHTER
+    from wrcore.contact.geometry import SCAN_STEP
+    from wrcore.contact.reduction import CURVATURE_FLOOR
+    from wrcore.creep.build import A_OVER_B
+    from wrcore.creep.kalker import GRID_A_OVER_B
+    from wrcore.creep.laws import FASTSIM_GRID
+    from wrcore.creep.table import DEFAULT_TOLERANCE
+    from wrcore.dynamics.drive import GRIP
+    from wrcore.geometry import irregularity, profile
+    from wrcore.integrate import choice, engine, tolerances
+    from wrcore.scene.description import load_scene
+
+    scene = load_scene(ROOT / "config/scenes/suspended_wheelset.yaml").data
+    damping, feedback = scene["contact"]["normal"]["damping"], scene["integration"]["baumgarte"]
+    share, factors = tolerances.SHARE, [*irregularity.VERTICAL.values(), *irregularity.LATERAL.values()]
+    spectra = [f"{factor:.3e}".replace("e-0", "e-") for factor in factors]
+    printed = {
+        "profiles": [
+            f"({1e3 * profile.SPACING:g} mm)", f"w = {1e3 * profile.WINDOW:g} mm", f"exceeds {profile.STEEPEST:g} ",
+            f"down to {1e3 * profile.GAUGE_DEPTH:g} mm",
+        ],
+        "contact": [f"({1e3 * SCAN_STEP:g} mm)", f"floor of {CURVATURE_FLOOR} 1/m"],
+        "normal": [f"({damping['c_e']} and {damping['v0']} m/s unless stated)"],
+        "creep": [
+            f"{FASTSIM_GRID} strips of {FASTSIM_GRID} steps", f"a/b ({A_OVER_B[0]:g} to {A_OVER_B[1]:g})",
+            f"({DEFAULT_TOLERANCE} of", f"from 1/{1 / GRID_A_OVER_B[0]:g} to {GRID_A_OVER_B[-1]:g} (",
+        ],
+        "multibody": [f"= {GRIP}$ rad/s", f"\\beta = {feedback['alpha']:g}$ 1/s"],
+        "track": [
+            f"{irregularity.CUTOFF_C}$", f"{irregularity.CUTOFF_R}$", f"{irregularity.CUTOFF_S}$ rad/m",
+            f"b = {irregularity.HALF_BASE} m", *spectra,
+        ],
+        "integration": [
+            f"${choice.STABLE}/", f"({choice.STEPS_PER_METRE} steps per metre)", f"{tolerances.LENGTH}\\ \\mathrm m",
+            f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
+            f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", "a tenth of the last",
+        ],
+    }  # fmt: skip
+    assert choice.EXPLICIT_PER_STIFF == 4.0 and share["ros34pw2"] == TIGHTER == 0.1  # in words
+    missing = [
+        (name, text)
+        for name, texts in printed.items()
+        for text in texts
+        if text not in (ROOT / f"docs/theory/{name}.md").read_text("utf-8")
+    ]
+    assert missing == []
+
+
 @NEEDS_TOOLS
 @pytest.mark.parametrize("page", THEORY, ids=relative)
 def test_equations_become_mathml(page, monkeypatch):
