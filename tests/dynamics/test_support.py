@@ -125,14 +125,14 @@ def test_at_rest_the_springs_carry_the_wheels(support):
 @pytest.mark.parametrize("method", ["tsit5", "rodas4"])
 def test_energy_of_a_run_on_its_flanges_adds_up(support, method):
     changes = {
-        "speed": 60.0, "initial.y": 0.005, "integration.duration": 0.6, "integration.method": method,
+        "speed": 70.0, "initial.y": 0.006, "integration.duration": 0.5, "integration.method": method,
         "integration.rtol": 1e-7, "output.rate": 10000.0, "output.channels": ["pose", "contact", "energy"],
     }  # fmt: skip
     run = simulate(load_scene(scene_on(support), changes))
     energy = run.groups["energy"]
     balance = energy_balance(energy, run.t)
     assert np.isfinite(first_flange_contact(run))
-    assert np.abs(balance.imbalance).max() < 1e-5 * balance.turned_over[-1]
+    assert np.abs(balance.imbalance).max() < 1e-5 * balance.turned_over[-1]  # found: 1e-6 to 4e-6
     assert np.abs(energy["input_by_joints_W"]).max() < 1e-6
     for name, values in energy.items():
         if name.startswith("dissipated"):
