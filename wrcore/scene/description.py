@@ -35,6 +35,7 @@ from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
 from wrcore.scene.pairs import Pair, find_file, own_pairs, pair_geometries, wheel_and_rail
+from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
 
@@ -159,6 +160,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
         data["contact"]["creep"]["table"] = str(table)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
+    check_support(data["track"].get("support"), source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
     check_bodies(data["initial"]["bodies"], vehicle, source)
@@ -275,13 +277,16 @@ def compile_scene(
     contact, integration = data["contact"], data["integration"]
     material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
     friction = read_friction(contact["friction"], scene.source)
+    geometry = _once(shared, "geometry", parts, lambda: contact_geometry(
+        scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
+    ))  # fmt: skip
+    support, elements = track_support(
+        data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
+    )
     model = Model(
         vehicle.bodies,
         ContactModel(
-            _once(shared, "geometry", parts, lambda: contact_geometry(
-                scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
-            )),
-            hertz_table(), LAWS[contact["creep"]["model"]],
+            geometry, hertz_table(), LAWS[contact["creep"]["model"]],
             _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
@@ -293,15 +298,15 @@ def compile_scene(
                 scene.pairs, scene.track, vehicle.half_distance
             )),
         ),
-        vehicle.elements, vehicle.joints,
+        elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source),
+        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source), support=support,
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
-        *damping.values(), *integration["baumgarte"].values(),
+        *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
     at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
     return model, initial_state(scene, model, at_rest)
