@@ -2,8 +2,7 @@
 
 import pytest
 
-from study.report.evidence import PAGE, ROOT, page, read
-from study.report.evidence import test_source as source_of
+from study.report.evidence import PAGE, ROOT, page, read, source_of
 
 ROWS = [row for section in read()["sections"] for row in section["rows"]]
 ABSENT = ("shared_file", "uic519", "worn_on_uic60", "loaded_partial_slip", "one_pose_many_creepages")
