@@ -12,7 +12,7 @@ import wrcore
 GROUPS = {
     "Scenes and runs": (
         "load_scene", "Scene", "simulate", "simulate_many", "simulate_to_accuracy", "Run", "load_run", "load_runs",
-        "write_run", "plot_run", "hunting_frequency",
+        "example", "write_run", "plot_run", "hunting_frequency",
     ),
     "Profiles and contact": (
         "list_profiles", "named_profile", "WheelsetOnTrack", "first_touch", "conicity_curve", "contact_table", "patch",
@@ -21,8 +21,9 @@ GROUPS = {
     "Creep forces": ("creep_force", "CreepTable", "ensure_table", "RollingContact", "plot_creep_force"),
     "Forces, modes, critical speeds": (
         "wheel_forces", "wheel_table", "wheelset_channels", "creep_power", "wear_number", "modes", "critical_speeds",
-        "limit_cycles",
+        "limit_cycles", "Settling",
     ),
+    "Pictures": ("draw", "plot_wheel_on_rail"),
     "Assessment, damage and wear": (
         "assess", "Assessment", "damage_table", "plot_shakedown", "local_wear", "WheelWear", "evolve",
     ),
@@ -123,7 +124,7 @@ def cli_page():
     """Commands with their options, units and defaults, from the parsers themselves."""
     from wrcore import cli
 
-    parser = (getattr(cli, "parser", None) or cli._parser)()
+    parser = cli.parser()
     parts = ["# Command line", f"\n{parser.description}\n"]
     for name, command, summary in _commands(parser):
         parts += [f"\n## wrcore {name}\n", f"{_sentence(summary)}\n", f"```text\n{_usage(command)}\n```\n"]
