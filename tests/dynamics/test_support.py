@@ -221,6 +221,25 @@ def test_beside_a_drive():
     assert ours.status == "completed" and abs(gap) < 0.01 * abs(np.ptp(rigid["wheelset"].wy_rad_per_s)) + 1e-3
 
 
+@BOTH
+def test_methods_agree_with_independent_wheels_a_controller_and_a_curve(support, tmp_path):
+    """All kinds of own states in one state: wheels that turn apart, track, the controller's integral."""
+    text = (SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
+    vehicle = tmp_path / "independent.yaml"
+    vehicle.write_text(text.replace("    kind: wheelset\n", "    kind: wheelset\n    independent_wheels: true\n"))
+    drive = {
+        "motors": [{"name": "motor", "bodies": ["wheelset", "frame"]}],
+        "controller": {"body": "wheelset", "speed": 20.0, "proportional": 1e4, "integral": 1e3, "limit": 1e4},
+    }
+    path = [{"transition": 5}, {"curve": 50, "radius": 500, "cant": 0.05}]
+    changes = {"vehicle.parameters": str(vehicle), "drive": drive, "track": {"support": support, "path": path},
+               "integration.duration": 0.5, "integration.rtol": 1e-6}  # fmt: skip
+    one, other = (simulate(load_scene(SCENE, changes | {"integration.method": name})) for name in ("tsit5", "rodas4"))
+    for name in ("y_m", "rolling_rate_left_rad_per_s", "rail_y_left_m", "rail_z_right_m"):
+        np.testing.assert_allclose(one["wheelset"][name], other["wheelset"][name], rtol=0, atol=2e-6, err_msg=name)
+    assert np.ptp(one["wheelset"].rail_z_right_m) > 1e-5
+
+
 def test_a_scene_without_has_none():
     model, state = compile_scene(load_scene(SCENE))
     assert own_states(model) == 0 and len(state) == STATE_SIZE and Equations(model).arguments[1].value.rails == 0
