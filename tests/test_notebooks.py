@@ -27,6 +27,17 @@ def test_kept_without_outputs_and_with_lines_to_change(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_what_it_takes_is_said_before_anything_runs(path):
+    first = json.loads(path.read_text())["cells"][0]
+    assert first["cell_type"] == "markdown" and "seconds" in "".join(first["source"])
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_none_needs_the_study_to_have_run(path):
+    assert "results/" not in "".join("".join(cell["source"]) for cell in code(path))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_no_numerics_of_their_own(path):
     source = "\n".join("".join(cell["source"]) for cell in code(path)).replace("%matplotlib inline", "")
     tree = ast.parse(source)

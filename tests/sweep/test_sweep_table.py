@@ -204,7 +204,7 @@ def test_curved_and_irregular_track_is_measured_along_the_track():
         ({"keys": {}}, "keys: expected a mapping from scene keys"),
         ({"sampling": {"kind": "latin_hypercube"}}, "sampling.runs"),
         ({"sampling": {"kind": "random"}}, "sampling.kind: expected 'grid'"),
-        ({"measures": ["y_max"]}, "measures: expected some of y_rms_m, .* got 'y_max'"),
+        ({"measures": ["y_max"]}, "measures: expected one of y_rms_m, .* got 'y_max'"),
         ({"scene": "absent.yaml"}, "scene: expected an existing file, got 'absent.yaml'"),
         ({"batch": 1, "sampling": {"kind": "latin_hypercube", "runs": 600}}, "batch: expected at least 2 runs"),
         ({"speed": 3}, "speed: unknown key"),
