@@ -95,6 +95,13 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     ------
     InputError
         For a run without wheels, or nothing after ``begin``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.damage_table(run)[["wheelset", "side"]].values.tolist()
+    [['wheelset', 'left'], ['wheelset', 'right']]
     """
     if not wheelsets_of(run) or not np.any(run.t >= begin):
         raise InputError("damage_table", "run", f"expected the channels of wheels after {begin:g} s")
@@ -124,6 +131,13 @@ def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_S
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.plot_shakedown(run).axes[0].get_xlabel()
+    'utilised friction |T|/N'
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
     axes, late, top = figure.subplots(), run.t >= begin, 0.0

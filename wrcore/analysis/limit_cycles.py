@@ -216,6 +216,18 @@ def limit_cycles(
     -------
     pandas.DataFrame
         Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> settling = wr.Settling(window=1.0, longest=20.0)
+    >>> table = wr.limit_cycles(wr.example("suspended_wheelset"), [40.0, 65.0], settling, [0.006], 25.0)
+    >>> table[["branch", "speed_m_per_s", "status"]]
+        branch  speed_m_per_s     status
+    0  falling           65.0  irregular
+    1  falling           40.0    at rest
+    2   rising           40.0    at rest
+    3   rising           65.0  irregular
     """
     speeds, settling = rising(speeds), settling or Settling()
     model, state = straight_ahead(as_scene(scene))

@@ -65,6 +65,14 @@ class WheelWear:
     """Wear of one wheel and of the rail under it.
 
     Depths over the bins between ``edges`` of the lateral coordinate u of their profile, positive to the field side.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wear = wr.local_wear(run)["wheelset", "left"]
+    >>> wear.wheel_depth.shape[0] == wear.wheel_edges.shape[0] - 1, wear.volume > 0.0
+    (True, True)
     """
 
     wheel_edges: np.ndarray
@@ -104,6 +112,13 @@ def local_wear(
     ------
     InputError
         For an unknown law, a run without wheels, or nothing after ``begin``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> sorted(wr.local_wear(run))
+    [('wheelset', 'left'), ('wheelset', 'right')]
     """
     if law not in LAWS:
         raise InputError("local_wear", "law", one_of(LAWS, law))

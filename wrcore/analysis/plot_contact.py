@@ -82,6 +82,13 @@ def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> [axes.get_title() for axes in wr.plot_pair(pair).axes]
+    ['left, S1002 on 60E1', 'right, S1002 on 60E1']
     """
     shifts = 1e-3 * np.arange(-6, 7) if shifts is None else shifts
     return fig_contact_location(pair, first_touch(pair, shifts))

@@ -37,6 +37,13 @@ def plot_creep_force(
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> figure = wr.plot_creep_force(["linear", "polach"])
+    >>> [line.get_label() for line in figure.axes[0].lines][:2]
+    ['linear', 'polach']
     """
     models = [models] if isinstance(models, str) else list(models)
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")

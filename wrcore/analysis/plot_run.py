@@ -57,6 +57,14 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     ------
     InputError
         For a channel that the run does not have.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> figure = wr.plot_run(run, ["wheelset.y_m", "wheelset/left.N_N"])
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['y / mm', 'N / kN']
     """
     panels = [(channel.rpartition(".")[2], {channel: _values(run, channel)}) for channel in channels] or _overview(run)
     figure = Figure(figsize=(WIDTH, 0.7 + HEIGHT * len(panels)), layout="constrained")

@@ -118,6 +118,13 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
         That of `wrcore.analysis.modes.linear_modes`, followed by the columns of `energy_table`.
     shapes : pandas.DataFrame
         From `shape_table`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table, shapes = wr.modes(wr.example("suspended_wheelset"), 40.0)
+    >>> table.set_index("name").loc["wheelset hunting", "frequency_Hz"].round(1).item()
+    4.8
     """
     scene, (speed,) = as_scene(scene), rising([speed])
     table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
@@ -229,6 +236,17 @@ def critical_speeds(scenes: Source | dict[str, Scene], speeds: Iterable[float]) 
     -------
     pandas.DataFrame
         Rows of :func:`critical_speed` after a column variant.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wr.critical_speeds(wr.example("suspended_wheelset"), range(40, 71, 10)).round(0).T
+                                             0
+    variant                 suspended_wheelset
+    critical_speed_m_per_s                58.0
+    mode                      wheelset hunting
+    frequency_Hz                           7.0
+    wavelength_m                           8.0
     """
     rows, speeds = [], rising(speeds)
     if not isinstance(scenes, dict):

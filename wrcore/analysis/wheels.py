@@ -49,6 +49,14 @@ def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.nda
     -------
     Q, Y : numpy.ndarray, shape (n,)
         Vertical (downwards) and lateral (to the field side) force, N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> Q, Y = wr.wheel_forces(run, "wheelset", "left")
+    >>> round(1e-3 * Q.mean())
+    55
     """
     contact = run[f"{wheelset}/{side}"]
     vertical, lateral = np.zeros(len(run.t)), np.zeros(len(run.t))
@@ -80,6 +88,13 @@ def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.nd
     -------
     numpy.ndarray, shape (n,)
         N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.wear_number(run, "wheelset", "left", spin=True).shape == run.t.shape
+    True
     """
     return _creep_work(run, wheelset, side)[int(spin)]
 
@@ -99,6 +114,14 @@ def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
     -------
     numpy.ndarray, shape (n,)
         W.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> power = wr.creep_power(run, "wheelset", "left")
+    >>> power.shape == run.t.shape, bool(power.min() >= 0.0)
+    (True, True)
     """
     body = run[wheelset]
     speed = np.hypot(body.vx_m_per_s, body.vy_m_per_s) if "vx_m_per_s" in body else run.scene["speed"]
@@ -129,6 +152,13 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     -------
     pandas.DataFrame
         Index ``t_s``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
+    ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
     columns, total = {}, 0.0
     for side in SIDES:
@@ -160,6 +190,13 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     pandas.DataFrame
         A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
         without and with spin (N) and mean creep power (W).
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> (1e-3 * wr.wheel_table(run).set_index("side")["Q_mean_N"]).round().to_dict()
+    {'left': 55.0, 'right': 55.0}
     """
     late = run.t >= begin
     rows = []

@@ -182,6 +182,13 @@ def conicity_curve(
     ------
     InputError
         Amplitudes or step out of range, or a wheelset whose profiles do not meet near its centre.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> wr.conicity_curve(pair, [0.001, 0.003])["equivalent_conicity"].round(2).tolist()
+    [0.35, 0.17]
     """
     import pandas as pd
 

@@ -76,6 +76,13 @@ class WheelsetOnTrack:
         m; 14 mm in the Manchester contact benchmark. The reference rail of UIC 519 is drawn about a point 0.492 mm
         lower than its top, from which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies
         at 750 mm.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> pair.base, round(pair.rail_distance(pair.left), 4)
+    (1.5, 0.7605)
     """
 
     left: WheelOnRail
@@ -269,6 +276,14 @@ def first_touch(pair: WheelsetOnTrack, shifts: ArrayLike, roll: bool = True) -> 
         the field side), contact_angle (rad, rotation about x, as in `wrcore.contact.detection`) and height (m, of the
         wheelset's centre above the rails' tops; alike on both sides if roll is solved). NaN where a profile ends
         before it touches.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> touch = wr.first_touch(pair, [0.0, 0.003])
+    >>> touch["rolling_radius_difference_m"].round(5).tolist()
+    [0.0, 0.00096]
     """
     import pandas as pd
 

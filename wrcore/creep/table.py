@@ -52,6 +52,14 @@ class CreepTable:
         Exact solutions in it.
     force_error, moment_error : tuple of float
         Median, 95 %, 99 %, largest error found in the random check, over mu N and mu N c.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.ensure_table(0.28)
+    >>> Fx, Fy, Mz = table(6e-3, 4e-3, 5e4, xi=1e-3, eta=0.0, phi=0.0)
+    >>> round(float(Fx), -2)
+    -7600.0
     """
 
     data: CreepTableData
@@ -268,6 +276,13 @@ def ensure_table(
     Returns
     -------
     CreepTable
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.ensure_table(0.28)
+    >>> table.planes, table.tolerance, table.force_error[2] < table.tolerance
+    ('ellipse', 0.005, True)
     """
     _check_arguments(nu, planes, tolerance)
     path = table_path(nu, planes, tolerance)

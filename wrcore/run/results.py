@@ -50,6 +50,16 @@ def write_run(
         Adds to the file.
     **options
         Of its datasets, instead of `COMPRESSION`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> from tempfile import TemporaryDirectory
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> with TemporaryDirectory() as folder:
+    ...     wr.write_run(f"{folder}/run.h5", run)
+    ...     print(wr.load_run(f"{folder}/run.h5").status)
+    completed
     """
     with new_hdf5(path) as file:
         _write_attributes(file, run)
@@ -223,6 +233,16 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
     ------
     InputError
         As `load_run`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> from tempfile import TemporaryDirectory
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> with TemporaryDirectory() as folder:
+    ...     run.save(f"{folder}/slow/spatial.h5")
+    ...     print(wr.load_runs([f"{folder}/slow/spatial.h5"])["slow"].keys())
+    dict_keys(['spatial'])
     """
     cases: dict[str, dict[str, Run]] = {}
     for path in map(Path, paths):

@@ -49,6 +49,14 @@ class Patch:
         x_min, x_max, s_min, s_max, m, where they are known better than from the cells; else empty.
     pose : tuple of float
         y, z (m), roll and yaw (rad) of the wheelset; may be empty.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> (tread,) = wr.patch(pair, y=0.003, load=5e4)
+    >>> round(1e-3 * tread.normal, 1), tread.side, len(tread.pressure) == len(tread.x)
+    (49.9, 'left', True)
     """
 
     x: np.ndarray = field(repr=False)
