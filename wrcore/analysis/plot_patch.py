@@ -55,8 +55,8 @@ def plot_wheel_on_rail(source: Source | WheelsetOnTrack, side: str = "left", **p
     patches = patch(source, side=side, **pose)
     if not patches:
         raise InputError("patch", "z", "expected a pose in which the wheel touches")
-    figure = Figure(figsize=(9.4, 3.9), layout="constrained")
-    section, plan = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
+    figure = Figure(figsize=(6.0, 6.6), layout="constrained")
+    section, plan = figure.subplots(2, 1)
     _section(section, pair_of(source, side), side, patches)
     most = max(patches, key=lambda one: one.normal)
     most.plot(plan)
