@@ -3,6 +3,7 @@
 import copy
 import math
 import re
+from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from itertools import islice
@@ -264,7 +265,9 @@ def _explain(error, schema):
         schema = schema[part]
         if isinstance(schema, dict) and isinstance(schema.get("description"), str):
             description = schema["description"]
-    return field, f"expected {description}, got {_short(error.instance)}"
+    close = get_close_matches(str(error.instance), map(str, error.schema.get("enum", ())), 1)
+    meant = f"; did you mean {close[0]!r}?" if close else ""
+    return field, f"expected {description}, got {_short(error.instance)}{meant}"
 
 
 def _short(value):
