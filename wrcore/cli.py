@@ -100,9 +100,11 @@ def _add_simulate(commands):
 
 
 def _add_assess(commands):
-    command = commands.add_parser("assess", help="assess a stored run by EN 14363 or EN 12299")
+    command = commands.add_parser("assess", help="assess a stored run by EN 14363, EN 12299 or ISO 2631")
     command.add_argument("run_file", metavar="run.h5")
-    command.add_argument("--standard", default="EN 14363", metavar="'EN 14363'|'EN 12299'", help="default: EN 14363")
+    command.add_argument(
+        "--standard", default="EN 14363", metavar="'EN 14363'|'EN 12299'|'ISO 2631'", help="default: EN 14363"
+    )
     command.add_argument("--begin", type=float, default=0.0, metavar="s", help="leave out what came before; default: 0")
     command.add_argument("--freight", action="store_true", help="limits of freight wagons")
     command.add_argument("--out", metavar="sections.csv", help="write percentiles section by section (EN 14363)")
@@ -113,6 +115,7 @@ def _add_evolve(commands):
     command = commands.add_parser("evolve", help="wear a wheel profile over the distance of a plan, or go on with it")
     command.add_argument("plan", metavar="PLAN.yaml")
     command.add_argument("--out", required=True, metavar="FOLDER", help="profile_000.csv and so on, steps.csv")
+    command.add_argument("--threads", type=int, default=1, metavar="n", help="scenes of a step at the same time")
     command.set_defaults(run=_evolve)
 
 
@@ -325,10 +328,16 @@ def _assess(options):
 def _evolve(options):
     from wrcore.analysis.evolve import evolve
 
-    table = evolve(options.plan, options.out, partial(print, flush=True))
+    _check_threads("wrcore evolve", options.threads)
+    table = evolve(options.plan, options.out, partial(print, flush=True), threads=options.threads)
     columns = ["distance_m", "worn_m", "Sh_m", "Sd_m", "qR_m", "equivalent_conicity"]
     print(table[columns].to_string(index=False, float_format=lambda value: f"{value:.5g}"))
     return 0
+
+
+def _check_threads(command, threads):
+    if not 1 <= threads <= 1000:
+        raise InputError(command, "--threads", f"expected 1 to 1000, got {threads}")
 
 
 def _sweep(options):
@@ -337,8 +346,7 @@ def _sweep(options):
 
     out = _output(options.out, (".csv", ".h5"))
     _refuse_others(out, "format", "wrcore sweep")
-    if not 1 <= options.threads <= 1000:
-        raise InputError("wrcore sweep", "--threads", f"expected 1 to 1000, got {options.threads}")
+    _check_threads("wrcore sweep", options.threads)
     sweep, started = load_sweep(options.sweep), time.perf_counter()
     if options.gather:
         gather(sweep, options.gather, out)

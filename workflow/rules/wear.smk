@@ -1,7 +1,7 @@
 # Wear: a wheel profile over a distance, and what settings and models do to it.
 
 WEAR = config["wear"]
-CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", *VEHICLE, STYLE, "study/wear")
+CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", "analysis/wear_laws", *VEHICLE, STYLE, "study/wear")
 
 
 rule wear_evolution:
@@ -32,8 +32,27 @@ rule wear_evolution:
         "<benchmarks>/wear_evolution.tsv"
     params:
         settings=WEAR["settings"],
+    threads: 2
     script:
         "../scripts/wear/wear_evolution.py"
+
+
+# hours: no part of the study
+use rule wear_evolution as wear_100000_km with:
+    message:
+        "A wheel profile over 100 000 km"
+    output:
+        table="<results>/wear/100000_km.csv",
+        figure="<results>/wear/100000_km.png",
+        svg="<results>/wear/100000_km.svg",
+    log:
+        "<logs>/wear_100000_km.log",
+    benchmark:
+        "<benchmarks>/wear_100000_km.tsv"
+    params:
+        settings=WEAR["settings"] | {"distance": 1.0e8},
+    resources:
+        runtime=480,
 
 
 rule wear_influences:
