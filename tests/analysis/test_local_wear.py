@@ -108,8 +108,8 @@ def test_archard_takes_off_k_times_load_times_slip_over_hardness():
     whole = 1e-3 * 5e4 * 0.05 / 2e9
     assert volume(sliding, law([1e-3])) == pytest.approx(whole, rel=1e-9)
     assert volume(sliding, law([1e-3, 7e-3], speeds=[2.0])) == pytest.approx(whole, rel=1e-9)
-    # the slip that FASTSIM gives is xi less the elastic part, 0.05 but for 1 %: at 10 m/s 0.5 m/s
-    assert volume(sliding, law([9e-3, 1e-3, 7e-3], speeds=[0.45, 0.55])) == pytest.approx(whole, rel=0.03)
+    # the slip that FASTSIM gives is xi but for the elastic part, which is 15 % of it at most: at 10 m/s 0.43 to 0.57 m/s
+    assert volume(sliding, law([9e-3, 1e-3, 7e-3], speeds=[0.4, 0.6])) == pytest.approx(whole, rel=0.03)
     peak = 1.5 * 5e4 / (np.pi * 5e-3 * 4e-3)
     assert volume(sliding, law([1e-3], [9.0], pressures=[1.01 * peak])) == pytest.approx(whole, rel=1e-9)
     # a parabola holds 1 - (1 - r^2)^2 of itself inside the radius r; Hertz's pressure is half its peak at r^2 = 3/4
