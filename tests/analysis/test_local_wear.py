@@ -108,7 +108,7 @@ def test_archard_takes_off_k_times_load_times_slip_over_hardness():
     whole = 1e-3 * 5e4 * 0.05 / 2e9
     assert volume(sliding, law([1e-3])) == pytest.approx(whole, rel=1e-9)
     assert volume(sliding, law([1e-3, 7e-3], speeds=[2.0])) == pytest.approx(whole, rel=1e-9)
-    # the slip that FASTSIM gives is xi but for the elastic part, which is 15 % of it at most: at 10 m/s 0.43 to 0.57 m/s
+    # FASTSIM's slip is xi but for the elastic part, which is 15 % of it at most: at 10 m/s 0.43 to 0.57 m/s
     assert volume(sliding, law([9e-3, 1e-3, 7e-3], speeds=[0.4, 0.6])) == pytest.approx(whole, rel=0.03)
     peak = 1.5 * 5e4 / (np.pi * 5e-3 * 4e-3)
     assert volume(sliding, law([1e-3], [9.0], pressures=[1.01 * peak])) == pytest.approx(whole, rel=1e-9)
