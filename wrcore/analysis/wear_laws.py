@@ -9,7 +9,8 @@ With q the work (N/m^2 per metre rolled), p the pressure, s the slip (-) and V t
 * ``energy``: the first branch alone, loss in proportion to friction's work.
 * ``archard``: depth k p s/H, with the wear coefficient k from a map over p and the sliding speed V s, hardness H
   (Archard, J. Appl. Phys. 24 (1953) 981-988; as a map for wheels: Jendel, Wear 253 (2002) 89-99; with the user's bounds
-  and coefficients: GENSYS manual, ``wr_coupl_pra1``, read). Where FASTSIM slides, the traction is mu p: p s = q/mu. The map looks at Hertz's pressure, and at the slip under FASTSIM's parabolic one.
+  and coefficients: GENSYS manual, ``wr_coupl_pra1``, read). Where FASTSIM slides, the traction is mu p: p s = q/mu.
+  The map looks at Hertz's pressure, and at the slip under FASTSIM's parabolic one.
 * ``t_gamma``: volume of a patch per metre rolled over its T gamma, linear between given points, spread as q is: the
   form of Pearce and Sherratt, Wear 144 (1991) 343-351, whose area per distance times the wheel's diameter is a function
   of T gamma (times pi: the volume).
