@@ -19,6 +19,8 @@ PLAN = {
 }  # fmt: skip
 
 
+OFF = {"speed": 140, "integration.duration": 3.0, "initial.y": 0.015}
+"""Far above the critical speed."""
 ARCHARD = {"archard": {"hardness": 2e9, "coefficients": [[1e-4]]}}
 
 
@@ -92,6 +94,13 @@ def test_a_damaged_folder_is_refused(worn, tmp_path, name, text):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=f"{name}: expected"):
         ev.evolve(PLAN, tmp_path)
+
+
+def test_a_scene_that_does_not_end_is_named(tmp_path):
+    """A wheelset released far off on a smooth track leaves the rails."""
+    plan = PLAN | {"scenes": [PLAN["scenes"][0], {"share": 1.0, "set": OFF}]}
+    with pytest.raises(InputError, match=r"profile_\d+.csv: scenes.1: expected a run to its end .*, got derailed"):
+        ev.evolve(plan, tmp_path)
 
 
 def test_smoothing_keeps_the_sum():

@@ -111,7 +111,7 @@ def test_archard_takes_off_k_times_load_times_slip_over_hardness():
     # FASTSIM's slip is xi but for the elastic part, which is 15 % of it at most: at 10 m/s 0.43 to 0.57 m/s
     assert volume(sliding, law([9e-3, 1e-3, 7e-3], speeds=[0.4, 0.6])) == pytest.approx(whole, rel=0.03)
     peak = 1.5 * 5e4 / (np.pi * 5e-3 * 4e-3)
-    assert volume(sliding, law([1e-3], [9.0], pressures=[1.01 * peak])) == pytest.approx(whole, rel=1e-9)
+    assert volume(sliding, law([1e-3], [0.9], pressures=[1.01 * peak])) == pytest.approx(whole, rel=1e-9)
     # a parabola holds 1 - (1 - r^2)^2 of itself inside the radius r; Hertz's pressure is half its peak at r^2 = 3/4
     found = volume(sliding, law([0.0], [1e-3], pressures=[0.5 * peak]))
     assert found == pytest.approx(whole * (1 - (1 - 0.75) ** 2), rel=0.01)

@@ -122,7 +122,7 @@ def evolve(
     threads : int
         Scenes of a step that run at the same time; of no influence on the result.
     spent : mutable mapping, optional
-        Filled: wall time of all runs (``simulate``) and of their local wear (``wear``), s.
+        Filled: processor time of all runs (``simulate``) and of their local wear (``wear``), s.
 
     Returns
     -------
@@ -280,7 +280,7 @@ class SceneWear(NamedTuple):
     rails: dict[str, float]
     """Area of each rail's section, m^2 per million gross tonnes."""
     seconds: tuple[float, float]
-    """Of simulating and of local wear."""
+    """Processor time of simulating and of local wear."""
 
 
 def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
@@ -289,7 +289,8 @@ def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
     one = partial(_scene_wear, data, profile, np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS), threads > 1)
     total, volume, rails = np.zeros(len(u)), 0.0, []
     with ThreadPoolExecutor(threads) as pool:
-        for share, worn in zip(shares, pool.map(one, scenes) if threads > 1 else map(one, scenes), strict=True):
+        found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
+        for share, worn in zip(shares, found, strict=True):
             total += share * worn.rise
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
@@ -300,12 +301,13 @@ def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
     return _smooth(total, data["smoothing"]), volume
 
 
-def _scene_wear(data, profile, edges, quiet, scene):
-    began = time.perf_counter()
+def _scene_wear(data, profile, edges, quiet, place, scene):
+    began = time.thread_time()
     run = simulate(load_scene(scene, {"wheel.profile": profile}), progress=False if quiet else None)
     if run.status != "completed":
-        raise InputError(scene.source, "scenes", f"expected a run to its end, got {run.status}: {run.reason}")
-    simulated = time.perf_counter()
+        expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
+        raise InputError(profile["points"], f"scenes.{place}", expected)
+    simulated = time.thread_time()
     wheels = local_wear(run, data["begin"], data["law"])
     rise = np.zeros(len(edges) - 1)
     for wheel in wheels.values():
@@ -315,7 +317,7 @@ def _scene_wear(data, profile, edges, quiet, scene):
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
-    return SceneWear(rise, volume, rails, (simulated - began, time.perf_counter() - simulated))
+    return SceneWear(rise, volume, rails, (simulated - began, time.thread_time() - simulated))
 
 
 def _smooth(values, width):

@@ -27,24 +27,20 @@ def cost_table(plan, distance, whole=WHOLE, threads=1):
     -------
     pandas.DataFrame
         Rows ``simulate`` (all runs), ``wear`` (their local wear), ``rest`` (smoothing, profiles, conicity, files) and
-        ``all``: wall_s, share, and extrapolated_h of the whole. With several threads the first two add up the threads'
-        times, and the rest is not known. Column steps: how many there were.
+        ``all``: cpu_s (processor time), share, extrapolated_cpu_h of the whole; wall_s and steps of all.
     """
     with TemporaryDirectory() as folder:
         evolve(plan, folder, changes={"distance": 1.0})  # compiles
-    spent, began = {}, time.perf_counter()
+    spent, began, started = {}, time.perf_counter(), time.process_time()
     with TemporaryDirectory() as folder:
         table = evolve(plan, folder, changes={"distance": distance}, threads=threads, spent=spent)
-    total = time.perf_counter() - began
-    if threads == 1:
-        spent["rest"] = total - sum(spent.values())
-    parts = spent | {"all": total}
-    hours = {part: seconds * whole / distance / 3600.0 for part, seconds in parts.items()}
-    rows = [
-        {"part": part, "wall_s": seconds, "share": seconds / total, "extrapolated_h": hours[part]}
-        for part, seconds in parts.items()
-    ]
-    return pd.DataFrame(rows).assign(steps=len(table) - 1)
+    total, wall = time.process_time() - started, time.perf_counter() - began
+    parts = spent | {"rest": total - sum(spent.values()), "all": total}
+    rows = [{"part": part, "cpu_s": seconds, "share": seconds / total} for part, seconds in parts.items()]
+    found = pd.DataFrame(rows)
+    return found.assign(
+        extrapolated_cpu_h=found["cpu_s"] * whole / distance / 3600.0, wall_s=wall, steps=len(table) - 1
+    )
 
 
 def main():
