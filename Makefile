@@ -1,7 +1,9 @@
-# make study    set up .venv, run the whole study: results/<question>, results/report.zip
+# make study    set up .venv, run the whole study: results/<question>, results/report/index.html, results/report.zip
 # make test     set up .venv, run the smoke workflow and all tests
 # make smoke    the reduced study alone: results/smoke
-# make report   the study's report anew: results/report.zip
+# make report   the study's report anew: results/report/index.html, results/report.zip
+# make figures  the study's pictures into reports/figures, those that are there by name
+# make docs     the documentation site, without a network: results/docs/index.html
 # make lint     ruff, mypy;   make bench   speed measurements;   make clean   remove everything generated
 #
 # PYTHON=python3.12 chooses the interpreter for a new .venv, CORES=4 the cores for the workflow.
@@ -10,9 +12,10 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 STAMP := .venv/.installed
+DOCS_STAMP := .venv/.docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-.PHONY: study test smoke report lint bench clean
+.PHONY: study test smoke report figures docs lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
@@ -24,7 +27,13 @@ smoke: $(STAMP)
 	$(SNAKEMAKE) --configfile config/smoke.yaml
 
 report: $(STAMP)
-	$(SNAKEMAKE) --forcerun report_archive
+	$(SNAKEMAKE) --forcerun report_pages report_archive
+
+figures:
+	for name in $(notdir $(wildcard reports/figures/*.png)); do cp results/*/$$name reports/figures/ || exit 1; done
+
+docs: $(DOCS_STAMP)
+	$(BIN)/python docs/build.py results/docs
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -42,4 +51,8 @@ $(STAMP): pyproject.toml constraints.txt
 	    'wrcore needs Python 3.11 or newer; this is ' + sys.version.split()[0] + '. Try: make PYTHON=python3.11')"
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[test,lint]"
+	@touch $@
+
+$(DOCS_STAMP): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[docs]"
 	@touch $@

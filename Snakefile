@@ -31,4 +31,5 @@ rule all:
     default_target: True
     input:
         rules.study.input,
+        rules.report_pages.output,
         rules.report_archive.output,

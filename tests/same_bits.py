@@ -63,7 +63,7 @@ def digests():
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "poses.csv").write_text(POSES)
         for name, command in COMMANDS.items():
-            subprocess.run([sys.executable, "-m", "wrcore.cli", *command], cwd=folder, check=True)
+            subprocess.run([sys.executable, "-m", "wrcore", *command], cwd=folder, check=True)
             out[f"command {name}"] = hashlib.sha256((Path(folder) / "out.csv").read_bytes()).hexdigest()[:16]
     return out
 

@@ -2,6 +2,7 @@
 
 import doctest
 import importlib
+import inspect
 import subprocess
 import sys
 import time
@@ -14,18 +15,26 @@ from synthetic import hunting_run
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
 
-DOCUMENTED = (
-    "analysis.contact", "analysis.patch", "creep.cases", "run.channels", "run.progress", "run.results", "run.run",
-    "run.simulate", "scene.description", "sweep.batch", "sweep.plan",
-)  # fmt: skip
-"""Modules with runnable examples; each must have some."""
+PUBLIC = sorted(set(wr.__all__) - {"__version__"})
+DOCUMENTED = sorted({getattr(wr, name).__module__ for name in PUBLIC} | {"wrcore.run.channels", "wrcore.run.progress"})
 
 
 @pytest.mark.parametrize("name", DOCUMENTED)
 def test_examples_in_docstrings_run_as_written(name, monkeypatch):
     monkeypatch.chdir(ROOT)
-    result = doctest.testmod(importlib.import_module(f"wrcore.{name}"), optionflags=doctest.NORMALIZE_WHITESPACE)
+    result = doctest.testmod(importlib.import_module(name), optionflags=doctest.NORMALIZE_WHITESPACE)
     assert result.attempted > 0 and result.failed == 0
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_every_public_name_has_an_example_and_types(name):
+    public = getattr(wr, name)
+    assert ">>> " in public.__doc__.partition("Examples\n")[2]
+    if inspect.isfunction(public):
+        signature = inspect.signature(public)
+        parts = {key: part.annotation for key, part in signature.parameters.items()}
+        missing = [key for key, part in parts.items() if part is inspect.Parameter.empty]
+        assert missing == [] and signature.return_annotation is not inspect.Signature.empty
 
 
 def test_a_path_a_dict_and_a_scene_with_changes_give_the_same_run():

@@ -1,18 +1,12 @@
 """reports/bring_your_own.md works as written: its files are written, its commands and lines of Python are run."""
 
-import re
-import shlex
-
 import numpy as np
 import pandas as pd
 import pytest
 
 import wrcore as wr
 from tests.conftest import ROOT
-from wrcore.cli import main
-
-TEXT = (ROOT / "reports" / "bring_your_own.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```(\w+)\n(.*?)```", TEXT, re.DOTALL)
+from tests.pages import run_blocks
 
 
 @pytest.fixture(scope="module")
@@ -22,17 +16,7 @@ def folder(tmp_path_factory):
     (place / "config").symlink_to(ROOT / "config")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
-        for kind, text in BLOCKS:
-            name = re.match(r"# file: (\S+)\n", text)
-            if name:
-                (place / name[1]).write_text(text)
-            elif kind == "python":
-                exec(compile(text, "bring_your_own.md", "exec"), {})
-            else:
-                assert kind == "bash", kind
-                for line in text.strip().splitlines():
-                    program, *arguments = shlex.split(line)
-                    assert program == "wrcore" and main(arguments) == 0, line
+        run_blocks("bring_your_own.md")
     return place
 
 

@@ -88,7 +88,7 @@ def test_rooms_stand_in_the_order_of_the_data():
 
 def test_the_core_shows_its_rooms_and_nothing_else():
     entries = {p.name for p in (ROOT / "wrcore").iterdir()} - {"__pycache__"}
-    assert {name.removesuffix(".py") for name in entries} == {*ROOMS, "__init__", "py.typed"}
+    assert {name.removesuffix(".py") for name in entries} == {*ROOMS, "__init__", "__main__", "py.typed"}
 
 
 def test_every_question_has_its_drawers():

@@ -3,7 +3,7 @@
 import json
 
 from tests.conftest import ROOT, SCENES
-from wrcore.cli import _parser
+from wrcore.cli import parser
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene.description import load_scene
@@ -14,7 +14,7 @@ def test_there_is_one_table_tolerance():
     named = {entry["name"]: entry["tolerance"] for entry in study["tables"]}
     assert study["table"]["tolerance"] == named["ellipse_default"] == named["sdec_default"] == DEFAULT_TOLERANCE
     assert load_scene(SCENES / "trailer_vehicle.yaml").data["contact"]["creep"]["tolerance"] == DEFAULT_TOLERANCE
-    assert _parser().parse_args(["table", "build", "--out", "x.h5"]).tolerance is None  # then the default
+    assert parser().parse_args(["table", "build", "--out", "x.h5"]).tolerance is None  # then the default
     schema = read_yaml(ROOT / "wrcore" / "scene" / "schemas" / "scene.yaml")
     tolerance = schema["properties"]["contact"]["properties"]["creep"]["properties"]["tolerance"]
     assert "default" not in tolerance and tolerance["description"].endswith(f"left out: {DEFAULT_TOLERANCE:g}")

@@ -61,6 +61,12 @@ def test_every_figure_is_there_as_png_and_svg(smoke, name):
     assert "<svg" in found(smoke, f"{name}.svg").read_text()[:2000]
 
 
+def test_every_text_of_every_figure_can_be_read(smoke):
+    logs = sorted((ROOT / "logs" / "smoke").rglob("*.log"))
+    said = [line for log in logs for line in log.read_text("utf-8").splitlines() if "UserWarning: figure " in line]
+    assert len(logs) > 40 and said == []
+
+
 def test_smoke_runs_every_rule_of_the_study(smoke):
     rules = []
     for extra in (["--configfile", "config/smoke.yaml"], []):
@@ -215,6 +221,16 @@ def test_report_holds_the_figures(smoke):
         text = "".join(archive.namelist())
         assert "report.html" in text
         assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)
+
+
+def test_pages_of_the_report_open_without_a_network_and_hold_everything(smoke):
+    from tests.study.report.test_site import check_pages
+
+    pages = [smoke / "report" / "index.html", *sorted((smoke / "report").glob("[0-9]*.html"))]
+    check_pages(pages)
+    assert len(pages) == 14
+    text = "".join(page.read_text("utf-8") for page in pages)
+    assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)
 
 
 @pytest.mark.parametrize(

@@ -24,13 +24,16 @@ if TYPE_CHECKING:
     from wrcore.analysis.contact import contact_table as contact_table
     from wrcore.analysis.damage import damage_table as damage_table
     from wrcore.analysis.damage import plot_shakedown as plot_shakedown
+    from wrcore.analysis.draw import draw as draw
     from wrcore.analysis.evolve import evolve as evolve
+    from wrcore.analysis.limit_cycles import Settling as Settling
     from wrcore.analysis.limit_cycles import limit_cycles as limit_cycles
     from wrcore.analysis.local_wear import WheelWear as WheelWear
     from wrcore.analysis.local_wear import local_wear as local_wear
     from wrcore.analysis.patch import patch as patch
     from wrcore.analysis.plot_contact import plot_pair as plot_pair
     from wrcore.analysis.plot_creep import plot_creep_force as plot_creep_force
+    from wrcore.analysis.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
     from wrcore.analysis.plot_run import plot_run as plot_run
     from wrcore.analysis.stability import critical_speeds as critical_speeds
     from wrcore.analysis.stability import modes as modes
@@ -60,6 +63,7 @@ if TYPE_CHECKING:
     from wrcore.run.simulate import simulate_many as simulate_many
     from wrcore.scene.description import Scene as Scene
     from wrcore.scene.description import load_scene as load_scene
+    from wrcore.scene.examples import example as example
     from wrcore.sweep.batch import run_sweep as run_sweep
     from wrcore.sweep.plan import load_sweep as load_sweep
 
@@ -67,22 +71,26 @@ __version__ = "0.1.0"
 
 _PUBLIC = {
     "Assessment": "wrcore.analysis.assess",
-    "InputError": "wrcore.errors",
     "CreepTable": "wrcore.creep.table",
+    "InputError": "wrcore.errors",
     "Patch": "wrcore.contact.patch.result",
     "RollingContact": "wrcore.creep.halfspace",
     "Run": "wrcore.run.run",
     "Scene": "wrcore.scene.description",
+    "Settling": "wrcore.analysis.limit_cycles",
     "WheelWear": "wrcore.analysis.local_wear",
     "WheelsetOnTrack": "wrcore.contact.first_touch",
     "assess": "wrcore.analysis.assess",
     "conicity_curve": "wrcore.contact.conicity",
     "contact_table": "wrcore.analysis.contact",
     "creep_force": "wrcore.creep.cases",
+    "creep_power": "wrcore.analysis.wheels",
     "critical_speeds": "wrcore.analysis.stability",
     "damage_table": "wrcore.analysis.damage",
+    "draw": "wrcore.analysis.draw",
     "ensure_table": "wrcore.creep.table",
     "evolve": "wrcore.analysis.evolve",
+    "example": "wrcore.scene.examples",
     "first_touch": "wrcore.contact.first_touch",
     "hunting_frequency": "wrcore.run.motion",
     "limit_cycles": "wrcore.analysis.limit_cycles",
@@ -99,10 +107,10 @@ _PUBLIC = {
     "plot_pair": "wrcore.analysis.plot_contact",
     "plot_run": "wrcore.analysis.plot_run",
     "plot_shakedown": "wrcore.analysis.damage",
+    "plot_wheel_on_rail": "wrcore.analysis.plot_patch",
     "run_sweep": "wrcore.sweep.batch",
     "simulate": "wrcore.run.simulate",
     "simulate_many": "wrcore.run.simulate",
-    "creep_power": "wrcore.analysis.wheels",
     "simulate_to_accuracy": "wrcore.analysis.to_accuracy",
     "wear_number": "wrcore.analysis.wheels",
     "wheel_forces": "wrcore.analysis.wheels",

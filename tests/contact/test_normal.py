@@ -3,10 +3,12 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipe, ellipk
 
+from tests.conftest import DATA
 from wrcore.contact.normal import (
     contact_modulus,
     damping_factor,
@@ -77,6 +79,19 @@ def test_benchmark_value_at_contacts_own_point(s1002):
     delta = (9997 / (contact_modulus(8.2e10, 0.28) * stiffness)) ** (2 / 3)
     assert delta == pytest.approx(0.01619e-3, rel=1e-3)
     assert 1.5 * 9997 / (math.pi * a * b * delta) == pytest.approx(322e6, rel=2e-3)
+
+
+def test_shipped_examples_of_contact():
+    # CONTACT solves them on elements of a twentieth to a fiftieth of the patch: 0.1 % in the approach, 0.2 % in p_max.
+    table = pd.read_csv(DATA / "contact" / "contact_hertz.csv", comment="#")
+    assert len(table) == 6
+    for row in table.itertuples():
+        stiffness, a, b = hertz_ellipse(hertz_table(), row.A_per_m, row.B_per_m)
+        approach = (row.N_N / (contact_modulus(row.G_Pa, row.nu) * stiffness)) ** (2 / 3)
+        assert approach == pytest.approx(row.approach_m, rel=1.2e-3), row.example
+        assert 1.5 * row.N_N / (math.pi * a * b * approach) == pytest.approx(row.p_max_Pa, rel=2e-3), row.example
+        if row.a_m == row.a_m:  # printed
+            assert (a * math.sqrt(approach), b * math.sqrt(approach)) == pytest.approx((row.a_m, row.b_m), rel=5e-4)
 
 
 def test_damping_factor_is_smooth_and_never_pulls():

@@ -11,7 +11,7 @@ from wrcore.errors import InputError
 
 GOOD = {
     "case_id": "one", "a_m": 5e-3, "b_neg_m": 4e-3, "b_pos_m": 6e-3, "N_N": 8e4, "mu": 0.3, "G_Pa": 82e9, "nu": 0.28,
-    "ux": 1e-3, "uy": -5e-4, "phi_per_m": 0.2,
+    "xi": 1e-3, "eta": -5e-4, "phi_per_m": 0.2,
 }  # fmt: skip
 
 
@@ -53,6 +53,11 @@ def test_table_agrees_with_exact(table):
     """1 % of mu N = 240 N."""
     exact, looked = (solve_cases(frame(), model, table, level=20).iloc[0] for model in ("exact", "table"))
     assert [looked.Fx_N, looked.Fy_N] == pytest.approx([exact.Fx_N, exact.Fy_N], abs=240)
+
+
+def test_creepages_by_their_other_names_are_the_same():
+    other = frame().rename(columns={"xi": "ux", "eta": "uy"})
+    pd.testing.assert_frame_equal(solve_cases(other, "linear"), solve_cases(frame(), "linear"))
 
 
 def test_out_of_range_patches_are_counted(table):

@@ -11,11 +11,11 @@ A, B, N, MU, G = 8e-3, 4e-3, 82e3, 0.3, 82e9
 SIMPLE = [name for name in LAWS if name != "table"]
 
 
-def scaled(uy, phi_per_m):
+def scaled(eta, phi_per_m):
     """Creepages of the patch of CONTACT's example "fastsim" (a = 8 mm, b = 4 mm, 82 kN, mu = 0.3), nondimensional."""
     c = np.sqrt(A * B)
     factor = G * c * c / (MU * N)
-    return 0.0, uy * factor, phi_per_m * c * factor
+    return 0.0, eta * factor, phi_per_m * c * factor
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +23,8 @@ def data(ellipse_table):
     return creep_data(0.28, ellipse_table, grid=200)
 
 
-def lateral(law, data, uy, phi):
-    return creep_force(LAWS[law], data, A / B, 0.0, *scaled(uy, phi))[1]
+def lateral(law, data, eta, phi):
+    return creep_force(LAWS[law], data, A / B, 0.0, *scaled(eta, phi))[1]
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_pure_lateral_creepage(data):
 
 def rectangular_fastsim(data, elements, elliptic):
     """FASTSIM on a rectangular grid over the bounding box, as the published numbers were made; Fy/(mu N)."""
-    ux, uy, phi = scaled(-6.25e-4, 0.625)
+    xi, eta, phi = scaled(-6.25e-4, 0.625)
     c11, c22, c23, _ = kalker_coefficients(A / B, data.table.kalker)
     a, b = np.sqrt(A / B), np.sqrt(B / A)
     dx, dy = 2 * a / elements, 2 * b / elements
@@ -59,8 +59,8 @@ def rectangular_fastsim(data, elements, elliptic):
     for x in a - (np.arange(elements) + 0.5) * dx:
         height = np.maximum(1 - (x / a) ** 2 - (y / b) ** 2, 0)
         bound = 1.5 / np.pi * np.sqrt(height) if elliptic else 2 / np.pi * height
-        px = px - (3 * c11 / (8 * a) * ux - 4 * c23 / (np.pi * a * a) * phi * y) * dx
-        py = py - (3 * c22 / (8 * a) * uy + 4 * c23 / (np.pi * a * a) * phi * x) * dx
+        px = px - (3 * c11 / (8 * a) * xi - 4 * c23 / (np.pi * a * a) * phi * y) * dx
+        py = py - (3 * c22 / (8 * a) * eta + 4 * c23 / (np.pi * a * a) * phi * x) * dx
         scale = np.minimum(1, bound / np.maximum(np.hypot(px, py), 1e-300))
         px, py = px * scale, py * scale
         total += py.sum() * dx * dy
@@ -120,7 +120,7 @@ def test_no_creepage_no_force(data, law):
 
 @pytest.mark.parametrize("law", list(LAWS))
 def test_mirror_and_turn(data, law):
-    """F(-w) = -F(w); mirrored in y: uy, phi, fy, mz change sign."""
+    """F(-w) = -F(w); mirrored in y: eta, phi, fy, mz change sign."""
     fx, fy, mz, _ = creep_force(LAWS[law], data, 1.7, 0.0, 0.2, 0.3, 0.4)
     assert creep_force(LAWS[law], data, 1.7, 0.0, -0.2, -0.3, -0.4)[:3] == pytest.approx((-fx, -fy, -mz), abs=1e-12)
     assert creep_force(LAWS[law], data, 1.7, 0.0, 0.2, -0.3, -0.4)[:3] == pytest.approx((fx, -fy, -mz), abs=1e-6)

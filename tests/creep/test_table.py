@@ -22,8 +22,8 @@ TINY = Resolution(4, 4, 6, 8, 4, 6)
 def look_up(table, g, psi, creepages, forces):
     outside = 0
     for i in range(g.size):
-        ux, uy, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, g[i], psi[i], ux, uy, phi)
+        xi, eta, phi = creepages[i]
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, g[i], psi[i], xi, eta, phi)
         outside += flag
     return outside
 

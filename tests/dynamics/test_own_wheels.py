@@ -64,7 +64,7 @@ def test_each_wheelset_has_its_own_wheels():
 
 
 BAD = [
-    ({"wheel.wheelsets": {"axle_3": {"left": {}}}}, "wheel.wheelsets.axle_3", "one of the wheelsets wheelset"),
+    ({"wheel.wheelsets": {"axle_3": {"left": {}}}}, "wheel.wheelsets.axle_3", "expected one of wheelset, got 'axle_3'"),
     ({"wheel.left": {"rolling_radius": 460}}, "wheel.left.rolling_radius", "in m"),
     ({"wheel.left": {"rolling_radius": 0.35}}, "wheel.left.rolling_radius", "within 0.05 m of 0.46 m"),
     ({"wheel.left": {"profile": "S1003"}}, "wheel.left.profile", "expected"),

@@ -86,7 +86,7 @@ BAD_VEHICLES = [
     ("bodies.wheelset.mass", -1.0, "bodies.wheelset.mass", "kg, above 0"),
     ("bodies.wheelset.inertia", {"roll": 1.0, "pitch": 1.0, "yaw": 2.0}, "bodies.wheelset.inertia", "equal"),
     ("bodies.wheelset.rolling_radius", 460, "bodies.wheelset.rolling_radius", "in m"),
-    ("elements.0.bodies", ["wheelset", "bogie"], "elements.axle_box_left.bodies", "frame or one of wheelset"),
+    ("elements.0.bodies", ["wheelset", "bogie"], "elements.axle_box_left.bodies", "one of frame, wheelset"),
     ("elements.0.at", [0.1, 1.0, 0.46], "elements.axle_box_left.at", "axle"),
     ("elements.0.stiffness", [1.0, 2.0], "elements.axle_box_left.stiffness", "N/m"),
     ("elements.0.preload", [0, 0, 2e5], "vehicle", "pressed onto the rails"),

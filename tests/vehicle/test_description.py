@@ -95,7 +95,7 @@ BAD = [
     (set_in("secondary_lateral_damper_1", damping=None, characteristic={"velocity": [0, 1], "force": [2, 2]}),
      "elements.secondary_lateral_damper_1.characteristic.force", "rise somewhere"),
     # bodies of an element
-    (set_in("coupler", bodies=["car_body", "track"]), "elements.coupler.bodies", "frame or one of car_body"),
+    (set_in("coupler", bodies=["car_body", "track"]), "elements.coupler.bodies", "one of frame, car_body"),
     (set_in("coupler", bodies=["frame", "car_body"]), "elements.coupler.bodies", "frame as the second"),
     (set_in("coupler", bodies=["car_body"]), "elements.coupler.bodies", "two body names"),
     (set_in("coupler", bodies=["car_body", "car_body"]), "elements.coupler.bodies", "two different bodies"),
@@ -128,7 +128,7 @@ BAD = [
      "bodies.toilet", "springs or joints that carry"),
     # joints
     (with_joint(bodies=["car_body", "bogie_1"]), "joints.pivot", "'at'"),
-    (with_joint(bodies=["car_body", "bogie_3"], at=[9.5, 0, 0.6]), "joints.pivot.bodies", "frame or one of"),
+    (with_joint(bodies=["car_body", "bogie_3"], at=[9.5, 0, 0.6]), "joints.pivot.bodies", "one of frame, "),
     (with_joint(kind="hinge", bodies=["car_body", "bogie_1"]), "joints.pivot.kind", "'spherical'"),
 ]  # fmt: skip
 

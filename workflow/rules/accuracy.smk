@@ -110,21 +110,21 @@ rule speed_against_error:
         report(
             "<results>/accuracy/speed_against_error.png",
             caption="../report/accuracy/speed_against_error.rst",
-            category="07 Speed against error",
+            category="08 Speed against error",
             labels={"figure": "speed against error"},
         ),
         "<results>/accuracy/speed_against_error.svg",
         report(
             "<results>/accuracy/choose_for_accuracy.csv",
             caption="../report/accuracy/choose_for_accuracy.rst",
-            category="07 Speed against error",
+            category="08 Speed against error",
             labels={"table": "choose this for that accuracy"},
         ),
         "<results>/accuracy/accuracy_front.csv",
         report(
             "<results>/accuracy/models.csv",
             caption="../report/accuracy/models.rst",
-            category="07 Speed against error",
+            category="08 Speed against error",
             labels={"table": "errors of models"},
         ),
     log:
@@ -150,7 +150,7 @@ rule accuracy_requests:
         summary=report(
             "<results>/accuracy/requests_summary.csv",
             caption="../report/accuracy/requests.rst",
-            category="07 Speed against error",
+            category="08 Speed against error",
             labels={"table": "accuracies asked for and reached"},
         ),
     log:
@@ -165,7 +165,7 @@ rule accuracy_requests:
 
 rule claims:
     message:
-        "What the README promises: medians and worst cases"
+        "What reports/accuracy.md promises: medians and worst cases"
     input:
         core=CORE["accuracy_figures"],
         contact=rules.contact_reductions.output.cases,

@@ -35,6 +35,9 @@ def check_config():
             raise WorkflowError(f"configuration: speeds.{key}: expected a name under speeds.tracks, got {speeds[key]!r}")
     if not set(speeds["shown"]) <= set(speeds["values"]):
         raise WorkflowError("configuration: speeds.shown: expected some of speeds.values")
+    for vehicle in speeds["vehicles"]:
+        if vehicle not in config["critical_speed"]["vehicles"]:
+            raise WorkflowError(f"configuration: speeds.vehicles.{vehicle}: expected under critical_speed.vehicles, too")
     creep = config["creep"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
         raise WorkflowError(f"configuration: creep.shown: expected a name under tables, got {creep['shown']!r}")
@@ -90,22 +93,22 @@ CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "scene")
 RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/motion", "analysis/wheels")
-STYLE = "analysis/style"
+STYLE = ("analysis/style", "analysis/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
-    "creep_figures": sources("kernels", "creep", "study/creep", STYLE),
+    "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
     "geometry": sources(*CONTACT, *SCENE, "study/paper/tables"),
     "contact_search": sources(*CONTACT, "analysis/contact", "study/contact/tables", "study/contact/search"),
-    "contact_figures": sources(*CONTACT, "analysis/contact", "analysis/plot_contact", STYLE, "study/contact"),
+    "contact_figures": sources(*CONTACT, "analysis/contact", "analysis/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN),
     "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
-    "vehicle_figures": sources("run", *VEHICLE, STYLE, "study/speeds"),
+    "vehicle_figures": sources("run", *VEHICLE, *STYLE, "study/speeds"),
     "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
-    "accuracy_figures": sources("run/accuracy", *VEHICLE, STYLE, "study/accuracy"),
+    "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
     "paper": sources("run", "analysis/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", STYLE, "study/paper"),
+    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", *STYLE, "study/paper"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

@@ -15,13 +15,13 @@ rule cost_pairs:
         pairs=report(
             "<results>/cost/benchmarks.csv",
             caption="../report/cost/benchmarks.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "benchmarks"},
         ),
         machine=report(
             "<results>/cost/benchmark_machine.csv",
             caption="../report/cost/benchmark_machine.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "machine"},
         ),
     log:
@@ -47,31 +47,31 @@ rule cost_growth:
         wheelsets=report(
             "<results>/cost/growth_wheelsets.csv",
             caption="../report/cost/growth_wheelsets.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "growth with wheelsets"},
         ),
         runs=report(
             "<results>/cost/growth_runs.csv",
             caption="../report/cost/growth_runs.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "growth with duration and tolerance"},
         ),
         simultaneous=report(
             "<results>/cost/growth_scenes.csv",
             caption="../report/cost/growth_scenes.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "scenes at the same time"},
         ),
         chains=report(
             "<results>/cost/growth_chains.csv",
             caption="../report/cost/growth_chains.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "growth with joints"},
         ),
         findings=report(
             "<results>/cost/growth_memory.csv",
             caption="../report/cost/growth_memory.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "arithmetic or memory"},
         ),
     log:
@@ -90,7 +90,7 @@ rule fig_growth:
     message:
         "Figure: growth of cost"
     input:
-        core=CORE["cost"] + sources(STYLE),
+        core=CORE["cost"] + sources(*STYLE),
         wheelsets=rules.cost_growth.output.wheelsets,
         runs=rules.cost_growth.output.runs,
         simultaneous=rules.cost_growth.output.simultaneous,
@@ -98,7 +98,7 @@ rule fig_growth:
         png=report(
             "<results>/cost/growth.png",
             caption="../report/cost/growth.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"figure": "growth"},
         ),
         svg="<results>/cost/growth.svg",
@@ -112,25 +112,25 @@ rule cost_stages:
     message:
         "Time, operations and bytes of one right-hand side by stage"
     input:
-        core=CORE["cost"] + sources(STYLE),
+        core=CORE["cost"] + sources(*STYLE),
         scenes=SCENES,
     output:
         stages=report(
             "<results>/cost/cost_breakdown.csv",
             caption="../report/cost/cost_breakdown.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "stages of a right-hand side"},
         ),
         limits=report(
             "<results>/cost/machine_limits.csv",
             caption="../report/cost/machine_limits.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "limits of the machine"},
         ),
         png=report(
             "<results>/cost/cost_breakdown.png",
             caption="../report/cost/cost_breakdown.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"figure": "stages of a right-hand side"},
         ),
         svg="<results>/cost/cost_breakdown.svg",
@@ -156,13 +156,13 @@ rule cost_runs:
         batch=report(
             "<results>/cost/batch.csv",
             caption="../report/cost/batch.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "a batch in one process"},
         ),
         rejections=report(
             "<results>/cost/rejected_steps.csv",
             caption="../report/cost/rejected_steps.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "rejected steps"},
         ),
     log:

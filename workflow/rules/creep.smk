@@ -113,7 +113,7 @@ rule creep_laws:
         report(
             "<results>/creep/creep_laws.csv",
             caption="../report/creep/creep_laws.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"table": "laws, error and cost"},
         ),
         "<results>/creep/creep_laws.md",
@@ -133,7 +133,7 @@ rule fig_creep_curves:
         report(
             "<results>/creep/creep_curves.png",
             caption="../report/creep/creep_curves.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"figure": "curves"},
         ),
         "<results>/creep/creep_curves.svg",
@@ -156,7 +156,7 @@ rule fig_creep_traction:
         report(
             "<results>/creep/creep_traction.png",
             caption="../report/creep/creep_traction.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"figure": "traction"},
         ),
         "<results>/creep/creep_traction.svg",
@@ -180,7 +180,7 @@ rule fig_creep_cost:
         report(
             "<results>/creep/creep_cost.png",
             caption="../report/creep/creep_cost.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"figure": "cost against error"},
         ),
         "<results>/creep/creep_cost.svg",
@@ -202,7 +202,7 @@ rule fig_creep_error_map:
         report(
             "<results>/creep/creep_error_map.png",
             caption="../report/creep/creep_error_map.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"figure": "error of the table"},
         ),
         "<results>/creep/creep_error_map.svg",
@@ -228,7 +228,7 @@ rule fig_creep_smoothness:
         report(
             "<results>/creep/creep_smoothness.png",
             caption="../report/creep/creep_smoothness.rst",
-            category="04 Creep forces",
+            category="05 Creep forces",
             labels={"figure": "smoothness of the table"},
         ),
         "<results>/creep/creep_smoothness.svg",

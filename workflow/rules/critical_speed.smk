@@ -5,7 +5,7 @@ HUNTING = list(CRITICAL["vehicles"])
 CORE["critical_speed"] = CORE["simulation"] + sources(
     "analysis/motion", "analysis/modes", "analysis/stability", "analysis/limit_cycles"
 )  # fmt: skip
-CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(STYLE, "study/critical_speed")
+CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "study/critical_speed")
 
 
 wildcard_constraints:
@@ -39,6 +39,7 @@ rule root_locus:
         "<benchmarks>/root_locus/{vehicle}.tsv"
     params:
         speeds=CRITICAL["speeds"],
+        search=CRITICAL["search"],
         shown=CRITICAL["shown"],
         variants={name: changes(entry) for name, entry in CRITICAL["variants"].items()},
     script:
@@ -78,25 +79,25 @@ rule critical_speeds:
         table=report(
             "<results>/critical_speed/critical_speeds.csv",
             caption="../report/critical_speed/critical_speeds.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"table": "critical speeds"},
         ),
         variants=report(
             "<results>/critical_speed/critical_speed_variants.csv",
             caption="../report/critical_speed/critical_speed_variants.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"table": "what the critical speed depends on"},
         ),
         locus=report(
             "<results>/critical_speed/root_locus.png",
             caption="../report/critical_speed/root_locus.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"figure": "root locus"},
         ),
         cycles=report(
             "<results>/critical_speed/limit_cycles.png",
             caption="../report/critical_speed/limit_cycles.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"figure": "limit cycles"},
         ),
         svg=expand("<results>/critical_speed/{name}.svg", name=["root_locus", "limit_cycles"]),
@@ -119,7 +120,7 @@ rule fig_modes:
         report(
             "<results>/critical_speed/modes_{vehicle}.png",
             caption="../report/critical_speed/modes.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"figure": "modes", "vehicle": "{vehicle}"},
         ),
         "<results>/critical_speed/modes_{vehicle}.svg",

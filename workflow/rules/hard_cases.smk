@@ -45,19 +45,19 @@ rule hard_cases_table:
         table=report(
             "<results>/hard_cases/all.csv",
             caption="../report/hard_cases/stability_table.rst",
-            category="09 Hard cases",
+            category="10 Hard cases",
             labels={"table": "every check"},
         ),
         summary=report(
             "<results>/hard_cases/summary.csv",
             caption="../report/hard_cases/stability_summary.rst",
-            category="09 Hard cases",
+            category="10 Hard cases",
             labels={"table": "cases"},
         ),
         limits=report(
             "<results>/hard_cases/limits.csv",
             caption="../report/hard_cases/stability_limits.rst",
-            category="09 Hard cases",
+            category="10 Hard cases",
             labels={"table": "known limits"},
         ),
         text="<results>/hard_cases/all.md",
@@ -71,14 +71,14 @@ rule fig_hard_cases:
     message:
         "Hard cases: figures"
     input:
-        core=CORE["hard_cases"] + sources(STYLE),
+        core=CORE["hard_cases"] + sources(*STYLE),
         curves=expand(rules.hard_cases.output.curves, family=FAMILIES),
     output:
         **{
             name: report(
                 f"<results>/hard_cases/hard_cases_{name}.png",
                 caption=f"../report/hard_cases/hard_cases_{name}.rst",
-                category="09 Hard cases",
+                category="10 Hard cases",
                 labels={"figure": name.replace("_", " ")},
             )
             for name in HARD_FIGURES

@@ -2,7 +2,7 @@
 
 IVP = config["ivp"]
 CORE["ivp"] = sources("kernels", "integrate", "study/ivp/problem", "study/ivp/wheelset", "study/ivp/runs")
-CORE["ivp_figures"] = CORE["ivp"] + sources(STYLE, "study/ivp/figures")
+CORE["ivp_figures"] = CORE["ivp"] + sources(*STYLE, "study/ivp/figures")
 
 
 rule ivp_wheelset:
@@ -15,13 +15,13 @@ rule ivp_wheelset:
         work_precision=report(
             "<results>/ivp/ivp_work_precision.csv",
             caption="../report/ivp/ivp_work_precision.rst",
-            category="10 Benchmark of integrators",
+            category="11 Benchmark of integrators",
             labels={"table": "error and work"},
         ),
         stabilisation=report(
             "<results>/ivp/ivp_stabilisation.csv",
             caption="../report/ivp/ivp_stabilisation.rst",
-            category="10 Benchmark of integrators",
+            category="11 Benchmark of integrators",
             labels={"table": "Baumgarte and projection"},
         ),
         values="<results>/ivp/ivp_values.csv",
@@ -50,13 +50,13 @@ rule fig_ivp:
         work_precision=report(
             "<results>/ivp/ivp_work_precision.png",
             caption="../report/ivp/ivp_work_precision.rst",
-            category="10 Benchmark of integrators",
+            category="11 Benchmark of integrators",
             labels={"figure": "error and work"},
         ),
         constraints=report(
             "<results>/ivp/ivp_constraints.png",
             caption="../report/ivp/ivp_constraints.rst",
-            category="10 Benchmark of integrators",
+            category="11 Benchmark of integrators",
             labels={"figure": "drift of the constraints"},
         ),
         svg=expand("<results>/ivp/ivp_{name}.svg", name=["work_precision", "constraints"]),

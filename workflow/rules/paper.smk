@@ -233,7 +233,7 @@ rule timing_table:
         report(
             "<results>/paper/timing.csv",
             caption="../report/paper/timing.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "timing"},
         ),
     log:

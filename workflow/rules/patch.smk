@@ -1,7 +1,7 @@
 # Patch models against exact contact: one pose at a time, in runs, and exact contact against CONTACT.
 
 PATCH = config["patch"]
-CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/contact", STYLE, "study/contact", "study/patch")
+CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/contact", *STYLE, "study/contact", "study/patch")
 
 
 rule patch_costs:
@@ -16,7 +16,7 @@ rule patch_costs:
         report(
             "<results>/patch/costs.csv",
             caption="../report/patch/patch_costs.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "cost of a patch"},
         ),
     log:
@@ -33,6 +33,29 @@ rule patch_costs:
         "../scripts/patch/patch_costs.py"
 
 
+rule wheel_on_rail:
+    message:
+        "Figure: a loaded wheel on its rail, with its patch"
+    input:
+        core=CORE["patch"] + sources("analysis/patch", "analysis/plot_patch"),
+    output:
+        report(
+            "<results>/patch/wheel_on_rail_patch.png",
+            caption="../report/patch/wheel_on_rail_patch.rst",
+            category="04 The real patch",
+            labels={"figure": "a wheel on its rail"},
+        ),
+        "<results>/patch/wheel_on_rail_patch.svg",
+    log:
+        "<logs>/wheel_on_rail.log",
+    params:
+        pair=CONTACT_PAIR,
+        shown=PATCH["shown"],
+        rolling={name: PATCH["rolling"][name] for name in ("speed", "friction")},
+    script:
+        "../scripts/patch/wheel_on_rail.py"
+
+
 rule patch_errors:
     message:
         "Patch models against exact contact, pose by pose"
@@ -46,25 +69,25 @@ rule patch_errors:
         conicity=report(
             "<results>/patch/conicity.csv",
             caption="../report/patch/patch_conicity.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "equivalent conicity under load"},
         ),
         summary=report(
             "<results>/patch/summary.csv",
             caption="../report/patch/patch_errors.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "errors of patch models"},
         ),
         errors_figure=report(
             "<results>/patch/patch_errors.png",
             caption="../report/patch/patch_errors.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"figure": "errors of patch models"},
         ),
         patches_figure=report(
             "<results>/patch/patch_fields.png",
             caption="../report/patch/patch_fields.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"figure": "patches"},
         ),
         svg=expand("<results>/patch/{name}.svg", name=["patch_errors", "patch_fields"]),
@@ -90,7 +113,7 @@ rule patch_reference:
         summary=report(
             "<results>/patch/contact.csv",
             caption="../report/patch/patch_reference.rst",
-            category="03 The real patch",
+            category="04 The real patch",
             labels={"table": "patch models against CONTACT"},
         ),
     log:
@@ -154,7 +177,7 @@ rule patch_models:
         report(
             "<results>/patch/models.csv",
             caption="../report/patch/patch_models.rst",
-            category="06 Hunting: critical speeds",
+            category="07 Hunting: critical speeds",
             labels={"table": "vehicles with every patch model"},
         ),
     log:
@@ -190,4 +213,5 @@ rule patch_study:
         rules.patch_models.output,
         rules.patch_reference.output,
         rules.patch_costs.output,
+        rules.wheel_on_rail.output,
         rules.patch_errors.output,

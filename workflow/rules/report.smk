@@ -1,6 +1,8 @@
 # The notebooks, the study as a whole, and its report.
 
-NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb") if p.stem != "first_light")
+from snakemake.io import get_flag_value
+
+NOTEBOOKS = sorted(p.stem for p in Path("notebooks").glob("*.ipynb"))
 CORE["notebooks"] = sources("", "study/")
 
 
@@ -30,22 +32,6 @@ rule notebooks:
         expand(rules.notebook.output, notebook=NOTEBOOKS),
 
 
-rule first_light_notebook:
-    message:
-        "Notebook: loads runs, redraws Fig. 4"
-    input:
-        core=CORE["figures"],
-        notebook="notebooks/first_light.ipynb",
-        runs=expand([rules.simulate.output.planar, rules.simulate.output.spatial], case=CASES),
-        tight=expand(rules.simulate_twins.output.tight, case=WITH_TWINS),
-    output:
-        "<results>/notebooks/first_light.ipynb",
-    log:
-        "<logs>/first_light_notebook.log",
-    script:
-        "../scripts/report/first_light_notebook.py"
-
-
 rule study:
     input:
         rules.contact_geometry.output,
@@ -57,7 +43,6 @@ rule study:
         rules.motion_table.output,
         rules.timing_table.output,
         rules.comparison_table.output,
-        rules.first_light_notebook.output,
         rules.notebooks.input,
         rules.creep_study.input,
         rules.contact_study.input,
@@ -72,6 +57,40 @@ rule study:
         rules.accuracy_requests.output,
         rules.claims.output,
         rules.cost_study.input,
+
+
+def report_items(wildcards):
+    """What the rules mark for the report, in their order; params only where they are plain values."""
+    items = []
+    for rule in workflow.rules:
+        plain = {name: value for name, value in rule.params.items() if not callable(value)}
+        for path in rule.output:
+            flag = get_flag_value(path, "report")
+            if flag:
+                caption = Path(flag.caption.get_path_or_uri(secret_free=True)).resolve()
+                items.append({
+                    "rule": rule.name, "pattern": str(path), "category": flag.category, "labels": dict(flag.labels),
+                    "caption": caption.relative_to(HERE / "workflow/report").as_posix(), "params": plain,
+                })  # fmt: skip
+    return items
+
+
+rule report_pages:
+    message:
+        "Report as pages: {output}"
+    input:
+        rules.study.input,
+        core=sources("study/report"),
+        captions=sorted(str(p.relative_to(HERE)) for p in (HERE / "workflow/report").rglob("*.rst")),
+    output:
+        "<results>/report/index.html",
+    log:
+        "<logs>/report_pages.log",
+    params:
+        marked=report_items,
+        config=config,
+    script:
+        "../scripts/report/report_pages.py"
 
 
 rule report_archive:

@@ -62,7 +62,7 @@ rule vehicle_lateral_motion:
         report(
             "<results>/speeds/vehicle_lateral_motion_{vehicle}.png",
             caption="../report/speeds/vehicle_lateral_motion.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"figure": "lateral motion", "vehicle": "{vehicle}"},
         ),
         "<results>/speeds/vehicle_lateral_motion_{vehicle}.svg",
@@ -80,18 +80,19 @@ rule vehicle_guiding_forces:
     input:
         core=CORE["vehicle_figures"],
         run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
+        linear="<results>/critical_speed/{vehicle}_linear.csv",
     output:
         report(
             "<results>/speeds/vehicle_guiding_forces_{vehicle}.png",
             caption="../report/speeds/vehicle_guiding_forces.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"figure": "guiding forces", "vehicle": "{vehicle}"},
         ),
         "<results>/speeds/vehicle_guiding_forces_{vehicle}.svg",
         report(
             "<results>/speeds/vehicle_wheels_{vehicle}.csv",
             caption="../report/speeds/vehicle_wheels.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"table": "wheels", "vehicle": "{vehicle}"},
         ),
     log:
@@ -106,26 +107,27 @@ rule vehicle_over_speed:
     input:
         core=CORE["vehicle_figures"],
         speeds=expand(rules.sweep_speeds.output.speeds, vehicle=VEHICLES),
+        linear=expand("<results>/critical_speed/{vehicle}_linear.csv", vehicle=VEHICLES),
         benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
     output:
         report(
             "<results>/speeds/vehicle_hunting.png",
             caption="../report/speeds/vehicle_hunting.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"figure": "hunting over speed"},
         ),
         "<results>/speeds/vehicle_hunting.svg",
         report(
             "<results>/speeds/vehicle_response.png",
             caption="../report/speeds/vehicle_response.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"figure": "response over speed"},
         ),
         "<results>/speeds/vehicle_response.svg",
         report(
             "<results>/speeds/vehicle_timing.csv",
             caption="../report/speeds/vehicle_timing.rst",
-            category="08 Cost",
+            category="09 Cost",
             labels={"table": "timing over vehicles"},
         ),
     log:
@@ -148,7 +150,7 @@ rule vehicle_values:
         report(
             "<results>/speeds/vehicle_values.html",
             caption="../report/speeds/vehicle_values.rst",
-            category="05 Wheelset and trailer vehicle",
+            category="06 Wheelset and trailer vehicle",
             labels={"table": "values and their sources"},
         ),
     log:

@@ -8,7 +8,7 @@ for file in config["sweeps"]:
     except InputError as error:
         raise WorkflowError(f"configuration: sweeps: {error}")
 CORE["sweeps"] = CORE["simulation"] + sources("sweep")
-CORE["sweeps_figures"] = sources("sweep", STYLE, "analysis/plot_run", "study/sweeps")
+CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/plot_run", "study/sweeps")
 
 
 wildcard_constraints:
@@ -66,7 +66,7 @@ rule sweep_table:
         figure=report(
             "<results>/sweeps/sweep_{sweep}.png",
             caption="../report/sweeps/sweep.rst",
-            category="11 Sweeps",
+            category="12 Sweeps",
             labels={"figure": "{sweep}"},
         ),
         svg="<results>/sweeps/sweep_{sweep}.svg",

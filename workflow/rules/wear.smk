@@ -1,7 +1,9 @@
 # Wear: a wheel profile over a distance, and what settings and models do to it.
 
 WEAR = config["wear"]
-CORE["wear"] = CORE["simulation"] + sources("analysis/evolve", "analysis/local_wear", "analysis/wear_laws", *VEHICLE, STYLE, "study/wear")
+CORE["wear"] = CORE["simulation"] + sources(
+    "analysis/evolve", "analysis/local_wear", "analysis/wear_laws", "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
+)  # fmt: skip
 
 
 rule wear_evolution:
@@ -16,13 +18,13 @@ rule wear_evolution:
         table=report(
             "<results>/wear/evolution.csv",
             caption="../report/wear/evolution.rst",
-            category="12 Wear",
+            category="13 Wear",
             labels={"table": "evolution of a wheel profile"},
         ),
         figure=report(
             "<results>/wear/evolution.png",
             caption="../report/wear/evolution.rst",
-            category="12 Wear",
+            category="13 Wear",
             labels={"figure": "evolution of a wheel profile"},
         ),
         svg="<results>/wear/evolution.svg",
@@ -72,13 +74,13 @@ rule wear_influences:
         table=report(
             "<results>/wear/influences.csv",
             caption="../report/wear/influences.rst",
-            category="12 Wear",
+            category="13 Wear",
             labels={"table": "influences on worn profiles"},
         ),
         figure=report(
             "<results>/wear/influences.png",
             caption="../report/wear/influences.rst",
-            category="12 Wear",
+            category="13 Wear",
             labels={"figure": "influences on worn profiles"},
         ),
         svg="<results>/wear/influences.svg",

@@ -20,7 +20,7 @@ import pandas as pd
 
 from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import quotient
 
@@ -42,7 +42,18 @@ STANDARDS = ("EN 14363", "EN 12299", "ISO 2631")
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """What a run is worth by a standard; prints itself as a table."""
+    """What a run is worth by a standard; prints itself as a table.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.5, output__rate=1000)
+    >>> assessment = wr.assess(run)
+    >>> assessment.standard, assessment.summary["quantity"].tolist()
+    ('EN 14363', ['sum_Y', 'Y_over_Q', 'Q'])
+    >>> assessment.sections[["quantity", "side", "p50"]].shape
+    (5, 3)
+    """
 
     standard: str
     summary: pd.DataFrame
@@ -80,10 +91,14 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
 
     Examples
     --------
-    ``print(wr.assess(wr.load_run("run.h5")))``
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.5, output__rate=1000)
+    >>> worst = wr.assess(run, "EN 14363").summary.set_index("quantity")
+    >>> bool(worst.loc["Y_over_Q", "value"] < worst.loc["Y_over_Q", "limit"])
+    True
     """
     if standard not in STANDARDS:
-        raise InputError("assess", "standard", f"expected one of {', '.join(STANDARDS)}, got {standard!r}")
+        raise InputError("assess", "standard", one_of(STANDARDS, standard))
     if standard != "EN 14363":
         table = (ride_table if standard == "EN 12299" else whole_body_table)(run, begin)
         return Assessment(standard, table, pd.DataFrame())

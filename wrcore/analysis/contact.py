@@ -2,7 +2,9 @@
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
+from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.poses import solve_poses
 from wrcore.geometry.track import Track
@@ -24,7 +26,14 @@ def pair_geometry(pair):
     return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 
 
-def contact_table(pair, shifts, yaws=0.0, wheel_load=1e-3, detection="spatial", patch="moment"):
+def contact_table(
+    pair: WheelsetOnTrack,
+    shifts: ArrayLike,
+    yaws: ArrayLike = 0.0,
+    wheel_load: float = 1e-3,
+    detection: str = "spatial",
+    patch: str = "moment",
+) -> pd.DataFrame:
     """Contact of a wheelset over its lateral position and yaw: all patches of both wheels at a load per wheel.
 
     Parameters

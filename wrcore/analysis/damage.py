@@ -7,6 +7,10 @@ Engineering Materials and Structures 25 (2002) 899-909: FI = |T|/N - 2 pi a b k/
 the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24).
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -15,6 +19,9 @@ from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import greatest_pressure, wear_number, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 YIELD_IN_SHEAR = 300e6
 """Of a wheel or rail steel that has hardened, Pa (chosen)."""
@@ -67,7 +74,7 @@ def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
     return utilised_friction(run, wheelset, side) - less
 
 
-def damage_table(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
+def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> pd.DataFrame:
     """Rolling contact fatigue of each wheel and the rail under it over a run.
 
     Parameters
@@ -88,6 +95,13 @@ def damage_table(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
     ------
     InputError
         For a run without wheels, or nothing after ``begin``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.damage_table(run)[["wheelset", "side"]].values.tolist()
+    [['wheelset', 'left'], ['wheelset', 'right']]
     """
     if not wheelsets_of(run) or not np.any(run.t >= begin):
         raise InputError("damage_table", "run", f"expected the channels of wheels after {begin:g} s")
@@ -106,7 +120,7 @@ def damage_table(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
 
 
 @styled
-def plot_shakedown(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
+def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> Figure:
     """Shakedown map: greatest pressure over k against utilised friction, all wheels and times.
 
     Parameters
@@ -117,6 +131,13 @@ def plot_shakedown(run, begin=0.0, shear_yield=YIELD_IN_SHEAR):
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.plot_shakedown(run).axes[0].get_xlabel()
+    'utilised friction |T|/N'
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
     axes, late, top = figure.subplots(), run.t >= begin, 0.0

@@ -133,6 +133,17 @@ def evolve(
     ------
     InputError
         For a bad plan, a folder of another plan, or a run that left the rails or failed.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> from tempfile import TemporaryDirectory
+    >>> scene = wr.example("suspended_wheelset")
+    >>> hunting = {"share": 1.0, "set": {"speed": 30, "integration.duration": 0.4}}
+    >>> plan = {"name": "short", "scene": scene, "distance": 1e4, "begin": 0.2, "scenes": [hunting]}
+    >>> with TemporaryDirectory() as folder:
+    ...     print(wr.evolve(plan, folder)[["step", "distance_m"]].values.tolist())
+    [[0.0, 0.0], [1.0, 10000.0]]
     """
     data, scenes = load_wear_plan(plan, changes)
     folder = Path(folder)

@@ -6,6 +6,9 @@ one. *Rising*: a small disturbance at each speed, carried upwards; it stays at r
 the branches differ, the disturbance decides.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +19,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.integrator import integrate
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulate import DERAILED_Y
+from wrcore.scene.description import Source, as_scene
 
 CYCLES = ("limit cycle", "irregular")
 """Status of motions that do not die away."""
@@ -43,6 +47,12 @@ class Settling:
     method : str
     rtol : float
         Integration method and tolerance, see `wrcore.integrate.integrator.integrate`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wr.Settling(longest=10.0).window
+    2.0
     """
 
     window: float = 2.0
@@ -180,22 +190,47 @@ def rising_branch(model, state, speeds, settling):
     return pd.DataFrame(rows)
 
 
-def limit_cycles(scene, speeds, settling, disturbances, resolution):
+def limit_cycles(
+    scene: Source,
+    speeds: Iterable[float],
+    settling: Settling | None = None,
+    disturbances: Sequence[float] = (0.006, 0.0065, 0.007, 0.008, 0.009),
+    resolution: float = 0.25,
+) -> pd.DataFrame:
     """Both branches of a scene's vehicle.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, path or dict
         On a tangent, perfect track; where the vehicle starts is of no influence.
-    speeds, settling, disturbances, resolution
-        As for :func:`falling_branch`.
+    speeds : sequence of float
+        Rising, m/s.
+    settling : Settling, optional
+        Left out: its defaults.
+    disturbances : sequence of float
+        Sideways shifts of the vehicle that may end on a cycle, m.
+    resolution : float
+        Of the lowest speed with a limit cycle, m/s.
 
     Returns
     -------
     pandas.DataFrame
         Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> settling = wr.Settling(window=1.0, longest=20.0)
+    >>> table = wr.limit_cycles(wr.example("suspended_wheelset"), [40.0, 65.0], settling, [0.006], 25.0)
+    >>> table[["branch", "speed_m_per_s", "status"]]
+        branch  speed_m_per_s     status
+    0  falling           65.0  irregular
+    1  falling           40.0    at rest
+    2   rising           40.0    at rest
+    3   rising           65.0  irregular
     """
-    speeds, (model, state) = rising(speeds), straight_ahead(scene)
+    speeds, settling = rising(speeds), settling or Settling()
+    model, state = straight_ahead(as_scene(scene))
     tables = {
         "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),
         "rising": rising_branch(model, state, speeds, settling),

@@ -28,7 +28,7 @@ from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle, wheel_at_
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data, creep_force_at
 from wrcore.creep.table import ensure_table
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.surface import SIDES
 
 MODELS = (*PATCHES, "grid")
@@ -245,7 +245,7 @@ class Strips(LoadedWheels):
         super().__init__(geometry, **options)
         for name, value, known in (("resolution", resolution, RESOLUTIONS), ("slip", slip, SLIPS)):
             if value not in known:
-                raise InputError("contact", name, f"expected one of {', '.join(known)}, got {value!r}")
+                raise InputError("contact", name, one_of(known, value))
         self.resolution, self.surfaces, self.always = resolution, slip == "surfaces", model == "grid"
         self.exact, self.grids = model != "strips", GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
         arguments = geometry, self.modulus, resolution
@@ -386,7 +386,7 @@ def loaded_wheels(geometry, model="exact", resolution="middle", slip="surfaces",
         For an unknown choice, or a number in another unit.
     """
     if model not in MODELS:
-        raise InputError("patch", "", f"expected one of {', '.join(MODELS)}, got {model!r}")
+        raise InputError("patch", "", one_of(MODELS, model))
     if model in REDUCTIONS:
         return Ellipses(geometry, model, **options)
     return Strips(geometry, model, resolution, slip, **options)

@@ -12,7 +12,10 @@ A wheel meets a patch once a revolution, a rail once a passage. A strip of the p
 and leaves it spread over the width of the strip. Depths are those of the profile's ordinate, volumes exact sums.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +26,9 @@ from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import rolling_speed
 from wrcore.scene.friction import read_friction
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
 
 BIN = 2.5e-4
 """Width of the bins of depth over a profile, m."""
@@ -36,6 +42,14 @@ class WheelWear:
     """Wear of one wheel and of the rail under it.
 
     Depths over the bins between ``edges`` of the lateral coordinate u of their profile, positive to the field side.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wear = wr.local_wear(run)["wheelset", "left"]
+    >>> wear.wheel_depth.shape[0] == wear.wheel_edges.shape[0] - 1, wear.volume > 0.0
+    (True, True)
     """
 
     wheel_edges: np.ndarray
@@ -51,7 +65,9 @@ class WheelWear:
     """Friction's work in the patches, J/m."""
 
 
-def local_wear(run, begin=0.0, law="sheffield", width=BIN):
+def local_wear(
+    run: Run, begin: float = 0.0, law: str = "sheffield", width: float = BIN
+) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
     Parameters
@@ -75,6 +91,13 @@ def local_wear(run, begin=0.0, law="sheffield", width=BIN):
     InputError
         For an unknown law, a run without wheels or their contacts, nothing after ``begin``, or Archard's law with
         friction that is not one number.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> sorted(wr.local_wear(run))
+    [('wheelset', 'left'), ('wheelset', 'right')]
     """
     loss = wear_law(law)
     if not wheelsets_of(run):

@@ -175,7 +175,7 @@ def linear_modes(vehicle, linearisation):
         largest = place.flat[np.argmax(np.abs(place))]
         shapes[k] = place / largest if largest != 0.0 else 0.0
         rows.append({
-            "name": namer(value, place, speed, vector[12 * n :]),
+            "name": namer(value, place, speed, vector[12 * n :][: vehicle.elements.states]),
             "real_per_s": value.real, "imag_rad_per_s": value.imag, "frequency_Hz": value.imag / (2.0 * np.pi),
             "damping_ratio": -value.real / abs(value) if abs(value) >= NEUTRAL else np.nan,
             "most_energy": f"{vehicle.body_names[body]} {DIRECTIONS[direction]}", "part": energies[k, body, direction],

@@ -1,14 +1,19 @@
 """The real contact patch of one wheel, with pressure, traction, slip and adhesion: ``wr.patch``."""
 
+from __future__ import annotations
+
 import math
+from typing import NamedTuple
 
 from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Rolling, Strips
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
-from wrcore.errors import InputError, check_number
+from wrcore.contact.patch.result import Patch
+from wrcore.errors import InputError, check_number, one_of
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.surface import SIDES
-from wrcore.scene.description import load_scene
+from wrcore.scene.description import Source, as_scene
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import Pair
 
@@ -16,9 +21,11 @@ METHODS = ("exact", "grid")
 
 
 def patch(
-    source, y=0.0, yaw=0.0, roll=None, z=None, load=None, side="left", speed=None, omega=None, vy=0.0, yaw_rate=0.0,
-    mu=None, method="exact", resolution="middle", slip="surfaces", load_by="vertical",
-):  # fmt: skip
+    source: Source | WheelsetOnTrack, y: float = 0.0, yaw: float = 0.0, roll: float | None = None,
+    z: float | None = None, load: float | None = None, side: str = "left", speed: float | None = None,
+    omega: float | None = None, vy: float = 0.0, yaw_rate: float = 0.0, mu: float | None = None, method: str = "exact",
+    resolution: str = "middle", slip: str = "surfaces", load_by: str = "vertical",
+) -> list[Patch]:  # fmt: skip
     """Contact patches of one wheel, solved on the real surfaces.
 
     Parameters
@@ -72,7 +79,7 @@ def patch(
     for name, value, known in (("method", method, METHODS), ("side", side, SIDES), ("resolution", resolution, GRIDS),
                                ("load_by", load_by, ("vertical", "normal"))):  # fmt: skip
         if value not in known:
-            raise InputError("patch", name, f"expected one of {', '.join(known)}, got {value!r}")
+            raise InputError("patch", name, one_of(known, value))
     geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source, side)
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
     numbers = {"y": (y, 0.1), "yaw": (yaw, 0.5), "roll": (roll, 0.5), "z": (z, 2.0), "omega": (omega, 4e3),
@@ -97,6 +104,43 @@ def patch(
     return [one.patch for one in found]
 
 
+class Placed(NamedTuple):
+    """Profiles of a wheel and its rail, and where they lie, m."""
+
+    wheel: ProfileCurve
+    rail: ProfileCurve
+    rolling_radius: float
+    half_distance: float
+    rail_distance: float
+
+
+def pair_of(source, side="left"):
+    """Wheel and rail of a source of `patch`: of a scene those of its first wheelset.
+
+    Parameters
+    ----------
+    source, side
+        As for `patch`.
+
+    Returns
+    -------
+    Placed
+    """
+    if isinstance(source, WheelsetOnTrack):
+        one = getattr(source, side)
+        return Placed(one.wheel, one.rail, one.rolling_radius, source.half_distance, source.rail_distance(one))
+    scene = as_scene(source)
+    own = _own_pair(scene, side)
+    distance = scene.track.rail_distance(own.rail)
+    return Placed(own.wheel, own.rail, own.rolling_radius, scene.vehicle.half_distance, distance)
+
+
+def _own_pair(scene, side):
+    """Wheel and rail of a side of the first wheelset."""
+    alike = Pair(scene.wheel, scene.rail, scene.vehicle.rolling_radius)
+    return dict(zip(SIDES, scene.pairs, strict=False)).get(side, alike)
+
+
 def _of_pair(pair):
     """Geometry, material and usual values of a pair."""
     return pair_geometry(pair), {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
@@ -104,12 +148,12 @@ def _of_pair(pair):
 
 def _of_scene(source, side):
     """The same of a scene: of the first wheelset, if its wheels differ from others."""
-    scene = load_scene(source)
+    scene = as_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
     friction = read_friction(contact["friction"], scene.source).largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
-    own = dict(zip(SIDES, scene.pairs, strict=False)).get(side, Pair(scene.wheel, scene.rail, vehicle.rolling_radius))
+    own = _own_pair(scene, side)
     geometry = contact_geometry(own.wheel, own.rail, scene.track, own.rolling_radius, vehicle.half_distance)
     detection = "planar" if scene.detection == "planar" else "spatial"
     load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])

@@ -2,9 +2,10 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.first_touch import first_touch
+from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
 from wrcore.geometry.surface import SIDES
 
 LIFT = 0.020
@@ -48,7 +49,8 @@ def _location(axes, pair, table, side):
     u_wheel, u_rail = table[f"u_wheel_{side}_m"].to_numpy(), table[f"u_rail_{side}_m"].to_numpy()
     y = sign * MM * np.array([from_wheel + u_wheel, from_rail + u_rail])
     z = MM * np.array([LIFT + one.wheel(u_wheel), one.rail(u_rail)])
-    axes.plot(y, z, color=ACCENT, linewidth=0.6)
+    joints = axes.plot(y, z, color=ACCENT, linewidth=0.6)
+    joints[0].set_label("contact at the shift in mm")
     _label_shifts(axes, MM * table.y_m.to_numpy(), y[0], z[0])
     inner, outer = np.nanmin(np.abs(y)) - 12.0, np.nanmax(np.abs(y)) + 12.0
     axes.set(xlabel="y, to the left / mm", ylabel="z / mm", ylim=(-20, MM * LIFT + 14))
@@ -68,7 +70,7 @@ def _label_shifts(axes, shifts, across, height):
             written.append(across[k])
 
 
-def plot_pair(pair, shifts=None):
+def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
     """Draw a pair of profiles with its contact points as the wheelset moves sideways.
 
     Parameters
@@ -80,6 +82,13 @@ def plot_pair(pair, shifts=None):
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> [axes.get_title() for axes in wr.plot_pair(pair).axes]
+    ['left, S1002 on 60E1', 'right, S1002 on 60E1']
     """
     shifts = 1e-3 * np.arange(-6, 7) if shifts is None else shifts
     return fig_contact_location(pair, first_touch(pair, shifts))

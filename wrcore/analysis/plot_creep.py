@@ -1,5 +1,7 @@
 """Picture of creep laws: force over creepage."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -11,8 +13,10 @@ LOOKS = ("-", (0, (4, 2)), (0, (1, 1)), "-.", (0, (6, 1, 1, 1)), (0, (2, 2)))
 
 
 @styled
-def plot_creep_force(models=("linear", "polach", "fastsim", "table"), a=5e-3, b=5e-3, normal_force=5e4, mu=0.3,
-                     spin=0.5, largest=8e-3):  # fmt: skip
+def plot_creep_force(
+    models: str | Sequence[str] = ("linear", "polach", "fastsim", "table"), a: float = 5e-3, b: float = 5e-3,
+    normal_force: float = 5e4, mu: float = 0.3, spin: float = 0.5, largest: float = 8e-3,
+) -> Figure:  # fmt: skip
     """Draw creep laws for one elliptic patch: longitudinal force over xi without spin, lateral force over eta with it.
 
     Parameters
@@ -33,6 +37,13 @@ def plot_creep_force(models=("linear", "polach", "fastsim", "table"), a=5e-3, b=
     Returns
     -------
     matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> figure = wr.plot_creep_force(["linear", "polach"])
+    >>> [line.get_label() for line in figure.axes[0].lines][:2]
+    ['linear', 'polach']
     """
     models = [models] if isinstance(models, str) else list(models)
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 from wrcore.geometry.surface import SIDES
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 
@@ -28,10 +28,14 @@ LARGE = ("x_m", "s_m", "z_m")
 """Channels in m that are printed in m."""
 
 WIDTH, HEIGHT = 7.2, 1.7
-LINE_STYLES: tuple[dict[str, Any], ...] = (
-    {"color": "0.1"}, {"color": "#0072B2", "linestyle": (0, (4, 2))}, {"color": "#E69F00"},
-    {"color": "0.55", "linestyle": ":"},
-)  # fmt: skip
+COLORS = ("0.1", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7", "0.6")
+"""Okabe-Ito, by wheelset or line; beyond the last, lines change their dashes."""
+
+DASHES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 1, 1, 1)))
+"""A wheelset's left wheel has full lines, its right one dashes."""
+
+MOST_ENTRIES = 8
+"""In one column of a legend."""
 
 
 @styled
@@ -53,6 +57,14 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     ------
     InputError
         For a channel that the run does not have.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> figure = wr.plot_run(run, ["wheelset.y_m", "wheelset/left.N_N"])
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['y / mm', 'N / kN']
     """
     panels = [(channel.rpartition(".")[2], {channel: _values(run, channel)}) for channel in channels] or _overview(run)
     figure = Figure(figsize=(WIDTH, 0.7 + HEIGHT * len(panels)), layout="constrained")
@@ -69,8 +81,9 @@ def _values(run: Run, channel: str) -> np.ndarray:
     try:
         return run[group][name]
     except KeyError:
-        known = ", ".join(f"{group}.{name}" for group, names in run.groups.items() for name in names)
-        raise InputError("plot", channel, f"expected a channel of the run: {known}") from None
+        known = [f"{group}.{name}" for group, names in run.groups.items() for name in names]
+        expected = f"expected a channel of the run: {', '.join(known)}{similar(channel, known)}"
+        raise InputError("plot", channel, expected) from None
 
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
@@ -96,8 +109,7 @@ def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
 def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> None:
     unit = unit_of(quantity)
     factor, printed = (1.0, "m") if quantity in LARGE else PRINTED.get(unit, (1.0, unit))
-    for at, (label, values) in enumerate(lines.items()):
-        style = dict(LINE_STYLES[at % len(LINE_STYLES)])
+    for style, (label, values) in zip(_styles(list(lines)), lines.items(), strict=True):
         if values.ndim > 1:  # a patch may last for a single output
             style |= {"marker": ".", "markersize": 3}
         for patch, column in enumerate(np.reshape(values, (len(run.t), -1)).T):
@@ -109,6 +121,21 @@ def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> 
     symbol = symbol.replace("_", " ")
     axes.set(ylabel=f"{symbol} / {printed}" if printed else symbol, xmargin=0)
     if len(lines) > 1:
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        look = {"fontsize": 7 if len(lines) > MOST_ENTRIES // 2 else 9, "ncols": -(-len(lines) // MOST_ENTRIES)}
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **look)
     else:
         axes.set_title(next(iter(lines)).removesuffix(f".{quantity}").replace("_", " "), loc="left")
+
+
+def _styles(labels: Sequence[str]) -> list[dict[str, Any]]:
+    """A look of its own for each line: colours by wheelset, dashes by side; told apart in grey too."""
+    stems = [label.removesuffix(" left").removesuffix(" right") for label in labels]
+    firsts = list(dict.fromkeys(stems))
+    styles = []
+    for label, stem in zip(labels, stems, strict=True):
+        turn, color = divmod(firsts.index(stem), len(COLORS))
+        dash = 2 * turn + label.endswith(" right")
+        if stem == label:
+            dash = firsts.index(stem)
+        styles.append({"color": COLORS[color], "linestyle": DASHES[dash % len(DASHES)]})
+    return styles

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 BLOCK = 5.0
 """Length of the stretches that comfort is evaluated over, s."""
@@ -97,7 +97,7 @@ def weighted(values, rate, weighting):
         For an unknown weighting.
     """
     if weighting not in WEIGHTINGS:
-        raise InputError("weighted", "weighting", f"expected one of {', '.join(WEIGHTINGS)}, got {weighting!r}")
+        raise InputError("weighted", "weighting", one_of(WEIGHTINGS, weighting))
     values = np.asarray(values, float)
     size = 2 * len(values)
     spectrum = np.fft.rfft(values, size) * WEIGHTINGS[weighting].response(np.fft.rfftfreq(size, 1.0 / rate))

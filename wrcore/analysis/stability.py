@@ -1,5 +1,9 @@
 """Stability of small motions over speed: root locus and linear critical speed."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
@@ -9,7 +13,7 @@ from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError, check_number
-from wrcore.scene.description import compile_scene, static_equilibrium
+from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
 """Accelerations above this are no steady motion, m/s^2 or rad/s^2; the drag of a free wheelset's spin creepage, which
@@ -99,12 +103,12 @@ def steady_motion(model, state, speed):
     return motion
 
 
-def modes(scene, speed):
+def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Modes of a scene's vehicle at one speed, with their energies and shapes.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, path or dict
     speed : float
         m/s.
 
@@ -114,8 +118,15 @@ def modes(scene, speed):
         That of `wrcore.analysis.modes.linear_modes`, followed by the columns of `energy_table`.
     shapes : pandas.DataFrame
         From `shape_table`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table, shapes = wr.modes(wr.example("suspended_wheelset"), 40.0)
+    >>> table.set_index("name").loc["wheelset hunting", "frequency_Hz"].round(1).item()
+    4.8
     """
-    (speed,) = rising([speed])
+    scene, (speed,) = as_scene(scene), rising([speed])
     table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
     full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
     return full, shape_table(scene.vehicle, table, shapes)
@@ -211,22 +222,36 @@ def loci(scenes, speeds):
     return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
 
 
-def critical_speeds(scenes, speeds):
-    """Linear critical speeds of one vehicle in several scenes.
+def critical_speeds(scenes: Source | dict[str, Scene], speeds: Iterable[float]) -> pd.DataFrame:
+    """Linear critical speed of a scene's vehicle, or of one in several scenes.
 
     Parameters
     ----------
-    scenes : dict of str to Scene
-        By what they differ in.
+    scenes : Scene or path, or dict of str to Scene
+        Several by what they differ in.
     speeds : sequence of float
-        Rising, m/s.
+        Rising, m/s: the critical speed is looked for between them.
 
     Returns
     -------
     pandas.DataFrame
         Rows of :func:`critical_speed` after a column variant.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wr.critical_speeds(wr.example("suspended_wheelset"), range(40, 71, 10)).round(0).T
+                                             0
+    variant                 suspended_wheelset
+    critical_speed_m_per_s                58.0
+    mode                      wheelset hunting
+    frequency_Hz                           7.0
+    wavelength_m                           8.0
     """
     rows, speeds = [], rising(speeds)
+    if not isinstance(scenes, dict):
+        scene = as_scene(scenes)
+        scenes = {scene.data["name"]: scene}
     for variant, scene in scenes.items():
         rows.append({"variant": variant, **critical_speed(scene.vehicle, *straight_ahead(scene), speeds)})
     return pd.DataFrame(rows)

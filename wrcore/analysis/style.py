@@ -4,10 +4,13 @@ Planar and spatial detection keep their colour, line and marker in every figure;
 grey copy stays readable. Units change in the functions that draw and nowhere before: m to mm, rad to mrad, N to kN.
 """
 
+import warnings
 from functools import wraps
 from pathlib import Path
 
 import matplotlib as mpl
+
+from wrcore.analysis.legible import findings
 
 MM = 1e3
 
@@ -68,10 +71,17 @@ def save_figure(figure, *paths):
     figure : matplotlib.figure.Figure
     paths : path-like
         ``.png`` and ``.svg`` files; folders are created.
+
+    Warns
+    -----
+    UserWarning
+        For texts that cannot be read: one line that begins with "figure" and the first file's name.
     """
     for path in map(Path, paths):
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+    for finding in findings(figure):
+        warnings.warn(f"figure {Path(paths[0]).name}: {finding}", stacklevel=2)
 
 
 def derailed_at(axes, speeds, color):
@@ -82,10 +92,10 @@ def derailed_at(axes, speeds, color):
 
 
 def shared_legend(figure, panels, **kwargs):
-    """One legend above all panels, each label once."""
+    """One legend for all panels, above them, each label once."""
     entries = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
         entries.update(zip(labels, handles, strict=True))
-    look = {"ncols": len(entries)} | kwargs
-    figure.legend(entries.values(), entries.keys(), loc="outside upper right", **look)
+    look = {"ncols": len(entries), "loc": "outside upper right"} | kwargs
+    figure.legend(entries.values(), entries.keys(), **look)

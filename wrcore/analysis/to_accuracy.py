@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.surface import SIDES
 from wrcore.run.run import Run
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import Scene
+from wrcore.scene.description import Source, as_scene
 
 QUANTITIES = {"y": "m", "Y": "N", "Q": "N", "wear": "N"}
 """What an accuracy can be asked of, and its unit: lateral position of the wheelsets, lateral and vertical wheel forces
@@ -70,7 +70,7 @@ class Accuracy:
 
 
 def simulate_to_accuracy(
-    scene: Scene, accuracy: float, of: str = "y", progress: Callable | None = None
+    scene: Source, accuracy: float, of: str = "y", progress: Callable | None = None
 ) -> tuple[Run, Accuracy]:
     """Run a scene until its error is below a bound, as two runs of different tolerance tell.
 
@@ -80,7 +80,7 @@ def simulate_to_accuracy(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, path or dict
         Its output must have the channels ``pose`` and ``contact``.
     accuracy : float
         Largest error, in the unit of the quantity.
@@ -110,7 +110,8 @@ def simulate_to_accuracy(
     (True, True)
     """
     if of not in QUANTITIES:
-        raise InputError("--accuracy-of", str(of), f"expected one of {', '.join(QUANTITIES)}")
+        raise InputError("--accuracy-of", "", one_of(QUANTITIES, of))
+    scene = as_scene(scene)
     check_number(accuracy, 1e-300, 1e300, "--accuracy", "", QUANTITIES[of])
     if not {"pose", "contact"} <= set(scene.data["output"]["channels"]):
         raise InputError(scene.source, "output.channels", "expected pose and contact among them")

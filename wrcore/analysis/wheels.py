@@ -3,12 +3,20 @@
 Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import forces_on_rail, quotient
 from wrcore.run.motion import growth_rate, hunting_frequency
+
+if TYPE_CHECKING:
+    from wrcore.run.run import Run
+
 
 SMALLEST = 1e-6
 """Motions below this are not asked for a frequency or a damping, m."""
@@ -19,7 +27,7 @@ def wheelsets_of(run):
     return [name for name in run.groups if f"{name}/left" in run.groups]
 
 
-def wheel_forces(run, wheelset, side):
+def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.ndarray]:
     """Forces of a wheel on its rail.
 
     Parameters
@@ -32,6 +40,14 @@ def wheel_forces(run, wheelset, side):
     -------
     Q, Y : numpy.ndarray, shape (n,)
         Vertical (downwards) and lateral (to the field side) force, N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> Q, Y = wr.wheel_forces(run, "wheelset", "left")
+    >>> round(1e-3 * Q.mean())
+    55
     """
     contact = run[f"{wheelset}/{side}"]
     if "Q_N" in contact and "Y_N" in contact:
@@ -39,15 +55,54 @@ def wheel_forces(run, wheelset, side):
     return forces_on_rail(contact, side)
 
 
-def wear_number(run, wheelset, side, spin=False):
-    """Wear number T gamma of a wheel over time, N, shape (n,); without or with the spin's part."""
+def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.ndarray:
+    """Wear number T gamma of a wheel over time, without or with the spin's part.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+    spin : bool
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        N.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> wr.wear_number(run, "wheelset", "left", spin=True).shape == run.t.shape
+    True
+    """
     return run[f"{wheelset}/{side}"]["T_gamma_spin_N" if spin else "T_gamma_N"]
 
 
-def creep_power(run, wheelset, side):
-    """Power that a wheel's creep dissipates over time, W, shape (n,).
+def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
+    """Power that a wheel's creep dissipates over time.
 
     Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
+
+    Parameters
+    ----------
+    run : Run
+    wheelset : str
+    side : {"left", "right"}
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        W.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> power = wr.creep_power(run, "wheelset", "left")
+    >>> power.shape == run.t.shape, bool(power.min() >= 0.0)
+    (True, True)
     """
     return run[f"{wheelset}/{side}"].creep_power_W
 
@@ -57,7 +112,7 @@ def greatest_pressure(run, wheelset, side):
     return np.max(np.nan_to_num(run[f"{wheelset}/{side}"].p_max_Pa), axis=1)
 
 
-def wheelset_channels(run, wheelset):
+def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
 
     Parameters
@@ -69,6 +124,13 @@ def wheelset_channels(run, wheelset):
     -------
     pandas.DataFrame
         Index ``t_s``.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
+    ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
     columns = {}
     for side in SIDES:
@@ -85,7 +147,7 @@ def wheelset_channels(run, wheelset):
     return pd.DataFrame(columns | {"sum_Y_N": run[wheelset].sum_Y_N}, index=pd.Index(run.t, name="t_s"))
 
 
-def wheel_table(run, begin=0.0):
+def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     """Loads, guiding forces and wear of each wheel.
 
     Parameters
@@ -99,6 +161,13 @@ def wheel_table(run, begin=0.0):
     pandas.DataFrame
         A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
         without and with spin (N) and mean creep power (W).
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> (1e-3 * wr.wheel_table(run).set_index("side")["Q_mean_N"]).round().to_dict()
+    {'left': 55.0, 'right': 55.0}
     """
     late = run.t >= begin
     rows = []

@@ -9,13 +9,20 @@ so a half wave is x = integral of dy / sqrt(2 (E - Phi) / (e r0)) between the tu
 conicity is that of the cone with the same wavelength L = 2 x: (pi / L)^2 2 e r0.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from wrcore.contact.first_touch import first_touch
+from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
 from wrcore.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEP = {True: 5e-5, False: 1e-4}
 """Default step of dr(y) with and without roll, m. A contact jump is smeared over one step, so the conicity just beyond
@@ -150,7 +157,9 @@ def equivalent_conicity(y, difference, amplitudes):
     return conicity, ends
 
 
-def conicity_curve(pair, amplitudes, roll=False, step=None):
+def conicity_curve(
+    pair: WheelsetOnTrack, amplitudes: ArrayLike, roll: bool = False, step: float | None = None
+) -> pd.DataFrame:
     """Equivalent conicity of a wheelset on its track over the amplitude, as in EN 15302.
 
     Parameters
@@ -173,6 +182,13 @@ def conicity_curve(pair, amplitudes, roll=False, step=None):
     ------
     InputError
         Amplitudes or step out of range, or a wheelset whose profiles do not meet near its centre.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> wr.conicity_curve(pair, [0.001, 0.003])["equivalent_conicity"].round(2).tolist()
+    [0.35, 0.17]
     """
     import pandas as pd
 

@@ -58,7 +58,7 @@ from wrcore.contact.scan import (
     strip_place,
 )
 from wrcore.contact.strip import gap_at, make_pose, strip_point
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit, rarely_called
 
@@ -366,7 +366,7 @@ def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="ma
     if detection not in ("planar", "spatial"):
         raise InputError("detect", "detection", f"expected planar or spatial, got {detection!r}")
     if reduction not in REDUCTIONS:
-        raise InputError("detect", "reduction", f"expected one of {', '.join(REDUCTIONS)}, got {reduction!r}")
+        raise InputError("detect", "reduction", one_of(REDUCTIONS, reduction))
     axle = axle_direction(roll, yaw)
     found, geometry = [], Handle(geometry)  # as in runs, which share the kernel
     for side, sign in (("left", 1.0), ("right", -1.0)):

@@ -10,17 +10,23 @@ both wheels touch, or left at zero, so that each side is searched by itself: the
 the second kind.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrcore.contact.geometry import HALF_DISTANCES, RADII
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
 from wrcore.geometry.track import GAUGES
 from wrcore.kernels.jit import FAST, jit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCAN_STEP = 1e-4
 """Distance of the wheel's nodes in the search for the first touch, m."""
@@ -70,6 +76,13 @@ class WheelsetOnTrack:
         m; 14 mm in the Manchester contact benchmark. The reference rail of UIC 519 is drawn about a point 0.492 mm
         lower than its top, from which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies
         at 750 mm.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> pair.base, round(pair.rail_distance(pair.left), 4)
+    (1.5, 0.7605)
     """
 
     left: WheelOnRail
@@ -86,7 +99,14 @@ class WheelsetOnTrack:
                 raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")
 
     @classmethod
-    def alike(cls, wheel, rail, gauge=1.435, rolling_radius=0.46, half_distance=0.75):
+    def alike(
+        cls,
+        wheel: ProfileCurve,
+        rail: ProfileCurve,
+        gauge: float = 1.435,
+        rolling_radius: float = 0.46,
+        half_distance: float = 0.75,
+    ) -> WheelsetOnTrack:
         """The usual case: the right side is the mirror image of the left one."""
         side = WheelOnRail(wheel, rail, rolling_radius)
         return cls(side, side, half_distance, gauge)
@@ -237,7 +257,7 @@ def _tabulate(left, right, shifts, solve_roll, rolls, found):
         rolls[i] = _touch_both(left, right, shifts[i], solve_roll, buffers, found[i])
 
 
-def first_touch(pair, shifts, roll=True):
+def first_touch(pair: WheelsetOnTrack, shifts: ArrayLike, roll: bool = True) -> pd.DataFrame:
     """Where a rigid wheelset without yaw touches the rails, and the rolling radius difference.
 
     Parameters
@@ -256,6 +276,14 @@ def first_touch(pair, shifts, roll=True):
         the field side), contact_angle (rad, rotation about x, as in `wrcore.contact.detection`) and height (m, of the
         wheelset's centre above the rails' tops; alike on both sides if roll is solved). NaN where a profile ends
         before it touches.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> touch = wr.first_touch(pair, [0.0, 0.003])
+    >>> touch["rolling_radius_difference_m"].round(5).tolist()
+    [0.0, 0.00096]
     """
     import pandas as pd
 

@@ -13,10 +13,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipkm1
 
+from wrcore.geometry.spline import spline_slopes
 from wrcore.kernels.jit import FUSED, jit
 
 LOG_RATIO_MAX = 14.0
@@ -36,41 +34,55 @@ def contact_modulus(shear_modulus, poisson_ratio):
     return shear_modulus / (1.0 - poisson_ratio)
 
 
+def _elliptic(flat):
+    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean.
+
+    With c_n the half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly
+    equal numbers where the ellipse is nearly a circle.
+    """
+    mean, other, total, weight = np.ones_like(flat), np.sqrt(flat), np.zeros_like(flat), 1.0
+    for _ in range(9):  # enough for a/b up to 1e13; the sixth is exact up to 1e3
+        mean, other, difference = 0.5 * (mean + other), np.sqrt(mean * other), 0.5 * (mean - other)
+        total += weight * difference * difference
+        weight *= 2.0
+    half = 0.5 * (1.0 - flat)
+    big_k = math.pi / (2.0 * mean)
+    return big_k, big_k * (half - total) / flat, big_k * (half + total)
+
+
 def hertz_shape(ratio):
     """Exact shape functions of the Hertz ellipse.
 
     Parameters
     ----------
-    ratio : float
-        Larger over smaller relative curvature, >= 1.
+    ratio : float or array_like
+        Larger over smaller relative curvature, 1 to 1e20.
 
     Returns
     -------
-    p_large, p_small, k : float
+    p_large, p_small, k : float or numpy.ndarray
         Semi-axis factors (the larger axis lies along the smaller curvature) and stiffness factor of the module's
         formulas.
 
     References
     ----------
-    Johnson, Contact Mechanics (1985), section 4.2, Eqs. (4.28)-(4.32).
+    Johnson, Contact Mechanics (1985), section 4.2, Eqs. (4.28)-(4.32). Abramowitz and Stegun (1964), 17.6 (complete
+    elliptic integrals by the arithmetic-geometric mean).
     """
-
-    def curvature_ratio(log_axis_ratio):
-        """ln of (large/small curvature) of the ellipse with axis ratio exp(log_axis_ratio) >= 1."""
-        flat = math.exp(-2.0 * log_axis_ratio)  # (b/a)^2 = 1 - e^2
-        if flat > 1.0 - 1e-6:  # both differences cancel; series in 1 - flat
-            return 1.5 * log_axis_ratio
-        big_k, big_e = ellipkm1(flat), ellipe(1.0 - flat)
-        return math.log((big_e / flat - big_k) / (big_k - big_e))
-
-    log_axis_ratio = brentq(lambda x: curvature_ratio(x) - math.log(ratio), 0.0, 30.0, xtol=1e-14)
-    flat = math.exp(-2.0 * log_axis_ratio)
-    big_k, big_e = ellipkm1(flat), ellipe(1.0 - flat)
+    ratio = np.asarray(ratio, float)
+    low, high = np.zeros_like(ratio), np.full_like(ratio, 30.0)
+    for _ in range(60):  # halves the range of ln(a/b)
+        middle = 0.5 * (low + high)
+        _, along, across = _elliptic(np.exp(-2.0 * middle))
+        less = along < ratio * across
+        low, high = np.where(less, middle, low), np.where(less, high, middle)
+    flat = np.exp(-2.0 * low)
+    big_k, along, _ = _elliptic(flat)
     # With c^3 = 3 F / (4 E* (A + B)): a^3 = (2 E / (pi flat)) c^3, and delta = (p0 / E*) b K, p0 = 3 F / (2 pi a b).
-    a = (2.0 * big_e / (math.pi * flat)) ** (1.0 / 3.0)
-    b = a * math.sqrt(flat)
+    a = np.cbrt(2.0 * (along + big_k) / math.pi)
+    b = a * np.sqrt(flat)
     r = 2.0 * big_k / (math.pi * a)
-    return a / math.sqrt(r), b / math.sqrt(r), r**-1.5
+    return a / np.sqrt(r), b / np.sqrt(r), r**-1.5
 
 
 @lru_cache(maxsize=1)
@@ -81,14 +93,11 @@ def hertz_table():
     -------
     HertzTable
     """
-    log_ratio = np.linspace(0.0, LOG_RATIO_MAX, _NODES // 2 + 1)
-    p_large, p_small, k = np.array([hertz_shape(ratio) for ratio in np.exp(log_ratio)]).T
-    log_ratio = np.concatenate([-log_ratio[:0:-1], log_ratio])
-    step = log_ratio[1] - log_ratio[0]
+    log_ratio, step = np.linspace(0.0, LOG_RATIO_MAX, _NODES // 2 + 1, retstep=True)
+    p_large, p_small, k = hertz_shape(np.exp(log_ratio))
     p, k = np.concatenate([p_small[:0:-1], p_large]), np.concatenate([k[:0:-1], k])
     values = np.column_stack([p, p[::-1], k, np.log(p / p[::-1])])
-    slopes = CubicSpline(log_ratio, values)(log_ratio, 1) * step
-    return HertzTable(float(step), np.concatenate([values, slopes], axis=1))
+    return HertzTable(float(step), np.concatenate([values, spline_slopes(step, values) * step], axis=1))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -7,7 +7,7 @@ import numpy as np
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.surface import SIDES
 
@@ -122,7 +122,7 @@ def solve_poses(
     if detection not in ("planar", "spatial"):
         raise InputError("detection", "", f"expected planar or spatial, got {detection!r}")
     if reduction not in columns.REDUCTIONS:
-        raise InputError("patch", "", f"expected one of {', '.join(columns.REDUCTIONS)}, got {reduction!r}")
+        raise InputError("patch", "", one_of(columns.REDUCTIONS, reduction))
     rule = columns.REDUCTIONS[reduction]
     rows = []
     patches = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))

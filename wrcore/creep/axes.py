@@ -1,8 +1,8 @@
 """Axes of the creep table, and the look-up: quadratic B-splines in up to five inputs.
 
-Creepages w = (ux', uy', phi') become a direction and a distance from zero creepage,
+Creepages w = (xi', eta', phi') become a direction and a distance from zero creepage,
 
-    X = ux' C11/3,   Y = uy' C22/3,   P = phi' l C11/3,   l = LEVER (sqrt(g) + 1/sqrt(g))
+    X = xi' C11/3,   Y = eta' C22/3,   P = phi' l C11/3,   l = LEVER (sqrt(g) + 1/sqrt(g))
     alpha = atan2(Y, X),   beta = atan2(P, hypot(X, Y)),
     r^2 = X^2 + Y^2 + phi'^2 ((C23/1.5)^2 + SPIN_FLOOR^2),   t = k r/(1 + k r),   k = RATE sqrt(1 + WIDE b/a),
 
@@ -13,7 +13,7 @@ not (it has a term r abs(r)). Stored is what remains of the force beside its lin
     F = (1 - t)^2 F_lin(w) + t R(g, psi, t, alpha, beta),      F_lin from `kalker`,
 
 so that the slope at zero creepage is Kalker's exactly: R = 0 at t = 0 for the ellipse. Symmetries are used, not
-approximated: F(-w) = -F(w) leaves beta >= 0, and mirroring y leaves psi >= 0 and, for the ellipse, ux >= 0.
+approximated: F(-w) = -F(w) leaves beta >= 0, and mirroring y leaves psi >= 0 and, for the ellipse, xi >= 0.
 R is the tensor product of quadratic B-splines that interpolates the nodes (beside the spin axis nearly so, see
 `build.spline_coefficients`): once continuously differentiable, three taps per axis.
 """
@@ -102,7 +102,7 @@ def _atan2(y, x):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scales(g, c11, c22, c23):
-    """Factors of ux', uy', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
+    """Factors of xi', eta', phi' in the direction, of phi' in the distance, and k (see the module's formulas)."""
     root = np.sqrt(g)
     inverse = 1 / root
     lever = LEVER * (root + inverse)
@@ -144,7 +144,7 @@ def creepages_at(g, t, alpha, beta, kalker):
     Returns
     -------
     ndarray (..., 3)
-        ux', uy', phi'.
+        xi', eta', phi'.
     """
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
@@ -183,7 +183,7 @@ def _solid(c, start, row, layer, wt, wa, wb):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def table_lookup(table, g, psi, ux, uy, phi):
+def table_lookup(table, g, psi, xi, eta, phi):
     """Creep force from the table.
 
     Parameters
@@ -191,8 +191,8 @@ def table_lookup(table, g, psi, ux, uy, phi):
     table : CreepTableData
     g, psi : float
         a/b and shape number. Outside the table's range the nearest patch inside is taken and the flag is set.
-    ux, uy, phi : float
-        Nondimensional creepages ux', uy', phi'; any finite value (NaN or infinity give NaN and the flag).
+    xi, eta, phi : float
+        Nondimensional creepages xi', eta', phi'; any finite value (NaN or infinity give NaN and the flag).
 
     Returns
     -------
@@ -201,14 +201,14 @@ def table_lookup(table, g, psi, ux, uy, phi):
     out_of_range : int
         1 where a/b or psi lay outside.
     """
-    return table_lookup_at(table, np.log(g), g, psi, ux, uy, phi)
+    return table_lookup_at(table, np.log(g), g, psi, xi, eta, phi)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
+def table_lookup_at(table, log_g, g, psi, xi, eta, phi):
     """`table_lookup` where ln(a/b) is known."""
     axes, c = table.axes, table.coefficients
-    if not abs(log_g + psi + ux + uy + phi) < np.inf:
+    if not abs(log_g + psi + xi + eta + phi) < np.inf:
         return np.nan, np.nan, np.nan, 1
     outside = 0
     if not axes.log_g_min - 1e-12 <= log_g <= axes.log_g_max + 1e-12:
@@ -217,19 +217,19 @@ def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
         g = np.exp(log_g)
     if abs(psi) > axes.psi_max:
         outside = 1
-    # mirror y (psi >= 0), then turn all creepages round (phi >= 0), then, for the ellipse, mirror again (ux >= 0)
+    # mirror y (psi >= 0), then turn all creepages round (phi >= 0), then, for the ellipse, mirror again (xi >= 0)
     flip_y = -1.0 if psi < 0 else 1.0
     flip = -1.0 if flip_y * phi < 0 else 1.0
-    ux, uy, phi = flip * ux, flip * flip_y * uy, flip * flip_y * phi
+    xi, eta, phi = flip * xi, flip * flip_y * eta, flip * flip_y * phi
     flip_x = 1.0
-    if axes.n_psi == 1 and ux < 0:
-        flip_x, ux = -1.0, -ux
+    if axes.n_psi == 1 and xi < 0:
+        flip_x, xi = -1.0, -xi
     c11, c22, c23, c33 = coefficients_at(log_g, table.kalker)
     sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
-    size = max(abs(ux), abs(uy), abs(phi))
+    size = max(abs(xi), abs(eta), abs(phi))
     if size > _LARGE:
-        ux, uy, phi = ux / size * _LARGE, uy / size * _LARGE, phi / size * _LARGE
-    x, y, p, q = ux * sx, uy * sy, phi * sp, phi * spin
+        xi, eta, phi = xi / size * _LARGE, eta / size * _LARGE, phi / size * _LARGE
+    x, y, p, q = xi * sx, eta * sy, phi * sp, phi * spin
     flat = x * x + y * y
     far = rate * np.sqrt(flat + q * q)
     whole = 1 + far
@@ -263,7 +263,7 @@ def table_lookup_at(table, log_g, g, psi, ux, uy, phi):
             force = force + wg[u] * (wp[0] * one + wp[1] * two + wp[2] * three)
             start += plane
     linear = stick * stick
-    fx = t * lane(force, 0) - linear * c11 * ux
-    fy = t * lane(force, 1) - linear * (c22 * uy + c23 * phi)
-    mz = t * lane(force, 2) + linear * (c23 * uy - c33 * phi)
+    fx = t * lane(force, 0) - linear * c11 * xi
+    fy = t * lane(force, 1) - linear * (c22 * eta + c23 * phi)
+    mz = t * lane(force, 2) + linear * (c23 * eta - c33 * phi)
     return flip * flip_x * fx, flip * flip_y * fy, flip * flip_y * mz, outside

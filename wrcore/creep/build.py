@@ -70,7 +70,7 @@ def axis_values(axes):
 
 
 def _directions(axes, ellipse):
-    """Node indices (alpha, beta) that must be solved: ux >= 0 for the ellipse, the pole once."""
+    """Node indices (alpha, beta) that must be solved: xi >= 0 for the ellipse, the pole once."""
     a, b = np.meshgrid(np.arange(axes.n_alpha), np.arange(axes.n_beta), indexing="ij")
     quarter = axes.n_alpha // 4
     wanted = (b < axes.n_beta - 1) | (a == axes.n_alpha // 2)
@@ -242,7 +242,7 @@ def build_data(nu, planes, resolution, progress=None):
 def random_creepages(g, count, kalker, rng):
     """Creepages from small to beyond saturation: a third each without spin, pure spin, mixed.
 
-    With xi, eta = u C/3 (C11, C22) and spin phi' C23: abs(xi, eta) log-uniform 0.03..3, spin log-uniform 0.03..5.
+    With X = xi' C11/3, Y = eta' C22/3, spin phi' C23: abs(X, Y) log-uniform 0.03..3, spin log-uniform 0.03..5.
     """
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     kind, turn = rng.integers(0, 3, count), rng.uniform(0, 2 * np.pi, count)

@@ -1,16 +1,25 @@
 """Creep forces of a list of cases in SI units: the work behind ``wrcore creep``."""
 
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_csv import read_csv_table
 
 MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
-NUMBERS = (*POSITIVE, "nu", "ux", "uy", "phi_per_m")
+NUMBERS = (*POSITIVE, "nu", "xi", "eta", "phi_per_m")
+OTHER_NAMES = {"ux": "xi", "uy": "eta"}
+"""Columns that are read, too, where the usual ones are missing."""
+
 _SAME_NU = 1e-9
 
 
@@ -43,7 +52,8 @@ def check_cases(frame, source="cases"):
     Parameters
     ----------
     frame : pandas.DataFrame
-        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, ux, uy, phi_per_m; others are ignored.
+        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m; others are
+        ignored.
     source : str
         Name of the file, for messages.
 
@@ -57,6 +67,7 @@ def check_cases(frame, source="cases"):
         On a missing column, on a value that is not a finite number, not positive where it must be, or nu outside
         0 to 0.5. Rows are counted from 1, without the header.
     """
+    frame = frame.rename(columns={other: name for other, name in OTHER_NAMES.items() if name not in frame})
     missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
     if missing:
         raise InputError(source, ", ".join(missing), f"expected columns case_id, {', '.join(NUMBERS)}; not found")
@@ -93,7 +104,7 @@ def nondimensional(columns):
     -------
     g, psi : (n,) ndarray
     creepages : (n, 3) ndarray
-        ux', uy', phi'.
+        xi', eta', phi'.
     c : (n,) ndarray
         sqrt(a b), b the mean of b_neg and b_pos, m.
     """
@@ -101,7 +112,7 @@ def nondimensional(columns):
     psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
     c = np.sqrt(columns["a_m"] * b)
     factor = columns["G_Pa"] * c**2 / (columns["mu"] * columns["N_N"])
-    creepages = np.stack([columns["ux"], columns["uy"], columns["phi_per_m"] * c], axis=1) * factor[:, None]
+    creepages = np.stack([columns["xi"], columns["eta"], columns["phi_per_m"] * c], axis=1) * factor[:, None]
     return columns["a_m"] / b, psi, creepages, c
 
 
@@ -139,7 +150,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
 
     source = source or frame.attrs.get("source", "cases")
     if model not in MODELS:
-        raise InputError(source, "model", f"expected one of {', '.join(MODELS)}, got {model!r}")
+        raise InputError(source, "model", one_of(MODELS, model))
     columns = check_cases(frame, source)
     g, psi, creepages, c = nondimensional(columns)
     if model == "exact":
@@ -182,8 +193,21 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
 
 
-def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8.2e10, nu=0.28, table=None):
-    """Creep force of any law on elliptic patches, in physical units; scalars and arrays broadcast.
+def creep_force(
+    model: str,
+    a: ArrayLike,
+    b: ArrayLike,
+    normal_force: ArrayLike,
+    xi: ArrayLike,
+    eta: ArrayLike,
+    phi: ArrayLike,
+    mu: ArrayLike = 0.3,
+    shear_modulus: ArrayLike = 8.2e10,
+    nu: ArrayLike = 0.28,
+    table: CreepTable | str | PathLike[str] | None = None,
+    psi: ArrayLike = 0.0,
+) -> tuple[Any, Any, Any]:
+    """Creep force of any law in physical units; scalars and arrays broadcast.
 
     Parameters
     ----------
@@ -198,6 +222,9 @@ def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8
         Friction coefficient, shear modulus (Pa), Poisson's ratio.
     table : CreepTable or path, optional
         For the model "table"; left out: the cached table for nu, built first if need be.
+    psi : float or array_like
+        Shape number of a double ellipse, which spans ``b (1 + psi)`` to the left and ``b (1 - psi)`` to the right; of
+        an ellipse 0. Only "table", "exact" and "fastsim" know it.
 
     Returns
     -------
@@ -217,8 +244,9 @@ def creep_force(model, a, b, normal_force, xi, eta, phi, mu=0.3, shear_modulus=8
     """
     import pandas as pd
 
-    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "ux", "uy", "phi_per_m")
-    values = np.broadcast_arrays(a, b, b, normal_force, mu, shear_modulus, nu, xi, eta, phi)
+    left, right = np.multiply(b, np.add(1.0, psi)), np.multiply(b, np.subtract(1.0, psi))
+    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "xi", "eta", "phi_per_m")
+    values = np.broadcast_arrays(a, right, left, normal_force, mu, shear_modulus, nu, xi, eta, phi)
     frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))
     forces = solve_cases(frame, model, table, source="creep_force")

@@ -30,7 +30,7 @@ class FastsimData(NamedTuple):
 
 
 @jit(allocates=False)
-def fastsim(settings, kalker, g, psi, ux, uy, phi):
+def fastsim(settings, kalker, g, psi, xi, eta, phi):
     """Creep force by FASTSIM with three flexibilities.
 
     Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
@@ -41,7 +41,7 @@ def fastsim(settings, kalker, g, psi, ux, uy, phi):
     ----------
     settings : FastsimData
     kalker : KalkerData
-    g, psi, ux, uy, phi : float
+    g, psi, xi, eta, phi : float
         a/b, shape number, nondimensional creepages (see `laws`).
 
     Returns
@@ -51,7 +51,7 @@ def fastsim(settings, kalker, g, psi, ux, uy, phi):
     """
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
-    rate_x, rate_y = ux * 3 * c11 / (8 * a), uy * 3 * c22 / (8 * a)
+    rate_x, rate_y = xi * 3 * c11 / (8 * a), eta * 3 * c22 / (8 * a)
     rate_spin = phi * 4 * c23 / (np.pi * a * a)
     fx = fy = mz = 0.0
     width = 2 * b / settings.n_y

@@ -1,6 +1,6 @@
 """Kalker's linear theory of rolling contact: the coefficients C11, C22, C23, C33 and the law.
 
-    fx = -C11 ux',   fy = -C22 uy' - C23 phi',   mz = +C23 uy' - C33 phi'
+    fx = -C11 xi',   fy = -C22 eta' - C23 phi',   mz = +C23 eta' - C33 phi'
 
 in the nondimensional form of the package (`halfspace.RollingContact`), i.e. Fx = -G a b C11 xi and so on. The
 coefficients come from this package's own half-space operator with adhesion everywhere, extrapolated in the panel
@@ -16,9 +16,9 @@ from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline, krogh_interpolate
 
 from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
+from wrcore.geometry.spline import spline_cubics
 from wrcore.kernels.jit import FUSED, jit
 
 COEFFICIENTS_FILE = "kalker_coefficients.csv"
@@ -126,9 +126,11 @@ def kalker_data(nu):
     rows = np.loadtxt(text.splitlines(), delimiter=",", skiprows=2)
     values = rows[:, 2:].reshape(len(GRID_NU), len(GRID_A_OVER_B), 4)
     log_g = np.log(GRID_A_OVER_B)
-    spline = CubicSpline(log_g, krogh_interpolate(GRID_NU, values, nu))
-    cubic = np.ascontiguousarray(np.moveaxis(spline.c[::-1], 0, 1))
-    return KalkerData(float(nu), float(log_g[0]), float(log_g[1] - log_g[0]), cubic)
+    step = float(log_g[1] - log_g[0])
+    others = [[other for other in GRID_NU if other != one] for one in GRID_NU]
+    weights = [np.prod([(nu - o) / (one - o) for o in other]) for one, other in zip(GRID_NU, others, strict=True)]
+    cubic = spline_cubics(step, np.tensordot(weights, values, axes=1))
+    return KalkerData(float(nu), float(log_g[0]), step, cubic)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

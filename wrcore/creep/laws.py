@@ -2,7 +2,7 @@
 
 Every law maps the patch (g = a/b, shape number psi) and the nondimensional creepages
 
-    ux' = ux G c^2/(mu N),   uy' = uy G c^2/(mu N),   phi' = phi G c^3/(mu N),   c = sqrt(a b)
+    xi' = xi G c^2/(mu N),   eta' = eta G c^2/(mu N),   phi' = phi G c^3/(mu N),   c = sqrt(a b)
 
 to (fx, fy, mz) = (Fx/(mu N), Fy/(mu N), Mz/(mu N c)), forces on the body whose creepage it is (the wheel). Only the
 table and FASTSIM know the shape number; the others take the mean ellipse.
@@ -60,24 +60,24 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def linear(kalker, g, ux, uy, phi):
-    """Kalker's linear theory: fx = -C11 ux', fy = -C22 uy' - C23 phi', mz = C23 uy' - C33 phi'; no bound.
+def linear(kalker, g, xi, eta, phi):
+    """Kalker's linear theory: fx = -C11 xi', fy = -C22 eta' - C23 phi', mz = C23 eta' - C33 phi'; no bound.
 
     Parameters
     ----------
     kalker : KalkerData
-    g, ux, uy, phi : float
+    g, xi, eta, phi : float
 
     Returns
     -------
     fx, fy, mz : float
     """
     c11, c22, c23, c33 = kalker_coefficients(g, kalker)
-    return -c11 * ux, -c22 * uy - c23 * phi, c23 * uy - c33 * phi
+    return -c11 * xi, -c22 * eta - c23 * phi, c23 * eta - c33 * phi
 
 
 @jit(allocates=False, fastmath=FUSED)
-def she(kalker, g, ux, uy, phi):
+def she(kalker, g, xi, eta, phi):
     """Shen, Hedrick and Elkins: the linear force, reduced to u - u^2/3 + u^3/27 (1 for u >= 3), direction kept.
 
     u is the linear force over mu N. The spin moment is reduced by the same factor (the paper leaves it open).
@@ -86,14 +86,14 @@ def she(kalker, g, ux, uy, phi):
     ----------
     Shen, Hedrick, Elkins, Proc. 8th IAVSD Symposium (1983) 591-605.
     """
-    fx, fy, mz = linear(kalker, g, ux, uy, phi)
+    fx, fy, mz = linear(kalker, g, xi, eta, phi)
     u = np.sqrt(fx * fx + fy * fy)
     factor = 1 - u / 3 + u * u / 27 if u < 3 else 1 / u
     return factor * fx, factor * fy, factor * mz
 
 
 @jit(allocates=False, fastmath=FUSED)
-def polach(kalker, g, ux, uy, phi):
+def polach(kalker, g, xi, eta, phi):
     """Polach: one saturation curve for the force, a separate one for the part that spin makes; no moment (mz = 0).
 
     With the creepages s, s_yc = s_y + phi a where that is larger in size than s_y, s_c = sqrt(s_x^2 + s_yc^2):
@@ -107,50 +107,50 @@ def polach(kalker, g, ux, uy, phi):
     """
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
-    turned = uy + phi * a
-    lateral = turned if abs(turned) > abs(uy) else uy
-    total = np.sqrt(ux * ux + lateral * lateral)
+    turned = eta + phi * a
+    lateral = turned if abs(turned) > abs(eta) else eta
+    total = np.sqrt(xi * xi + lateral * lateral)
     if total < 1e-300:
         return 0.0, 0.0, 0.0
-    plain = np.sqrt(ux * ux + uy * uy) + 1e-300
-    stiffness = np.sqrt((c11 * ux / plain) ** 2 + (c22 * uy / plain) ** 2)
+    plain = np.sqrt(xi * xi + eta * eta) + 1e-300
+    stiffness = np.sqrt((c11 * xi / plain) ** 2 + (c22 * eta / plain) ** 2)
     eps = 0.25 * np.pi * stiffness * total
     force = 2 / np.pi * (eps / (1 + eps * eps) + np.arctan(eps))
     k = 1 + 6.3 * (1 - np.exp(-g))
     eps_spin = 8 / 3 * b * c23 * abs(lateral) / k
     delta = (eps_spin * eps_spin - 1) / (eps_spin * eps_spin + 1)
     spin = eps_spin * (delta**3 / 3 - delta**2 / 2 + 1 / 6) - (1 - delta**2) ** 1.5 / 3
-    return -force * ux / total, (-force * uy + 0.5625 * a * k * spin * phi) / total, 0.0
+    return -force * xi / total, (-force * eta + 0.5625 * a * k * spin * phi) / total, 0.0
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _other_law(law, data, log_g, g, psi, ux, uy, phi):
+def _other_law(law, data, log_g, g, psi, xi, eta, phi):
     """All laws but the table."""
     rarely_called()
     kalker = data.table.kalker
     end = kalker.start + kalker.cubic.shape[0] * kalker.spacing
     outside = int(not kalker.start <= log_g <= end)
     if law == _LINEAR:
-        fx, fy, mz = linear(kalker, g, ux, uy, phi)
+        fx, fy, mz = linear(kalker, g, xi, eta, phi)
     elif law == _SHE:
-        fx, fy, mz = she(kalker, g, ux, uy, phi)
+        fx, fy, mz = she(kalker, g, xi, eta, phi)
     elif law == _POLACH:
-        fx, fy, mz = polach(kalker, g, ux, uy, phi)
+        fx, fy, mz = polach(kalker, g, xi, eta, phi)
     else:
-        fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, ux, uy, phi)
+        fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, xi, eta, phi)
     return fx, fy, mz, outside
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def creep_force_at(law, data, log_g, g, psi, ux, uy, phi):
+def creep_force_at(law, data, log_g, g, psi, xi, eta, phi):
     """`creep_force` where ln(a/b) is known."""
     if law == _TABLE:
-        return table_lookup_at(data.table, log_g, g, psi, ux, uy, phi)
-    return _other_law(law, data, log_g, g, psi, ux, uy, phi)
+        return table_lookup_at(data.table, log_g, g, psi, xi, eta, phi)
+    return _other_law(law, data, log_g, g, psi, xi, eta, phi)
 
 
 @jit(allocates=False, fastmath=FUSED)
-def creep_force(law, data, g, psi, ux, uy, phi):
+def creep_force(law, data, g, psi, xi, eta, phi):
     """Creep force by the law with number ``law`` (see `LAWS`).
 
     Parameters
@@ -159,7 +159,7 @@ def creep_force(law, data, g, psi, ux, uy, phi):
     data : CreepData
     g, psi : float
         a/b and shape number.
-    ux, uy, phi : float
+    xi, eta, phi : float
         Nondimensional creepages.
 
     Returns
@@ -169,7 +169,7 @@ def creep_force(law, data, g, psi, ux, uy, phi):
     out_of_range : int
         1 where the patch lies outside what the law's data cover; the nearest patch inside was taken.
     """
-    return creep_force_at(law, data, np.log(g), g, psi, ux, uy, phi)
+    return creep_force_at(law, data, np.log(g), g, psi, xi, eta, phi)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -182,7 +182,7 @@ def creep_forces(law, data, g, psi, creepages, forces):
     data : CreepData
     g, psi : ndarray (n,)
     creepages : ndarray (n, 3)
-        ux', uy', phi'.
+        xi', eta', phi'.
     forces : ndarray (n, 3)
         Filled: fx, fy, mz.
 
@@ -193,7 +193,7 @@ def creep_forces(law, data, g, psi, creepages, forces):
     """
     outside = 0
     for i in range(g.size):
-        ux, uy, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], ux, uy, phi)
+        xi, eta, phi = creepages[i]
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = creep_force(law, data, g[i], psi[i], xi, eta, phi)
         outside += flag
     return outside

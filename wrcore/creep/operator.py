@@ -20,7 +20,6 @@ Vollebregt, User guide for CONTACT, section on the SDEC patch.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
 
 from wrcore.kernels.jit import jit
 
@@ -233,6 +232,8 @@ def slip_matrix(panels, nu, rows=None):
 
 def _resolvent(axx, axy, ayx, ayy, step):
     """Transposed ``(H + A)^-1 H = (I + H^-1 A)^-1`` in float32."""
+    from scipy.linalg import get_lapack_funcs  # a tenth of a second that a table on disk need not wait
+
     matrix = np.block([[axx, axy], [ayx, ayy]]) / np.concatenate([step, step])[:, None]
     matrix[np.diag_indices_from(matrix)] += 1
     matrix = np.asfortranarray(matrix, dtype=np.float32)

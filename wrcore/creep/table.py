@@ -5,17 +5,23 @@ patches (five). Its error is measured, not assumed: random patches and creepages
 finer table is built until the 99 % quantile of the force error is below the tolerance. The numbers stay in the file.
 """
 
+from __future__ import annotations
+
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+import wrcore
 from wrcore import __version__
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import table_folder, warn
 
@@ -26,12 +32,12 @@ resolution, whose 99 % error was found to be 0.0027); planar detection changes i
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
-_SCHEMA = "wrcore creep table 2"
+SCHEMA = "wrcore creep table 2"
 
 
 @dataclass(frozen=True)
 class CreepTable:
-    """A creep table with what is known about it.
+    """A creep table with what is known about it; called, it gives forces in physical units.
 
     Attributes
     ----------
@@ -46,6 +52,14 @@ class CreepTable:
         Exact solutions in it.
     force_error, moment_error : tuple of float
         Median, 95 %, 99 %, largest error found in the random check, over mu N and mu N c.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.ensure_table(0.28)
+    >>> Fx, Fy, Mz = table(6e-3, 4e-3, 5e4, xi=1e-3, eta=0.0, phi=0.0)
+    >>> round(float(Fx), -2)
+    -7600.0
     """
 
     data: CreepTableData
@@ -60,6 +74,23 @@ class CreepTable:
     def nu(self):
         """Poisson's ratio."""
         return self.data.kalker.nu
+
+    def __call__(
+        self,
+        a: ArrayLike,
+        b: ArrayLike,
+        normal_force: ArrayLike,
+        xi: ArrayLike,
+        eta: ArrayLike,
+        phi: ArrayLike,
+        mu: ArrayLike = 0.3,
+        shear_modulus: ArrayLike = 8.2e10,
+        psi: ArrayLike = 0.0,
+    ) -> tuple[Any, Any, Any]:
+        """Fx, Fy (N) and Mz (N m) by this table; arguments as for :func:`wrcore.creep_force`."""
+        return wrcore.creep_force(
+            "table", a, b, normal_force, xi, eta, phi, mu, shear_modulus, self.nu, table=self, psi=psi
+        )
 
     def kernel_data(self):
         """The `CreepTableData` to hand to kernels."""
@@ -111,7 +142,7 @@ def _promising(planes, tolerance):
 
 def _check_arguments(nu, planes, tolerance):
     if planes not in RESOLUTIONS:
-        raise InputError("creep table", "planes", f"expected one of {', '.join(RESOLUTIONS)}, got {planes!r}")
+        raise InputError("creep table", "planes", one_of(RESOLUTIONS, planes))
     if not 0 <= nu <= 0.5:
         raise InputError("creep table", "nu", f"expected 0 to 0.5, got {nu}")
     if not 0 < tolerance < 1:
@@ -142,7 +173,7 @@ def _write_datasets(file, table):
         dataset = file.create_dataset(name, data=errors)
         dataset.attrs["units"] = "1"
         dataset.attrs["description"] = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
-    file.attrs.update(schema=_SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
+    file.attrs.update(schema=SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
     file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
     for name, value in axes._asdict().items():
         file.attrs[f"axes.{name}"] = value
@@ -166,8 +197,8 @@ def load_table(path):
     """
     with checked_hdf5(path, "a creep table in HDF5") as (file, signed):
         found = file.attrs.get("schema")
-        if found != _SCHEMA or not signed:
-            expected = f"expected {_SCHEMA!r} with its digest, got {found!r}"
+        if found != SCHEMA or not signed:
+            expected = f"expected {SCHEMA!r} with its digest, got {found!r}"
             raise InputError(path, "schema", f"{expected}; 'wrcore table build' makes a new one")
         return _read_datasets(path, file)
 
@@ -215,7 +246,7 @@ def show_progress(patches):
 
 def creep_digest():
     """Digest (16 hex digits) of everything in this room that the numbers in a table depend on, and of their form."""
-    digest = hashlib.sha256(_SCHEMA.encode())
+    digest = hashlib.sha256(SCHEMA.encode())
     room = files("wrcore.creep")
     for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
         digest.update(room.joinpath(name).read_bytes())
@@ -227,7 +258,12 @@ def table_path(nu, planes, tolerance):
     return table_folder() / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
 
 
-def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
+def ensure_table(
+    nu: float = 0.28,
+    planes: str = "ellipse",
+    tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable | None = None,
+) -> CreepTable:
     """The table from the cache; built and cached first where it is not there yet, or is damaged or another one.
 
     Two processes that need the same table at once both build it and the later rename wins, with equal content.
@@ -240,6 +276,13 @@ def ensure_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progres
     Returns
     -------
     CreepTable
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.ensure_table(0.28)
+    >>> table.planes, table.tolerance, table.force_error[2] < table.tolerance
+    ('ellipse', 0.005, True)
     """
     _check_arguments(nu, planes, tolerance)
     path = table_path(nu, planes, tolerance)

@@ -5,7 +5,9 @@ equations of motion have the powers
 
     E' = P_frame + P_joints + P_motors - P_brakes - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
 
-The rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
+Rigid rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
+Of a track that gives (:mod:`wrcore.dynamics.support`) masses, springs and dampers count with those of the vehicle, and
+the power of the contacts is that on both sides: between a wheel and a rail that moves.
 
 *Elastic contact.* Eq. (7) is a spring N_el = c_d(0) K delta^1.5 and a damping N - N_el. The spring's power P_elastic =
 N_el (approach speed) is the rate of U_contact = 2/5 N_el delta where K is constant and the approach speed the rate of
@@ -26,6 +28,7 @@ from wrcore.dynamics.drive import BRAKE, undriven
 from wrcore.dynamics.equilibrium import frictionless
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.outputs import drive_history
+from wrcore.dynamics.support import support_places
 from wrcore.dynamics.suspension import (
     DISPLACEMENT,
     LINE,
@@ -177,7 +180,7 @@ def _wheels_inertia(bodies, j):
 def _fill_powers(times, states, equations, model, work, rate, powers):
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rate)
-        powers[i] = 0.0
+        powers[i] = work.support.power[0]
         for b in range(work.wrenches.shape[0]):
             for k in range(6):
                 powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + 7 + k]
@@ -187,7 +190,7 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
 
 
 def _powers(times, states, model, work):
-    """Power of all wrenches of a model at each state, W, shape (n,); gyroscopic moments have none."""
+    """Power of all wrenches of a model at each state, W, shape (n,), on rails too; gyroscopic moments have none."""
     powers = np.empty(len(times))
     _fill_powers(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), powers)
     return powers
@@ -265,11 +268,14 @@ def energy_channels(model, work, times, states):
         powers in W.
     """
     times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
+    begin, gives = work.arc_lengths.copy(), len(model.support.mass) > 0
+    if gives:
+        model, states, track = _track_energies(model, states, work)
     loose = model.joints._replace(equations=0)
     touching = undriven(model)._replace(elements=pack_elements(), joints=loose, gravity=0.0)
     smooth = frictionless(touching)
     undamped = smooth._replace(contact=smooth.contact._replace(damping=1.0))
-    begin, parts = work.arc_lengths.copy(), []
+    parts = []
     for variant in (model, touching, smooth, undamped):
         work.arc_lengths[:] = begin
         parts.append(_powers(times, states, variant, work))
@@ -283,9 +289,32 @@ def energy_channels(model, work, times, states):
     elastic = -0.5 * (1.0 + model.contact.damping) * hertz
     torques = sum(drives[name] * (1.0 if name.startswith("input") else -1.0) for name in drives)
     joints = whole + rise - contact - (driven - stretching - damped) - torques
+    if gives:
+        kinetic, stored, stretching, damped = track + (kinetic, stored, stretching, damped)
     rows = (kinetic, height, stored, pressed, driven, joints, damped, normal - contact, -normal - elastic,
             stretching, rise, elastic)  # fmt: skip
     return dict(zip(CHANNELS, rows, strict=True)) | drives
+
+
+def _track_energies(model, states, work):
+    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n).
+
+    Before them the model and the states, in which rails without mass have velocities, too: as found by this model, for
+    variants of it.
+    """
+    support, places, d = model.support, support_places(model), len(model.support.mass)
+    if support.mass[0] == 0.0:
+        rates = Equations(model, work).at(0.0, states)
+        own = np.concatenate([states[:, places], rates[:, places]], axis=-1)
+        parts = states[:, : places[0, 0]], own.reshape(len(states), -1), states[:, places[-1, -1] + 1 :]
+        states, elements = np.hstack(parts), model.elements
+        elements = elements._replace(states=elements.states + places.size)
+        model = model._replace(support=support._replace(mass=np.ones(d)), elements=elements)
+        places = support_places(model)
+    q, v = states[:, places[:, :d]], states[:, places[:, d:]]
+    pulls = q @ support.stiffness, v @ support.damping
+    terms = 0.5 * support.mass * v * v, 0.5 * q * pulls[0], v * pulls[0], v * pulls[1]
+    return model, states, np.array([term.sum(axis=(1, 2)) for term in terms])
 
 
 def _drive_powers(model, work, times, states):

@@ -13,7 +13,6 @@ of them to first order, whatever the wheelsets' spin.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.equilibrium import RESIDUAL
@@ -79,6 +78,8 @@ def linearise(model, state):
     -----
     Central differences in all independent coordinates; all right-hand sides in one compiled call.
     """
+    from scipy.linalg import block_diag  # a tenth of a second that runs need not wait
+
     size = 6 * len(model.bodies.mass)
     equations = Equations(model)
     equations(0.0, state)  # leaves the joints' Jacobian

@@ -38,6 +38,7 @@ from wrcore.contact.patch.solve import (
     solve_patch,
 )  # fmt: skip
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, surface_slip
+from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import ANGLE, COSINE, MOMENT, PATCH_COLUMNS, PENETRATION, SINE, X, Y, Z
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import creep_force_at
@@ -50,6 +51,9 @@ SLENDER = 3.0
 
 FELL_BACK = 2
 """Counter of patches that the grid has solved."""
+
+FORCES, KEPT = 9, 12
+"""What a solution gives in ``work.force``, and where it is kept while another one is found."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
 """Elements along and across the patch of that grid, and the tolerance of its tractions."""
@@ -184,6 +188,35 @@ def _mirror(strips, slip, sums, count):
 
 
 @jit(allocates=False, fastmath=FUSED)
+def _roll_patch(model, m, pose, frame, windows, creepage, speed, friction, counters, work):
+    """Creep force on a solution of the normal problem; fills ``work.force`` as `solve_on_grid` does."""
+    settings, strips, slip, sums, f = model.strips, work.strips, work.slip, work.sums, work.force
+    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
+    count = publish(model.geometry, pose, frame, modulus, work.normal, windows, strips, sums)
+    mean_x, mean_s = sums[MEAN_X], sums[MEAN_S]
+    if settings.surfaces == 0:
+        xi, eta, phi = creepage
+        creepage_slip(xi, eta, phi, strips[CENTRE, :count], strips[MIDDLE, :count], slip[:, :count])
+    else:
+        velocity = m[6], m[7], m[8], m[9], m[10], m[11], speed
+        rigid_slip(
+            model.geometry, pose, frame, velocity, strips[CENTRE, :count], strips[MIDDLE, :count],
+            strips[WHEEL_HEIGHT, :count], slip[:, :count],
+        )  # fmt: skip
+    f[3], f[4], f[5], f[8] = sums[LOAD], mean_x, mean_s, sums[LARGEST]
+    f[6] = a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
+    f[7] = b = math.sqrt(5.0 * max(sums[MEAN_SS] - mean_s * mean_s, 1e-14))
+    if m[6] < 0.0:  # rolling is always towards x
+        _mirror(strips, slip, sums, count)
+    if settings.rolling == 0:
+        fx, fs, mn, missed = _creep_by_law(model, friction, strips, slip, count, sums)
+        counters[1] += missed
+    else:
+        fx, fs, mn = _roll(model, friction, settings, strips, slip, count, a > SLENDER * b, windows, work)
+    f[0], f[1], f[2] = fx, -fs if m[6] < 0.0 else fs, mn
+
+
+@jit(allocates=False, fastmath=FUSED)
 def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """Solve the overlaps from ``first`` to before ``last`` as one patch: its row, its share of the wrench."""
     settings = model.strips
@@ -219,38 +252,31 @@ def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, m
             model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, settings.normal,
             memory, work.normal,
         )  # fmt: skip
-    strips, slip, sums = work.strips, work.slip, work.sums
+    f = work.force
     if windows == 0:
         counters[FELL_BACK] += 1
-        f = work.force
         f[0], f[1], f[2] = y - lift * side * frame.sine, z + lift * frame.cosine, 1.0 if spatial else 0.0
         f[3], f[4], f[5], f[6], f[7] = frame.cosine, frame.sine, frame.x, frame.ur, frame.z
         f[8], f[9], f[10], f[11] = xi, eta, phi, friction
         call_address(settings.fallback, model, m, f)
-        fx, fs, mn, normal, mean_x, mean_s, a, b, top = f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8]
     else:
-        modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
-        count = publish(model.geometry, pose, frame, modulus, work.normal, windows, strips, sums)
-        normal, mean_x, mean_s, top = sums[LOAD], sums[MEAN_X], sums[MEAN_S], sums[LARGEST]
-        if settings.surfaces == 0:
-            creepage_slip(xi, eta, phi, strips[CENTRE, :count], strips[MIDDLE, :count], slip[:, :count])
-        else:
-            velocity = m[6], m[7], m[8], m[9], m[10], m[11], speed
-            rigid_slip(
-                model.geometry, pose, frame, velocity, strips[CENTRE, :count], strips[MIDDLE, :count],
-                strips[WHEEL_HEIGHT, :count], slip[:, :count],
+        more = work.normal.more
+        share = more[1]
+        _roll_patch(model, m, pose, frame, windows, (xi, eta, phi), speed, friction, counters, work)
+        if share > 0.0:  # the mean with more strips
+            for k in range(FORCES):
+                f[KEPT + k] = f[k]
+            more[0] = MORE
+            windows, frame = solve_patch(
+                model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips,
+                settings.normal, memory, work.normal,
             )  # fmt: skip
-        a = math.sqrt(5.0 * max(sums[MEAN_XX] - mean_x * mean_x, 1e-14))
-        b = math.sqrt(5.0 * max(sums[MEAN_SS] - mean_s * mean_s, 1e-14))
-        if m[6] < 0.0:  # rolling is always towards x
-            _mirror(strips, slip, sums, count)
-        if settings.rolling == 0:
-            fx, fs, mn, missed = _creep_by_law(model, friction, strips, slip, count, sums)
-            counters[1] += missed
-        else:
-            fx, fs, mn = _roll(model, friction, settings, strips, slip, count, a > SLENDER * b, windows, work)
-        if m[6] < 0.0:
-            fs = -fs
+            more[0] = 1.0
+            if windows > 0:
+                _roll_patch(model, m, pose, frame, windows, (xi, eta, phi), speed, friction, counters, work)
+                for k in range(FORCES):
+                    f[k] = (1.0 - share) * f[KEPT + k] + share * f[k]
+    fx, fs, mn, normal, mean_x, mean_s, a, b, top = f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8]
     cosine, sine = frame.cosine, side * frame.sine
     out[ANGLE], out[COSINE], out[SINE] = math.atan2(sine, cosine), cosine, sine
     out[X] = frame.x + mean_x

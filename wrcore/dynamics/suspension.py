@@ -59,7 +59,8 @@ class Elements(NamedTuple):
     table: np.ndarray
     """(q, 2): points of all characteristics: displacement or speed and force; SERIES_VELOCITY: force and speed."""
     states: int
-    """Number of own states: displacements (m) of dampers that act in series with a spring."""
+    """Number of own states: displacements (m) of dampers that act in series with a spring; and what else is counted
+    with them, see `wrcore.dynamics.system.fill_derivatives`."""
 
 
 def pack_elements(springs=(), directed=(), turning=()):

@@ -20,6 +20,7 @@ from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.rail_friction import fill_rail_friction
 from wrcore.dynamics.schedule import Schedules, pack_schedules
+from wrcore.dynamics.support import Support, SupportWork, no_support, support_work, support_wrenches
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
@@ -70,6 +71,10 @@ class Model(NamedTuple):
     """Motors, brakes and speed controller."""
     torques: int = 0
     """Address of the kernel that adds their torques."""
+    support: Support = no_support()
+    """The track under each wheelset, if it gives."""
+    rails: int = 0
+    """Address of the kernel that finds the wrenches of rails that give."""
 
 
 class Workspace(NamedTuple):
@@ -104,15 +109,16 @@ class Workspace(NamedTuple):
     """(3, 3): axes of the track's frame."""
     irregularity: np.ndarray
     strips: StripWork
+    support: SupportWork
 
 
 def state_size(model):
-    """Length of the state vector: 13 numbers per body, the force elements' own states, the speed controller's one."""
+    """Length of the state vector: 13 numbers per body, then all states that belong to no body."""
     return STATE_SIZE * len(model.bodies.mass) + own_states(model)
 
 
 def own_states(model):
-    """Number of states that belong to no body: those of force elements, then that of the speed controller."""
+    """Number of states that belong to no body: of force elements and the track, then that of the speed controller."""
     return model.elements.states + len(model.drive.control)
 
 
@@ -134,6 +140,7 @@ def workspace(model):
         np.zeros((k, 2), np.int64), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)), np.zeros((k, 2, 3, 3)),
         np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(3, np.int64),
         constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)), strip_work(model.contact.strips, k),
+        support_work(model.support, k),
     )  # fmt: skip
 
 
@@ -208,15 +215,18 @@ def wheel_motions(model, state, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_rail_wrenches(model, state, work):
+def _add_rail_wrenches(model, state, work, rate):
     """Add the wrenches of the rails to those of the wheelsets; while they are held, those found last."""
     wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, work.strips.held[0] == WRENCHES_HELD
     if not held:
         wheel_motions(model, state, work)
-        call_address(
-            model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-            work.counters, work.strips,
-        )  # fmt: skip
+        if model.rails != 0:
+            call_address(model.rails, model, state, work, rate)
+        else:
+            call_address(
+                model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+                work.counters, work.strips,
+            )  # fmt: skip
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
@@ -235,7 +245,8 @@ def fill_derivatives(t, state, model, work, rate):
         Time, s.
     state : numpy.ndarray, shape (state_size(model),)
         Per body: position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the force
-        elements' own states (m) and the speed controller's integral (m).
+        elements' own states (m), those of wheels that turn independently (rad/s) and of a track that gives (m, m/s,
+        :mod:`wrcore.dynamics.support`), and the speed controller's integral (m).
     model : Model
     work : Workspace
         Overwritten; patches and counts belong to this evaluation afterwards.
@@ -257,7 +268,7 @@ def fill_derivatives(t, state, model, work, rate):
         wrench[:] = 0.0
         wrench[2] = -model.gravity * bodies.mass[b]
     if bodies.wheelsets.shape[0] > 0:
-        _add_rail_wrenches(model, state, work)
+        _add_rail_wrenches(model, state, work, rate)
         _turn_wheels_apart(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     if model.torques != 0:
@@ -316,6 +327,9 @@ def with_kernels(model, work):
         model = model._replace(rail_friction=kernel.address)
     if not len(model.bodies.wheelsets):
         return model
+    if len(model.support.mass):
+        kernel = Kernel(support_wrenches, Handle(model), np.empty(0), Handle(work), np.empty(0))
+        model = model._replace(rails=kernel.address)
     kernel = Kernel(
         wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
         work.counters, Handle(work.strips),

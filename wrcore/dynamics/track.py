@@ -3,7 +3,8 @@
 At the wheelset's arc length s the track has a frame [t n b] (Eq. 3). A rail stands at (Y, Z) of that cross-section,
 with the widening and its irregularity, and runs in a direction that leaves t by the slopes of both (and by the twist of
 a cant ramp). Pose and velocities are turned into the rail's frame, the contact is solved there as on a tangent track,
-and the wrench is turned back. The rail does not move: only the direction of its surface changes along the track.
+and the wrench is turned back. The rail does not move (one that gives: :mod:`wrcore.dynamics.support`): only the
+direction of its surface changes along the track.
 
 Within a patch the rail counts as straight. Its curvature kappa enters Hertz's relative curvature; what is left out is
 its sagitta kappa x^2/2 over the longitudinal distance x of the contact from the cross-section (0.5 um at x = 17 mm and

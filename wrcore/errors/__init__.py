@@ -1,4 +1,4 @@
-"""The one error that a user can cause, and the check of a single number that raises it."""
+"""The one error that a user can cause, and what it says of a number or a word that cannot be."""
 
 from numbers import Real
 
@@ -18,6 +18,15 @@ class InputError(ValueError):
     Notes
     -----
     ``str(error)`` is always one line. The command line prints it and ends with status 2.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> try:
+    ...     wr.simulate(wr.example("wheelset"), sped=30)
+    ... except wr.InputError as error:
+    ...     print(str(error).split(";")[0])
+    changes: sped: unknown key
     """
 
     def __init__(self, source, field, expected):
@@ -45,3 +54,43 @@ def check_number(value, low, high, source, field, unit=""):
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
         raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {value!r}")
     return float(value)
+
+
+def similar(word, known):
+    """``; did you mean 'speed'?`` where one of the known words is close to a word, else nothing.
+
+    Parameters
+    ----------
+    word : object
+    known : iterable of str
+
+    Returns
+    -------
+    str
+    """
+    from difflib import get_close_matches
+
+    words = {name.lower(): name for name in map(str, known)}
+    near = get_close_matches(str(word).lower(), words, n=1)
+    return f"; did you mean {words[near[0]]!r}?" if near else ""
+
+
+def one_of(known, word):
+    """What to say of a word that is none of the known ones: these, and the closest.
+
+    Parameters
+    ----------
+    known : iterable of str
+    word : object
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> one_of(("planar", "spatial"), "spacial")
+    "expected one of planar, spatial, got 'spacial'; did you mean 'spatial'?"
+    """
+    known = [str(name) for name in known]
+    return f"expected one of {', '.join(known)}, got {word!r}{similar(word, known)}"

@@ -2,8 +2,8 @@
 
 import copy
 import math
+import os
 import re
-from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from itertools import islice
@@ -11,7 +11,7 @@ from itertools import islice
 import jsonschema
 import yaml
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 
 MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
 """A longer document, one with more values, or nested deeper, is none that a person wrote."""
@@ -155,6 +155,41 @@ def _schema(name):
     return yaml.load(text, Loader=_Loader)  # reads 1.0e9 as a number
 
 
+def keys_of(schema_name):
+    """What a kind of file may hold: for help pages.
+
+    Parameters
+    ----------
+    schema_name : str
+        File in ``wrcore/scene/schemas`` without its ending.
+
+    Yields
+    ------
+    path : str
+        ``contact.friction``; ``*`` stands for any name, ``[]`` for the items of a list.
+    description : str
+        What is expected there, with unit and range.
+    needed : bool
+        Whether what is above it cannot do without.
+    default : object
+        None where there is none.
+    """
+    return _keys(_schema(schema_name), "")
+
+
+def _keys(part, path):
+    inner = part.get("additionalProperties")
+    entries = dict(part.get("properties", {}))
+    entries |= {"*": inner} if isinstance(inner, dict) else {}
+    for name, item in entries.items():
+        key = f"{path}.{name}" if path else name
+        if "description" in item:
+            yield key, item["description"], name in part.get("required", ()), item.get("default")
+        yield from _keys(item, key)
+    if isinstance(part.get("items"), dict):
+        yield from _keys(part["items"], f"{path}[]")
+
+
 def validate(data, schema_name, source):
     """Check data against a schema of the package and fill in its defaults.
 
@@ -189,7 +224,7 @@ def validate(data, schema_name, source):
 
 
 def plain_tree(data, source):
-    """A copy of nested data that holds nothing but what JSON knows.
+    """A copy of nested data that holds nothing but what JSON knows; paths become text.
 
     Parameters
     ----------
@@ -225,6 +260,8 @@ def plain_tree(data, source):
                     raise InputError(source, ".".join(path), f"expected keys that are text, got {_short(key)}")
                 copied(key, path, above)
             return {key: copied(item, (*path, key), above) for key, item in value.items()}
+        if isinstance(value, os.PathLike):
+            value = os.fspath(value)
         fault = _fault(value)
         if fault:
             raise InputError(source, ".".join(path), fault)
@@ -252,9 +289,9 @@ def _explain(error, schema):
     field = ".".join(str(part) for part in error.absolute_path)
     if error.validator == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
-        unknown = sorted(str(key) for key in set(error.instance) - set(known))
-        field = ".".join(filter(None, [field, unknown[0]]))
-        return field, f"unknown key; expected one of {', '.join(known)}"
+        unknown = min(str(key) for key in set(error.instance) - set(known))
+        field = ".".join(filter(None, [field, unknown]))
+        return field, f"unknown key; expected one of {', '.join(known)}{similar(unknown, known)}"
     if error.validator == "required":
         missing = [key for key in error.validator_value if key not in error.instance]
         field = ".".join(filter(None, [field, missing[0]]))
@@ -265,9 +302,8 @@ def _explain(error, schema):
         schema = schema[part]
         if isinstance(schema, dict) and isinstance(schema.get("description"), str):
             description = schema["description"]
-    close = get_close_matches(str(error.instance), map(str, error.schema.get("enum", ())), 1)
-    meant = f"; did you mean {close[0]!r}?" if close else ""
-    return field, f"expected {description}, got {_short(error.instance)}{meant}"
+    hint = similar(error.instance, error.validator_value) if error.validator == "enum" else ""
+    return field, f"expected {description}, got {_short(error.instance)}{hint}"
 
 
 def _short(value):

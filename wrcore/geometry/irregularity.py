@@ -14,7 +14,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from wrcore.errors import InputError
 from wrcore.kernels.jit import jit
@@ -113,6 +112,8 @@ def irregularity_data(start, step, values):
     IrregularityData
         With cells of zeros added at both ends, in which the spline dies out: it is C2 there, too.
     """
+    from scipy.interpolate import CubicSpline  # a third of a second that other scenes need not wait
+
     values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
     spline = CubicSpline(step * np.arange(len(values)), values, bc_type="clamped")
     coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
@@ -242,6 +243,8 @@ def _numbers(path, line, row, count):
 
 
 def _uniform(s, values, path):
+    from scipy.interpolate import CubicSpline
+
     steps = np.diff(s)
     if np.ptp(steps) <= 1e-6 * steps.mean():
         return np.linspace(s[0], s[-1], len(s)), values
@@ -309,7 +312,7 @@ def generate(level, seed, length, spacing, shortest, longest):
         Deviations of the channels, m, not faded.
     """
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
-    from scipy.fft import next_fast_len  # a quarter of a second that other scenes need not wait
+    from scipy.fft import next_fast_len
 
     period = next_fast_len(2 * len(s), real=True)
     random = np.random.default_rng(seed)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
@@ -76,7 +76,7 @@ def _turned(spec, u, f):
 def _checked(spec, kind):
     unknown = sorted(str(k) for k in set(spec) - _KEYS)
     if unknown:
-        raise InputError(kind, unknown[0], f"expected one of {', '.join(sorted(_KEYS))}")
+        raise InputError(kind, unknown[0], one_of(sorted(_KEYS), unknown[0]))
     if not isinstance(spec.get("points"), (str, Path)):
         raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
     if spec.get("unit") not in (None, *_UNITS):

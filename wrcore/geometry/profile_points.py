@@ -2,11 +2,14 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, PPoly, splprep
 
 from wrcore.errors import InputError
+
+if TYPE_CHECKING:  # a third of a second that runs with standard profiles need not wait
+    from scipy.interpolate import BSpline
 
 FEWEST = 8
 """Fewest points that make a profile."""
@@ -33,10 +36,12 @@ class Outline:
         Named in error messages.
     """
 
-    curve: BSpline
+    curve: "BSpline"
     name: str
 
     def _component(self, column):
+        from scipy.interpolate import PPoly
+
         return PPoly.from_spline((self.curve.t, self.curve.c[:, column], self.curve.k))
 
     def _dense(self):
@@ -98,7 +103,7 @@ class Outline:
 
     def shifted(self, du, df):
         """The outline moved by (``du``, ``df``), m."""
-        return Outline(BSpline(self.curve.t, self.curve.c + (du, df), self.curve.k), self.name)
+        return Outline(type(self.curve)(self.curve.t, self.curve.c + (du, df), self.curve.k), self.name)
 
     def innermost(self, depth):
         """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0, NaN if not reached."""
@@ -182,6 +187,8 @@ def _head(u, f):
 
 def _spline(u, f, name, smoothing):
     """Parametric cubic spline over chord length; points that nearly coincide with the one before are left out."""
+    from scipy.interpolate import BSpline, splprep
+
     kept = [0]
     for i in range(1, u.size):
         if np.hypot(u[i] - u[kept[-1]], f[i] - f[kept[-1]]) > _CLOSE:

@@ -3,10 +3,11 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, similar
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry import profile_files
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
@@ -154,7 +155,13 @@ def cone_sections(slope):
     return (Line(low, slope * low, high, slope * high),)
 
 
-def named_profile(spec, kind, inclination=None, window=WINDOW, spacing=SPACING):
+def named_profile(
+    spec: str | Path | dict[str, Any],
+    kind: str,
+    inclination: float | None = None,
+    window: float = WINDOW,
+    spacing: float = SPACING,
+) -> ProfileCurve:
     """Profile by name, analytic form or file.
 
     Parameters
@@ -181,6 +188,13 @@ def named_profile(spec, kind, inclination=None, window=WINDOW, spacing=SPACING):
     ------
     InputError
         Unknown name, a wheel used as a rail (or the reverse), a rail without an inclination, or a faulty file.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wheel, rail = wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", inclination=1 / 40)
+    >>> round(1e3 * float(wheel(-0.035)), 2), rail.name
+    (-6.87, '60E1')
     """
     if kind not in ("wheel", "rail"):
         raise ValueError(f"kind must be 'wheel' or 'rail', got {kind!r}")
@@ -221,8 +235,9 @@ def _sections(spec, kind):
     elif form == "circle" and value:
         found, build, source = "rail", lambda: circle_sections(_number(name, value, 0.01, 100.0)), "analytic"
     else:
-        known = ", ".join(row["name"] for row in list_profiles() if row["kind"] == kind)
-        raise InputError(kind, "profile", f"expected a point file or one of {known}, got {spec!r}")
+        known = [row["name"] for row in list_profiles() if row["kind"] == kind]
+        expected = f"expected a point file or one of {', '.join(known)}, got {spec!r}{similar(spec, known)}"
+        raise InputError(kind, "profile", expected)
     if found != kind:
         raise InputError(kind, "profile", f"expected a {kind} profile, got {spec!r}, which is a {found}")
     return build(), source
@@ -235,13 +250,19 @@ def _number(spec, value, low, high):
     return number
 
 
-def list_profiles():
+def list_profiles() -> list[dict[str, str]]:
     """Table of the named profiles.
 
     Returns
     -------
     list of dict
         Keys name, kind, sections (from the flange or from the crown), source.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> [row["name"] for row in wr.list_profiles() if row["kind"] == "rail"][:3]
+    ['UIC60-MBench', '60E1', '60E2']
     """
     rows = [{"name": "S1002", "kind": "wheel", "sections": "arcs, line, polynomials", "source": _S1002_SOURCE}]
     for name, head in RAIL_HEADS.items():

@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.integrate.jacobian import own_state_bodies, reached_bodies
+from wrcore.integrate.groups import FACTORISE, REDUCE, RESTORE, Groups, new_groups
+from wrcore.integrate.links import own_state_bodies, own_state_groups, reached_bodies
 from wrcore.integrate.moving_axes import RATE
+from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import jit
 
 
@@ -61,6 +63,8 @@ class System(NamedTuple):
     """(6, 6)."""
     slide: np.ndarray
     """(3,): (sigma - Q)^-1 of the positions in axes that turn: along x and y, across them, along z."""
+    groups: Groups
+    """Own states that go together, where there are any."""
 
 
 def plan_elimination(model):
@@ -80,6 +84,8 @@ def plan_elimination(model):
     for ends in own:
         for body in ends:
             links[body] |= ends
+    for state in (state for states in own_state_groups(model) for state in states):
+        own[state] = set()
     place, order, later = np.full((n, n), -1), [], []
     left = {b: neighbours - {b} for b, neighbours in links.items()}
     while left:
@@ -109,7 +115,7 @@ def new_system(model):
     return System(
         pattern, np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),
         np.zeros(len(pattern.state_starts) - 1), np.zeros((entries, 6)), np.zeros((entries, 6)), np.zeros((n, 6)),
-        np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(3),
+        np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(3), new_groups(model),
     )  # fmt: skip
 
 
@@ -207,7 +213,7 @@ def _slid(slide, x, y, z):
 
 
 @jit(allocates=False, inline="always")
-def _derivative(jacobian, system, row, body, direction):
+def derivative(jacobian, system, row, body, direction):
     """Derivative of a row with respect to a velocity, with what the displacement that it brings about adds."""
     columns, first = jacobian.by_position, 6 * body
     value = jacobian.by_velocity[first + direction, row]
@@ -237,7 +243,7 @@ def factorise(jacobian, system, sigma):
         block = blocks[pattern.place[i, j]]
         for column in range(6):
             for row in range(6):
-                block[row, column] = -_derivative(jacobian, system, 6 * i + row, j, column)
+                block[row, column] = -derivative(jacobian, system, 6 * i + row, j, column)
     for b in range(n):
         block = blocks[pattern.place[b, b]]
         for k in range(6):
@@ -249,7 +255,7 @@ def factorise(jacobian, system, sigma):
             body = pattern.state_bodies[q]
             for k in range(6):
                 system.force[q, k] = -jacobian.by_velocity[6 * n + s, 6 * body + k]
-                system.drive[q, k] = -_derivative(jacobian, system, 6 * n + s, body, k)
+                system.drive[q, k] = -derivative(jacobian, system, 6 * n + s, body, k)
         for q in range(first, last):
             for p in range(first, last):
                 block = blocks[pattern.place[pattern.state_bodies[q], pattern.state_bodies[p]]]
@@ -257,6 +263,8 @@ def factorise(jacobian, system, sigma):
                     factor = system.force[q, i] / system.pivot[s]
                     for j in range(6):
                         block[i, j] -= factor * system.drive[p, j]
+    if system.groups.address[0] != 0:
+        call_address(system.groups.address[0], jacobian, system, sigma, system.pivot, FACTORISE)
     return _eliminate(pattern, blocks, system.scratch)
 
 
@@ -356,7 +364,12 @@ def solve_stage(jacobian, system, sigma, increment):
             body = pattern.state_bodies[q]
             for k in range(6):
                 own[s] += jacobian.by_position[6 * body + k, 6 * n + s] * shift[body, k]
+    groups = system.groups.address[0]
+    if groups != 0:
+        call_address(groups, jacobian, system, sigma, increment, REDUCE)
     _solve_velocities(system, own)
+    if groups != 0:
+        call_address(groups, jacobian, system, sigma, increment, RESTORE)
     for b in range(n):
         at, axes, turning = STATE_SIZE * b, jacobian.axes[b], jacobian.turning[b]
         carried, to, velocity = system.carried[b], shift[b], right[b]

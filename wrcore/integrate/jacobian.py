@@ -20,8 +20,6 @@ import numpy as np
 
 from wrcore.contact.patch.model import WRENCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.drive import drive_links, drive_state_bodies
-from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import cross, dot
 from wrcore.dynamics.wheel import MOTION_COLUMNS
@@ -34,6 +32,7 @@ from wrcore.integrate.contact_blocks import (
     renew_contacts,
 )
 from wrcore.integrate.engine import copy_into
+from wrcore.integrate.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_rate
 from wrcore.kernels.jit import jit
 
@@ -104,40 +103,6 @@ class Jacobian(NamedTuple):
     """Scratch of :mod:`wrcore.integrate.contact_blocks`."""
 
 
-def _links(model):
-    """For each body the set of bodies joined to it, and the set of those whose accelerations depend on its motion."""
-    n = len(model.bodies.mass)
-    joined, linked = [{b} for b in range(n)], [{b} for b in range(n)]
-    for i, j in model.joints.bodies:
-        if i != FRAME and j != FRAME:  # bodies joined to one another accelerate together
-            joined[i] |= joined[j]
-            for body in joined[i]:
-                joined[body] = joined[i]
-    for i, j in [*model.elements.pairs, *model.joints.bodies, *drive_links(model)]:
-        if i != FRAME and j != FRAME:
-            linked[i].add(int(j))
-            linked[j].add(int(i))
-    return joined, [set().union(*(joined[k] for k in linked[body])) for body in range(n)]
-
-
-def reached_bodies(model):
-    """For each body the set of bodies whose accelerations depend on its motion."""
-    return _links(model)[1]
-
-
-def own_state_bodies(model):
-    """For each own state the set of bodies whose accelerations it enters or follows."""
-    elements, joined = model.elements, _links(model)[0]
-    bodies = [set() for _ in range(elements.states)]
-    for p, ends in enumerate(elements.pairs):
-        for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
-            if elements.law[k, 4] >= 0:
-                bodies[elements.law[k, 4]] = set().union(*(joined[b] for b in ends if b != FRAME))
-    for wheelset, state in model.bodies.independent:
-        bodies[state] = joined[model.bodies.wheelsets[wheelset]]
-    return bodies + [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
-
-
 def _groups(reach):
     """Groups of columns whose rows do not overlap; ``reach`` holds the rows of each column."""
     groups = []
@@ -190,6 +155,9 @@ def plan_sweep(model):
         for direction in range(DIRECTIONS)
     ]
     own_rows = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(own)]
+    for states in own_state_groups(model):
+        for state in states:
+            own_rows[state] |= {6 * n + other for other in states}
     full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
     return _sweep(full)
 
@@ -201,7 +169,7 @@ def joined_bodies(model):
     -------
     Joined
     """
-    joined = [sorted(_links(model)[0][b]) for b in model.bodies.wheelsets]
+    joined = [sorted(joined_sets(model)[b]) for b in model.bodies.wheelsets]
     return Joined(
         np.cumsum([0] + [len(bodies) for bodies in joined]),
         np.array([b for bodies in joined for b in bodies], np.int64),
@@ -224,6 +192,19 @@ def new_jacobian(model):
 def turn_of(jacobian):
     """Turn rate and angle of the axes, see `Jacobian`."""
     return jacobian.turn[RATE], jacobian.turn[ANGLE]
+
+
+@jit(allocates=False, inline="always")
+def contacts_alone(model):
+    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone.
+
+    Wheels that turn independently and rails that give are own states, whose rows and columns these do not tell.
+    """
+    return (
+        model.bodies.wheelsets.shape[0] > 0
+        and model.bodies.independent.shape[0] == 0
+        and model.support.mass.shape[0] == 0
+    )
 
 
 @jit(allocates=False)
@@ -365,9 +346,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, model.contact.least_speed / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
-    # wheels that turn independently are own states, whose rows and columns the wheelset's wrench alone does not give
-    strips = model.contact.strips.strips > 0
-    wheels = model.bodies.wheelsets.shape[0] > 0 and model.bodies.independent.shape[0] == 0
+    strips, wheels = model.contact.strips.strips > 0, contacts_alone(model)
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses
         work.strips.cheap[0] = 1

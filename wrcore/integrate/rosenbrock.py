@@ -31,10 +31,12 @@ from wrcore.integrate.engine import (
     judge,
     take_stock,
 )
+from wrcore.integrate.group_elimination import eliminate_groups
 from wrcore.integrate.jacobian import (
     Jacobian,
     Joined,
     Sweep,
+    contacts_alone,
     joined_bodies,
     new_jacobian,
     plan_sweep,
@@ -42,6 +44,7 @@ from wrcore.integrate.jacobian import (
     turn_of,
 )
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
+from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import jit
 
 CONTACT_REFRESHES = 20
@@ -70,9 +73,11 @@ def new_linear(model):
     -------
     Linear
     """
-    sweep = plan_sweep(model)
-    differences = np.zeros(int(np.diff(sweep.starts).max()))
-    return Linear(sweep, joined_bodies(model), new_jacobian(model), new_system(model), differences)
+    sweep, jacobian, system = plan_sweep(model), new_jacobian(model), new_system(model)
+    if len(system.groups.members):
+        kernel = Kernel(eliminate_groups, jacobian, system, 0.0, system.pivot, 0)
+        system.groups.address[0] = kernel.address
+    return Linear(sweep, joined_bodies(model), jacobian, system, np.zeros(int(np.diff(sweep.starts).max())))
 
 
 @jit(allocates=False)
@@ -84,8 +89,7 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
     clock, counters = memory.clock, memory.counters
     age, step = counters[AGE], clock[NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
-        alone = model.bodies.wheelsets.shape[0] > 0 and model.bodies.independent.shape[0] == 0
-        whole = age < 0 or not alone or counters[SINCE_FULL] >= CONTACT_REFRESHES
+        whole = age < 0 or not contacts_alone(model) or counters[SINCE_FULL] >= CONTACT_REFRESHES
         if whole:
             counters[SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[EVALUATIONS] += refresh_jacobian(

@@ -18,6 +18,7 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 import numpy as np
 
 from wrcore.dynamics.body import EULER, OMEGA, POSITION, STATE_SIZE, VELOCITY
+from wrcore.dynamics.support import RAILS, support_places
 from wrcore.dynamics.system import own_states
 
 LENGTH = 0.01
@@ -51,7 +52,8 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     Returns
     -------
     numpy.ndarray, shape (size,)
-        m, 1, m/s, rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently).
+        m, 1, m/s, rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s
+        for the velocities of a track that gives; its sleeper's roll counts at the rails).
     """
     n, rate = len(model.bodies.mass), RATE
     if len(model.bodies.wheelsets):  # a driven vehicle does not keep its speed, and may come to a standstill
@@ -64,6 +66,12 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     bodies[:, OMEGA:] = rate / lever
     for wheelset, state in model.bodies.independent:
         weights[STATE_SIZE * n + state] = rate / lever[model.bodies.wheelsets[wheelset], 0]
+    freedoms = len(model.support.mass)
+    if freedoms:
+        places = support_places(model)
+        weights[places[:, freedoms:]] = rate
+        if freedoms > RAILS:  # roll of the sleeper
+            weights[places[:, RAILS + 2 :: freedoms]] /= HALF_GAUGE
     return (atol + rtol * LENGTH) * SHARE.get(method, 1.0) * weights
 
 

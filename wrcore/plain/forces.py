@@ -78,8 +78,8 @@ def kalker_coefficients(kalker, log_g):
 def linear(kalker, log_g, creepages):
     """Kalker's linear theory in the nondimensional form of :mod:`wrcore.creep.laws`, shape (3,)."""
     c11, c22, c23, c33 = kalker_coefficients(kalker, log_g)
-    ux, uy, phi = creepages
-    return np.array([-c11 * ux, -c22 * uy - c23 * phi, c23 * uy - c33 * phi])
+    xi, eta, phi = creepages
+    return np.array([-c11 * xi, -c22 * eta - c23 * phi, c23 * eta - c33 * phi])
 
 
 def shen_hedrick_elkins(kalker, log_g, creepages):
@@ -117,7 +117,7 @@ def table_force(table, log_g, creepages):
     w = np.array(creepages, float)
     turned = -1.0 if w[2] < 0.0 else 1.0  # F(-w) = -F(w)
     w *= turned
-    mirrored = np.array([-1.0 if w[0] < 0.0 else 1.0, 1.0, 1.0])  # and Fx odd, Fy and Mz even in ux
+    mirrored = np.array([-1.0 if w[0] < 0.0 else 1.0, 1.0, 1.0])  # and Fx odd, Fy and Mz even in xi
     w *= mirrored
     c11, c22, c23, _ = kalker_coefficients(table.kalker, log_g)
     root = math.exp(0.5 * log_g)

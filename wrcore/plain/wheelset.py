@@ -160,8 +160,8 @@ def plain_wheelset(scene, creep, step=NODE_DISTANCE):
     vehicle, data = scene.vehicle, scene.vehicle.data
     if len(vehicle.body_names) != 1 or len(vehicle.wheelset_names) != 1:
         raise InputError(scene.source, "vehicle", "expected one wheelset and no other body for the plain equations")
-    if not scene.track.tangent:
-        raise InputError(scene.source, "track", "expected a tangent, perfect track for the plain equations")
+    if not scene.track.tangent or "support" in scene.data["track"]:
+        raise InputError(scene.source, "track", "expected a tangent, perfect, rigid track for the plain equations")
     if isinstance(scene.data["contact"]["friction"], dict) or "drive" in scene.data:
         raise InputError(scene.source, "contact.friction", "expected a number, and no drive, for the plain equations")
     if scene.detection == "auto":

@@ -14,6 +14,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.outputs import drive_history, evaluations_at
+from wrcore.dynamics.support import support_places
 from wrcore.dynamics.system import Equations, Model, Workspace, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
@@ -39,6 +40,13 @@ CONTACT_CHANNELS = {
     "xi": reduction.XI, "eta": reduction.ETA, "phi_per_m": reduction.PHI,
 }  # fmt: skip
 """Contact channels and their columns in the patch array."""
+
+
+TRACK_CHANNELS = (
+    "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
+    "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
+)  # fmt: skip
+"""Of a track that gives, in the order of its freedoms (:mod:`wrcore.dynamics.support`)."""
 
 
 class Places(NamedTuple):
@@ -177,6 +185,8 @@ class Course:
             groups[name] = _body_channels(states[:, own], rates[:, own], poses[:, body], wanted)
             if "pose" in wanted and not model.track.tangent:
                 groups[name]["s_m"] = poses[:, body, 0]
+            if "pose" in wanted and body in wheelsets and len(model.support.mass):
+                groups[name] |= self._track_places(states, body)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
             if body in wheelsets and not {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
@@ -219,6 +229,12 @@ class Course:
         mean = np.array([matrix_of(part[3:7])[:, 1] @ part[10:13] for part in own])
         half = states[:, independent_at(bodies, j)]
         return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
+
+    def _track_places(self, states, body):
+        """Channels of the displacements of rails and sleeper under a wheelset, m and rad."""
+        k = int(np.flatnonzero(self.model.bodies.wheelsets == body)[0])
+        places = support_places(self.model)[k, : len(self.model.support.mass)]
+        return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
     def _drive_channels(self, trajectory):
         """Torque and power of motors and brakes, force and speed of the controller, if the scene has any."""

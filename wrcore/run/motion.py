@@ -1,6 +1,7 @@
 """What a sampled motion shows by itself: zero crossings, frequency, amplitude, growth."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 def zero_crossings(t, y):
@@ -26,7 +27,7 @@ def _sign_changes(y):
     return np.flatnonzero((y[:-1] < 0) != (y[1:] < 0))
 
 
-def hunting_frequency(t, y):
+def hunting_frequency(t: ArrayLike, y: ArrayLike) -> float:
     """Frequency of a lateral motion about the track's centre, from its zero crossings.
 
     Parameters
@@ -38,9 +39,17 @@ def hunting_frequency(t, y):
     -------
     float
         Frequency, Hz; NaN with fewer than three crossings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import wrcore as wr
+    >>> t = np.linspace(0.0, 2.0, 401)
+    >>> round(wr.hunting_frequency(t, 1e-3 * np.cos(2 * np.pi * 3.0 * t)), 3)
+    3.0
     """
     when = zero_crossings(t, y)
-    return 0.5 * (when.size - 1) / (when[-1] - when[0]) if when.size > 2 else np.nan
+    return float(0.5 * (when.size - 1) / (when[-1] - when[0])) if when.size > 2 else np.nan
 
 
 def amplitude(y):

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from wrcore import __version__
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
@@ -50,6 +50,16 @@ def write_run(
         Adds to the file.
     **options
         Of its datasets, instead of `COMPRESSION`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> from tempfile import TemporaryDirectory
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> with TemporaryDirectory() as folder:
+    ...     wr.write_run(f"{folder}/run.h5", run)
+    ...     print(wr.load_run(f"{folder}/run.h5").status)
+    completed
     """
     with new_hdf5(path) as file:
         _write_attributes(file, run)
@@ -223,6 +233,16 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
     ------
     InputError
         As `load_run`.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> from tempfile import TemporaryDirectory
+    >>> run = wr.simulate(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> with TemporaryDirectory() as folder:
+    ...     run.save(f"{folder}/slow/spatial.h5")
+    ...     print(wr.load_runs([f"{folder}/slow/spatial.h5"])["slow"].keys())
+    dict_keys(['spatial'])
     """
     cases: dict[str, dict[str, Run]] = {}
     for path in map(Path, paths):
@@ -244,7 +264,7 @@ def _check_format(path, file, signed):
 def _check_run(path, run):
     """What every other part of the package relies on."""
     if run.status not in STATUSES or not isinstance(run.reason, str):
-        raise InputError(path, "attribute status", f"expected one of {', '.join(STATUSES)}, got {run.status!r}")
+        raise InputError(path, "attribute status", one_of(STATUSES, run.status))
     for name in ("scene", "settings", "counters"):
         if not isinstance(getattr(run, name), dict):
             raise InputError(path, f"attribute {name}", "expected a JSON object")

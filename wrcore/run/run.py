@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import wrcore
+from wrcore.errors import similar
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.derived import derived_channels
 
@@ -48,10 +48,9 @@ class Channels(Mapping[str, np.ndarray]):
             return self._channels[name]
         if name in self._derived:
             return self._derived[name]()
-        has, close = ", ".join(self._channels), get_close_matches(str(name), [*self._channels, *self._derived], 1)
-        meant = f"; did you mean {close[0]!r}?" if close else ""
-        follow = f"; from these follow {', '.join(self._derived)}" if self._derived else ""
-        raise KeyError(f"no channel {name!r} in {self._group!r}{meant}; it has {has}{follow}")
+        has, known = ", ".join(self._channels), [*self._channels, *self._derived]
+        follow = f", and what follows from these, {', '.join(self._derived)}" if self._derived else ""
+        raise KeyError(f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}")
 
     def __contains__(self, name: object) -> bool:
         return name in self._channels
@@ -150,7 +149,9 @@ class Run:
     def __getitem__(self, group: str) -> Channels:
         """Channels of one group as attributes; KeyError names the groups that exist."""
         if group not in self.groups:
-            raise KeyError(f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}")
+            raise KeyError(
+                f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}{similar(group, self)}"
+            )
         derived = derived_channels(self.groups, group, self.scene.get("speed", np.nan))
         return Channels(group, self.groups[group], derived)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_parameters, matrix_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 PLACES, ANGLES, RATES = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("vx", "vy", "vz", "wx", "wy", "wz")
 """Keys of a body, named like the channels of runs."""
@@ -14,7 +14,7 @@ def check_bodies(bodies, vehicle, source):
     for name, values in bodies.items():
         field = f"initial.bodies.{name}"
         if name not in vehicle.body_names:
-            raise InputError(source, field, f"expected one of {', '.join(vehicle.body_names)} as the body's name")
+            raise InputError(source, field, one_of(vehicle.body_names, name))
         if vehicle.data["bodies"][name]["kind"] == "axle_box":
             raise InputError(source, field, "expected no axle box: it follows its wheelset")
         if name in vehicle.wheelset_names and "pitch" in values:

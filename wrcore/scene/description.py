@@ -35,6 +35,7 @@ from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
 from wrcore.scene.pairs import Pair, find_file, own_pairs, pair_geometries, wheel_and_rail
+from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
 
@@ -54,6 +55,15 @@ class Scene:
     track : Track
     pairs : tuple of Pair
         Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("metro_car"), speed=25)
+    >>> scene
+    Scene 'metro_car': metro car, S1002 on UIC60-MBench, 25 m/s, spatial detection, 10 s
+    >>> scene.vehicle.wheelset_names
+    ('wheelset_1', 'wheelset_2', 'wheelset_3', 'wheelset_4')
     """
 
     data: dict[str, Any]
@@ -79,6 +89,11 @@ class Scene:
 
 Source = Scene | str | PathLike[str] | Mapping[str, Any]
 """What stands for a scene: a checked one, its file, or the file's content."""
+
+
+def as_scene(scene: Source) -> Scene:
+    """A scene as it is, or what stands for one as :func:`load_scene` reads it."""
+    return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
@@ -117,16 +132,18 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
         source, folder, data = "scene", Path("."), plain_tree(dict(scene), "scene")
     else:
         source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
-    if isinstance(overrides, Mapping):
-        changes = {**overrides, **changes}
-    else:
-        for text in overrides:
-            key, equals, value = text.partition("=")
-            if not equals or not key.strip():
-                raise InputError("--set", text, "expected key.path=value")
-            _set(data, key.strip(), parse_value(value), "--set")
-    for key, value in _flat(changes):
-        _set(data, key, value, source)
+    texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
+    asked = [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
+    for option, key, value in asked:
+        _set(data, key, value, option)
+    try:
+        return _checked(data, source, folder)
+    except InputError as error:
+        raise _blamed(error, source, asked) from None
+
+
+def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
+    """The scene of a file's content, with whatever other files it names."""
     data = validate(data, "scene", source)
     parameters = find_file(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
@@ -143,12 +160,30 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
         data["contact"]["creep"]["table"] = str(table)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
+    check_support(data["track"].get("support"), source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
     check_bodies(data["initial"]["bodies"], vehicle, source)
     read_friction(data["contact"]["friction"], source)
     read_drive(data.get("drive"), vehicle, source)
     return Scene(data, source, vehicle, wheel, rail, track, pairs)
+
+
+def _blamed(error, source, asked):
+    """A fault of a scene's file, or of what has been asked for instead of what is written there."""
+    for option, key, _ in reversed(asked):
+        near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")
+        if error.source == source and near:
+            return InputError(option, error.field, error.expected)
+    return error
+
+
+def _pair(text):
+    """Key path and value of ``key.path=value``."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError("--set", text, "expected key.path=value")
+    return key.strip(), parse_value(value)
 
 
 WHOLE = (".profile", ".friction", ".controller.speed")
@@ -242,13 +277,16 @@ def compile_scene(
     contact, integration = data["contact"], data["integration"]
     material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
     friction = read_friction(contact["friction"], scene.source)
+    geometry = _once(shared, "geometry", parts, lambda: contact_geometry(
+        scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
+    ))  # fmt: skip
+    support, elements = track_support(
+        data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
+    )
     model = Model(
         vehicle.bodies,
         ContactModel(
-            _once(shared, "geometry", parts, lambda: contact_geometry(
-                scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
-            )),
-            hertz_table(), LAWS[contact["creep"]["model"]],
+            geometry, hertz_table(), LAWS[contact["creep"]["model"]],
             _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
@@ -260,15 +298,15 @@ def compile_scene(
                 scene.pairs, scene.track, vehicle.half_distance
             )),
         ),
-        vehicle.elements, vehicle.joints,
+        elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source),
+        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source), support=support,
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
-        *damping.values(), *integration["baumgarte"].values(),
+        *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
     at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
     return model, initial_state(scene, model, at_rest)

@@ -5,7 +5,7 @@ import numpy as np
 from wrcore.dynamics.drive import BRAKE, CONTROLLED, MOTOR, Drive, no_drive
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.schedule import pack_schedules
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.scene.schedule import read_schedule
 from wrcore.vehicle.layout import FRAME_NAME
 
@@ -94,5 +94,5 @@ def _controller(spec, rows, vehicle, source, tables):
 def _body(name, vehicle, source, field):
     """Number of a body."""
     if name not in vehicle.body_names:
-        raise InputError(source, field, f"expected one of {', '.join(vehicle.body_names)}, got {name!r}")
+        raise InputError(source, field, one_of(vehicle.body_names, name))
     return vehicle.body_names.index(name)

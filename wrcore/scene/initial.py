@@ -18,6 +18,7 @@ from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.support import rails_at
 from wrcore.dynamics.system import Equations, independent_at, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
@@ -61,7 +62,7 @@ def rest(scene, model):
         If there is none near the nominal position.
     """
     vehicle, wheelsets, model = scene.vehicle, scene.vehicle.bodies.wheelsets, undriven(model)
-    unit = None if model.contact.geometries else vehicle.unit
+    unit = _unit(vehicle, model)
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
@@ -78,7 +79,7 @@ def rest(scene, model):
                     scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 )
             k = int(np.flatnonzero(wheelsets == body)[0])
-            roll, state[at + 2] = _settled(scene, model, k, 0.0, 0.0, load)
+            roll, state[at + 2] = _settled(scene, model, k, 0.0, 0.0, load, state)
             if model.contact.geometries:
                 state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
@@ -121,6 +122,11 @@ def static_equilibrium(scene, model):
     return dataclasses.replace(at_rest, state=state)
 
 
+def _unit(vehicle, model):
+    """The vehicle that a train has several times, where its own stands for all: all have wheels and track alike."""
+    return None if model.contact.geometries or len(model.support.mass) else vehicle.unit
+
+
 def _moving_ahead(model, at_rest):
     """State of the bodies at rest with the speed of the moving frame."""
     state = at_rest.state.copy()
@@ -133,7 +139,7 @@ def _roll_as_it_stands(scene, model, k, state):
     body = model.bodies.wheelsets[k]
     part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
     roll, _, yaw = angles(part[3:7])
-    left, right = _radii(scene, model, k, part[1], part[2], float(roll), float(yaw))
+    left, right = _radii(scene, model, k, state, float(roll), float(yaw))
     radius = sum(left + right) / len(left + right)
     part[10:13] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
     for j in np.flatnonzero(model.bodies.independent[:, 0] == k):
@@ -146,18 +152,26 @@ def _geometries(model, k):
     return model.contact.geometries[2 * k : 2 * k + 2] or (model.contact.geometry,) * 2
 
 
-def _radii(scene, model, k, y, z, roll, yaw):
-    """Rolling radii (m) of the left and the right wheel's patches, for the k-th wheelset in some pose."""
+def _radii(scene, model, k, state, roll, yaw):
+    """Rolling radii (m) of the left and the right wheel's patches, for the k-th wheelset in its place in a state."""
+    y, z = state[STATE_SIZE * model.bodies.wheelsets[k] :][1:3]
     detection = "planar" if scene.detection == "planar" else "spatial"
     reduction = "maximum" if model.contact.reduction == 0 else "moment"
-    sides = dict(zip(("left", "right"), _geometries(model, k), strict=True))
-    found = {id(one): detect(one, y, z, roll, yaw, detection, reduction) for one in sides.values()}
-    return [[z - patch.z_m for patch in found[id(one)] if patch.side == side] for side, one in sides.items()]
+    radii, found = [], {}
+    for side, one, (aside, up) in zip(("left", "right"), _geometries(model, k), rails_at(model, state, k), strict=True):
+        place = id(one), y - aside, z - up
+        if place not in found:
+            found[place] = detect(one, *place[1:], roll, yaw, detection, reduction)
+        radii.append([z - up - patch.z_m for patch in found[place] if patch.side == side])
+    return radii
 
 
-def _settled(scene, model, k, y, yaw, load):
-    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest."""
-    contact = model.contact
+def _settled(scene, model, k, y, yaw, load, state):
+    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest.
+
+    Rails that give are where the state has them.
+    """
+    contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
     if sides[0] is sides[1]:
@@ -169,6 +183,8 @@ def _settled(scene, model, k, y, yaw, load):
             scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
             f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
         )  # fmt: skip
+    if len(model.support.mass):
+        roll, z = roll + 0.5 * (left[1] - right[1]) / contact.geometry.rail_distance, z + 0.5 * (left[1] + right[1])
     return roll, z
 
 
@@ -199,7 +215,7 @@ def initial_state(scene, model, at_rest=None):
     for k, body in enumerate(vehicle.bodies.wheelsets):
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
         if y or yaw:
-            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
+            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
         _roll_as_it_stands(scene, model, k, state)
     if y or yaw:
@@ -226,7 +242,7 @@ def _move(scene, model, moved, at_rest, state):
         part, own = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
         if own.keys() & {"y", "yaw"}:
             y, yaw = own.get("y", part[1]), own.get("yaw", float(angles(part[3:7])[2]))
-            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()))
+            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             _roll_as_it_stands(scene, model, k, state)
         part[10:13] *= own.get("vx", part[7]) / part[7]
@@ -257,7 +273,7 @@ def _steady(vehicle, model, state):
 
     The vehicles of a train do not act on each other: the first one's is that of all.
     """
-    unit = None if model.contact.geometries else vehicle.unit
+    unit = _unit(vehicle, model)
     if unit is not None:
         size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
         first = np.concatenate([state[: size - own], state[STATE_SIZE * len(vehicle.body_names) :][:own]])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wrcore.contact.geometry import contact_geometry
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -78,8 +78,7 @@ def own_pairs(data, vehicle, wheel, rail, folder, source):
     single = data["wheel"].get("wheelsets", {})
     unknown = sorted(set(single) - set(vehicle.wheelset_names))
     if unknown:
-        expected = f"expected one of the wheelsets {', '.join(vehicle.wheelset_names)}"
-        raise InputError(source, f"wheel.wheelsets.{unknown[0]}", expected)
+        raise InputError(source, f"wheel.wheelsets.{unknown[0]}", one_of(vehicle.wheelset_names, unknown[0]))
     if not single and not any(side in data[kind] for kind in ("wheel", "rail") for side in SIDES):
         return ()
     sides = []

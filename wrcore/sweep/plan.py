@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore import __version__
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
@@ -112,7 +112,7 @@ def load_sweep(
     data = validate(data, "sweep", name)
     for measure in data["measures"]:
         if measure not in MEASURES:
-            raise InputError(name, "measures", f"expected some of {', '.join(MEASURES)}, got {measure!r}")
+            raise InputError(name, "measures", one_of(MEASURES, measure))
     scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     _check_values(scene, data["keys"], values, name)
@@ -171,7 +171,7 @@ def _check_values(scene, entries, values, source):
             except InputError as error:
                 raise InputError(source, f"keys.{key}", str(error)) from None
             if changed.data["integration"]["method"] not in ("auto", *METHODS):
-                raise InputError(source, f"keys.{key}", f"expected one of auto, {', '.join(METHODS)}, got {value!r}")
+                raise InputError(source, f"keys.{key}", one_of(("auto", *METHODS), value))
 
 
 def _grid(values):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 KEYS = {
     "spring_damper": (("at",), ("stiffness", "damping", "rotation_stiffness", "rotation_damping", "preload")),
@@ -45,8 +45,7 @@ def check_element(item, source):
             raise InputError(source, f"{field}.{key}", f"expected a value, as kind {kind} needs one")
     for key in item:
         if key not in ("name", "kind", "bodies", *needed, *optional):
-            known = ", ".join(needed + optional)
-            raise InputError(source, f"{field}.{key}", f"unknown for kind {kind}; expected one of {known}")
+            raise InputError(source, f"{field}.{key}", f"unknown for kind {kind}; {one_of(needed + optional, key)}")
     for key in ("stiffness", "damping", "preload", "series_stiffness"):
         if key in item:
             _check_quantity(item, key, f"{field}.{key}", source)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.dynamics.marker import FRAME
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 FRAME_NAME = "frame"
 
@@ -42,9 +42,7 @@ class Layout:
         known = (*self.names, *self.aliases)
         for name in item["bodies"]:
             if name != FRAME_NAME and name not in known:
-                raise InputError(
-                    self.source, f"{field}.bodies", f"expected {FRAME_NAME} or one of {', '.join(known)}, got {name!r}"
-                )
+                raise InputError(self.source, f"{field}.bodies", one_of((FRAME_NAME, *known), name))
             numbers.append(FRAME if name == FRAME_NAME else self.names.index(self.aliases.get(name, name)))
         if numbers[0] == numbers[1]:
             raise InputError(

@@ -235,7 +235,7 @@ def test_a_patch_is_drawn_with_units(benchmark_pair):
     case = some_cases("mbench_contact")[0]
     figure = solve_on_grids(benchmark_pair, case.pose, case.plane, (1e-3, 5e-4, 0.1), grids=((16, 16),)).plot()
     axes, bar = figure.axes
-    assert "(mm)" in axes.get_xlabel() and "(mm)" in axes.get_ylabel() and "MPa" in bar.get_ylabel()
+    assert axes.get_xlabel().endswith(" / mm") and axes.get_ylabel().endswith(" / mm") and "MPa" in bar.get_ylabel()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["adhesion", "slip"]
     plt.close(figure)
 

@@ -65,6 +65,22 @@ def test_normal_force_is_smooth_over_the_lateral_position(benchmark_pair, y, yaw
     assert np.abs(np.diff(increments)).max() < 0.05 * np.median(np.abs(increments))
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.005])
+@pytest.mark.parametrize("resolution", RESOLUTIONS)
+def test_normal_force_is_smooth_where_the_number_of_strips_changes(benchmark_pair, yaw, resolution):
+    contact, changes, before = NormalContact(benchmark_pair, MODULUS, resolution), 0, None
+    for y in np.arange(-2.2e-3, 1.6e-3, 2e-5):
+        z = height(benchmark_pair, y, 55e3, yaw)
+        (patch,) = contact.at_height("left", y, z, 0.0, yaw)
+        if before not in (None, patch.centre.size):
+            changes += 1
+            found = forces(contact, [(y + k * 1e-6, z, yaw) for k in range(-40, 21)], warm=False)
+            increments = np.diff(found)
+            assert np.abs(np.diff(increments)).max() < 0.05 * np.median(np.abs(increments))
+        before = patch.centre.size
+    assert changes >= 4
+
+
 def test_normal_force_is_smooth_where_two_overlaps_merge(benchmark_pair):
     # y = 5.1 mm: the undeformed overlaps merge 44.4 um below first touch, where one ellipse steps by 31 %.
     y, z = 0.0051, 0.47

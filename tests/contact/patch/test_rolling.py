@@ -145,7 +145,7 @@ def solve_case(case, level):
     psi = (case["b_pos_m"] - case["b_neg_m"]) / (2 * b)
     strips = sdec(LEVELS[level].strips, case["a_m"], b, psi, force=case["N_N"])
     options = dict(mu=case["mu"], shear_modulus=case["G_Pa"], nu=case["nu"])
-    return force(strips, (case["ux"], case["uy"], case["phi_per_m"]), level, **options)
+    return force(strips, (case["xi"], case["eta"], case["phi_per_m"]), level, **options)
 
 
 @pytest.mark.parametrize("name, bound_95, bound_max", [("ellipse_cases", 0.009, 0.018), ("sdec_cases", 0.009, 0.018)])

@@ -100,12 +100,12 @@ def test_errors_are_those_of_the_forces(reference, models, errors):
 
 
 def test_linear_law_errs_as_by_hand(reference, errors):
-    """Case with the smallest creepages: -C11 ux', -C22 uy' - C23 phi', C23 uy' - C33 phi'."""
+    """Case with the smallest creepages: -C11 xi', -C22 eta' - C23 phi', C23 eta' - C33 phi'."""
     cases = reference["ellipse"]
     i = int(np.argmin(np.linalg.norm(cases.creepages, axis=1)))
     c11, c22, c23, c33 = coefficients_at(np.log(cases.g[i]), kalker_data(NU))
-    ux, uy, phi = cases.creepages[i]
-    off = np.array([-c11 * ux, -c22 * uy - c23 * phi, c23 * uy - c33 * phi]) - cases.forces[i]
+    xi, eta, phi = cases.creepages[i]
+    off = np.array([-c11 * xi, -c22 * eta - c23 * phi, c23 * eta - c33 * phi]) - cases.forces[i]
     rows = errors[(errors.cases == "ellipse") & (errors.model == "linear") & (errors.against == "CONTACT")]
     row = rows[rows.case_id == cases.case_id[i]].iloc[0]
     assert row.force_error == pytest.approx(np.hypot(*off[:2])) and row.moment_error == pytest.approx(abs(off[2]))
@@ -174,7 +174,7 @@ def test_curves_start_linear_and_end_at_coulomb(models):
     curves = creep_curves(models, NU, 1.0, 12, 41)
     c11 = coefficients_at(0.0, kalker_data(NU))[0]
     part = curves[curves.line == "longitudinal"]
-    assert part[part.model == "linear"].fx.to_numpy() == pytest.approx(-c11 * part[part.model == "linear"].ux)
+    assert part[part.model == "linear"].fx.to_numpy() == pytest.approx(-c11 * part[part.model == "linear"].xi)
     exact, table = (part[part.model == name] for name in ("exact, level 12", "sdec"))
     assert exact.fx.iloc[-1] == pytest.approx(-1, abs=1e-3)
     assert abs(exact.fx.to_numpy() - table.fx.to_numpy()).max() < 0.02

@@ -72,10 +72,11 @@ def test_figures_belong_to_families_and_show_their_curves():
     assert axes.lines[0].get_ydata().tolist() == [1.0, 2.0]  # ms
     label = {"vehicle": "a", "detection": "spatial", "least_speed_m_per_s": 1e-3}
     braking = [label | {"t_s": t, "v_m_per_s": 1 - t} for t in (0, 1)]
-    off = [{"vehicle": "a", "speed_m_per_s": 0.1, "least_speed_m_per_s": x, "y_off_m": 1e-3 * x} for x in (0.0, 0.5)]
+    off = [{"vehicle": "a", "speed_m_per_s": 0.1, "least_speed_m_per_s": x, "y_off_m": 1e-3 * x}
+           for x in (0.0, 1e-3, 0.5)]  # fmt: skip
     axes = fig_low_speed({"braking": braking, "regularisation": off}).axes
     assert axes[0].lines[0].get_ydata().tolist() == [1, 0]
-    assert axes[1].lines[0].get_ydata().tolist() == pytest.approx([0.5])  # mm; no change cannot be drawn
+    assert axes[1].lines[0].get_ydata().tolist() == pytest.approx([1e-3, 0.5])  # mm; no change cannot be drawn
 
 
 def test_tables_survive_a_csv_file(tmp_path):

@@ -34,8 +34,10 @@ def labels(figure):
 def test_lateral_motion_shows_every_wheelset_in_mm(runs):
     figure = lateral_motion({"20 m/s": runs, "60 m/s": runs})
     assert len(figure.axes) == 4
-    drawn = figure.axes[0].lines[0].get_ydata()
-    np.testing.assert_allclose(drawn, 1e3 * runs["planar"]["wheelset_1"].y_m)
+    drawn = figure.axes[0].lines[0].get_xydata()
+    assert drawn[-1, 0] == pytest.approx(10 / 2.6, abs=0.02)  # ten swings
+    np.testing.assert_allclose(drawn[:, 1], 1e3 * runs["planar"]["wheelset_1"].y_m[: len(drawn)])
+    assert "first 3.8 of 4 s" in figure.axes[0].get_title(loc="left")
     assert set(labels(figure)) == {"y / mm", "time / s"}
 
 
@@ -44,6 +46,9 @@ def test_guiding_forces_show_both_wheels_in_kN(runs):
     assert len(figure.axes) == 6
     assert [len(axes.lines) for axes in figure.axes] == [2] * 6
     assert figure.axes[0].lines[0].get_ydata()[0] == pytest.approx(8.9 * np.cos(0.03))
+    run = copy.deepcopy(runs["spatial"])
+    run.t = 2.0 * run.t
+    assert guiding_forces(run, "any").axes[0].lines[0].get_xdata()[[0, -1]].tolist() == [4.0, 8.0]
     assert {"Q / kN", "Y / kN", "Y/Q", "time / s"} == set(labels(figure))
 
 
@@ -59,6 +64,18 @@ def test_over_speed_draws_a_line_per_vehicle_and_detection(runs, quantities):
     assert [len(axes.lines) for axes in figure.axes] == [4] * len(quantities)
     assert "speed / (m/s)" in labels(figure)
     assert {label for _, _, label in quantities} <= set(labels(figure))
+
+
+def test_speeds_beyond_the_critical_one_are_marked(runs):
+    run = runs["spatial"]
+    assert guiding_forces(run, "any", 15.0).get_suptitle() == "any, above the linear critical speed of 15.0 m/s"
+    assert guiding_forces(run, "any", 25.0).get_suptitle() == "any, below the linear critical speed of 25.0 m/s"
+    assert guiding_forces(run, "any", np.inf).get_suptitle() == "any, below the linear critical speed"
+    row = speed_row(run) | {"detection": "spatial", "track": "released", "amplitude_m": 5e-3}
+    table = pd.DataFrame([row | {"speed_m_per_s": speed} for speed in (20.0, 40.0)])
+    figure = over_speed({"wheelset": table, "coach": table}, "released", HUNTING, {"wheelset": 30.0, "coach": np.inf})
+    for axes in figure.axes:
+        assert [line.get_xdata()[0] for line in axes.lines if "critical" in line.get_label()] == [30.0]
 
 
 def test_a_run_that_derailed_early_has_no_late_part(runs):

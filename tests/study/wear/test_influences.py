@@ -4,8 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.wear.figures import fig_evolution, fig_influences
+from study.wear.figures import fig_influences
 from study.wear.influences import influence_table, variant_depth, with_copies
+from wrcore.analysis.plot_wear import plot_evolution
 
 
 def test_copies_share_and_differ_in_their_seeds():
@@ -34,5 +35,5 @@ def test_deviations_are_from_the_first_variant():
 def test_a_variant_of_a_plan(tmp_path):
     u, depth, table, seconds = variant_depth("config/wear/smoke.yaml", {"distance": 5e4}, tmp_path / "a")
     assert depth.max() > 0.0 and table["step_m"].sum() == pytest.approx(5e4) and seconds > 0.0
-    drawn = fig_evolution((u, u), [(0.0, u, u), (5e4, u, u + depth)], table)
+    drawn = plot_evolution([(0.0, u, u), (5e4, u, u + depth)], table)
     assert len(drawn.axes) == 6

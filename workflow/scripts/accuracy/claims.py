@@ -1,4 +1,4 @@
-"""What the README promises: medians and worst cases."""
+"""What reports/accuracy.md promises: medians and worst cases."""
 
 import sys
 from pathlib import Path

@@ -18,7 +18,7 @@ for name, changes in params.variants.items():
     scenes[name] = load_scene(source, [*shared, "initial.y=0.0", *changes])
 speeds = np.linspace(**params.speeds)
 locus = loci({name: scenes[name] for name in ("planar", "spatial")}, speeds)
-linear = critical_speeds(scenes, speeds)
+linear = critical_speeds(scenes, np.linspace(**params.search))
 shown, shapes = modes(scenes["spatial"], params.shown)
 for name, content in (("locus", locus), ("linear", linear), ("shown", shown), ("shapes", shapes)):
     content.to_csv(output[name], index=False)

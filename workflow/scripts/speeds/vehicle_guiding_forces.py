@@ -2,6 +2,8 @@
 
 import sys
 
+import pandas as pd
+
 from study.speeds.figures import guiding_forces
 from wrcore.analysis.style import save_figure
 from wrcore.analysis.wheels import wheel_table
@@ -9,5 +11,6 @@ from wrcore.run.results import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 run = load_run(snakemake.input.run)
-save_figure(guiding_forces(run, f"{run.scene['speed']:g} m/s on irregular track"), *snakemake.output[:2])
+linear = pd.read_csv(snakemake.input.linear).set_index("variant").loc["spatial", "critical_speed_m_per_s"]
+save_figure(guiding_forces(run, f"{run.scene['speed']:g} m/s on irregular track", linear), *snakemake.output[:2])
 wheel_table(run, 0.5 * run.t[-1]).to_csv(snakemake.output[2], index=False)

@@ -10,7 +10,9 @@ from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = dict(zip(snakemake.params.titles.values(), map(pd.read_csv, snakemake.input.speeds), strict=True))
-save_figure(over_speed(tables, snakemake.params.released, HUNTING), *snakemake.output[:2])
-save_figure(over_speed(tables, snakemake.params.disturbed, RESPONSE), *snakemake.output[2:4])
+linear = [pd.read_csv(path).set_index("variant").loc["spatial"] for path in snakemake.input.linear]
+critical = dict(zip(tables, (row["critical_speed_m_per_s"] for row in linear), strict=True))
+save_figure(over_speed(tables, snakemake.params.released, HUNTING, critical), *snakemake.output[:2])
+save_figure(over_speed(tables, snakemake.params.disturbed, RESPONSE, critical), *snakemake.output[2:4])
 job_seconds = [pd.read_csv(path, sep="\t")["s"].iloc[0] for path in snakemake.input.benchmarks]
 cost_table(tables, dict(zip(tables, job_seconds, strict=True))).to_csv(snakemake.output[4], index=False)

@@ -4,8 +4,8 @@ import os
 import sys
 from pathlib import Path
 
-from study.wear.figures import fig_evolution
 from wrcore.analysis.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
+from wrcore.analysis.plot_wear import plot_evolution
 from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
@@ -15,4 +15,4 @@ folder = Path(snakemake.output.table).with_name("profiles") / plan_mark(*load_we
 table = evolve(plan, folder, print, changes, snakemake.threads)  # a job that was killed goes on there
 profiles = profiles_over_distance(folder)
 table.to_csv(snakemake.output.table, index=False)
-save_figure(fig_evolution(profiles[0][1:], profiles, table), snakemake.output.figure, snakemake.output.svg)
+save_figure(plot_evolution(profiles, table), snakemake.output.figure, snakemake.output.svg)

@@ -1,4 +1,4 @@
-"""What the README promises, as medians and worst cases, and of which cases: from tables of the study."""
+"""What reports/accuracy.md promises, as medians and worst cases, and of which cases: from tables of the study."""
 
 import pandas as pd
 

@@ -1,10 +1,10 @@
-"""The measured fronts as the README quotes them."""
+"""The measured fronts as reports/accuracy.md quotes them."""
 
 from wrcore.run.accuracy import measured_front
 
 
 def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
-    """The fastest measured choice for each accuracy as a table in Markdown, as the README quotes it.
+    """The fastest measured choice for each accuracy as a table in Markdown, as reports/accuracy.md quotes it.
 
     Parameters
     ----------

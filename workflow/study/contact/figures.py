@@ -7,8 +7,9 @@ nowhere before: lengths to mm, angles to mrad, forces to kN.
 """
 
 import numpy as np
-from matplotlib.colors import LogNorm, TwoSlopeNorm
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from study.contact.tables import first_order_law, over_contact_angle
 from wrcore.analysis.style import MM, styled
@@ -22,6 +23,8 @@ STYLES = (
     {"color": "#CC79A7", "linestyle": "-."},
 )
 """Okabe-Ito colours, each with its own line: told apart in grey too."""
+
+THIN = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
 
 
 @styled
@@ -113,9 +116,9 @@ def fig_conicity_of_pairs(table):
     figure, axes = _single()
     for style, (label, rows) in zip(STYLES, table.groupby("pair", sort=False), strict=False):
         amplitude = MM * rows.amplitude_m
-        axes.plot(amplitude, rows.conicity_with_roll, label=f"{label}, with roll", **style)
-        thin = {**style, "linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
-        axes.plot(amplitude, rows.conicity_without_roll, label="without roll (EN 15302)", **thin)
+        axes.plot(amplitude, rows.conicity_with_roll, label=label, **style)
+        axes.plot(amplitude, rows.conicity_without_roll, **{**style, **THIN})
+    axes.plot([], [], color="0.4", label="without roll (EN 15302)", **THIN)
     axes.set(xlabel="amplitude / mm", ylabel="equivalent conicity", ylim=(0, None))
     axes.legend(fontsize=7)
     return figure
@@ -175,12 +178,11 @@ def fig_planar_error(table):
     table = table[table.yaw_rad > 0]
     table = table.assign(ratio=table.missed_m / table.law_m, excess=table.bound_m / table.missed_m)
     figure = Figure(figsize=(7.6, 6.6), layout="constrained")
-    for part, column, factor, norm, cmap, title in zip(
+    for part, column, factor, norm, title in zip(
         figure.subfigures(2, 2).ravel(),
         ("missed_m", "shift_m", "ratio", "excess"),
         (1e6, MM, 1.0, 1.0),
-        (LogNorm(1e-3, 1e3), LogNorm(1e-2, 1e2), TwoSlopeNorm(1.0, 0.8, 1.2), LogNorm(1.0, 1e3)),
-        ("cividis", "cividis", "PuOr", "cividis"),
+        (LogNorm(1e-3, 1e3), LogNorm(1e-2, 1e2), Normalize(0.8, 1.2), LogNorm(1.0, 1e3)),
         (
             "(a) missed normal penetration / \N{MICRO SIGN}m",
             "(b) missed longitudinal position / mm",
@@ -191,7 +193,7 @@ def fig_planar_error(table):
     ):
         panels = part.subplots(len(BANDS), 1, sharex=True)
         for axes, band in zip(panels, BANDS[::-1], strict=True):
-            mesh = _error_band(axes, table, band, column, factor, norm, cmap)
+            mesh = _error_band(axes, table, band, column, factor, norm)
             _law_contours(axes, table.yaw_rad.max(), band, column)
         part.colorbar(mesh, ax=list(panels), extend="both")
         panels[0].set_title(title, fontsize=9)
@@ -200,7 +202,7 @@ def fig_planar_error(table):
     return figure
 
 
-def _error_band(axes, table, band, column, factor, norm, cmap):
+def _error_band(axes, table, band, column, factor, norm):
     """Cells of one band of contact angles."""
     limits = np.geomspace(*band, _CELLS + 1)
     grid = over_contact_angle(table, limits, column)
@@ -210,7 +212,7 @@ def _error_band(axes, table, band, column, factor, norm, cmap):
     values = factor * grid.to_numpy(dtype=float)
     axes.set(facecolor="0.9", xlim=(0.0, edges[-1]), ylim=(MM * band[0], MM * band[1]))
     axes.grid(visible=False)
-    return axes.pcolormesh(edges, MM * limits, values, norm=norm, cmap=cmap, rasterized=True)
+    return axes.pcolormesh(edges, MM * limits, values, norm=norm, cmap="cividis", rasterized=True)
 
 
 def _law_contours(axes, largest_yaw, band, column):
@@ -256,7 +258,8 @@ def fig_lateral_sweep(sweep):
         force.plot(y, values, label=name, rasterized=True, **style)
         change = np.maximum(np.abs(np.diff(values)) * per_micrometre, 1e-6)
         steps.semilogy(0.5 * (y[1:] + y[:-1]), change, label=name, rasterized=True, **style)
-    force.set(ylabel="vertical force of both wheels / kN", xmargin=0)
+    force.set(ylabel="vertical force / kN", yscale="log", xmargin=0, title="both wheels at fixed height")
+    force.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     steps.set(xlabel="lateral shift y, to the left / mm", ylabel="change per µm / kN", ylim=(1e-4, 1e3))
     force.legend(fontsize=8)
     return figure
@@ -275,7 +278,7 @@ def fig_patch_forces(tables):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(7.2, 3.0), layout="constrained")
+    figure = Figure(figsize=(7.6, 3.0), layout="constrained")
     panels = figure.subplots(1, len(tables), squeeze=False)[0]
     for axes, (title, table) in zip(panels, tables.items(), strict=True):
         lowering = 1e6 * table.lowering_m

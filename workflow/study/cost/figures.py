@@ -4,7 +4,7 @@ They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those o
 """
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from wrcore.analysis.style import styled
 
@@ -29,17 +29,19 @@ def fig_growth(wheelsets, runs, scenes):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(7.2, 5.6), layout="constrained")
+    figure = Figure(figsize=(7.2, 6.0), layout="constrained")
     (a, b), (c, d) = figure.subplots(2, 2)
     for (scene, part), style in zip(wheelsets.groupby("scene", sort=False), SERIES, strict=False):
         a.plot(
             part["wheelsets"], part["evaluation_us_per_wheelset"], markersize=4, label=f"{scene}: evaluation", **style
         )
-        a.plot(part["wheelsets"], part["run_us_per_wheelset"], markersize=4, mfc="w", label="in a run", **style)
+        a.plot(
+            part["wheelsets"], part["run_us_per_wheelset"], markersize=4, mfc="w", label=f"{scene}: in a run", **style
+        )
     a.set_xscale("log", base=2)
     a.set(xlabel="wheelsets / 1", ylabel="time per wheelset / µs", title="(a) train")
     a.set_ylim(bottom=0.0)
-    a.legend(fontsize=7)
+    figure.legend(*a.get_legend_handles_labels(), loc="outside upper left", ncols=2, fontsize=8, title="(a)")
     durations, tolerances = (runs[runs["varied"] == name] for name in ("duration_s", "rtol"))
     b.errorbar(durations["value"], durations["run_ms"], _spread(durations, "run_ms"), markersize=4, **SERIES[0])
     b.set(xscale="log", yscale="log", xlabel="simulated time / s", ylabel="run / ms", title="(b) duration")
@@ -53,6 +55,8 @@ def fig_growth(wheelsets, runs, scenes):
     d.set(xlabel="scenes in one process / 1", ylabel="wall time per scene / ms", title="(d) scenes")
     d.set_ylim(bottom=0.0)
     d.legend(fontsize=7)
+    for axis in (b.yaxis, c.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     for axis in (a.xaxis, b.xaxis, b.yaxis, c.yaxis, d.xaxis):
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())

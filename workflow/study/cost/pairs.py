@@ -175,7 +175,7 @@ def children_time():
 
 def process(scene, passes):
     """A process that runs one scene with kernels and creep table cached, against one that only imports NumPy."""
-    command = [sys.executable, "-m", "wrcore.cli", "simulate", str(scene), "--json"]
+    command = [sys.executable, "-m", "wrcore", "simulate", str(scene), "--json"]
     report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
 
     def started(arguments):

@@ -35,17 +35,17 @@ CONTACT_STYLE = {"CONTACT": {"color": "0.35", "marker": "o"}, "its FASTSIM": {"c
 TRACTION_COLOURS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.65, 256)))
 
 CURVES = (
-    ("longitudinal", "ux", "fx", "(a) longitudinal"),
-    ("lateral", "uy", "fy", "(b) lateral"),
+    ("longitudinal", "xi", "fx", "(a) longitudinal"),
+    ("lateral", "eta", "fy", "(b) lateral"),
     ("spin", "phi", "fy", "(c) pure spin: lateral force"),
-    ("combined", "uy", "fy", "(d) lateral with spin: force"),
-    ("lateral", "uy", "mz", "(e) lateral: moment"),
+    ("combined", "eta", "fy", "(d) lateral with spin: force"),
+    ("lateral", "eta", "mz", "(e) lateral: moment"),
     ("spin", "phi", "mz", "(f) pure spin: moment"),
 )
 
 SYMBOLS = {
-    "ux": r"$\xi' = \xi\,G c^2/(\mu N)$ / 1",
-    "uy": r"$\eta' = \eta\,G c^2/(\mu N)$ / 1",
+    "xi": r"$\xi' = \xi\,G c^2/(\mu N)$ / 1",
+    "eta": r"$\eta' = \eta\,G c^2/(\mu N)$ / 1",
     "phi": r"$\varphi' = \varphi\,G c^3/(\mu N)$ / 1",
     "fx": r"$F_x/(\mu N)$ / 1",
     "fy": r"$F_y/(\mu N)$ / 1",
@@ -332,11 +332,14 @@ def _error_panel(axes, errors, column, error):
 
 
 SMOOTH_PANELS = {
-    "cells": ("(a) across cells of all inputs", "$x$ / 1", False),
-    "border": ("(b) 100 × (a), sharpest bend,\nless its mean", "$x$ / 1", True),
-    "axis": ("(c) past the spin axis,\nless its mean", r"$\xi'/\varphi'$ / 1", True),
-    "zero": ("(d) through zero", "$x$ / 1", False),
+    "cells": ("(a) across many cells:\nall inputs change", "place $x$ / 1", False),
+    "border": ("(b) the sharpest bend of (a),\n100 times wider, less its mean", "place $x$ / 1", True),
+    "axis": ("(c) past pure spin,\nless its mean", r"place $x = \xi'/\varphi'$ / 1", True),
+    "zero": ("(d) through zero creepage:\nfull adhesion", "place $x$ / 1", False),
 }
+"""Title, label and whether the mean is taken off, of each of `study.creep.smoothness.smooth_lines`."""
+
+
 OUTPUTS = {
     "fx": {"color": "#0072B2", "linestyle": "-", "label": r"$F_x/(\mu N)$"},
     "fy": {"color": "#E69F00", "linestyle": (0, (4, 2)), "label": r"$F_y/(\mu N)$"},
@@ -359,7 +362,7 @@ def fig_creep_smoothness(lines, table):
     -------
     matplotlib.figure.Figure
     """
-    figure = Figure(figsize=(7.6, 4.4), layout="constrained")
+    figure = Figure(figsize=(8.4, 4.6), layout="constrained")
     panels = figure.subplots(2, 4, sharex="col")
     for (name, (title, label, centred)), column in zip(SMOOTH_PANELS.items(), panels.T, strict=True):
         part = lines[lines["line"] == name]
@@ -370,7 +373,7 @@ def fig_creep_smoothness(lines, table):
         column[1].locator_params(axis="x", nbins=4)
     panels[0, 0].set_ylabel("force, moment / 1")
     panels[1, 0].set_ylabel("slope along $x$ / 1")
-    panels[0, 2].text(0.04, 0.06, _axis_text(table), transform=panels[0, 2].transAxes, fontsize=7)
+    panels[1, 2].set_title(_axis_text(table), fontsize=7)
     handles = [Line2D([], [], **style) for style in OUTPUTS.values()]
     handles.append(Line2D([], [], color="0.4", marker=".", linestyle="none", label="exact solver"))
     _legend_below(figure, handles, 4, handlelength=3)
@@ -379,7 +382,7 @@ def fig_creep_smoothness(lines, table):
 
 def _axis_text(table):
     rows = table[(table["line"] == "axis") & (table["output"] == "fx")].set_index("source")["variation"]
-    return f"slope of $F_x$\nvaries by\n{PERCENT * rows['table']:.1f} %\n(exact {PERCENT * rows['exact']:.1f} %)"
+    return f"slope of $F_x$ varies by\n{PERCENT * rows['table']:.1f} % (exact {PERCENT * rows['exact']:.1f} %)"
 
 
 def _smooth_pair(column, part, output, style, centred):

@@ -1,7 +1,7 @@
 """What creep laws and creep tables err and cost: tidy tables against CONTACT's cases and against the exact solver.
 
-Everything is nondimensional (see `wrcore.creep.laws`): creepages ux', uy', phi', forces over mu N, moments over mu N c,
-c = sqrt(a b). A force error is the length of the error of (fx, fy), a moment error the size of that of mz.
+Everything is nondimensional (see `wrcore.creep.laws`): creepages xi', eta', phi', forces over mu N, moments over
+mu N c, c = sqrt(a b). A force error is the length of the error of (fx, fy), a moment error the size of that of mz.
 """
 
 import time
@@ -359,7 +359,7 @@ def creep_curves(models, nu, a_over_b, level, points):
     Returns
     -------
     pandas.DataFrame
-        Columns line ("longitudinal", "lateral", "spin", "combined": lateral at a held spin), model, family, ux, uy,
+        Columns line ("longitudinal", "lateral", "spin", "combined": lateral at a held spin), model, family, xi, eta,
         phi, fx, fy, mz; the exact solution has the family "exact".
     """
     import pandas as pd
@@ -369,6 +369,6 @@ def creep_curves(models, nu, a_over_b, level, points):
         found = [(f"exact, level {level}", "exact", patch.solve_many(creepages)[0])]
         found += [(model.name, model.family, law_forces(model, a_over_b, 0.0, creepages)[0]) for model in models]
         for name, family, forces in found:
-            numbers = pd.DataFrame(np.hstack([creepages, forces]), columns=["ux", "uy", "phi", "fx", "fy", "mz"])
+            numbers = pd.DataFrame(np.hstack([creepages, forces]), columns=["xi", "eta", "phi", "fx", "fy", "mz"])
             parts.append(numbers.assign(line=line, model=name, family=family))
     return pd.concat(parts, ignore_index=True)

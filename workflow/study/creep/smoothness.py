@@ -15,7 +15,7 @@ SIZES, DIRECTIONS = 16, 10
 
 SIZE_RANGE = (0.01, 100.0)
 NEAR_POLE = 1e-3
-"""Distance ux'/phi' (and uy'/phi') at which the smoothness lines pass the spin axis."""
+"""Distance xi'/phi' (and eta'/phi') at which the smoothness lines pass the spin axis."""
 
 SPAN = 4
 """Points over which a jump of the slope is sought: more than the three that a central difference takes."""

@@ -5,6 +5,7 @@ before: lengths to mm.
 """
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.modes import OVERDAMPED
@@ -72,33 +73,36 @@ def fig_modes(table, title):
     Parameters
     ----------
     table : pandas.DataFrame
-        First table of `modes`; what does not oscillate is left out.
+        First table of `modes`; what does not oscillate is left out, modes of equal name, frequency and damping stand in
+        one row.
     title : str
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    rows = np.flatnonzero(table["damping_ratio"] < OVERDAMPED)
+    table = table[table["damping_ratio"] < OVERDAMPED]
+    labels = pd.Series(
+        f"{mode.name}   {mode.frequency_Hz:.2f} Hz   {100 * mode.damping_ratio:.1f} %".replace("-", "\N{MINUS SIGN}")
+        for mode in table.itertuples()
+    )
+    times = labels.map(labels.value_counts())
+    rows = np.flatnonzero(~labels.duplicated())  # modes of equal wheelsets that hardly know of each other
     parts = table.iloc[rows, table.columns.get_loc("part") + 1 :]
     parts = parts.loc[:, parts.max() >= LEAST_ENERGY]
-    figure = Figure(figsize=(2.6 + 0.27 * parts.shape[1], 1.2 + 0.16 * len(rows)), layout="constrained")
+    labels = [labels[row] if times[row] == 1 else f"{times[row]} times {labels[row]}" for row in rows]
+    figure = Figure(figsize=(max(2.6 + 0.27 * parts.shape[1], 4.6), 1.5 + 0.16 * len(rows)), layout="constrained")
     axes = figure.subplots()
     axes.imshow(parts, cmap="Greys", vmin=0.0, vmax=1.8, aspect="auto")
     for (row, column), part in np.ndenumerate(parts.to_numpy()):
         if part >= LEAST_ENERGY:
             axes.text(column, row, f"{100 * part:.0f}", ha="center", va="center", fontsize=6)
-    labels = [
-        f"{mode.name}   {mode.frequency_Hz:.2f} Hz   {100 * mode.damping_ratio:.1f} %".replace("-", "\N{MINUS SIGN}")
-        for mode in table.iloc[rows].itertuples()
-    ]
     axes.set_yticks(range(len(rows)), labels, fontsize=7)
     axes.set_xticks(range(parts.shape[1]), parts.columns, fontsize=7, rotation=90)
     axes.xaxis.tick_top()
     axes.tick_params(length=0)
     axes.grid(False)
-    axes.set_title(title, loc="left")
-    axes.set_xlabel("kinetic energy by coordinate / %", fontsize=8)
+    figure.suptitle(f"{title}: kinetic energy by coordinate / %", fontsize=9, x=0.01, ha="left")
     return figure
 
 

@@ -17,6 +17,8 @@ METHODS = {
 }  # fmt: skip
 """Colour (Okabe-Ito; dark to light in grey) and marker of the integrators."""
 
+DASHES = ("-", (0, (4, 2)), (0, (1, 1)), "-.")
+
 SHADES = ("#222222", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7")
 
 
@@ -43,7 +45,7 @@ def fig_low_speed(curves):
     -------
     matplotlib.figure.Figure
     """
-    figure, (braking, influence) = _panels(2)
+    figure, (braking, influence) = _panels(2, 7.8)
     rows = pd.DataFrame(curves["braking"])
     rows = rows[(rows["detection"] == "spatial") & (rows["least_speed_m_per_s"] == rows["least_speed_m_per_s"].min())]
     for (vehicle, part), color, dash in zip(
@@ -60,9 +62,10 @@ def fig_low_speed(curves):
         influence.plot(shown["least_speed_m_per_s"], MM * shown["y_off_m"], **look)
         influence.axvline(speed[0], color=color, linewidth=0.7, linestyle=":")
     influence.set(xscale="log", yscale="log", xlabel="smallest speed of creepages / (m/s)", ylabel="change of y / mm")
-    influence.set_title("suspended wheelset at", loc="left")
-    for axes in (braking, influence):
-        axes.legend(fontsize=7)
+    influence.set_title("suspended wheelset", loc="left")
+    braking.legend(fontsize=7)
+    look = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    influence.legend(fontsize=7, title="running speed\n(dotted)", title_fontsize=7, **look)
     return figure
 
 
@@ -122,9 +125,9 @@ def fig_lift_off(curves):
     impact.set(xscale="log", xlabel="speed of the impact / (m/s)", ylabel="restitution")
     rows = pd.DataFrame(curves["drops"])
     rows = rows[(rows["rtol"] == rows["rtol"].min()) & (rows["detection"] == rows["detection"].iloc[0])]
-    for method, part in rows.groupby("integrator", sort=False):
+    for (method, part), dash in zip(rows.groupby("integrator", sort=False), DASHES, strict=False):
         color, _ = METHODS[method]
-        drop.plot(part["t_s"], MM * part["lift_m"], color=color, linewidth=0.9, label=method)
+        drop.plot(part["t_s"], MM * part["lift_m"], color=color, linewidth=0.9, linestyle=dash, label=method)
     shown = rows.loc[rows["lift_m"].abs() > 0.01 * rows["lift_m"].max(), "t_s"].max()
     drop.set(xlabel="time / s", ylabel="height above rest / mm", xlim=(0.0, 1.2 * shown))
     for axes, title in ((impact, "free wheelset on both rails"), (drop, "dropped")):
@@ -181,6 +184,7 @@ def fig_stability_map(curves):
                       linestyle="", label=method)  # fmt: skip
         axes.set(xscale="log", yscale="log", xlabel="speed / (m/s)", ylabel="largest stable step / ms")
         axes.set_title(vehicle, loc="left")
+    panels[0].plot([], [], color="0.5", linewidth=0.9, label="linearised")
     panels[0].legend(fontsize=7, ncols=2)
     return figure
 
@@ -237,16 +241,18 @@ def fig_sharp_curve(curves):
     -------
     matplotlib.figure.Figure
     """
-    figure, (axes,) = _panels(1, 5.0, 3.0)
+    figure, (axes,) = _panels(1, 5.2, 3.8)
     rows = pd.DataFrame(curves["curve"])
     rows = rows[(rows["vehicle"] == rows["vehicle"].iloc[-1]) & (rows["integrator"] == rows["integrator"].iloc[0])]
-    for share, table in rows.groupby("share", sort=False):
+    for (share, table), width in zip(rows.groupby("share", sort=False), (1.8, 0.9), strict=False):
         for detection, part in table.groupby("detection", sort=False):
-            axes.plot(part["t_s"], KILO * part["Y_N"], **LINES[detection], label=f"{share:g} of balance, {detection}")
-        axes.axhline(KILO * table["expected_N"].iloc[0], color=ACCENT, linewidth=0.9, linestyle="-.")
+            look = {**LINES[detection], "linewidth": width}
+            axes.plot(part["t_s"], KILO * part["Y_N"], **look, label=f"{share:g} × balanced speed, {detection}")
+        newton = {"color": ACCENT, "linewidth": width, "linestyle": "-.", "label": f"{share:g} ×, Newton's law"}
+        axes.axhline(KILO * table["expected_N"].iloc[0], **newton)
     axes.set(xlabel="time / s", ylabel="lateral force on the rails / kN")
     axes.set_title(str(rows["vehicle"].iloc[0]), loc="left")
-    axes.legend(fontsize=7)
+    figure.legend(fontsize=7, loc="outside lower center", ncols=2)
     return figure
 
 

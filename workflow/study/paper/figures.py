@@ -99,19 +99,19 @@ def _coordinate_lines(axes, scene, side, point, lift):
     _line(axes, _wheel_points(scene, side, u_w, np.linspace(0.0, s_w, 50), **wheel), **blue)
     _line(axes, _rail_points(scene, side, _inside(scene.rail, 200), 0.0), **red)
     _line(axes, _rail_points(scene, side, u_r, np.linspace(0.0, s_r, 20)), **red)
-    for name, at, style in (
-        ("Q ($u_w$, $s_w$)", _wheel_points(scene, side, u_w, s_w, **wheel), blue),
-        ("P ($u_r$, $s_r$)", _rail_points(scene, side, u_r, s_r), red),
+    for name, at, style, aside in (
+        ("Q ($u_w$, $s_w$)", _wheel_points(scene, side, u_w, s_w, **wheel), blue, "right"),
+        ("P ($u_r$, $s_r$)", _rail_points(scene, side, u_r, s_r), red, "left"),
     ):
         axes.scatter(*(MM * at), color=style["color"], s=16, zorder=6, depthshade=False)
-        axes.text(*(MM * at + np.array([0.0, 0.0, 6.0])), name, color=style["color"], zorder=7)
+        axes.text(*(MM * at + np.array([0.0, 0.0, 6.0])), name, color=style["color"], zorder=7, ha=aside)
 
 
 def _axis_arrows(axes, length):
     for name, direction in (("x forward", (1, 0, 0)), ("y left", (0, 1, 0)), ("z up", (0, 0, 1))):
         end = length * np.array(direction)
         axes.quiver(0, 0, 0, *end, color="k", linewidth=1.0, arrow_length_ratio=0.12, zorder=8)
-        axes.text(*(1.1 * end), name, zorder=8)
+        axes.text(*(1.1 * end + np.array([0.0, 0.0, 25.0])), name, zorder=8)
 
 
 @styled
@@ -191,12 +191,13 @@ def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
         found[detection] = [patch for patch in detect(geometry, **pose, detection=detection) if patch.side == side]
         if not found[detection]:
             raise ValueError(f"no contact on the {side} side at this pose")
-    figure = Figure(figsize=(6.8, 3.3), layout="constrained")
+    figure = Figure(figsize=(6.8, 3.7), layout="constrained")
     section, plan = figure.subplots(1, 2)
     _cross_section(section, scene, pose, side, found["planar"], window)
     _plan_view(plan, scene, pose, side, found, window)
     section.set_title("(a) planar: profiles in one plane", fontsize=9)
     plan.set_title("(b) spatial: overlap from above", fontsize=9)
+    shared_legend(figure, (section, plan), loc="outside lower center", ncols=3, fontsize=8)
     return figure
 
 
@@ -221,8 +222,8 @@ def _cross_section(axes, scene, pose, side, patches, window):
     axes.plot(MM * y_wheel, MM * z_wheel, color=WHEEL, linewidth=1.6, label="wheel profile")
     axes.fill_between(MM * y_wheel, MM * z_wheel, MM * z_rail, where=z_wheel < z_rail, color=ACCENT, alpha=0.5, lw=0)
     _mark(axes, [(patch.y_m, patch.z_m) for patch in patches], "planar")
-    axes.set(xlabel="y / mm", ylabel="z / mm", aspect="equal")
-    axes.legend(fontsize=7, loc="upper left")
+    axes.set(xlabel="y / mm", ylabel="z / mm")
+    axes.set_aspect("equal", adjustable="datalim")  # a tread is flat: the panel keeps its height
 
 
 def _rail_below(scene, side, y):
@@ -247,8 +248,9 @@ def _plan_view(axes, scene, pose, side, found, window):
     axes.plot(kept * x[deepest, strip], y[deepest, strip], color=ACCENT, label="deepest point of each strip")
     for detection, patches in found.items():
         _mark(axes, [(patch.x_m, patch.y_m) for patch in patches], detection)
-    axes.set(xlabel="x / mm", ylabel="y / mm")
-    axes.legend(fontsize=7, loc="lower left")
+    seen = overlap > 0.0
+    axes.set(xlabel="x / mm", ylabel="y / mm", xlim=(x[seen].min() - 10.0, x[seen].max() + 10.0),
+             ylim=(y[seen].min() - 2.0, y[seen].max() + 2.0))  # fmt: skip
 
 
 def _mark(axes, points, detection):

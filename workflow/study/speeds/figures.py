@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wrcore.analysis.motion import SIDES
-from wrcore.analysis.style import LINES, MM, derailed_at, shared_legend, styled
-from wrcore.analysis.wheels import wheel_forces, wheelsets_of
+from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from wrcore.analysis.wheels import hunting, wheel_forces, wheelsets_of
 from wrcore.run.derived import quotient
 
 KN = 1e-3
@@ -16,10 +16,24 @@ KN = 1e-3
 VEHICLES = ({"marker": "o", "markersize": 3.5}, {"marker": "s", "markersize": 3.5, "markerfacecolor": "white"})
 """Markers of the vehicles that one figure compares, in order."""
 
+CRITICAL = ({"linestyle": "-."}, {"linestyle": ":"})
+"""Lines at the linear critical speeds of those vehicles."""
+
+SWINGS = 10
+"""Oscillations of the leading wheelset that its motion is drawn for: more would run together."""
+
+LAST = 4.0
+"""Time at the end of a run that forces are drawn for, s."""
+
+WIDE = (20.0, 1e5)
+"""Values whose largest and smallest differ by a factor between these are drawn on a logarithmic axis."""
+
 
 @styled
 def lateral_motion(runs):
     """Lateral position of every wheelset over time, planar and spatial, one column per speed.
+
+    Drawn are the first `SWINGS` oscillations of the leading wheelset; the title says so where the run goes on.
 
     Parameters
     ----------
@@ -31,29 +45,41 @@ def lateral_motion(runs):
     matplotlib.figure.Figure
     """
     names = wheelsets_of(next(iter(next(iter(runs.values())).values())))
-    figure = Figure(figsize=(0.6 + 3.1 * len(runs), 0.9 + 1.15 * len(names)), layout="constrained")
+    figure = Figure(figsize=(0.6 + 3.1 * len(runs), 1.1 + 1.15 * len(names)), layout="constrained")
     panels = figure.subplots(len(names), len(runs), squeeze=False, sharex="col", sharey="col")
     for column, (title, pair) in enumerate(runs.items()):
+        shown, whole = _swings(pair["spatial"], names[0])
+        part = f"first {shown:.2g} of {whole:g} s" if shown < whole else f"{whole:g} s"
         for row, name in enumerate(names):
             axes = panels[row, column]
             for detection, line in LINES.items():
-                axes.plot(pair[detection].t, MM * pair[detection][name].y_m, label=detection, **line)
+                seen = pair[detection].t <= shown
+                axes.plot(pair[detection].t[seen], MM * pair[detection][name].y_m[seen], label=detection, **line)
             axes.set(xmargin=0)
-            axes.set_title(f"{name.replace('_', ' ')}, {title}", loc="left")
+            axes.set_title(name.replace("_", " ") if row else f"{title}, {part}\n{name.replace('_', ' ')}", loc="left")
             axes.set_ylabel("y / mm")
         panels[-1, column].set_xlabel("time / s")
     shared_legend(figure, panels.ravel())
     return figure
 
 
+def _swings(run, wheelset):
+    """Time that `SWINGS` oscillations of a wheelset take, and that of the whole run, s."""
+    frequency, _, _ = hunting(run.t, run[wheelset].y_m)
+    whole = float(run.t[-1])
+    return (min(SWINGS / frequency, whole) if frequency > 0.0 else whole), whole
+
+
 @styled
-def guiding_forces(run, title):
-    """Vertical force Q, lateral force Y and Y/Q of every wheel of a run over time.
+def guiding_forces(run, title, critical=None):
+    """Vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run.
 
     Parameters
     ----------
     run : Run
     title : str
+    critical : float, optional
+        Linear critical speed of the vehicle, m/s; the title says on which side of it the run is.
 
     Returns
     -------
@@ -62,19 +88,23 @@ def guiding_forces(run, title):
     names = wheelsets_of(run)
     figure = Figure(figsize=(7.2, 0.9 + 1.35 * len(names)), layout="constrained")
     panels = figure.subplots(len(names), 3, squeeze=False, sharex=True, sharey="col")
+    shown = run.t >= run.t[-1] - LAST
     lines = {"left": {"color": "0.1"}, "right": {"color": "0.55", "linestyle": (0, (4, 2))}}
     for row, name in enumerate(names):
         for side in SIDES:
             vertical, lateral = wheel_forces(run, name, side)
             series = (KN * vertical, KN * lateral, quotient(vertical, lateral))
             for axes, values, label in zip(panels[row], series, ("Q / kN", "Y / kN", "Y/Q"), strict=True):
-                axes.plot(run.t, values, label=f"{side} wheel", **lines[side])
+                axes.plot(run.t[shown], values[shown], label=f"{side} wheel", **lines[side])
                 axes.set(ylabel=label, xmargin=0)
         panels[row, 0].set_title(name.replace("_", " "), loc="left")
     for axes in panels[-1]:
         axes.set_xlabel("time / s")
-    figure.suptitle(title)
-    shared_legend(figure, panels.ravel())
+    if critical is not None:
+        side = "above" if run.scene["speed"] > critical else "below"
+        title += f", {side} the linear critical speed" + (f" of {critical:.1f} m/s" if np.isfinite(critical) else "")
+    figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+    shared_legend(figure, panels.ravel(), loc="outside lower right")
     return figure
 
 
@@ -96,7 +126,7 @@ RESPONSE = (
 
 
 @styled
-def over_speed(tables, track, quantities):
+def over_speed(tables, track, quantities, critical=None):
     """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are crosses at the top.
 
     Parameters
@@ -107,6 +137,8 @@ def over_speed(tables, track, quantities):
         Which of the tables' tracks to show.
     quantities : sequence of (column, factor, label)
         One panel each: ``HUNTING`` or ``RESPONSE``.
+    critical : dict of str to float, optional
+        Linear critical speed by vehicle, m/s: marked, as runs beyond it hunt whatever the track.
 
     Returns
     -------
@@ -124,8 +156,19 @@ def over_speed(tables, track, quantities):
                     style = {**line, **marker, "markevery": 2}
                     axes.plot(part["speed_m_per_s"], values, label=f"{vehicle}, {detection}", **style)
                 derailed_at(axes, part.loc[part["status"] == "derailed", "speed_m_per_s"], line["color"])
-        axes.set(ylabel=label)
+        for look, (vehicle, speed) in zip(CRITICAL, (critical or {}).items(), strict=False):
+            if np.isfinite(speed):
+                axes.axvline(speed, color=ACCENT, linewidth=0.9, label=f"{vehicle}, linear critical", **look)
+        axes.set(ylabel=label, yscale="log" if _wide(axes) else "linear")
     for axes in np.atleast_2d(panels)[-1]:
         axes.set_xlabel("speed / (m/s)")
     shared_legend(figure, np.ravel(panels), ncols=2)
     return figure
+
+
+def _wide(axes):
+    """Whether small values of a panel would be lost beside its large ones, and all are above zero."""
+    drawn = [line.get_ydata() for line in axes.lines if line.get_transform() == axes.transData]
+    values = np.concatenate([[], *drawn])
+    values = values[np.isfinite(values)]
+    return bool(values.size) and values.min() > 0.0 and WIDE[0] < values.max() / values.min() < WIDE[1]

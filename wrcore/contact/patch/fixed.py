@@ -8,15 +8,15 @@ from wrcore.contact.patch.strips import BEND, MAX_WINDOWS, assemble, place_strip
 from wrcore.contact.patch.windows import take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
-COARSE = 32
-"""Fixed strips over the overlaps, where the first guess of the windows has failed."""
+FIXED = 32
+"""Fixed strips, where the first guess of the windows has failed."""
 
 _SWEEPS = 4
 
 
 @jit(allocates=False, fastmath=FUSED)
 def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
-    """Windows from fixed strips over all overlaps: loads by an active set at given half lengths, these from the loads.
+    """Windows from fixed strips: over all overlaps, then finer ones about the runs that carry load.
 
     Leaves c and Q of the fixed strips at the nodes as the next guesses. Returns the number of windows.
     """
@@ -27,76 +27,97 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
             low, high = min(low, nodes[S, i]), max(high, nodes[S, i])
     if not high > low:
         return 0
-    work.low[0], work.high[0], work.start[0], work.start[1] = low, high, 0, COARSE
-    w = (high - low) / COARSE
-    work.gap[0, U], work.gap[0, UR] = frame.u + low * frame.cosine, frame.ur + low * frame.cosine
-    place_strips(geometry, pose, frame, work, 1)
-    active, load, matrix = work.active, work.load, work.matrix
-    for i in range(COARSE):
+    work.low[0], work.high[0], windows = low, high, 1
+    for refined in range(2):
+        work.start[0] = 0
+        for k in range(windows):
+            work.start[k + 1] = work.start[k] + FIXED // windows
+        work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
+        place_strips(geometry, pose, frame, work, windows)
+        if not _carry(values, work, windows):
+            return 0
+        found, largest = _runs(work, windows)
+        if refined == 0:
+            windows = _widened(work, found, low, high, work.width[0])
+    total, squares = 0.0, 1e-300
+    for i in range(work.start[windows]):
+        if work.active[i]:
+            total, squares = total + work.load[i], squares + work.square[i]
+    mean = total / squares
+    for k in range(count):
+        nodes[NODE_SQUARE, k], nodes[NODE_SHARE, k] = 0.0, mean
+        for i in range(work.start[windows]):
+            if work.active[i] and abs(nodes[S, k] - work.centre[i]) <= 0.5 * work.width[i]:
+                nodes[NODE_SQUARE, k], nodes[NODE_SHARE, k] = work.square[i], work.load[i] / work.square[i]
+    return take_fresh(work, found, math.sqrt(largest), resolution)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _carry(values, work, windows):
+    """Loads of fixed strips by an active set at given half lengths, these from the loads; whether it was found."""
+    strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
+    for i in range(strips):
         active[i] = work.gap[i, GAP] < 0.0
-        work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * w * w)
-        work.middle[i], work.share[i] = work.gap[i, CREST], 0.0
-    offset = 2 * COARSE + 2
+        work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * work.width[i] ** 2)
+        work.middle[i] = work.gap[i, CREST]
+    offset = 2 * strips + 2 * windows
     for _ in range(_SWEEPS):
-        for i in range(COARSE):
+        for i in range(strips):
             work.share[i] = 0.0
-        n = assemble(values, work, 1, 2)
-        for _ in range(12):
-            used = 0
-            for i in range(COARSE):
-                if active[i]:
-                    column = 0
-                    row = offset + used
-                    for j in range(COARSE):
-                        if active[j]:
-                            matrix[row, column] = matrix[2 * i, 2 * j] / work.square[j]
-                            column += 1
-                    matrix[row, column] = matrix[2 * i, n]
-                    used += 1
-            if used == 0 or not _solve_below(matrix, offset, used):
-                return 0
-            used, dropped = 0, False
-            for i in range(COARSE):
-                load[i] = 0.0
-                if active[i]:
-                    load[i] = matrix[offset + used, column]
-                    used += 1
-                    if load[i] <= 0.0:
-                        active[i], dropped, load[i] = False, True, 0.0
-            if dropped:
-                continue
-            added = False
-            for i in range(COARSE):
-                if not active[i]:
-                    gap = -matrix[2 * i, n]
-                    for j in range(COARSE):
-                        gap += matrix[2 * i, 2 * j] / work.square[j] * load[j]
-                    if gap < 0.0:
-                        active[i] = added = True
-            if not added:
-                break
+        n = assemble(values, work, windows, 2)
+        if not _active_set(work, strips, n, offset):
+            return False
         largest = 0.0
-        for i in range(COARSE):
+        for i in range(strips):
             bend = 0.0
-            for j in range(COARSE):
+            for j in range(strips):
                 bend -= matrix[2 * i + 1, 2 * j] / work.square[j] * load[j]
             matrix[offset, i] = bend / (work.gap[i, SHAPE] * BEND)
             largest = max(largest, matrix[offset, i])
-        for i in range(COARSE):
-            new = max(matrix[offset, i], 0.02 * largest, 0.02 * w * w)
+        for i in range(strips):
+            new = max(matrix[offset, i], 0.02 * largest, 0.02 * work.width[i] ** 2)
             work.square[i] = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
-    total, squares = 0.0, 1e-300
-    for i in range(COARSE):
-        if active[i]:
-            total, squares = total + load[i], squares + work.square[i]
-    mean = total / squares
-    for k in range(count):
-        position = (nodes[S, k] - low) / w
-        i = min(max(int(position), 0), COARSE - 1)
-        nodes[NODE_SQUARE, k], nodes[NODE_SHARE, k] = 0.0, mean
-        if active[i] and 0.0 <= position <= COARSE:
-            nodes[NODE_SQUARE, k], nodes[NODE_SHARE, k] = work.square[i], load[i] / work.square[i]
-    return _runs(work, low, w, resolution)
+    return True
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _active_set(work, strips, n, offset):
+    """Loads of the strips at their half lengths: none pulls, none that carries nothing is pressed in."""
+    matrix, active, load = work.matrix, work.active, work.load
+    for _ in range(12):
+        used = 0
+        for i in range(strips):
+            if active[i]:
+                column = 0
+                row = offset + used
+                for j in range(strips):
+                    if active[j]:
+                        matrix[row, column] = matrix[2 * i, 2 * j] / work.square[j]
+                        column += 1
+                matrix[row, column] = matrix[2 * i, n]
+                used += 1
+        if used == 0 or not _solve_below(matrix, offset, used):
+            return False
+        used, changed = 0, False
+        for i in range(strips):
+            load[i] = 0.0
+            if active[i]:
+                load[i] = matrix[offset + used, column]
+                used += 1
+                if load[i] <= 0.0:
+                    active[i], changed, load[i] = False, True, 0.0
+        if changed:
+            continue
+        for i in range(strips):
+            if not active[i]:
+                gap = -matrix[2 * i, n]
+                for j in range(strips):
+                    gap += matrix[2 * i, 2 * j] / work.square[j] * load[j]
+                if gap < 0.0:
+                    active[i] = changed = True
+        if not changed:
+            break
+    return True
 
 
 @jit(allocates=False)
@@ -106,18 +127,29 @@ def _solve_below(matrix, offset, n):
 
 
 @jit(allocates=False)
-def _runs(work, low, w, resolution):
-    """Windows of the runs of active coarse strips."""
+def _runs(work, windows):
+    """Runs of active strips, into ``work.fresh``: their number, and the largest c."""
     found, inside, largest = 0, False, 0.0
-    for i in range(COARSE):
-        if work.active[i]:
-            largest = max(largest, work.square[i])
-            if not inside and found < MAX_WINDOWS:
-                work.fresh[0, found], inside = low + i * w, True
-            if inside:
-                work.fresh[1, found] = low + (i + 1) * w
-        elif inside:
+    for i in range(work.start[windows]):
+        if inside and (not work.active[i] or work.window[i] != work.window[i - 1]):
             found, inside = found + 1, False
-    if inside:
-        found += 1
-    return take_fresh(work, found, math.sqrt(largest), resolution)
+        if work.active[i] and found < MAX_WINDOWS:
+            largest = max(largest, work.square[i])
+            if not inside:
+                work.fresh[0, found], inside = work.centre[i] - 0.5 * work.width[i], True
+            work.fresh[1, found] = work.centre[i] + 0.5 * work.width[i]
+    return found + int(inside), largest
+
+
+@jit(allocates=False)
+def _widened(work, found, low, high, by):
+    """Windows of the runs, wider by ``by`` at either end; those that meet are one. Returns their number."""
+    windows = 0
+    for k in range(found):
+        first, last = max(work.fresh[0, k] - by, low), min(work.fresh[1, k] + by, high)
+        if windows > 0 and first <= work.high[windows - 1]:
+            work.high[windows - 1] = last
+        else:
+            work.low[windows], work.high[windows] = first, last
+            windows += 1
+    return windows

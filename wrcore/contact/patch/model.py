@@ -13,14 +13,14 @@ from wrcore.contact.patch.rolling import Workspace as RollingWork
 from wrcore.contact.patch.rolling_influence import Panels, make_panels
 from wrcore.contact.patch.solve import EXACT, STRIP_ROWS, STRIPS, SUMS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 
 PATCHES = ("maximum", "moment", "strips", "exact")
 """Patch models by name: two reductions to an ellipse, cheap and exact strips."""
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
-FORCE_ROWS = 16
+FORCE_ROWS = 21
 
 PATCHES_HELD, WRENCHES_HELD = 1, 2
 """What `StripWork.held` says."""
@@ -110,7 +110,7 @@ def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28):
     named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
     for name, (value, known) in named.items():
         if value not in known:
-            raise InputError("contact", name, f"expected one of {', '.join(known)}, got {value!r}")
+            raise InputError("contact", name, one_of(known, value))
     return _strip_model(patch, resolution, slip, float(nu))
 
 

@@ -113,6 +113,22 @@ _PATIENCE = 3
 """Steps in which a strip would lose its pressure, or two windows overlap, before Newton's iteration gives up."""
 
 
+FAINT, NEGLIGIBLE = 2e-3, 1e-4
+"""A strip goes without pressure below this share of its window's largest c, a window below that of the patch's."""
+
+
+@jit(allocates=False, fastmath=FUSED)
+def top_squares(work, windows):
+    """Fill ``work.tops``; the largest c of all windows."""
+    largest = 0.0
+    for k in range(windows):
+        work.tops[k] = 0.0
+        for i in range(work.start[k], work.start[k + 1]):
+            work.tops[k] = max(work.tops[k], work.square[i])
+        largest = max(largest, work.tops[k])
+    return largest
+
+
 @jit(allocates=False, fastmath=FUSED)
 def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tolerance):
     """Newton's iteration from the strips in ``work``, with limits strip by strip; ``bold``: see `_tips_too_fast`.
@@ -128,11 +144,10 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
         work.stride[0, k] = work.stride[1, k] = 0.0
     for step in range(most):
         place_strips(geometry, pose, frame, work, windows)
-        largest = 0.0
-        for i in range(strips):
-            if kinds == 2:
+        largest = top_squares(work, windows)
+        if kinds == 2:
+            for i in range(strips):
                 work.middle[i] = work.gap[i, CREST]
-            largest = max(largest, work.square[i])
         n = assemble(values, work, windows, kinds)
         _copy(work.matrix, n, work.kept)
         if not solve_linear(work.matrix, n):
@@ -154,9 +169,10 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
             if not (abs(dq) < 1e300 and abs(dc) < 1e300):
                 return LOST
             change = max(change, abs(dq) / q, abs(dc) / largest)
-            starved = starved or (c + dc < 0.0 and c < 2e-3 * largest)
+            top = work.tops[work.window[i]]
+            starved = starved or (c + dc < 0.0 and (c < FAINT * top or top < NEGLIGIBLE * largest))
             work.share[i] = _limited(q + dq, 0.5 * q, 1.5 * q)
-            work.square[i] = _limited(c + dc, max(0.3 * c, 1e-9 * largest), 1.5 * c + 0.1 * largest)
+            work.square[i] = _limited(c + dc, max(0.3 * c, 1e-9 * largest), 1.5 * c + 0.1 * top)
             if kinds == 3:
                 dx, a = work.matrix[k + 2, n], math.sqrt(c)
                 change = max(change, abs(dx) / math.sqrt(largest))

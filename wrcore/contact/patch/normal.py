@@ -26,6 +26,7 @@ from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.solve import (
     CENTRE,
     EXACT,
+    LOAD,
     MIDDLE,
     PEAK,
     STRIP_ROWS,
@@ -38,8 +39,9 @@ from wrcore.contact.patch.solve import (
     wheel_overlaps,
 )
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
+from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.geometry.surface import SIDES
 
 RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}
@@ -129,7 +131,7 @@ class NormalContact:
         for name, value, known in (("resolution", resolution, RESOLUTIONS), ("model", model, MODELS),
                                    ("detection", detection, ("planar", "spatial"))):  # fmt: skip
             if value not in known:
-                raise InputError("NormalContact", name, f"expected one of {', '.join(known)}, got {value!r}")
+                raise InputError("NormalContact", name, one_of(known, value))
         if not 0.0 < modulus < math.inf:
             raise InputError("NormalContact", "modulus", f"expected a contact modulus in Pa, got {modulus!r}")
         self.geometry, self.modulus, self.spatial = geometry, float(modulus), detection == "spatial"
@@ -178,14 +180,17 @@ class NormalContact:
         return found
 
     def _solve(self, side, pose, first, last, velocity, memory):
-        work = self._work
-        windows, frame = solve_patch(self.geometry, pose, self._hertz, self._values, self._patches, first, last,
-                                     self.resolution, self.model, memory, work)  # fmt: skip
-        count = 0
-        if windows:
-            count = publish(self.geometry, pose, frame, self.modulus, work, windows, self._strips, self._sums)
-        sums = self._sums if windows else np.full(SUMS, np.nan)
-        strips = self._strips[:, :count].copy()
+        windows, frame, strips, sums = self._once(pose, first, last, memory)
+        share = self._work.more[1]
+        if share > 0.0:  # the mean with a solution on more strips; the strips of the one that weighs more
+            self._work.more[0] = MORE
+            more, _, finer, others = self._once(pose, first, last, memory)
+            self._work.more[0] = 1.0
+            if more:
+                load = (others if share > 0.5 else sums)[LOAD]
+                sums, strips = (1.0 - share) * sums + share * others, finer if share > 0.5 else strips
+                strips[PEAK] *= sums[LOAD] / load
+        count = strips.shape[1]
         slips = (None,) * 4
         if velocity is not None:
             slips = np.zeros((4, count))
@@ -196,6 +201,15 @@ class NormalContact:
             side, windows > 0, pose.side * math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
             strips[WINDOW].astype(int), *map(float, sums), *slips,
         )  # fmt: skip
+
+    def _once(self, pose, first, last, memory):
+        """One solution of the overlaps: number of windows, frame, strips and sums."""
+        windows, frame = solve_patch(self.geometry, pose, self._hertz, self._values, self._patches, first, last,
+                                     self.resolution, self.model, memory, self._work)  # fmt: skip
+        if not windows:
+            return 0, frame, self._strips[:, :0], np.full(SUMS, np.nan)
+        count = publish(self.geometry, pose, frame, self.modulus, self._work, windows, self._strips, self._sums)
+        return windows, frame, self._strips[:, :count].copy(), self._sums.copy()
 
     def at_load(self, side, y, load, roll=0.0, yaw=0.0, guess=None, vertical=True, velocity=None):
         """Patches of one wheel that carries a given load, and the wheelset's height.

@@ -17,7 +17,6 @@ import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
-from scipy.ndimage import spline_filter
 
 from wrcore.kernels.jit import FUSED, jit
 
@@ -70,6 +69,8 @@ def influence_table():
     -------
     InfluenceTable
     """
+    from scipy.ndimage import spline_filter  # only scenes with exact contact wait for its import
+
     extra = 14  # nodes beyond either end, so that what the spline assumes there does not matter
     tau = _TAU_START + _TAU_STEP * (np.arange(_TAU_NODES + 2 * extra) - 1 - extra)
     square = 0.5 * (tau**4 + np.sqrt(tau**8 + 4.0 * tau**4 * _BLUR**2))

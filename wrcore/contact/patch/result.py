@@ -8,6 +8,8 @@ import numpy as np
 _MM, _MPA = 1e3, 1e-6
 _MOST_ARROWS = 18
 """Along the longer side of a plot; a denser field is thinned out."""
+_LEGEND_BELOW = -0.45
+"""Upper edge of a plot's legend from the lower edge of its axes, inches: below the label."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,14 @@ class Patch:
         x_min, x_max, s_min, s_max, m, where they are known better than from the cells; else empty.
     pose : tuple of float
         y, z (m), roll and yaw (rad) of the wheelset; may be empty.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    >>> (tread,) = wr.patch(pair, y=0.003, load=5e4)
+    >>> round(1e-3 * tread.normal, 1), tread.side, len(tread.pressure) == len(tread.x)
+    (49.9, 'left', True)
     """
 
     x: np.ndarray = field(repr=False)
@@ -151,8 +161,8 @@ class Patch:
         self._draw_arrows(axes)
         axes.set_aspect("equal")
         axes.autoscale_view()
-        axes.set_xlabel("x, rolling direction (mm)")
-        axes.set_ylabel("s, to the left (mm)")
+        axes.set_xlabel("x, rolling direction / mm")
+        axes.set_ylabel("s, to the left / mm")
         forces = " kN, ".join(f"{name} {1e-3 * f:.2f}" for name, f in (("N", self.normal), ("Fx", self.fx)))
         axes.set_title(f"{forces} kN, Fs {1e-3 * self.fs:.2f} kN", fontsize="medium")
         return figure
@@ -163,6 +173,7 @@ class Patch:
         from matplotlib.collections import PolyCollection
         from matplotlib.colors import ListedColormap
         from matplotlib.patches import Patch as Swatch
+        from matplotlib.transforms import ScaledTranslation
 
         at = self.touching
         x, s, dx, ds = (_MM * values[at] for values in (self.x, self.s, 0.5 * self.dx, 0.5 * self.ds))
@@ -174,9 +185,11 @@ class Patch:
         axes.add_collection(cells)
         style = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
         axes.add_collection(PolyCollection(boxes[slips], hatch="////", **style))
-        figure.colorbar(cells, ax=axes, label="pressure (MPa)")
+        figure.colorbar(cells, ax=axes, label="pressure / MPa")
         swatches = Swatch(fc="0.8", label="adhesion"), Swatch(fc="0.8", ec="C0", lw=0.0, hatch="////", label="slip")
-        axes.legend(handles=list(swatches), loc="upper left", bbox_to_anchor=(0.0, -0.13), ncols=2, frameon=False)
+        below = axes.transAxes + ScaledTranslation(0.0, _LEGEND_BELOW, figure.dpi_scale_trans)
+        place = {"loc": "upper left", "bbox_to_anchor": (0.0, 0.0), "bbox_transform": below}
+        axes.legend(handles=list(swatches), ncols=2, frameon=False, **place)
 
     def _draw_arrows(self, axes):
         """Traction in up to `_MOST_ARROWS` squared cells, spread evenly."""

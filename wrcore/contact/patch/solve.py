@@ -100,7 +100,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
             if attempts == 1 and extra == 0:
                 _remember(frame, work, found, memory)
             return found, frame
-        windows = 0
+        windows = work.guessed[0] = 0
     return 0, frame
 
 

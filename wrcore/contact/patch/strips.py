@@ -60,8 +60,12 @@ class Workspace(NamedTuple):
     """(MAX_WINDOWS,) tips of the windows, m."""
     start: np.ndarray
     """(MAX_WINDOWS + 1,) first strip of each window."""
+    guessed: np.ndarray
+    """(MAX_WINDOWS + 1,): number of windows of the first guess, 0: of no use, and their numbers of strips."""
     fresh: np.ndarray
     """(2, MAX_WINDOWS + 1): tips of windows to be, m."""
+    tops: np.ndarray
+    """(MAX_WINDOWS,): largest c of each window, m^2."""
     stride: np.ndarray
     """(2, MAX_WINDOWS): last step of the tips, m."""
     window: np.ndarray
@@ -88,6 +92,9 @@ class Workspace(NamedTuple):
     active: np.ndarray
     load: np.ndarray
     """Fixed strips in contact and their loads."""
+    more: np.ndarray
+    """(3,): widths of windows count this many times where strips are counted, 1 or `windows.MORE`; the weight that the
+    solution with MORE has in the mean of both (found with 1); and this weight of the first guess."""
 
 
 def workspace():
@@ -100,10 +107,12 @@ def workspace():
     n, m = MAX_STRIPS, MAX_WINDOWS
     return Workspace(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
-        np.zeros(m + 1, np.int64), np.zeros((2, m + 1)), np.zeros((2, m)), np.zeros(n, np.int64),
+        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), np.zeros(m), np.zeros((2, m)),
+        np.zeros(n, np.int64),
         *(np.zeros(n) for _ in range(5)), np.zeros((n, GAP_ROWS)),
         np.stack([np.log(np.arange(n) + 0.5), np.zeros(n), np.zeros(n)]), np.zeros((4, 4)),
         *(np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)) for _ in range(2)), np.zeros(n, np.bool_), np.zeros(n),
+        np.array([1.0, 0.0, 0.0]),
     )  # fmt: skip
 
 

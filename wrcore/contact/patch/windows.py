@@ -8,6 +8,7 @@ import math
 
 from wrcore.contact.normal import hertz_ellipse
 from wrcore.contact.patch.gap import CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
+from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
 from wrcore.contact.patch.strips import MAX_STRIPS, MAX_WINDOWS, gap_under_load, place_strips
 from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y, PENETRATION
 from wrcore.kernels.jit import FUSED, jit
@@ -16,6 +17,12 @@ LEAST = 8
 """Strips of a slender window (length over width above `SLENDER`), whatever the resolution."""
 
 SLENDER = 4.0
+
+MORE = 1.05
+"""Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
+
+_STEPS = (1.0 / SLENDER, 1.2, 1.8)
+"""Widths over lengths at which the number of strips steps."""
 
 _SADDLE = 0.02
 """A lobe of its own rises by this share of the deepest penetration from its neighbour."""
@@ -88,12 +95,20 @@ def guess_at(work, count, s):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def count_strips(width, length, resolution):
-    """Strips of a window: few where it is slender, more where it is wide (it then has lobes)."""
-    if length > SLENDER * width:
+def count_strips(width, length, resolution, more):
+    """Strips of a window: few where it is slender, more where it is wide (it then has lobes).
+
+    Just below a width at which the number steps ``more`` (see `Workspace`) gets the weight of the larger number: it
+    rises from 0 to 1, so that forces do not step. It is the largest over the windows.
+    """
+    ratio = more[0] * width / length
+    for step in _STEPS:
+        t = (MORE * ratio / step - 1.0) / (MORE - 1.0)
+        if 0.0 < t <= 1.0 and more[0] == 1.0 and (step >= 1.0 or resolution != LEAST):
+            more[1] = max(more[1], t * t * (3.0 - 2.0 * t))
+    if ratio < _STEPS[0]:
         return LEAST
-    ratio = width / length
-    halves = 2 if ratio <= 1.2 else min(int(math.ceil(2.0 * ratio / 1.2)), 4)
+    halves = 2 if ratio <= _STEPS[1] else 3 if ratio <= _STEPS[2] else 4
     return min(resolution * halves // 2, MAX_STRIPS)
 
 
@@ -101,7 +116,7 @@ def count_strips(width, length, resolution):
 def windows_from_guess(work, stretches, resolution):
     """Windows where the guess of c is positive. Returns their number."""
     nodes, count, windows = work.nodes, work.ends[stretches - 1], 0
-    inside, largest = False, 0.0
+    inside, largest, work.more[1] = False, 0.0, 0.0
     for i in range(count):
         c = nodes[NODE_SQUARE, i]
         fresh = i == 0
@@ -118,11 +133,15 @@ def windows_from_guess(work, stretches, resolution):
             if c < 0.0:
                 high -= (nodes[S, i] - nodes[S, i - 1]) * c / (c - before)
             work.high[windows] = high
-            work.start[windows + 1] = count_strips(high - work.low[windows], 2.0 * math.sqrt(largest), resolution)
+            width, length = high - work.low[windows], 2.0 * math.sqrt(largest)
+            work.start[windows + 1] = count_strips(width, length, resolution, work.more)
             inside = False
             windows += 1
         if inside:
             largest = max(largest, c)
+    work.guessed[0], work.more[2] = windows, work.more[1]
+    for k in range(1, windows + 1):
+        work.guessed[k] = work.start[k]
     _number(work, windows)
     return windows
 
@@ -163,14 +182,13 @@ def start_strips(geometry, pose, frame, work, windows, stretches):
 @jit(allocates=False, fastmath=FUSED)
 def drop_starved(work, windows, resolution):
     """Windows of the runs of strips that kept their pressure after a starved iteration. Returns their number."""
-    largest = 0.0
+    largest = top_squares(work, windows)
     strips = work.start[windows]
-    for i in range(strips):
-        largest = max(largest, work.square[i])
     found, inside = 0, False
     lows, highs = work.fresh[0], work.fresh[1]
     for i in range(strips):
-        alive = work.square[i] > 2e-3 * largest
+        top = work.tops[work.window[i]]
+        alive = work.square[i] > FAINT * top and top > NEGLIGIBLE * largest
         edge = i > 0 and work.window[i] != work.window[i - 1]
         if inside and (edge or not alive):
             highs[found] = work.centre[i - 1] + 0.5 * work.width[i - 1]
@@ -207,9 +225,14 @@ def merge_close(work, windows, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def take_fresh(work, found, a, resolution):
+    """Windows from their tips in ``work.fresh``: as many strips as guessed if they are as many as were guessed."""
+    known = found == work.guessed[0]
+    work.more[1] = work.more[2] if known else 0.0
     for k in range(found):
         work.low[k], work.high[k] = work.fresh[0, k], work.fresh[1, k]
-        work.start[k + 1] = count_strips(work.high[k] - work.low[k], 2.0 * a, resolution)
+        work.start[k + 1] = (
+            work.guessed[k + 1] if known else count_strips(work.high[k] - work.low[k], 2.0 * a, resolution, work.more)
+        )
     _number(work, found)
     return found
 

@@ -1,0 +1,56 @@
+"""Limit cycles and forces on flanges with rigid rails and on the tracks of reports/tracks.md.
+
+``python -m tests.dynamics.giving_track`` prints the table of that page.
+"""
+
+import re
+
+import numpy as np
+
+from tests.conftest import ROOT, SCENES
+from wrcore.analysis.wheels import wheelset_channels
+from wrcore.errors.checked_yaml import parse_value
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
+
+TEXT = (ROOT / "reports" / "tracks.md").read_text(encoding="utf-8")
+EXAMPLES = [
+    example for example in map(parse_value, re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)) if "support" in example
+]
+"""The page's tracks that give: with masses, and without."""
+
+TRACKS = {"rigid": {}, "masses": {"support": EXAMPLES[0]["support"]}, "massless": {"support": EXAMPLES[1]["support"]}}
+SPEEDS = (60.0, 70.0, 80.0)
+"""m/s; it hunts above some 55 m/s."""
+
+
+def hunting(track, speed):
+    """A run of the suspended wheelset into its limit cycle."""
+    changes = {"track": track, "speed": speed, "initial.y": 0.005, "integration.duration": 4.0,
+               "integration.rtol": 1e-5, "output.rate": 5000.0}  # fmt: skip
+    return simulate(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+
+
+def row(name, speed):
+    """Amplitude and frequency of the last second, greatest Q and Y of the run, and what it cost."""
+    run = hunting(TRACKS[name], speed)
+    late, forces = run.t > run.t[-1] - 1.0, wheelset_channels(run, "wheelset")
+    y = run["wheelset"].y_m[late]
+    crossings = np.count_nonzero(np.diff(np.sign(y - y.mean())) > 0)
+    greatest = [max(forces[f"{force}_{side}_N"].max() for side in ("left", "right")) for force in ("Q", "Y")]
+    return (
+        f"| {speed:g} | {name} | {run.status} | {500.0 * np.ptp(y):.2f} | {crossings} | {1e-3 * greatest[0]:.0f} |"
+        f" {1e-3 * greatest[1]:.0f} | {run.counters['wall_s']:.2f} |"
+    )
+
+
+def main():
+    print("| m/s | rails | ended | amplitude mm | Hz | greatest Q kN | greatest Y kN | computing s |")
+    print("|---|---|---|---|---|---|---|---|")
+    for speed in SPEEDS:
+        for name in TRACKS:
+            print(row(name, speed), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,270 @@
+"""The track that gives under each wheelset: against two masses on springs, in balance, in runs and in the Jacobian."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from tests.conftest import SCENES
+from tests.dynamics import test_jacobian as jacobian_tests
+from tests.dynamics.giving_track import EXAMPLES
+from wrcore.analysis.motion import first_flange_contact
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.energy import energy_balance
+from wrcore.dynamics.support import RAILS, support_places
+from wrcore.dynamics.system import Equations, own_states
+from wrcore.errors import InputError
+from wrcore.integrate.integrator import integrate
+from wrcore.integrate.rosenbrock import new_linear
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
+
+SCENE = SCENES / "suspended_wheelset.yaml"
+MASSES, MASSLESS = (example["support"] for example in EXAMPLES)
+BOTH = pytest.mark.parametrize("support", [MASSES, MASSLESS], ids=["masses", "massless"])
+BASE = 0.75
+ROUGH = {"spectrum": {"level": "low", "seed": 3, "length": 200, "begin": 5}}
+
+
+def scene_on(support, **changes):
+    """The suspended wheelset on a track."""
+    return load_scene(SCENE, {"track": {"support": support}}, **changes)
+
+
+def unloaded(support):
+    """Matrix A (14, 14) of q and q' of a track whose wheelset hangs in the air, by the engine's equations."""
+    model, state = compile_scene(scene_on(support))
+    state[2] += 0.1
+    places, equations = support_places(model)[0], Equations(model)
+    state[places] = 0.0
+    moved = state + 1e-3 * np.eye(len(state))[places]
+    rates = 1e3 * equations.at(0.0, np.vstack([moved, state]))[:, places]
+    np.testing.assert_array_equal(rates[-1], 0.0)
+    return rates[:-1].T, model.contact.geometry.rail_distance
+
+
+def spring(of, direction, omega=0.0):
+    """Dynamic stiffness k + i omega c."""
+    return of[direction]["stiffness"] + 1j * omega * of[direction]["damping"]
+
+
+def patterns(support, base):
+    """Shapes of rails and sleeper that go alone: freedoms, direction, and the sleeper's mass for each rail."""
+    half = 0.5 * support["sleeper"]["mass"]
+    return {
+        "lateral in phase": ([1, 0, 1, 0, 1, 0, 0], "lateral", half),
+        "gauge": ([1, 0, -1, 0, 0, 0, 0], "lateral", np.inf),
+        "bounce": ([0, 1, 0, 1, 0, 1, 0], "vertical", half),
+        "roll": ([0, 1, 0, -1, 0, 0, 1 / base], "vertical", 0.5 * support["sleeper"]["roll_inertia"] / base**2),
+    }
+
+
+@pytest.mark.parametrize("name", ["lateral in phase", "gauge", "bounce", "roll"])
+def test_the_unloaded_track_has_the_receptance_of_two_masses(name):
+    matrix, base = unloaded(MASSES)
+    shape, direction, sleeper = patterns(MASSES, base)[name]
+    push = np.zeros(14)
+    push[7 : 7 + RAILS] = np.array(shape[:RAILS]) / MASSES["rail"]["mass"]  # unit forces on both rails
+    rail = 0 if direction == "lateral" else 1
+    for omega in 2.0 * np.pi * np.array([0.0, 10.0, 60.0, 110.0, 250.0, 400.0, 1000.0]):
+        pad, ballast = (spring(MASSES[part], direction, omega) for part in ("rail", "sleeper"))
+        below = 0.5 * ballast - omega**2 * sleeper if np.isfinite(sleeper) else np.inf
+        carried = pad if np.isinf(np.real(below)) else pad * below / (pad + below)
+        expected = 1.0 / (carried - omega**2 * MASSES["rail"]["mass"])
+        found = np.linalg.solve(1j * omega * np.eye(14) - matrix, push)[rail]
+        assert abs(found - expected) < 1e-6 * abs(expected)
+
+
+def test_natural_frequencies_are_those_of_two_masses():
+    undamped = json.loads(json.dumps(MASSES))
+    for part in undamped.values():
+        for direction in ("lateral", "vertical"):
+            part[direction]["damping"] = 0.0
+    matrix, base = unloaded(undamped)
+    expected = []
+    for _, direction, m2 in patterns(undamped, base).values():
+        m1, (k1, k2) = MASSES["rail"]["mass"], (MASSES[part][direction]["stiffness"] for part in ("rail", "sleeper"))
+        if np.isinf(m2):
+            expected.append(k1 / m1)
+            continue
+        a, b = m1 * m2, m1 * (k1 + 0.5 * k2) + m2 * k1  # a w^4 - b w^2 + k1 k2/2 = 0
+        root = np.sqrt(b * b - 2.0 * a * k1 * k2)
+        expected += [(b - root) / (2.0 * a), (b + root) / (2.0 * a)]
+    found = np.sort(np.abs(np.linalg.eigvals(matrix).imag))[::2]
+    np.testing.assert_allclose(found, np.sqrt(np.sort(expected)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas4"])
+def test_a_track_let_go_swings_as_two_masses_do(method):
+    model, state = compile_scene(scene_on(MASSES))
+    state[2] += 0.1
+    places = support_places(model)[0]
+    state[places] = [1e-3, 2e-3, 0.0, 2e-3, *np.zeros(10)]
+    times = np.linspace(0.0, 0.02, 21)
+    found = integrate(model, state, times, method, 1e-9, 0.0).states[:, places]
+    matrix, _ = unloaded(MASSES)
+    expected = np.array([expm(t * matrix) @ state[places] for t in times])
+    np.testing.assert_allclose(found[:, :7], expected[:, :7], rtol=0.0, atol=2e-9)
+
+
+@BOTH
+def test_at_rest_the_springs_carry_the_wheels(support):
+    scene = scene_on(support, initial__y=0.0)
+    model, _ = compile_scene(scene)
+    found = static_equilibrium(scene, model)
+    q = found.state[support_places(model)[0, : len(model.support.mass)]]
+    softness = 1.0 / support["rail"]["vertical"]["stiffness"]
+    if "sleeper" in support:
+        softness += 2.0 / support["sleeper"]["vertical"]["stiffness"]
+    np.testing.assert_allclose(q[1:RAILS:2], -found.wheel_loads[0] * softness, rtol=1e-6)
+    assert q[0] == pytest.approx(-q[2], rel=1e-6) and q[0] > 1e-5  # inclined contacts push the rails apart
+
+
+@BOTH
+@pytest.mark.parametrize("method", ["tsit5", "rodas4"])
+def test_energy_of_a_run_on_its_flanges_adds_up(support, method):
+    changes = {
+        "speed": 70.0, "initial.y": 0.006, "integration.duration": 0.5, "integration.method": method,
+        "integration.rtol": 1e-7, "output.rate": 10000.0, "output.channels": ["pose", "contact", "energy"],
+    }  # fmt: skip
+    run = simulate(load_scene(scene_on(support), changes))
+    energy = run.groups["energy"]
+    balance = energy_balance(energy, run.t)
+    assert np.isfinite(first_flange_contact(run))
+    assert np.abs(balance.imbalance).max() < 1e-5 * balance.turned_over[-1]  # found: 1e-6 to 4e-6
+    assert np.abs(energy["input_by_joints_W"]).max() < 1e-6
+    for name, values in energy.items():
+        if name.startswith("dissipated"):
+            assert values.min() > -1e-6 * energy["dissipated_by_creep_W"].max(), name
+
+
+@BOTH
+def test_mirrored_scenes_give_mirrored_runs(support):
+    runs = [
+        simulate(scene_on(support, initial__y=y, speed=50.0, integration__duration=0.4, integration__rtol=1e-7))
+        for y in (0.004, -0.004)
+    ]
+    one, other = (run["wheelset"] for run in runs)
+    for name, mirror, sign in (
+        ("y_m", "y_m", -1), ("yaw_rad", "yaw_rad", -1), ("z_m", "z_m", 1), ("rail_y_left_m", "rail_y_right_m", -1),
+        ("rail_z_left_m", "rail_z_right_m", 1),
+    ):  # fmt: skip
+        np.testing.assert_allclose(one[name], sign * other[mirror], rtol=0.0, atol=1e-8, err_msg=name)
+    assert np.ptp(one.rail_z_left_m) > 1e-5
+
+
+def test_a_stiffer_track_tends_to_rigid_rails_at_first_order():
+    def run(factor):
+        rail = {
+            way: {key: factor * value for key, value in MASSLESS["rail"][way].items()}
+            for way in ("lateral", "vertical")
+        }
+        track = {"support": {"rail": rail}} if factor else {}
+        settings = {"integration.duration": 0.3, "integration.rtol": 1e-8, "integration.method": "rodas4"}
+        return simulate(load_scene(SCENE, settings | {"track": track}))["wheelset"]
+
+    rigid = run(0)
+    gaps = [np.abs(run(factor).y_m - rigid.y_m).max() for factor in (1e2, 1e3)]
+    assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=0.1) and gaps[1] < 1e-6
+
+
+@BOTH
+def test_methods_agree_on_rough_track(support):
+    changes = {"track": {"support": support, "irregularity": ROUGH}, "integration.duration": 0.6,
+               "integration.rtol": 1e-6}  # fmt: skip
+    one, other = (simulate(load_scene(SCENE, changes | {"integration.method": name})) for name in ("tsit5", "rodas4"))
+    for name in ("y_m", "z_m", "rail_y_left_m", "rail_z_right_m"):
+        np.testing.assert_allclose(one["wheelset"][name], other["wheelset"][name], rtol=0, atol=2e-7, err_msg=name)
+
+
+@pytest.mark.parametrize("patch", ["moment", "strips"])
+def test_rails_without_mass_are_in_balance(patch):
+    model, state = compile_scene(scene_on(MASSLESS, contact__patch=patch))
+    places, equations = support_places(model)[0], Equations(model)
+    random = np.random.default_rng(1)
+    for _ in range(5):
+        moved = state.copy()
+        moved[1:3] += random.normal(0.0, [2e-3, 3e-5])
+        moved[7:13] += random.normal(0.0, 0.1, 6)
+        rate, forces = equations(0.0, moved), equations.work.support.forces[0].ravel()
+        left = model.support.damping @ rate[places] + model.support.stiffness @ moved[places] - forces
+        assert np.abs(left).max() < 1e-6 * np.abs(forces).max() and np.abs(rate[places]).max() > 1e-3
+
+
+def with_track(name, support, changes):
+    """A moving vehicle for the tests of the Jacobian; rails heavy enough for differences to tell them from rounding."""
+    support = json.loads(json.dumps(support))
+    support["rail"]["mass"] = 10.0 * support["rail"].get("mass", 0.0)
+    changes = {"speed": 20.0, "track": {"support": support}} | changes
+    model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", changes))
+    end = integrate(model, start, [0.0, 0.3], "tsit5", 1e-6, 1e-9).end.memory
+    t, state, equations = end.clock[0], end.state, Equations(model)
+    return model, t, state, equations(t, state), equations
+
+
+def test_each_entry_of_the_jacobian():
+    jacobian_tests.test_every_entry_against_central_differences(with_track("suspended_wheelset", MASSES, {}))
+
+
+@BOTH
+def test_stages_are_solved_as_a_dense_system_would_be(support, monkeypatch):
+    monkeypatch.setattr(jacobian_tests, "new_system", lambda model: new_linear(model).system)
+    jacobian_tests.test_stages_are_solved_as_a_dense_system_would_be(with_track("trailer_vehicle", support, {}))
+
+
+def test_beside_a_drive():
+    brake = {"name": "brake", "bodies": ["wheelset", "frame"], "torque": 500.0}
+    changes = {"track": {"support": MASSES}, "drive.brakes": [brake], "integration.duration": 0.2}
+    ours, rigid = (simulate(load_scene(SCENE, part)) for part in (changes, changes | {"track": {}}))
+    gap = ours["wheelset"].wy_rad_per_s[-1] - rigid["wheelset"].wy_rad_per_s[-1]
+    assert ours.status == "completed" and abs(gap) < 0.01 * abs(np.ptp(rigid["wheelset"].wy_rad_per_s)) + 1e-3
+
+
+def test_a_scene_without_has_none():
+    model, state = compile_scene(load_scene(SCENE))
+    assert own_states(model) == 0 and len(state) == STATE_SIZE and Equations(model).arguments[1].value.rails == 0
+
+
+BAD = [
+    ({"rail": {"lateral": MASSLESS["rail"]["lateral"]}}, "track.support.rail", "vertical"),
+    (MASSLESS | {"sleeper": MASSES["sleeper"]}, "track.support.rail.mass", "above 0"),
+    ({"rail": MASSLESS["rail"] | {"lateral": {"stiffness": 1e7, "damping": 0.0}}}, "track.support.rail.lateral.damping",
+     "without mass"),
+    ({"rail": MASSLESS["rail"] | {"lateral": {"stiffness": -1e7, "damping": 1.0}}},
+     "track.support.rail.lateral.stiffness", "N/m"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("support", "field", "expected"), BAD)
+def test_bad_descriptions_name_their_field(support, field, expected):
+    with pytest.raises(InputError) as caught:
+        scene_on(support)
+    assert caught.value.field.startswith(field) and expected in str(caught.value)
+
+
+def test_the_values_on_the_page_follow_from_their_sources():
+    bending, spacing, length = 2.059e11 * 3.217e-5, 0.6, 2.6
+    pads, ground = [(65e6, 75e3)], [(137.75e6, 58.8e3), (77.5e6, 31.15e3)]
+
+    def in_series(*springs):  # of dampers what counts at low frequency
+        k = 1.0 / sum(1.0 / stiffness for stiffness, _ in springs)
+        return np.array([k, k * k * sum(damping / stiffness**2 for stiffness, damping in springs)])
+
+    beta = (in_series(*pads, *ground)[0] / spacing / (4.0 * bending)) ** 0.25
+    seats, sleepers = 2.0 / beta / spacing, 1.5 / beta / spacing
+    rail, sleeper = MASSES["rail"], MASSES["sleeper"]
+
+    def values(part):
+        return [part["stiffness"], part["damping"]]
+
+    close = {"rtol": 5e-3}
+    np.testing.assert_allclose(values(rail["vertical"]), seats * in_series(*pads), **close)
+    np.testing.assert_allclose(values(rail["lateral"]), seats * np.array([15e6, 50e3]), **close)
+    np.testing.assert_allclose(values(sleeper["vertical"]), 2.0 * seats * in_series(*ground), **close)
+    masses = [rail["mass"], sleeper["mass"], sleeper["roll_inertia"]]
+    expected = [1.5 / beta * 60.64, sleepers * 251.0, sleepers * 251.0 * length**2 / 12.0]
+    np.testing.assert_allclose(masses, expected, **close)
+    for way in ("lateral", "vertical"):
+        both = in_series(values(rail[way]), [0.5 * value for value in values(sleeper[way])])
+        np.testing.assert_allclose(values(MASSLESS["rail"][way]), both, rtol=0.02)

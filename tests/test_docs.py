@@ -1,0 +1,202 @@
+"""Documentation: links and paths lead somewhere, equations are MathML, every public name is there, the site builds."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+import wrcore
+from tests.conftest import ROOT
+
+PAGES = sorted(
+    [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "reports").glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+)
+THEORY = sorted((ROOT / "docs/theory").glob("*.md"))
+LAID_OUT = {
+    "guide": ("reports", ".md", {"index", "findings"}),
+    "tutorials": ("notebooks", ".ipynb", {"index"}),
+    "reference": ("docs/reference", ".md", {"index", "api", "modules", "cli", "files", "names"}),
+}
+"""Folders of the site that `docs/build.py` fills: from where, and pages that it makes itself."""
+FIGURES = (ROOT / "docs/figures.py").read_text("utf-8")
+TOOLS = [name for name in ("sphinx", "myst_parser", "furo", "latex2mathml") if not importlib.util.find_spec(name)]
+NEEDS_TOOLS = pytest.mark.skipif(bool(TOOLS), reason=f"pip install .[docs]: {', '.join(TOOLS)} not installed")
+
+
+def relative(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+def prose(path):
+    """Text of a page without code blocks."""
+    return re.sub(r"^```.*?^```", "", path.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def slugs(path):
+    """Anchors of a page's headings, as GitHub and the site make them."""
+    headings = re.findall(r"^#+ +(.+)$", prose(path), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def lost(page, target):
+    """Why a link of a page leads nowhere; empty where it does not."""
+    path, _, anchor = target.partition("#")
+    place = (page.parent / path) if path else page
+    parts = place.resolve().relative_to(ROOT).parts if place.resolve().is_relative_to(ROOT) else ()
+    if parts[:2] == ("docs", "theory") and place.suffix == ".png":
+        return "" if f"def {place.stem}()" in FIGURES else f"{relative(page)}: {target}: not drawn"
+    if parts[:1] == ("docs",) and len(parts) == 3 and parts[1] in LAID_OUT:
+        folder, ending, made = LAID_OUT[parts[1]]
+        if place.stem in made:
+            return ""
+        place = ROOT / folder / f"{place.stem}{ending}"
+    if not place.exists():
+        return f"{relative(page)}: {target}: no such file"
+    if anchor and place.suffix == ".md" and anchor not in slugs(place):
+        return f"{relative(page)}: {target}: no such heading"
+    return ""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_links_and_images_lead_somewhere(page):
+    targets = re.findall(r"\]\(([^)\s]+)\)", prose(page)) + re.findall(r'(?:src|href)="([^"]+)"', prose(page))
+    assert [why for target in targets if "://" not in target and (why := lost(page, target))] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=relative)
+def test_paths_in_code_style_exist(page):
+    """But for pattern names such as ``config/vehicles/NAME.yaml``."""
+    named = re.findall(
+        r"`((?:config|tests|reports|wrcore|workflow|docs|notebooks)/[\w/.*-]+)`", page.read_text("utf-8")
+    )
+    named = [name for name in named if not re.search(r"NAME|/Q/|/Q\.|\*|^wrcore/examples", name)]
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_a_lost_link_is_found():
+    page = ROOT / "docs/index.md"
+    assert lost(page, "guide/nothing.md").endswith("no such file") and lost(page, "nothing.md")
+    assert not lost(page, "theory/overlap.png") and lost(page, "theory/nothing.png").endswith("not drawn")
+    assert lost(page, "theory/creep.md#nothing").endswith("no such heading") and not lost(page, "guide/tracks.md")
+
+
+def test_equations_have_labels_of_their_own_and_references_lead_to_one():
+    text = "\n".join(path.read_text("utf-8") for path in THEORY)
+    labels = re.findall(r"^\$\$ \((eq-[\w-]+)\)$", text, re.MULTILINE)
+    assert len(labels) == len(set(labels)) > 40
+    assert text.count("\n$$\n") == len(labels)  # each block begins with a line of its own and ends with a label
+    assert set(re.findall(r"\{eq\}`([^`]+)`", text)) <= set(labels)
+
+
+def test_numbers_in_the_theory_are_those_of_the_code():
+    """Constants that a reader will rely on, each as its page prints it."""
+    from wrcore.analysis.to_accuracy import MARGIN, TIGHTER
+    from wrcore.contact.geometry import SCAN_STEP
+    from wrcore.contact.reduction import CURVATURE_FLOOR
+    from wrcore.creep.build import A_OVER_B
+    from wrcore.creep.kalker import GRID_A_OVER_B
+    from wrcore.creep.laws import FASTSIM_GRID
+    from wrcore.creep.table import DEFAULT_TOLERANCE
+    from wrcore.dynamics.drive import GRIP
+    from wrcore.geometry import irregularity, profile
+    from wrcore.integrate import choice, engine, tolerances
+    from wrcore.scene.description import load_scene
+
+    scene = load_scene(ROOT / "config/scenes/suspended_wheelset.yaml").data
+    damping, feedback = scene["contact"]["normal"]["damping"], scene["integration"]["baumgarte"]
+    share, factors = tolerances.SHARE, [*irregularity.VERTICAL.values(), *irregularity.LATERAL.values()]
+    spectra = [f"{factor:.3e}".replace("e-0", "e-") for factor in factors]
+    printed = {
+        "profiles": [
+            f"({1e3 * profile.SPACING:g} mm)", f"w = {1e3 * profile.WINDOW:g} mm", f"exceeds {profile.STEEPEST:g} ",
+            f"down to {1e3 * profile.GAUGE_DEPTH:g} mm",
+        ],
+        "contact": [f"({1e3 * SCAN_STEP:g} mm)", f"floor of {CURVATURE_FLOOR} 1/m"],
+        "normal": [f"({damping['c_e']} and {damping['v0']} m/s unless stated)"],
+        "creep": [
+            f"{FASTSIM_GRID} strips of {FASTSIM_GRID} steps", f"a/b ({A_OVER_B[0]:g} to {A_OVER_B[1]:g})",
+            f"({DEFAULT_TOLERANCE} of", f"from 1/{1 / GRID_A_OVER_B[0]:g} to {GRID_A_OVER_B[-1]:g} (",
+        ],
+        "multibody": [f"= {GRIP}$ rad/s", f"\\beta = {feedback['alpha']:g}$ 1/s"],
+        "track": [
+            f"{irregularity.CUTOFF_C}$", f"{irregularity.CUTOFF_R}$", f"{irregularity.CUTOFF_S}$ rad/m",
+            f"b = {irregularity.HALF_BASE} m", *spectra,
+        ],
+        "integration": [
+            f"${choice.STABLE}/", f"({choice.STEPS_PER_METRE} steps per metre)", f"{tolerances.LENGTH}\\ \\mathrm m",
+            f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
+            f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", "a tenth of the last",
+        ],
+    }  # fmt: skip
+    assert choice.EXPLICIT_PER_STIFF == 4.0 and share["ros34pw2"] == TIGHTER == 0.1  # in words
+    missing = [
+        (name, text)
+        for name, texts in printed.items()
+        for text in texts
+        if text not in (ROOT / f"docs/theory/{name}.md").read_text("utf-8")
+    ]
+    assert missing == []
+
+
+@NEEDS_TOOLS
+@pytest.mark.parametrize("page", THEORY, ids=relative)
+def test_equations_become_mathml(page, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    from mathml import to_mathml
+
+    text = page.read_text("utf-8")
+    for latex in re.findall(r"^\$\$\n(.*?)\n\$\$", text, re.MULTILINE | re.DOTALL):
+        assert to_mathml(latex, block=True).startswith("<math")
+    inline = re.sub(r"^\$\$\n.*?\n\$\$.*?$", "", text, flags=re.MULTILINE | re.DOTALL)
+    for latex in re.findall(r"\$([^$]+)\$", inline):
+        assert to_mathml(latex).startswith("<math")
+    with pytest.raises(ValueError, match="no MathML"):
+        to_mathml(r"\nosuchcommand")
+
+
+def test_every_public_name_is_in_the_reference(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    from reference import GROUPS, api_page, groups
+
+    shown = re.findall(r"^\.\. auto\w+:: wrcore\.(\w+)$", api_page(), re.MULTILINE)
+    assert sorted(shown) == sorted(wrcore._PUBLIC)
+    assert {name for names in GROUPS.values() for name in names} <= set(wrcore._PUBLIC)
+    assert sum(map(len, groups().values())) == len(wrcore._PUBLIC)
+
+
+def test_every_command_and_key_is_in_the_reference(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    from reference import cli_page, files_page
+
+    page = cli_page()
+    assert {"simulate", "sweep", "contact", "table build"} <= set(re.findall(r"^## wrcore (.+)$", page, re.MULTILINE))
+    assert "| `--threads` `n` | `1` | runs at the same time |" in page
+    keys = files_page()
+    assert "| `integration.rtol` |" in keys and "| `0.0001` |" in keys and "| `bodies` |" in keys
+
+
+@NEEDS_TOOLS
+def test_the_site_builds_without_a_warning_and_without_a_network(tmp_path):
+    """Nothing is loaded from elsewhere; search finds words of theory, guides, docstrings and tutorials."""
+    code = ROOT / "docs/build.py"
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "workflow"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, str(code), str(tmp_path / "site")], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": paths}, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    pages = {path.relative_to(tmp_path / "site").as_posix(): path for path in (tmp_path / "site").rglob("*.html")}
+    assert {"index.html", "guide/tracks.html", "tutorials/creep_table.html", "reference/cli.html"} <= set(pages)
+    loaded = [
+        (name, url)
+        for name, path in pages.items()
+        for url in re.findall(r'<(?:script|link|img|iframe)[^>]*(?:src|href)="([^"]+)"', path.read_text("utf-8"))
+        if "//" in url
+    ]
+    assert loaded == []
+    assert "SHOW_SEARCH_SUMMARY: false" in (tmp_path / "site/_static/documentation_options.js").read_text("utf-8")
+    index = (tmp_path / "site/searchindex.js").read_text("utf-8").lower()
+    assert all(word in index for word in ("polach", "baumgart", "simulate_to_accuraci", "clothoid", "conic"))

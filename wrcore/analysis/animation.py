@@ -1,0 +1,177 @@
+"""Animation of a run as one page that any browser opens without a network: the data and the program are inside.
+
+Above, the vehicle from above in the axes of the track, displacements larger than they are by a stated factor. Below,
+one wheelset from behind, true to scale: profiles of wheel and rail where they are, patches, and forces on the wheel.
+"""
+
+import json
+import math
+from dataclasses import dataclass, field
+from html import escape
+from importlib.resources import files
+
+import numpy as np
+
+from wrcore.analysis.plot_vehicle import box_of
+from wrcore.analysis.wheels import wheelsets_of
+from wrcore.errors import InputError, check_number
+from wrcore.errors.new_files import appearing
+from wrcore.geometry.surface import SIDES
+from wrcore.scene.pairs import Pair
+
+MOST_FRAMES = 600
+FRAME_RATE = 50.0
+"""Frames per second of simulated time, as near as the run's output times allow."""
+
+SHOWN = 0.5
+"""Largest displacement from above, as the factor is chosen, m."""
+
+POINTS = 160
+"""Of a profile."""
+
+PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A page with a run in motion; a notebook shows it.
+
+    Attributes
+    ----------
+    html : str
+        The whole page.
+    data : dict
+        What it draws: per body nominal place and size (m), ``y`` (m) and ``yaw`` (rad) over the frames, both times
+        ``factor``; per wheelset its pose, true to scale, and per wheel profiles, patches and forces.
+    """
+
+    html: str = field(repr=False)
+    data: dict = field(repr=False)
+
+    def write(self, path):
+        """Write the page; it appears under its name when it is complete."""
+        with appearing(path) as file:
+            file.write(self.html.encode())
+
+    def _repr_html_(self):
+        return f'<iframe srcdoc="{escape(self.html)}" width="100%" height="720" frameborder="0"></iframe>'
+
+
+def animate(run, scene, factor=None, begin=0.0, end=math.inf):
+    """Put a run in motion.
+
+    Parameters
+    ----------
+    run : Run
+        With the output channels pose and contact.
+    scene : Scene
+        Of the run: lends the vehicle's nominal position and the profiles.
+    factor : float, optional
+        By which displacements are drawn larger from above; left out: a round one with which the largest is some
+        `SHOWN` m.
+    begin, end : float
+        Part of the run, s; of a longer one than `MOST_FRAMES` at `FRAME_RATE` the beginning is shown.
+
+    Returns
+    -------
+    Animation
+
+    Raises
+    ------
+    InputError
+        For a run without these channels, or of another vehicle, or a time beyond its end.
+    """
+    frames = _frames(run, begin, end)
+    vehicle = scene.vehicle
+    strange = [name for name in wheelsets_of(run) if name not in vehicle.body_names]
+    if strange or not wheelsets_of(run):
+        raise InputError("draw", "scene", f"expected that of the run, with {', '.join(strange) or 'wheelsets'}")
+    for name in vehicle.body_names:
+        if "yaw_rad" not in run.groups.get(name, {}):
+            raise InputError("draw", name, "expected a run with the output channels pose and contact")
+    poses = {name: run.groups[name] for name in vehicle.body_names}
+    largest = max(float(np.abs(poses[name]["y_m"][frames]).max()) for name in vehicle.body_names)
+    factor = _round(SHOWN / max(largest, 1e-6)) if factor is None else factor
+    check_number(factor, 1.0, 1e6, "draw", "factor")
+    data = {
+        "name": run.scene.get("name", "run"), "status": run.status, "factor": factor,
+        "speed": float(run.scene.get("speed", 0.0)), "t": _numbers(run.t[frames], 4),
+        "half_distance": vehicle.half_distance, "radius": vehicle.rolling_radius,
+        "bodies": [_body(vehicle, name, poses[name], frames, factor) for name in vehicle.body_names],
+        "wheelsets": [_wheelset(run, scene, name, frames) for name in vehicle.wheelset_names],
+    }  # fmt: skip
+    page = files("wrcore.analysis").joinpath("animation.html").read_text(encoding="utf-8")
+    content = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    return Animation(page.replace("TITLE", escape(data["name"])).replace("DATA", content), data)
+
+
+def _frames(run, begin, end):
+    """Numbers of the output times that are shown."""
+    if not len(run.t) or not 0.0 <= begin < min(end, run.t[-1]):
+        last = run.t[-1] if len(run.t) else 0.0
+        raise InputError("draw", "begin", f"expected 0 <= begin < end, before the run's end at {last:g} s")
+    seen = np.flatnonzero((run.t >= begin) & (run.t <= end))
+    step = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
+    return seen[:: max(1, round(1.0 / (FRAME_RATE * step)))][:MOST_FRAMES]
+
+
+def _round(value):
+    """The largest of 1, 2, 5, 10, 20 and so on that is not above a value, at least 1."""
+    power = 10.0 ** math.floor(math.log10(max(value, 1.0)))
+    return max(one * power for one in (1.0, 2.0, 5.0) if one * power <= max(value, 1.0))
+
+
+def _numbers(values, digits):
+    """A list for JSON, rounded; absent values are null."""
+    rounded = np.round(np.asarray(values, float), digits)
+    return [None if math.isnan(value) else value for value in rounded.tolist()]
+
+
+def _body(vehicle, name, pose, frames, factor):
+    at, part = vehicle.body_names.index(name), vehicle.data["bodies"][name]
+    wheelset = part["kind"] == "wheelset"
+    size = [0.0, 2.0 * vehicle.half_distance] if wheelset else box_of(part)[:2].tolist()
+    return {
+        "name": name, "kind": part["kind"], "x": float(vehicle.positions[at, 0]), "size": size,
+        "y0": float(vehicle.positions[at, 1]),
+        "y": _numbers(factor * (pose["y_m"][frames] - vehicle.positions[at, 1]), 5),
+        "yaw": _numbers(factor * pose["yaw_rad"][frames], 6),
+    }  # fmt: skip
+
+
+def _wheelset(run, scene, name, frames):
+    pose = run.groups[name]
+    at = scene.vehicle.wheelset_names.index(name)
+    alike = Pair(scene.wheel, scene.rail, scene.vehicle.rolling_radius)
+    pairs = scene.pairs[2 * at : 2 * at + 2] or (alike, alike)
+    sides = zip(SIDES, pairs, strict=True)
+    return {
+        "name": name, "y": _numbers(pose["y_m"][frames], 6), "z": _numbers(pose["z_m"][frames], 6),
+        "roll": _numbers(pose["roll_rad"][frames], 7),
+        "wheels": [_wheel(run.groups[f"{name}/{side}"], scene, side, pair, frames) for side, pair in sides],
+    }  # fmt: skip
+
+
+def _wheel(contact, scene, side, pair, frames):
+    """Profiles (y, z from axle and track, m), where the rail is (its irregularity), and patches over the frames."""
+    sign, distance = SIDES[side], scene.track.rail_distance(pair.rail)
+    u_wheel, u_rail = (np.linspace(curve.u[0], curve.u[-1], POINTS) for curve in (pair.wheel, pair.rail))
+    rows = np.stack([contact[name][frames] for name in PATCH], axis=-1)  # (frames, patches, columns)
+    u = contact["u_rail_m"][frames]
+    aside = rows[..., 0] - sign * (distance + u)
+    height = rows[..., 1] - pair.rail(np.nan_to_num(u))
+    return {
+        "side": side,
+        "wheel": [_numbers(sign * (scene.vehicle.half_distance + u_wheel), 5),
+                  _numbers(pair.wheel(u_wheel) - pair.rolling_radius, 6)],
+        "rail": [_numbers(sign * (distance + u_rail), 5), _numbers(pair.rail(u_rail), 6)],
+        "rail_at": [_numbers(_held(aside), 6), _numbers(_held(height), 6)],
+        "patches": [[_numbers(patch, 5) for patch in frame if not np.isnan(patch[0])] for frame in rows],
+    }  # fmt: skip
+
+
+def _held(values):
+    """The first patch's value in each frame; where there is none that of the frame before, or 0."""
+    first = values[:, 0]
+    known = np.maximum.accumulate(np.where(np.isnan(first), -1, np.arange(len(first))))
+    return np.where(known < 0, 0.0, first[known])

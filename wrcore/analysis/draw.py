@@ -1,0 +1,84 @@
+"""Pictures of what a person has at hand: ``wr.draw``."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wrcore.analysis.animation import Animation, animate
+from wrcore.analysis.evolve import TABLE, profiles_over_distance
+from wrcore.analysis.plot_vehicle import plot_vehicle
+from wrcore.analysis.plot_wear import plot_evolution
+from wrcore.errors import InputError
+from wrcore.run.results import load_run
+from wrcore.run.run import Run
+from wrcore.scene.description import Scene, Source, as_scene, load_scene
+
+
+def draw(
+    source: Source | Run,
+    scene: Source | None = None,
+    factor: float | None = None,
+    begin: float = 0.0,
+    end: float = math.inf,
+) -> Figure | Animation:
+    """Draw a scene's vehicle, put a run in motion, or show how a profile wears.
+
+    Parameters
+    ----------
+    source : Scene, Run, str, Path or dict
+        A scene (or its file, or content): side and plan view of its vehicle with all bodies, force elements and joints.
+        A run (or its HDF5 file): an animation. A folder of :func:`wrcore.evolve`: the profile over the distance.
+    scene : Scene, str, Path or dict, optional
+        That of a run; left out: the one that the run names, with its files looked for from the working directory.
+    factor : float, optional
+        By which displacements are drawn larger in an animation from above; left out: a round one that shows them.
+    begin, end : float
+        Part of the run that is shown, s.
+
+    Returns
+    -------
+    matplotlib.figure.Figure or Animation
+        An animation is a page: ``.write("run.html")`` stores it, a notebook shows it.
+
+    Raises
+    ------
+    InputError
+        For what is none of these, and options that do not belong to it.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> figure = wr.draw("config/scenes/trailer_vehicle.yaml")
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['z, up / m', 'y, to the left / m', '']
+    """
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".h5", ".hdf5"):
+        source = load_run(source)
+    if isinstance(source, Run):
+        return animate(source, _scene_of(source, scene), factor, begin, end)
+    options: dict[str, Any] = {"scene": scene, "factor": factor, "begin": begin or None}
+    for name, value in options.items():
+        if value is not None:
+            raise InputError("draw", name, "expected this with a run only")
+    if not isinstance(source, Scene | Mapping) and os.path.isdir(source):
+        if not (Path(source) / TABLE).is_file():
+            raise InputError("draw", source, f"expected a folder of evolve, with {TABLE}")
+        return plot_evolution(profiles_over_distance(source), pd.read_csv(Path(source) / TABLE))
+    return plot_vehicle(as_scene(source))
+
+
+def _scene_of(run, scene):
+    """The scene of a run."""
+    if scene is not None:
+        return as_scene(scene)
+    try:
+        return load_scene(run.scene)
+    except InputError as error:
+        raise InputError("draw", "scene", f"expected that of the run, as its files are not here ({error})") from None

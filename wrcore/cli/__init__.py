@@ -1,0 +1,73 @@
+"""The command ``wrcore``, which ``python -m wrcore`` is, too: one module per command.
+
+Exit status 0 only when the result was produced; 2 for bad input, with one line that names the file, the field and
+what was expected.
+"""
+
+import os
+import sys
+from contextlib import suppress
+
+from wrcore import __version__
+from wrcore.cli import assess, conicity, contact, creep, draw, evolve, init, keys, profiles, simulate, sweep, table
+from wrcore.cli.options import Parser
+from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
+from wrcore.errors import InputError
+
+COMMANDS = (init, simulate, sweep, assess, draw, evolve, contact, conicity, creep, table, profiles, keys)
+"""Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over."""
+
+
+def parser():
+    """The parser of the whole command line.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        ``parser().parse_args(words).run(options)`` does what the words ask for.
+    """
+    whole = Parser(
+        prog="wrcore", description="Wheel-rail contact in railway dynamics.",
+        epilog="'wrcore COMMAND --help' lists its options with units and defaults, and the columns of its files. "
+        "Exit status: 0 done, 1 a run that stalled or failed, 2 bad input, 4 an accuracy that was not reached or is "
+        "that of a derailment.",
+    )  # fmt: skip
+    whole.add_argument("--version", action="version", version=f"wrcore {__version__}", help="print the version")
+    commands = whole.add_subparsers(metavar="COMMAND", required=True)
+    for module in COMMANDS:
+        module.add(commands)
+    return whole
+
+
+def main(arguments=None):
+    """Entry point.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Defaults to the process's arguments.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 4 an accuracy that was not reached or is that
+        of a derailment, 128 and its number for a signal.
+    """
+    whole = parser()
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next: eval "$(register-python-argcomplete wrcore)"
+        with suppress(ImportError):
+            import argcomplete
+
+            argcomplete.autocomplete(whole)
+    try:
+        options = whole.parse_args(arguments)
+        return options.run(options)
+    except InputError as error:
+        print(f"wrcore: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:  # a disk that fills up, a file that goes away
+        print(f"wrcore: {InputError(error.filename or '', '', error.strerror or error)}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("wrcore: interrupted", file=sys.stderr)
+        return 130

@@ -1,0 +1,119 @@
+"""``wrcore contact``: the patches of a wheelset in given poses."""
+
+from wrcore.cli.files import output, write_csv
+from wrcore.cli.options import add_pair, columns, ratio
+from wrcore.errors import InputError
+
+ABOUT = """
+Patches of both wheels for each pose of IN.csv. z given: forces at that height; only roll given: each wheel carries the
+load by itself; neither: both are solved. Roll turns the wheelset about x first, then yaw about z.
+"""
+
+
+POSES = columns(
+    "IN.csv, a row per pose",
+    pose_id="any text",
+    y_m="",
+    yaw_rad="",
+    roll_rad="optional",
+    z_m="optional",
+    V_m_per_s="optional: speed; where it is given creep forces act",
+    omega_rad_per_s="optional: rolling rate, positive forward; empty: free rolling",
+    vy_m_per_s="optional",
+    yaw_rate_rad_per_s="optional",
+    mu="optional: friction coefficient",
+)
+
+FILES = columns(
+    "OUT.csv, a row per patch",
+    pose_id="of its pose",
+    side="left or right",
+    patch="number at its wheel, from 1",
+    u_wheel_m="",
+    s_wheel_rad="",
+    u_rail_m="",
+    x_m="point of contact in the track frame, from the wheelset's cross-section; of strips the centroid of pressure",
+    y_m="the same, left positive",
+    z_m="the same, from the plane of the rails' highest points",
+    contact_angle_rad="",
+    penetration_m="",
+    a_m="",
+    b_m="",
+    N_N="",
+    p_max_Pa="",
+    roll_rad="of the wheelset",
+    z_wheelset_m="height of the wheelset's centre",
+    x_min_m="where the patch begins",
+    x_max_m="where it ends",
+    width_m="of the patch in the contact plane",
+    xi="",
+    eta="",
+    phi_per_m="",
+    Fx_N="",
+    Fy_N="",
+    Mz_Nm="",
+)
+
+
+def add(commands):
+    """The command's parser."""
+    command = commands.add_parser(
+        "contact", help="contact of a wheelset in given poses", description=ABOUT, epilog=f"{POSES}\n\n{FILES}"
+    )
+    command.add_argument("--poses", required=True, metavar="IN.csv", help="a pose per row")
+    add_pair(command)
+    command.add_argument("--shear-modulus", type=float, default=8.2e10, metavar="Pa", help="of both bodies, Pa")
+    command.add_argument("--poisson-ratio", type=float, default=0.28, metavar="nu", help="of both bodies")
+    command.add_argument(
+        "--detection", choices=("planar", "spatial"), default="spatial",
+        help="search in the wheelset's cross-section only, or ahead and behind it, too",
+    )  # fmt: skip
+    command.add_argument(
+        "--patch", choices=("maximum", "moment", "strips", "exact", "grid"), default="moment",
+        help="reduction of an overlap to an ellipse, or the real patch",
+    )  # fmt: skip
+    command.add_argument(
+        "--resolution", choices=("coarse", "middle", "fine"), default="fine", help="of strips and grids"
+    )
+    command.add_argument(
+        "--slip", choices=("surfaces", "creepages"), default="surfaces",
+        help="rigid slip of strips and grids: of the real surfaces, or of one set of creepages per patch",
+    )  # fmt: skip
+    command.add_argument(
+        "--load-by", choices=("vertical", "normal"), default="vertical",
+        help="the load is the vertical sum of all forces on a wheel, or the sum of its normal forces",
+    )  # fmt: skip
+    command.add_argument("--friction", type=float, default=0.3, metavar="mu", help="where a pose gives none")
+    command.add_argument("--wheel-load", type=float, required=True, metavar="N", help="per wheel, N")
+    command.add_argument("--out", required=True, metavar="OUT.csv", help="a row per patch")
+    command.set_defaults(run=run)
+
+
+def run(options):
+    """Do what the options say."""
+    from wrcore.analysis.poses import loaded_poses
+    from wrcore.contact.geometry import contact_geometry
+    from wrcore.contact.poses import read_poses
+    from wrcore.geometry.standards import named_profile
+    from wrcore.geometry.track import Track
+
+    out = output(options.out)
+    poses = read_poses(options.poses)
+    wheel = named_profile(options.wheel, "wheel")
+    rail = named_profile(options.rail, "rail", ratio(options.inclination))
+    geometry = contact_geometry(
+        wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
+    )
+    table = loaded_poses(
+        poses, geometry, options.wheel_load, options.patch, options.resolution, options.slip, options.load_by,
+        options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
+    )  # fmt: skip
+    if table.empty:
+        raise InputError(options.poses, "", "expected a pose in which a wheel touches its rail, got none")
+    write_csv(table, out)
+    missing = len(set(poses.pose_id) - set(table.pose_id))
+    remarks = f", {missing} poses without contact" if missing else ""
+    if options.patch != "grid" and table.attrs["on_grid"]:
+        remarks += f", {table.attrs['on_grid']} patches by the grid"
+    print(f"{len(poses)} poses, {len(table)} patches{remarks}: {out}")
+    return 0

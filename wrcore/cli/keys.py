@@ -1,0 +1,46 @@
+"""``wrcore keys``: what may stand in the files that a person writes."""
+
+import textwrap
+
+from wrcore.errors import InputError, similar
+from wrcore.errors.checked_yaml import keys_of
+
+KINDS = ("scene", "track", "vehicle", "sweep", "wear")
+
+ABOUT = """
+List the keys of a kind of file, each with what is expected there (with unit and range) and its default; 'needed' marks
+those that their mapping must have. '*' stands for any name, '[]' for the items of a list. 'track' is what a scene has
+below the key track.
+"""
+
+
+def add(commands):
+    """The command's parser."""
+    command = commands.add_parser("keys", help="list the keys of scenes, vehicles, sweeps", description=ABOUT)
+    command.add_argument("kind", choices=KINDS, help="kind of file")
+    command.add_argument("below", nargs="?", metavar="key.path", help="only this key and those below it")
+    command.set_defaults(run=run)
+
+
+def run(options):
+    """Print the list."""
+    rows = [row for row in keys_of(options.kind) if _is_below(row[0], options.below)]
+    if not rows:
+        known = {row[0] for row in keys_of(options.kind)}
+        raise InputError(
+            "wrcore keys", options.below, f"expected a key of {options.kind}{similar(options.below, known)}"
+        )
+    for path, description, needed, default in rows:
+        remark = " (needed)" if needed else f" (default: {_yaml(default)})" if default is not None else ""
+        print(path)
+        print(textwrap.fill(description + remark, 100, initial_indent="    ", subsequent_indent="    "))
+    return 0
+
+
+def _is_below(path, key):
+    return key is None or path == key or path.startswith((f"{key}.", f"{key}["))
+
+
+def _yaml(value):
+    """A default as it would be written."""
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else value

@@ -1,0 +1,87 @@
+"""Options that several commands have, and how all of them explain themselves and refuse."""
+
+import argparse
+import textwrap
+
+from wrcore.errors import InputError, one_of, similar
+from wrcore.run.channels import DESCRIPTIONS, unit_of
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Texts as they are written, and each option with its default."""
+
+    def _get_help_string(self, action):
+        text = action.help or ""
+        value = action.default
+        if action.required or not action.option_strings or value in (None, [], argparse.SUPPRESS) or "default" in text:
+            return text
+        if isinstance(value, bool):
+            return text
+        return f"{text} (default: {value:g})" if isinstance(value, float) else f"{text} (default: {value})"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are ours: one line, with the word that was perhaps meant."""
+
+    def __init__(self, **settings):
+        super().__init__(**{"formatter_class": _Help, **settings})
+
+    def error(self, message):
+        raise InputError(self.prog, "", message)
+
+    def parse_known_args(self, args=None, namespace=None):
+        """As argparse's, but an unknown option ends here, where the known ones are known."""
+        found, left = super().parse_known_args(args, namespace)
+        options = [word.partition("=")[0] for word in left if word.startswith("--")]
+        if options:
+            self.error(f"unknown option {options[0]}{similar(options[0], self._option_string_actions)}")
+        return found, left
+
+    def _check_value(self, action, value):
+        if action.choices is not None and value not in action.choices:
+            raise argparse.ArgumentError(action, one_of(action.choices, value))
+
+
+def columns(title, **texts):
+    """What a table holds, as text for a help page.
+
+    Parameters
+    ----------
+    title : str
+    **texts : str
+        Meaning by column; an empty one is that of the run's channel of this name. Units are those that the names state.
+
+    Returns
+    -------
+    str
+    """
+    lines = [f"{title}:"]
+    for name, text in texts.items():
+        unit = unit_of(name)
+        meaning = (text or DESCRIPTIONS[name]) + ("" if unit == "1" else f" [{unit}]")
+        lines += textwrap.wrap(meaning, 118, initial_indent=f"  {name:28} ", subsequent_indent=31 * " ")
+    return "\n".join(lines)
+
+
+def add_pair(command):
+    """Options of a wheel on a rail."""
+    command.add_argument("--wheel", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
+    command.add_argument("--rail", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
+    command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
+    command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="m, 14 mm below the rails' tops")
+    command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m", help="at the tape circle, m")
+    command.add_argument(
+        "--tape-circle-half-distance", type=float, default=0.75, metavar="m", help="from the wheelset's centre, m"
+    )
+
+
+def ratio(text):
+    """A ratio such as 1/40; None where none is given."""
+    from wrcore.errors.checked_yaml import parse_ratio
+
+    if text is None:
+        return None
+    value = parse_ratio(text)
+    if not abs(value) <= 0.2:
+        raise InputError("wrcore", "--inclination", f"expected a ratio such as 1/40, within 1/5, got {text!r}")
+    return value

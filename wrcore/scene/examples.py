@@ -1,0 +1,73 @@
+"""Scenes, vehicles, sweeps and wear plans to start from: ``config/`` of the project, which a wheel carries along."""
+
+import os
+import shutil
+from pathlib import Path
+
+from wrcore.errors import InputError, one_of
+
+PACKAGE = Path(__file__).parents[1]
+PARTS = ("scenes", "vehicles", "sweeps", "wear")
+
+
+def examples_folder() -> Path:
+    """The folder that holds `PARTS`: in an installed package its own, in a checkout ``config/``."""
+    own = PACKAGE / "examples"
+    return own if own.is_dir() else PACKAGE.parent / "config"
+
+
+def example(name: str) -> Path:
+    """Path of an example scene.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``wheelset``, ``suspended_wheelset``, ``trailer_vehicle``, ``metro_car``, ``locomotive``.
+
+    Returns
+    -------
+    Path
+        Of a YAML file, which :func:`wrcore.load_scene` and :func:`wrcore.simulate` take.
+
+    Raises
+    ------
+    InputError
+        For a name that no example has.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> wr.load_scene(wr.example("trailer_vehicle"), speed=40)
+    Scene 'trailer_vehicle': Manchester Benchmarks vehicle 1, S1002 on UIC60-MBench, 40 m/s, spatial detection, 10 s
+    """
+    known = {path.stem: path for path in sorted((examples_folder() / "scenes").glob("*.yaml"))}
+    if name not in known:
+        raise InputError("example", "", one_of(known, name))
+    return known[name]
+
+
+def copy_examples(folder: str | os.PathLike[str]) -> Path:
+    """Copy scenes, vehicles, sweeps and wear plans into a folder, to start from.
+
+    Parameters
+    ----------
+    folder : path-like
+        Created if needed.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        Where there is already something of that name: nothing is written over.
+    """
+    folder = Path(folder)
+    for place in (folder, *(folder / part for part in PARTS)):
+        if place.exists() and (place != folder or not place.is_dir()):
+            raise InputError(place, "", "expected nothing of that name: what is there is not written over")
+    for part in PARTS:
+        shutil.copytree(examples_folder() / part, folder / part)
+    return folder

@@ -1,0 +1,71 @@
+"""The track that gives under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
+
+import numpy as np
+
+from wrcore.dynamics.support import RAILS, Support, no_support, support_size
+from wrcore.errors import InputError
+
+SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2
+"""Freedoms of the sleeper."""
+
+
+def check_support(spec, source):
+    """Raise an InputError where the parts of ``track.support`` do not go together.
+
+    Parameters
+    ----------
+    spec : dict or None
+        Checked against the schema.
+    source : str
+        Named in errors.
+    """
+    if spec is None or spec["rail"]["mass"] > 0.0:
+        return
+    if "sleeper" in spec:
+        raise InputError(source, "track.support.rail.mass", "expected a mass above 0 in kg on a sleeper")
+    for direction in ("lateral", "vertical"):
+        if spec["rail"][direction]["damping"] == 0.0:
+            expected = "expected a damping above 0 in N s/m under a rail without mass"
+            raise InputError(source, f"track.support.rail.{direction}.damping", expected)
+
+
+def track_support(spec, half_distance, elements, wheelsets):
+    """What stands under each wheelset, and force elements that count its states among their own.
+
+    Parameters
+    ----------
+    spec : dict or None
+        As for `check_support`.
+    half_distance : float
+        Of the rails from the track's centre line, m: where the halves of the ballast are taken to carry the sleeper.
+    elements : Elements
+    wheelsets : int
+
+    Returns
+    -------
+    Support, Elements
+    """
+    if spec is None:
+        return no_support(), elements
+    rail, sleeper = spec["rail"], spec.get("sleeper")
+    d = RAILS + (3 if sleeper else 0)
+    mass, matrices = np.full(d, float(rail["mass"])), (np.zeros((d, d)), np.zeros((d, d)))
+    if sleeper:
+        mass[RAILS:] = sleeper["mass"], sleeper["mass"], sleeper["roll_inertia"]
+    for side, lever in enumerate((half_distance, -half_distance)):
+        foot = {SLEEPER_Z: 1.0, SLEEPER_ROLL: lever} if sleeper else {}  # height of the sleeper under this rail
+        _add(matrices, rail["lateral"], {2 * side: 1.0, **({SLEEPER_Y: -1.0} if sleeper else {})})
+        _add(matrices, rail["vertical"], {2 * side + 1: 1.0, **{freedom: -share for freedom, share in foot.items()}})
+        if sleeper:
+            _add(matrices, sleeper["vertical"], foot, 0.5)
+            _add(matrices, sleeper["lateral"], {SLEEPER_Y: 1.0}, 0.5)
+    support = Support(mass, *matrices, elements.states)
+    return support, elements._replace(states=elements.states + wheelsets * support_size(support))
+
+
+def _add(matrices, spring, stretch, share=1.0):
+    """Add a part of a spring and damper, whose stretch is a sum of freedoms by factors, to K and C."""
+    row = np.zeros(len(matrices[0]))
+    row[list(stretch)] = list(stretch.values())
+    for matrix, key in zip(matrices, ("stiffness", "damping"), strict=True):
+        matrix += share * spring[key] * np.outer(row, row)
