@@ -115,8 +115,21 @@ def test_a_run_without_what_it_takes_is_refused():
     slow = Run(run.scene, "completed", "", run.t[::5], {})
     with pytest.raises(InputError, match=r"output.rate.*at least 1000 1/s in the scene, got 200"):
         section_table(slow)
-    with pytest.raises(InputError, match="channels of wheels"):
+    with pytest.raises(InputError, match="channels of contacts, or Q and Y"):
         section_table(Run(run.scene, "completed", "", run.t, {}))
+
+
+def test_q_and_y_are_enough():
+    """A run that keeps Q and Y by name instead of its contacts is worth the same."""
+    run = synthetic(lambda t, sign: (LOAD + 1e3 * np.sin(9.0 * t), np.full_like(t, 2e3 + 500.0 * sign)), duration=3.0)
+    lean = Run(run.scene, "completed", "", run.t, {"wheelset": run.groups["wheelset"]})
+    for side in ("left", "right"):
+        wheel = run[f"wheelset/{side}"]
+        lean.groups[f"wheelset/{side}"] = {name: wheel[name] for name in ("Q_N", "Y_N")}
+    assert assess(lean).summary.equals(assess(run).summary)
+    del lean.groups["wheelset/left"]["Y_N"]
+    with pytest.raises(InputError, match="channels of contacts, or Q and Y"):
+        assess(lean)
 
 
 def test_command_line(tmp_path, capsys):

@@ -19,6 +19,11 @@ PLAN = {
 }  # fmt: skip
 
 
+OFF = {"speed": 140, "integration.duration": 3.0, "initial.y": 0.015}
+"""Far above the critical speed."""
+ARCHARD = {"archard": {"hardness": 2e9, "coefficients": [[1e-4]]}}
+
+
 @pytest.fixture(scope="module")
 def worn(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wear") / "short"
@@ -41,6 +46,28 @@ def test_steps_add_up_to_the_distance_and_the_volume(worn):
     assert np.sum(now - new) * ev.POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
     assert (now - new).min() >= -1e-15 and table["worn_m"].iloc[-1] == pytest.approx((now - new).max())
     assert table["worn_m"].is_monotonic_increasing
+
+
+def test_rails_lose_what_wheels_lose(worn):
+    """Per passage of the vehicle both rails lose the volume of its wheels per metre, in each scene."""
+    folder, table = worn
+    rails = ev.rail_wear(folder)
+    assert rails["scene"].tolist() == [0, 1] * 3 and rails["share"].tolist() == [0.75, 0.25] * 3
+    _, scenes = ev.load_wear_plan(PLAN)
+    mass = 2 * scenes[0].vehicle.nominal_wheel_load(scenes[0].vehicle.bodies.wheelsets[0]) / 9.81
+    area = (rails["left_m2_per_Mt"] + rails["right_m2_per_Mt"]) * rails["share"] * mass / 1e9
+    lost = area.groupby(rails["step"]).sum()
+    np.testing.assert_allclose(lost, 2 * table["volume_m3_per_m"].iloc[:-1], rtol=1e-9)
+
+
+def test_threads_and_cost(worn, tmp_path):
+    """Scenes at the same time give the same numbers; what the runs and their wear cost is told."""
+    folder, table = worn
+    spent = {}
+    twice = ev.evolve(PLAN, tmp_path, threads=2, spent=spent)
+    pd.testing.assert_frame_equal(twice, table, check_exact=True)
+    assert (tmp_path / "profile_003.csv").read_bytes() == (folder / "profile_003.csv").read_bytes()
+    assert spent["simulate"] > 0.0 and spent["wear"] > 0.0
 
 
 def test_going_on_changes_nothing(worn, tmp_path):
@@ -69,6 +96,13 @@ def test_a_damaged_folder_is_refused(worn, tmp_path, name, text):
         ev.evolve(PLAN, tmp_path)
 
 
+def test_a_scene_that_does_not_end_is_named(tmp_path):
+    """A wheelset released far off on a smooth track leaves the rails."""
+    plan = PLAN | {"scenes": [PLAN["scenes"][0], {"share": 1.0, "set": OFF}]}
+    with pytest.raises(InputError, match=r"profile_\d+.csv: scenes.1: expected a run to its end .*, got derailed"):
+        ev.evolve(plan, tmp_path)
+
+
 def test_smoothing_keeps_the_sum():
     values = np.zeros(400)
     values[[3, 200, 397]] = 1.0
@@ -83,6 +117,8 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
+        ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),
+        ({"law": ARCHARD, "set": {"contact.friction": {"left": 0.3, "right": 0.2}}}, "scenes.0.set: expected contact"),
     ):
         with pytest.raises(InputError, match=says):
             ev.evolve(PLAN | changes, tmp_path / "never")

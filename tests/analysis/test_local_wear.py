@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.analysis.test_assess import synthetic
-from wrcore.analysis.local_wear import BIN, LAWS, friction_work, local_wear, sheffield
+from wrcore.analysis.local_wear import BIN, friction_work, local_wear
+from wrcore.analysis.wear_laws import LAWS, Sliding, sheffield, wear_law
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
@@ -86,6 +87,45 @@ def test_branches_of_the_law():
     assert LAWS["energy"](50e6) == pytest.approx(ug * 265.0)
 
 
+def full_sliding(xi=0.05, speed=10.0, load=5e4):
+    """One patch of 5 x 4 mm that slides everywhere."""
+    rows = {"a_m": 5e-3, "b_m": 4e-3, "N_N": load, "xi": xi, "eta": 0.0, "phi_per_m": 0.0, "Fx_N": -MU * load}
+    rows = {name: np.array([value]) for name, value in rows.items()} | {"Fy_N": np.zeros(1), "Mz_Nm": np.zeros(1)}
+    return Sliding(rows, *friction_work(rows, MU, G, NU, 51, 200), MU, np.array([speed]))
+
+
+def volume(sliding, law):
+    return float(np.sum(np.sum(wear_law(law)(sliding), axis=-1) * sliding.dx * sliding.dy))
+
+
+def test_archard_takes_off_k_times_load_times_slip_over_hardness():
+    """Full sliding: k N xi/H, k that of the sliding speed; the pressure decides where it passes its bound."""
+
+    def law(*rows, **bounds):
+        return {"archard": {"hardness": 2e9, "coefficients": [list(row) for row in rows]} | bounds}
+
+    sliding = full_sliding()
+    whole = 1e-3 * 5e4 * 0.05 / 2e9
+    assert volume(sliding, law([1e-3])) == pytest.approx(whole, rel=1e-9)
+    assert volume(sliding, law([1e-3, 7e-3], speeds=[2.0])) == pytest.approx(whole, rel=1e-9)
+    # FASTSIM's slip is xi but for the elastic part, which is 15 % of it at most: at 10 m/s 0.43 to 0.57 m/s
+    assert volume(sliding, law([9e-3, 1e-3, 7e-3], speeds=[0.4, 0.6])) == pytest.approx(whole, rel=0.03)
+    peak = 1.5 * 5e4 / (np.pi * 5e-3 * 4e-3)
+    assert volume(sliding, law([1e-3], [0.9], pressures=[1.01 * peak])) == pytest.approx(whole, rel=1e-9)
+    # a parabola holds 1 - (1 - r^2)^2 of itself inside the radius r; Hertz's pressure is half its peak at r^2 = 3/4
+    found = volume(sliding, law([0.0], [1e-3], pressures=[0.5 * peak]))
+    assert found == pytest.approx(whole * (1 - (1 - 0.75) ** 2), rel=0.01)
+
+
+def test_volume_over_t_gamma_is_the_table_s():
+    sliding = full_sliding()  # T gamma: 0.3 * 5e4 * 0.05 = 750 N
+    law = {"t_gamma": [[0.0, 0.0], [700.0, 7e-12], [800.0, 9e-12]]}
+    assert volume(sliding, law) == pytest.approx(8e-12, rel=1e-9)
+    taken = wear_law(law)(sliding)
+    np.testing.assert_allclose(taken / taken.max(), sliding.work / sliding.work.max(), rtol=1e-12)
+    assert volume(full_sliding(), {"t_gamma": [[0.0, 1e-12], [10.0, 1e-12]]}) == pytest.approx(1e-12, rel=1e-9)
+
+
 def worn_run(left=3e-3, right=-2e-3):
     run = synthetic(lambda t, sign: (np.full_like(t, 6e4), np.zeros_like(t)), duration=0.05)
     run.scene["contact"] = {"friction": MU, "material": {"shear_modulus": G, "poisson_ratio": NU}}
@@ -100,7 +140,14 @@ def worn_run(left=3e-3, right=-2e-3):
     return run
 
 
-@pytest.mark.parametrize("law", LAWS)
+MAP = {
+    "archard": {"hardness": 2.5e9, "speeds": [0.05], "pressures": [1e9], "coefficients": [[1e-4, 3e-3], [2e-4, 5e-3]]}
+}
+TABLE = {"t_gamma": [[0.0, 0.0], [40.0, 1e-12], [80.0, 5e-12]]}
+"""Made up."""
+
+
+@pytest.mark.parametrize("law", [*LAWS, MAP, TABLE])
 def test_volume_is_the_sum_of_the_depths(law):
     for wear in local_wear(worn_run(), law=law).values():
         assert wear.volume > 0.0
@@ -111,8 +158,9 @@ def test_volume_is_the_sum_of_the_depths(law):
         assert width == pytest.approx(2 * 3e-3 * np.cos(0.5), abs=3 * BIN)  # the patch, seen from above
 
 
-def test_mirrored_wheels_wear_alike():
-    found = local_wear(worn_run())
+@pytest.mark.parametrize("law", ["sheffield", MAP, TABLE])
+def test_mirrored_wheels_wear_alike(law):
+    found = local_wear(worn_run(), law=law)
     left, right = found["wheelset", "left"], found["wheelset", "right"]
     np.testing.assert_allclose(left.wheel_edges, right.wheel_edges, atol=1e-12)
     np.testing.assert_allclose(left.wheel_depth, right.wheel_depth, rtol=1e-6, atol=1e-9 * left.wheel_depth.max())
@@ -121,5 +169,25 @@ def test_mirrored_wheels_wear_alike():
 def test_what_cannot_be_worn_is_refused():
     with pytest.raises(InputError, match="expected one of sheffield, energy"):
         local_wear(worn_run(), law="archard")
+    archard = MAP["archard"]
+    for law, says in (
+        ({"archard": archard, "energy": {}}, "law.energy: unknown key"),
+        ({"archard": archard | TABLE}, "law.archard.t_gamma: unknown key"),
+        ({}, "law: expected a mapping with either"),
+        ({"archard": {"coefficients": [[1e-4]]}}, "law.archard.hardness: expected a hardness"),
+        ({"archard": archard | {"hardness": 2.5}}, "law.archard.hardness: expected a hardness in Pa"),
+        ({"archard": archard | {"speeds": [0.7, 0.2]}}, "law.archard.speeds: expected rising"),
+        ({"archard": archard | {"speeds": []}}, "expected 2 rows of 1 numbers"),
+        ({"t_gamma": [[50.0, 1e-12], [10.0, 0.0]]}, "law.t_gamma: expected rising"),
+    ):
+        with pytest.raises(InputError, match=says):
+            local_wear(worn_run(), law=law)
+    run = worn_run()
+    run.scene["contact"]["friction"] = {"left": 0.1, "right": 0.4}
+    with pytest.raises(InputError, match="one number with the law archard"):
+        local_wear(run, law=MAP)
+    run.groups["wheelset/left"] = {"Q_N": np.full_like(run.t, 6e4)}
+    with pytest.raises(InputError, match="output.channels: expected contact"):
+        local_wear(run)
     with pytest.raises(InputError, match="within the run"):
         local_wear(worn_run(), begin=1.0)

@@ -4,17 +4,29 @@ import numpy as np
 import pytest
 
 from tests.synthetic import hunting_run
-from wrcore.analysis.ride import WEIGHTINGS, block_rms, ride_table, sperling, weighted
+from wrcore.analysis.assess import assess
+from wrcore.analysis.ride import WEIGHTINGS, block_rms, ride_table, sperling, weighted, whole_body_table
 from wrcore.errors import InputError
 
-TABLE_3 = {"Wk": {1.0: 0.482, 4.0: 0.967, 5.0: 1.039, 6.3: 1.054, 8.0: 1.036, 10.0: 0.988, 16.0: 0.768},
-           "Wd": {1.0: 1.011, 2.0: 0.890, 4.0: 0.512, 8.0: 0.253}}  # fmt: skip
+TABLE_3 = {
+    "Wk": (0.482, 0.484, 0.494, 0.531, 0.631, 0.804, 0.967, 1.039, 1.054, 1.036, 0.988, 0.902, 0.768, 0.636, 0.513,
+           0.405, 0.314, 0.246, 0.186, 0.132),
+    "Wd": (1.011, 1.008, 0.968, 0.890, 0.776, 0.642, 0.512, 0.409, 0.323, 0.253),
+}  # fmt: skip
+THIRDS = (1, 1.25, 1.6, 2, 2.5, 3.15, 4, 5, 6.3, 8, 10, 12.5, 16, 20, 25, 31.5, 40, 50, 63, 80)
+"""Hz."""
 
 
 @pytest.mark.parametrize("name", TABLE_3)
 def test_weightings_of_iso_2631(name):
-    for frequency, factor in TABLE_3[name].items():
-        assert abs(WEIGHTINGS[name].response(frequency)) == pytest.approx(factor, abs=1.5e-3)
+    found = np.abs(WEIGHTINGS[name].response(THIRDS[: len(TABLE_3[name])]))
+    np.testing.assert_allclose(found, TABLE_3[name], rtol=0.0, atol=8e-4)
+
+
+def test_gain_of_wb():
+    """1.024 (2.5/4)^2 = 0.4, the plateau of BS 6841, below the step; without band limits and beside its slopes."""
+    flat = WEIGHTINGS["Wb"]._replace(low=1e-4, high=1e6)
+    assert abs(flat.response(0.05)) == pytest.approx(0.4, rel=1e-3)
 
 
 @pytest.mark.parametrize("frequency", [0.8, 4.0, 15.0])
@@ -63,6 +75,24 @@ def test_mean_comfort_of_two_sines(run):
     assert list(table["body"]) == ["car_body"] and table["blocks"][0] == 3
     parts = [0.3 * abs(WEIGHTINGS["Wd"].response(2.0)), 0.2 * abs(WEIGHTINGS["Wb"].response(8.0))]
     assert table["N_MV"][0] == pytest.approx(6.0 * np.hypot(*parts) / np.sqrt(2.0), rel=0.02)
+
+
+def test_whole_body_vibration_of_two_sines(run):
+    run.groups["car_body"]["az_m_per_s2"][run.t > 15.0] *= 2.0
+    table = whole_body_table(run, begin=5.0).set_index("direction")
+    lateral = 0.3 * abs(WEIGHTINGS["Wd"].response(2.0)) / np.sqrt(2.0)
+    vertical = 0.2 * abs(WEIGHTINGS["Wk"].response(8.0)) / np.sqrt(2.0)
+    assert table["weighting"].tolist() == ["Wd", "Wd", "Wk"] and np.isnan(table.loc["x", "crest_factor"])
+    assert table.loc["y", "rms_m_per_s2"] == pytest.approx(lateral, rel=0.02)
+    largest = np.abs(weighted(run["car_body"].ay_m_per_s2[run.t >= 5.0], 200.0, "Wd")).max()  # at its start
+    assert table.loc["y", "crest_factor"] == pytest.approx(largest / lateral, rel=0.02)
+    assert table.loc["z", "MTVV_m_per_s2"] == pytest.approx(2.0 * vertical, rel=0.02)
+    rms = vertical * np.sqrt((2 / 3) + 4 / 3)  # 10 s as it was, 5 s of twice as much
+    assert table.loc["z", "rms_m_per_s2"] == pytest.approx(rms, rel=0.02)
+    dose = vertical * np.sqrt(2.0) * (3 / 8 * (10 + 16 * 5)) ** 0.25  # mean of sin^4: 3/8
+    assert table.loc["z", "VDV_m_per_s1_75"] == pytest.approx(dose, rel=0.02)
+    assert table["total_value_m_per_s2"].tolist() == pytest.approx([np.hypot(lateral, rms)] * 3, rel=0.02)
+    assert assess(run, "ISO 2631", begin=5.0).summary.equals(whole_body_table(run, begin=5.0))
 
 
 def test_what_cannot_be_assessed_is_refused(run):

@@ -2,7 +2,7 @@
 
 WEAR = config["wear"]
 CORE["wear"] = CORE["simulation"] + sources(
-    "analysis/evolve", "analysis/local_wear", "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
+    "analysis/evolve", "analysis/local_wear", "analysis/wear_laws", "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
 )  # fmt: skip
 
 
@@ -34,8 +34,32 @@ rule wear_evolution:
         "<benchmarks>/wear_evolution.tsv"
     params:
         settings=WEAR["settings"],
+    threads: 2
     script:
         "../scripts/wear/wear_evolution.py"
+
+
+# no part of the study; on a line without tight curves, see reports/wear.md
+use rule wear_evolution as wear_100000_km with:
+    message:
+        "A wheel profile over 100 000 km"
+    input:
+        core=CORE["wear"],
+        scenes=SCENES,
+        plan="config/wear/main_line.yaml",
+        table=rules.creep_table.output,
+    output:
+        table="<results>/wear/100000_km.csv",
+        figure="<results>/wear/100000_km.png",
+        svg="<results>/wear/100000_km.svg",
+    log:
+        "<logs>/wear_100000_km.log",
+    benchmark:
+        "<benchmarks>/wear_100000_km.tsv"
+    params:
+        settings={"distance": 1.0e8},
+    resources:
+        runtime=480,
 
 
 rule wear_influences:

@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.motion import SIDES
-from wrcore.analysis.ride import rate_of, ride_table
-from wrcore.analysis.wheels import OUTWARDS, quotient, wheel_forces, wheelsets_of
+from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
+from wrcore.analysis.wheels import wheel_forces, wheelsets_of
 from wrcore.errors import InputError, one_of
+from wrcore.geometry.surface import SIDES
+from wrcore.run.derived import quotient
 
 PERCENTILES = (0.15, 50.0, 99.85)
 WINDOW = 2.0
@@ -36,7 +37,7 @@ LEAST_RATE = 1000.0
 STRAIGHT_SECTION, WIDE_SECTION, TIGHT_SECTION, TIGHT = 250.0, 100.0, 70.0, 400.0
 """Lengths of sections on straight track, in curves of at least the radius ``TIGHT`` and in tighter ones, m."""
 
-STANDARDS = ("EN 14363", "EN 12299")
+STANDARDS = ("EN 14363", "EN 12299", "ISO 2631")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +57,9 @@ class Assessment:
 
     standard: str
     summary: pd.DataFrame
-    """A row per quantity (EN 14363) or body (EN 12299)."""
+    """A row per quantity (EN 14363), body (EN 12299), or body and direction (ISO 2631)."""
     sections: pd.DataFrame
-    """EN 14363: a row per section, wheelset or wheel and quantity; empty for EN 12299."""
+    """EN 14363: a row per section, wheelset or wheel and quantity; else empty."""
 
     def __repr__(self) -> str:
         table = self.summary.to_string(index=False, float_format=lambda value: f"{value:.4g}")
@@ -71,8 +72,9 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     Parameters
     ----------
     run : Run
-        With contact channels (EN 14363; at least 1000 1/s) or accelerations of bodies (EN 12299; at least 200 1/s).
-    standard : {"EN 14363", "EN 12299"}
+        With contact channels, or s or x of wheelsets and Q and Y of wheels (EN 14363; at least 1000 1/s), or
+        accelerations of bodies (the others; at least 200 1/s).
+    standard : {"EN 14363", "EN 12299", "ISO 2631"}
     begin : float
         Start of the evaluation, s.
     freight : bool
@@ -97,8 +99,9 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     """
     if standard not in STANDARDS:
         raise InputError("assess", "standard", one_of(STANDARDS, standard))
-    if standard == "EN 12299":
-        return Assessment(standard, ride_table(run, begin), pd.DataFrame())
+    if standard != "EN 14363":
+        table = (ride_table if standard == "EN 12299" else whole_body_table)(run, begin)
+        return Assessment(standard, table, pd.DataFrame())
     sections, wheel_load = section_table(run, begin)
     return Assessment(standard, _summary(sections, wheel_load, 0.85 if freight else 1.0), sections)
 
@@ -206,8 +209,9 @@ def section_table(run, begin=0.0):
         For a run without wheels, or with too low a rate.
     """
     rate = rate_of(run, LEAST_RATE, "EN 14363")
-    if not wheelsets_of(run):
-        raise InputError("EN 14363", "run", "expected the channels of wheels, such as wheelset/left")
+    wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]
+    if not wheels or not all(wheel.follows("Q_N") and wheel.follows("Y_N") for wheel in wheels):
+        raise InputError("EN 14363", "run", "expected the channels of contacts, or Q and Y, of wheels")
     late, rows, loads = run.t >= begin, [], []
     for name in wheelsets_of(run):
         body = run[name]
@@ -229,7 +233,7 @@ def section_table(run, begin=0.0):
 
 def _filtered(forces, s, rate):
     """Quantity, side and filtered signal of a wheelset and its wheels."""
-    yield "sum_Y", "", sliding_mean(s, sum(OUTWARDS[side] * forces[side][1] for side in SIDES))
+    yield "sum_Y", "", sliding_mean(s, sum(SIDES[side] * forces[side][1] for side in SIDES))
     for side in SIDES:
         vertical, lateral = forces[side]
         yield "Y_over_Q", side, sliding_mean(s, quotient(vertical, lateral))

@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.motion import SIDES
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import greatest_pressure, wear_number, wheelsets_of
 from wrcore.errors import InputError
+from wrcore.geometry.surface import SIDES
 
 if TYPE_CHECKING:
     from wrcore.run.run import Run

@@ -3,41 +3,51 @@
 A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
 wheel profile, averages the depths that all wheels lose (:mod:`wrcore.analysis.local_wear`), smooths them and goes on
 over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
-curves to both sides. The rail stays as it is.
+curves to both sides. The rail stays as it is: a wheel sees all rails of a line, a rail all vehicles. What this vehicle
+takes off the rails of each scene is stated per gross tonnes instead.
 
-A folder holds the state: the profile at the start of each step, and a table with a row per step. A step counts when its
-row is there; whoever is killed goes on after the last one.
+A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
+step. A step counts when its row is there; whoever is killed goes on after the last one.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+import time
+from collections.abc import Callable, MutableMapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wrcore import __version__
 from wrcore.analysis.local_wear import BIN, local_wear
+from wrcore.analysis.wear_laws import check_friction, wear_law
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.surface import SIDES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
+from wrcore.vehicle.description import GRAVITY
 
 POINTS = 2.5e-4
 """Distance of the points of a stored profile, m."""
 
 AMPLITUDE = 3e-3
 """Of the equivalent conicity in the table, m."""
+
+MT = 1e9
+"""A million gross tonnes, kg."""
 
 MOST_STEPS = 10_000
 TABLE = "steps.csv"
@@ -75,6 +85,7 @@ def load_wear_plan(
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
+    wear_law(data["law"], name)
     scenes = []
     for i, part in enumerate(data["scenes"]):
         try:
@@ -83,6 +94,7 @@ def load_wear_plan(
             raise InputError(name, f"scenes.{i}.set", str(error)) from None
         if data["begin"] >= scene.data["integration"]["duration"]:
             raise InputError(name, "begin", f"expected less than the duration of each run, got {data['begin']:g} s")
+        check_friction(data["law"], scene.data["contact"]["friction"], name, f"scenes.{i}.set")
         scenes.append(scene)
     return data, scenes
 
@@ -92,6 +104,8 @@ def evolve(
     folder: str | PathLike[str],
     say: Callable[[str], object] | None = None,
     changes: dict[str, Any] | None = None,
+    threads: int = 1,
+    spent: MutableMapping[str, float] | None = None,
 ) -> pd.DataFrame:
     """Wear a wheel profile over the distance of a plan, or go on with it.
 
@@ -101,10 +115,14 @@ def evolve(
     changes : dict, optional
         See `load_wear_plan`.
     folder : path-like
-        Of ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` takes them) and
-        ``steps.csv``; created if needed.
+        Of ``profile_000.csv`` and so on (columns u_m, f_m; ``wheel.profile: {points: FILE}`` takes them),
+        ``rails_000.csv`` and so on (see `rail_wear`) and ``steps.csv``; created if needed.
     say : callable, optional
         Called with a line after each step.
+    threads : int
+        Scenes of a step that run at the same time; of no influence on the result.
+    spent : mutable mapping, optional
+        Filled: processor time of all runs (``simulate``) and of their local wear (``wear``), s.
 
     Returns
     -------
@@ -144,7 +162,7 @@ def evolve(
         left = data["distance"] - gone
         rate, volume = np.zeros(len(u)), 0.0
         if left > 1e-9 * data["distance"]:
-            rate, volume = _wear_rate(data, scenes, shares, folder, step, u)
+            rate, volume = _wear_rate(data, scenes, shares, folder, step, u, threads, {} if spent is None else spent)
         length = min(left, data["largest_step"], data["largest_wear"] / max(rate.max(), 1e-300)) if volume else left
         length = length if left > 1e-9 * data["distance"] else 0.0
         if length > 0.0:
@@ -166,6 +184,25 @@ def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
     """u and what the ordinate has lost there since new, m, at the last step in a folder of `evolve`."""
     profiles = profiles_over_distance(folder)
     return profiles[-1][1], profiles[-1][2] - profiles[0][2]
+
+
+def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
+    """What the vehicle of a plan takes off the rails of each of its scenes, from a folder of `evolve`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per step and scene: step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and
+        right_m2_per_Mt, the area that the rail's section loses per million gross tonnes of such vehicles.
+    """
+    folder = Path(folder)
+    parts = [
+        pd.read_csv(_file(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
+        for row in _known_rows(folder)
+        if row["step_m"] > 0.0
+    ]
+    columns = ["step", "distance_m", "scene", "share", *(f"{side}_m2_per_Mt" for side in SIDES)]
+    return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
 
 
 def wear_row(scene, folder, step, gone, length, rate, volume):
@@ -223,18 +260,18 @@ def _points(curve):
     return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
 
 
-def _profile_file(folder, step):
-    return folder / f"profile_{step:03d}.csv"
+def _file(folder, kind, step):
+    return folder / f"{kind}_{step:03d}.csv"
 
 
 def _write_profile(folder, step, u, f):
-    with appearing(_profile_file(folder, step)) as file:
+    with appearing(_file(folder, "profile", step)) as file:
         lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
         file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
 
 
 def _read_profile(folder, step):
-    path = _profile_file(folder, step)
+    path = _file(folder, "profile", step)
     try:
         points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except (OSError, ValueError) as error:
@@ -244,21 +281,54 @@ def _read_profile(folder, step):
     return points[:, 0], points[:, 1]
 
 
-def _wear_rate(data, scenes, shares, folder, step, u):
+class SceneWear(NamedTuple):
+    """What a run of a scene takes off."""
+
+    rise: np.ndarray
+    """Of a wheel's ordinate at the stored points, m per m, mean of all wheels."""
+    volume: float
+    """m^3 per m of a wheel."""
+    rails: dict[str, float]
+    """Area of each rail's section, m^2 per million gross tonnes."""
+    seconds: tuple[float, float]
+    """Processor time of simulating and of local wear."""
+
+
+def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
     """Rise of the ordinate at the stored points (m per m), smoothed, and volume (m^3 per m of a wheel)."""
-    total, volume = np.zeros(len(u)), 0.0
-    edges = np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS)
-    for share, scene in zip(shares, scenes, strict=True):
-        profile = {"points": str(_profile_file(folder, step).resolve()), "unit": "m"}
-        run = simulate(load_scene(scene, {"wheel.profile": profile}))
-        if run.status != "completed":
-            raise InputError(scene.source, "scenes", f"expected a run to its end, got {run.status}: {run.reason}")
-        wheels = local_wear(run, data["begin"], data["law"]).values()
-        for wheel in wheels:
-            worn = np.concatenate([[0.0], np.cumsum(wheel.wheel_depth) * BIN])
-            total += share / len(wheels) * np.diff(np.interp(edges, wheel.wheel_edges, worn)) / POINTS
-            volume += share / len(wheels) * wheel.volume
+    profile = {"points": str(_file(folder, "profile", step).resolve()), "unit": "m"}
+    one = partial(_scene_wear, data, profile, np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS), threads > 1)
+    total, volume, rails = np.zeros(len(u)), 0.0, []
+    with ThreadPoolExecutor(threads) as pool:
+        found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
+        for share, worn in zip(shares, found, strict=True):
+            total += share * worn.rise
+            volume += share * worn.volume
+            rails.append({"scene": len(rails), "share": share} | worn.rails)
+            for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
+                spent[name] = spent.get(name, 0.0) + seconds
+    with appearing(_file(folder, "rails", step)) as file:
+        pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
     return _smooth(total, data["smoothing"]), volume
+
+
+def _scene_wear(data, profile, edges, quiet, place, scene):
+    began = time.thread_time()
+    run = simulate(load_scene(scene, {"wheel.profile": profile}), progress=False if quiet else None)
+    if run.status != "completed":
+        expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
+        raise InputError(profile["points"], f"scenes.{place}", expected)
+    simulated = time.thread_time()
+    wheels = local_wear(run, data["begin"], data["law"])
+    rise = np.zeros(len(edges) - 1)
+    for wheel in wheels.values():
+        worn = np.concatenate([[0.0], np.cumsum(wheel.wheel_depth) * BIN])
+        rise += np.diff(np.interp(edges, wheel.wheel_edges, worn)) / (POINTS * len(wheels))
+    volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
+    mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
+    areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
+    rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
+    return SceneWear(rise, volume, rails, (simulated - began, time.thread_time() - simulated))
 
 
 def _smooth(values, width):

@@ -2,19 +2,14 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.wear`). A wear law turns q into what is lost per metre rolled and area of
-contact.
+forces and creepages (:mod:`wrcore.run.wear`). A wear law (:mod:`wrcore.analysis.wear_laws`) turns q into what is
+lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
 
-    I = integral of (loss/density) dx: depth per passage of a rail;   I/(2 pi r): depth per metre run of a wheel
+    I = integral of (volume lost) dx: depth per passage of a rail;   I/(2 pi r): depth per metre run of a wheel
 
 and leaves it spread over the width of the strip. Depths are those of the profile's ordinate, volumes exact sums.
-
-Sources. Wear rate over T gamma/A of the University of Sheffield, steel R8T on 900A: Braghin, Lewis, Dwyer-Joyce and
-Bruni, Wear 261 (2006) 1253-1264; 5.3, 10.4, 55.12, 77.2 and 61.9 recalled and found alike in a public code, the third
-branch joined to the second without a step (as printed it begins at zero). Energy: loss proportional to friction's work,
-Pearce and Sherratt, Wear 144 (1991) 343-351, as a law of one coefficient, which is Sheffield's of mild wear here.
 """
 
 from __future__ import annotations
@@ -24,40 +19,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wrcore.analysis.motion import SIDES
-from wrcore.analysis.wheels import OUTWARDS, wheelsets_of
+from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
+from wrcore.analysis.wheels import wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError
+from wrcore.geometry.surface import SIDES
+from wrcore.run.derived import rolling_speed
 from wrcore.scene.friction import read_friction
 
 if TYPE_CHECKING:
     from wrcore.run.run import Run
-
-DENSITY = 7850.0
-"""Of steel, kg/m^3."""
 
 BIN = 2.5e-4
 """Width of the bins of depth over a profile, m."""
 
 STRIPS, STEPS = 25, 20
 """Strips across and steps along a patch."""
-
-_MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
-"""kg/m/m^2 per N/m^2, and the two bounds in N/m^2: 1 ug/m/mm^2 is 1e-3 kg/m/m^2."""
-
-
-def sheffield(work):
-    """Loss (kg per metre rolled and m^2) over friction's work per area (N/m^2): mild, flat, then rising steeply."""
-    flat = _MILD * _FLAT
-    return np.where(work < _FLAT, _MILD * work, flat + 61.9e-9 * np.maximum(work - _MORE, 0.0))
-
-
-def energy(work):
-    """Loss (kg per metre rolled and m^2) in proportion to friction's work per area (N/m^2)."""
-    return _MILD * np.asarray(work)
-
-
-LAWS = {"sheffield": sheffield, "energy": energy}
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +76,8 @@ def local_wear(
         With the contact channels.
     begin : float
         Start of the evaluation, s.
-    law : {"sheffield", "energy"}
+    law : {"sheffield", "energy"} or mapping
+        See :func:`wrcore.analysis.wear_laws.wear_law`.
     width : float
         Of the bins, m.
 
@@ -111,7 +89,8 @@ def local_wear(
     Raises
     ------
     InputError
-        For an unknown law, a run without wheels, or nothing after ``begin``.
+        For an unknown law, a run without wheels or their contacts, nothing after ``begin``, or Archard's law with
+        friction that is not one number.
 
     Examples
     --------
@@ -120,31 +99,36 @@ def local_wear(
     >>> sorted(wr.local_wear(run))
     [('wheelset', 'left'), ('wheelset', 'right')]
     """
-    if law not in LAWS:
-        raise InputError("local_wear", "law", one_of(LAWS, law))
+    loss = wear_law(law)
     if not wheelsets_of(run):
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):
         raise InputError("local_wear", "output.channels", "expected the channels of poses, for the rolling radius")
     if not np.any(run.t >= begin):
         raise InputError("local_wear", "begin", f"expected a time within the run, got {begin:g} s")
+    wheels = [(name, side) for name in wheelsets_of(run) for side in SIDES]
+    if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
+        raise InputError("local_wear", "output.channels", "expected contact among them")
+    check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
     late = run.t >= begin
     return {
-        (name, side): _wheel_wear(run[f"{name}/{side}"], late, run[name], OUTWARDS[side], run.scene, law, width)
-        for name in wheelsets_of(run)
-        for side in SIDES
+        (name, side): _wheel_wear(run[f"{name}/{side}"], late, run[name], SIDES[side], run.scene, loss, width)
+        for name, side in wheels
     }
 
 
-def _wheel_wear(contact, late, body, outwards, scene, law, width):
+def _wheel_wear(contact, late, body, outwards, scene, loss, width):
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
-    radius = np.broadcast_to(body["z_m"][late][:, None], there.shape)[there]
+    times = np.nonzero(there)[0]
+    radius = body["z_m"][late][times]
+    speed = np.broadcast_to(rolling_speed(body, scene["speed"]), late.shape)[late][times]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
     places, dy, dx, work = friction_work(rows, friction, *_material(scene))
     share = 1.0 / np.count_nonzero(late)
-    across = np.sum(LAWS[law](work) * dx[..., None], axis=-1) / DENSITY * share  # m per passage, mean over the run
+    taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
+    across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the run
     volume = float(np.sum(across * dy))
     slope = np.cos(rows["contact_angle_rad"])[:, None]
     low, high = (outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0))
@@ -157,8 +141,8 @@ def _wheel_wear(contact, late, body, outwards, scene, law, width):
     return WheelWear(*found, volume, float(np.sum(work * (dx * dy)[..., None]) * share))
 
 
-_NEEDED = ("a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",
-           "contact_angle_rad")  # fmt: skip
+_NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",
+           "contact_angle_rad"}  # fmt: skip
 
 
 def _material(scene):

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wrcore.analysis.motion import SIDES
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
 from wrcore.errors import InputError, similar
+from wrcore.geometry.surface import SIDES
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 
 if TYPE_CHECKING:
@@ -78,11 +78,12 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
 
 def _values(run: Run, channel: str) -> np.ndarray:
     group, _, name = channel.rpartition(".")
-    if name not in run.groups.get(group, {}):
+    try:
+        return run[group][name]
+    except KeyError:
         known = [f"{group}.{name}" for group, names in run.groups.items() for name in names]
         expected = f"expected a channel of the run: {', '.join(known)}{similar(channel, known)}"
-        raise InputError("plot", channel, expected)
-    return run.groups[group][name]
+        raise InputError("plot", channel, expected) from None
 
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:

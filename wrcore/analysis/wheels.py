@@ -1,9 +1,6 @@
 """What a vehicle's runs say: wheel loads, guiding forces, wear, ride and hunting, per wheel and over speed.
 
-Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: its lateral force on the rail in the plane
-of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Wear
-number T gamma: |Fx xi + Fy eta| summed over the patches (N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what
-friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed over the patches (W); see :mod:`wrcore.run.wear`.
+Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
 """
 
 from __future__ import annotations
@@ -13,18 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.motion import SIDES
+from wrcore.geometry.surface import SIDES
+from wrcore.run.derived import forces_on_rail, quotient
 from wrcore.run.motion import growth_rate, hunting_frequency
-from wrcore.run.wear import creep_work
 
 if TYPE_CHECKING:
     from wrcore.run.run import Run
-
-OUTWARDS = {"left": 1.0, "right": -1.0}
-
-
-UNLOADED = 1e3
-"""Below this Q counts as no contact and Y/Q is left out, N."""
 
 
 SMALLEST = 1e-6
@@ -59,19 +50,9 @@ def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.nda
     55
     """
     contact = run[f"{wheelset}/{side}"]
-    vertical, lateral = np.zeros(len(run.t)), np.zeros(len(run.t))
-    for patch in range(contact.N_N.shape[1]):
-        rows = np.flatnonzero(~np.isnan(contact.N_N[:, patch]))  # few have a second patch
-        normal, aside, angle = (contact[name][rows, patch] for name in ("N_N", "Fy_N", "contact_angle_rad"))
-        cosine, sine = np.cos(angle), np.sin(angle)
-        vertical[rows] += normal * cosine + aside * sine
-        lateral[rows] += aside * cosine - normal * sine
-    return vertical, -OUTWARDS[side] * lateral
-
-
-def _creep_work(run, wheelset, side):
-    c = run[f"{wheelset}/{side}"]
-    return creep_work(c.Fx_N, c.Fy_N, c.Mz_Nm, c.xi, c.eta, c.phi_per_m)
+    if "Q_N" in contact and "Y_N" in contact:
+        return contact.Q_N, contact.Y_N
+    return forces_on_rail(contact, side)
 
 
 def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.ndarray:
@@ -96,7 +77,7 @@ def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.nd
     >>> wr.wear_number(run, "wheelset", "left", spin=True).shape == run.t.shape
     True
     """
-    return _creep_work(run, wheelset, side)[int(spin)]
+    return run[f"{wheelset}/{side}"]["T_gamma_spin_N" if spin else "T_gamma_N"]
 
 
 def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
@@ -123,21 +104,12 @@ def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
     >>> power.shape == run.t.shape, bool(power.min() >= 0.0)
     (True, True)
     """
-    body = run[wheelset]
-    speed = np.hypot(body.vx_m_per_s, body.vy_m_per_s) if "vx_m_per_s" in body else run.scene["speed"]
-    return _creep_work(run, wheelset, side)[2] * speed
-
-
-def quotient(vertical, lateral):
-    """Y/Q; NaN where the wheel is as good as unloaded."""
-    return np.divide(lateral, vertical, out=np.full(np.shape(vertical), np.nan), where=np.asarray(vertical) > UNLOADED)
+    return run[f"{wheelset}/{side}"].creep_power_W
 
 
 def greatest_pressure(run, wheelset, side):
     """Greatest pressure under a wheel over time, Pa, shape (n,), 0 without contact; of ellipses 3 N/(2 pi a b)."""
-    c = run[f"{wheelset}/{side}"]
-    pressure = c.p_max_Pa if "p_max_Pa" in c else 1.5 * c.N_N / (np.pi * np.where(c.a_m > 0.0, c.a_m * c.b_m, np.nan))
-    return np.max(np.nan_to_num(pressure), axis=1)
+    return np.max(np.nan_to_num(run[f"{wheelset}/{side}"].p_max_Pa), axis=1)
 
 
 def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
@@ -160,10 +132,9 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
     ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
-    columns, total = {}, 0.0
+    columns = {}
     for side in SIDES:
         vertical, lateral = wheel_forces(run, wheelset, side)
-        total = total + OUTWARDS[side] * lateral
         columns |= {
             f"Q_{side}_N": vertical,
             f"Y_{side}_N": lateral,
@@ -173,7 +144,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
             f"creep_power_{side}_W": creep_power(run, wheelset, side),
             f"p_max_{side}_Pa": greatest_pressure(run, wheelset, side),
         }
-    return pd.DataFrame(columns | {"sum_Y_N": total}, index=pd.Index(run.t, name="t_s"))
+    return pd.DataFrame(columns | {"sum_Y_N": run[wheelset].sum_Y_N}, index=pd.Index(run.t, name="t_s"))
 
 
 def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:

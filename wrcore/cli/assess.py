@@ -26,10 +26,10 @@ FILES = columns(
 def add(commands):
     """The command's parser."""
     command = commands.add_parser(
-        "assess", help="assess a stored run by EN 14363 or EN 12299", description=ABOUT, epilog=FILES
+        "assess", help="assess a stored run by EN 14363, EN 12299 or ISO 2631", description=ABOUT, epilog=FILES
     )
     command.add_argument("run_file", metavar="run.h5", help="of 'wrcore simulate --out'")
-    command.add_argument("--standard", default="EN 14363", metavar="'EN 14363'|'EN 12299'", help="which one")
+    command.add_argument("--standard", default="EN 14363", metavar="'EN 14363'|'EN 12299'|'ISO 2631'", help="which one")
     command.add_argument("--begin", type=float, default=0.0, metavar="s", help="leave out what came before, s")
     command.add_argument("--freight", action="store_true", help="limits of freight wagons")
     command.add_argument("--out", metavar="sections.csv", help="write percentiles section by section (EN 14363)")

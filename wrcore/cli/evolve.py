@@ -3,6 +3,7 @@
 from functools import partial
 
 from wrcore.cli.options import columns
+from wrcore.errors import InputError
 
 ABOUT = """
 Wear a wheel profile over the distance of a plan, or go on with an interrupted one. Every key of a plan, with
@@ -32,6 +33,7 @@ def add(commands):
     )
     command.add_argument("plan", metavar="PLAN.yaml", help="'wrcore init FOLDER' makes one to start from")
     command.add_argument("--out", required=True, metavar="FOLDER", help="created if needed")
+    command.add_argument("--threads", type=int, default=1, metavar="n", help="scenes of a step at the same time")
     command.set_defaults(run=run)
 
 
@@ -39,7 +41,9 @@ def run(options):
     """Do what the options say."""
     from wrcore.analysis.evolve import evolve
 
-    table = evolve(options.plan, options.out, partial(print, flush=True))
+    if not 1 <= options.threads <= 1000:
+        raise InputError("wrcore evolve", "--threads", f"expected 1 to 1000, got {options.threads}")
+    table = evolve(options.plan, options.out, partial(print, flush=True), threads=options.threads)
     columns = ["distance_m", "worn_m", "Sh_m", "Sd_m", "qR_m", "equivalent_conicity"]
     print(table[columns].to_string(index=False, float_format=lambda value: f"{value:.5g}"))
     return 0

@@ -297,7 +297,7 @@ def _explain(error, schema):
         field = ".".join(filter(None, [field, missing[0]]))
         text = error.schema["properties"].get(missing[0], {}).get("description", "a value")
         return field, f"expected {text}, but the key is missing"
-    description = "a valid value"
+    description = schema.get("description", "a valid value")
     for part in error.absolute_schema_path:  # the innermost description on the way to what failed
         schema = schema[part]
         if isinstance(schema, dict) and isinstance(schema.get("description"), str):

@@ -20,9 +20,11 @@ from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import irregularity_end
+from wrcore.geometry.surface import SIDES
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.checkpoints import model_fingerprint
+from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.run import Run
 from wrcore.run.validity import exceeded
 from wrcore.scene.description import Scene, compile_scene
@@ -30,7 +32,6 @@ from wrcore.scene.description import Scene, compile_scene
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
 
-SIDES = ("left", "right")
 CONTACT_CHANNELS = {
     "u_wheel_m": reduction.U_WHEEL, "s_wheel_rad": reduction.S_WHEEL, "u_rail_m": reduction.U_RAIL,
     "x_m": reduction.X, "y_m": reduction.Y, "z_m": reduction.Z, "contact_angle_rad": reduction.ANGLE,
@@ -188,15 +189,15 @@ class Course:
                 groups[name] |= self._track_places(states, body)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
-            if "contact" in wanted and body in wheelsets:
+            if body in wheelsets and not {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
                 k = int(np.flatnonzero(wheelsets == body)[0])
-                for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
-                    groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
-                    if model.contact.strips.strips:
-                        groups[f"{name}/{side}"]["p_max_Pa"] = rows[..., reduction.P_MAX]
-                    if shaped(model.contact):
-                        groups[f"{name}/{side}"]["psi"] = rows[..., reduction.PSI]
-                if scene.detection == "auto":
+                contacts = self._contact_channels(name, patches[:, k])
+                if "contact" in wanted:
+                    groups |= contacts
+                moving = {name: _body_channels(states[:, own], rates[:, own], poses[:, body], ("velocity",))}
+                for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
+                    groups[group] = groups.get(group, {}) | channels
+                if "contact" in wanted and scene.detection == "auto":
                     groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
                     spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
                     groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
@@ -207,6 +208,18 @@ class Course:
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
         return groups, limits | {"beyond_irregularity": int(beyond)}
+
+    def _contact_channels(self, name, patches):
+        """Channels of the contacts of a wheelset's wheels by group."""
+        groups = {}
+        for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
+            channels = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+            if self.model.contact.strips.strips:
+                channels["p_max_Pa"] = rows[..., reduction.P_MAX]
+            if shaped(self.model.contact):
+                channels["psi"] = rows[..., reduction.PSI]
+            groups[f"{name}/{side}"] = channels
+        return groups
 
     def _rolling_rates(self, states, body):
         """Channels of the rolling rates of wheels that turn independently, rad/s."""

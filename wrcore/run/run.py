@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ import numpy as np
 import wrcore
 from wrcore.errors import similar
 from wrcore.run.channels import DESCRIPTIONS, unit_of
+from wrcore.run.derived import derived_channels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 class Channels(Mapping[str, np.ndarray]):
     """Channels of one group, as attributes and as items; ``dir`` and completion list them.
 
+    Those of ``derived`` are computed when they are asked for; iteration, length and ``in`` know only those that the run
+    holds.
+
     Examples
     --------
     >>> import numpy as np
@@ -31,15 +35,29 @@ class Channels(Mapping[str, np.ndarray]):
     (True, ['y_m'])
     """
 
-    def __init__(self, group: str, channels: Mapping[str, np.ndarray]) -> None:
-        self._group, self._channels = group, channels
+    def __init__(
+        self,
+        group: str,
+        channels: Mapping[str, np.ndarray],
+        derived: Mapping[str, Callable[[], np.ndarray]] | None = None,
+    ) -> None:
+        self._group, self._channels, self._derived = group, channels, derived or {}
 
     def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self._channels:
-            raise KeyError(
-                f"no channel {name!r} in {self._group!r}; it has {', '.join(self._channels)}{similar(name, self)}"
-            )
-        return self._channels[name]
+        if name in self._channels:
+            return self._channels[name]
+        if name in self._derived:
+            return self._derived[name]()
+        has, known = ", ".join(self._channels), [*self._channels, *self._derived]
+        follow = f", and what follows from these, {', '.join(self._derived)}" if self._derived else ""
+        raise KeyError(f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._channels
+
+    def follows(self, name: str) -> bool:
+        """Whether a channel is held, or can be computed from those that are."""
+        return name in self._channels or name in self._derived
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):  # what copying and pickling ask for before there are any channels
@@ -56,10 +74,10 @@ class Channels(Mapping[str, np.ndarray]):
         return len(self._channels)
 
     def __dir__(self) -> list[str]:
-        return sorted([*super().__dir__(), *self._channels])
+        return sorted([*super().__dir__(), *self._channels, *self._derived])
 
     def _ipython_key_completions_(self) -> list[str]:
-        return list(self._channels)
+        return [*self._channels, *self._derived]
 
     def __repr__(self) -> str:
         width = max(map(len, self._channels), default=0)
@@ -103,7 +121,9 @@ class Run:
 
     Examples
     --------
-    ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N.
+    ``run["wheelset"].y_m`` is the lateral position in m, ``run["wheelset/left"].N_N`` the normal forces in N,
+    ``run["wheelset/left"].Y_N`` the lateral force on the rail, which follows from the contacts' channels
+    (:mod:`wrcore.run.derived`).
 
     >>> import numpy as np
     >>> run = Run({"name": "still"}, "completed", "", np.array([0.0, 0.5]), {"wheelset": {"y_m": np.zeros(2)}})
@@ -132,7 +152,8 @@ class Run:
             raise KeyError(
                 f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}{similar(group, self)}"
             )
-        return Channels(group, self.groups[group])
+        derived = derived_channels(self.groups, group, self.scene.get("speed", np.nan))
+        return Channels(group, self.groups[group], derived)
 
     def __contains__(self, group: object) -> bool:
         return group in self.groups
@@ -211,7 +232,7 @@ class Run:
             Index ``t_s``; per side (``left``, ``right``) ``Q_left_N`` (vertical), ``Y_left_N`` (lateral, to the field
             side), ``Y_over_Q_left``, ``T_gamma_left_N``, ``T_gamma_spin_left_N``, ``creep_power_left_W`` and
             ``p_max_left_Pa``; ``sum_Y_N``, the lateral force on the track, to the left. Definitions:
-            :mod:`wrcore.analysis.wheels`.
+            :mod:`wrcore.run.derived`.
 
         Raises
         ------

@@ -12,7 +12,7 @@ sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 plan, changes = snakemake.input.plan, dict(snakemake.params.settings)
 changes["set"] = changes.get("set", {}) | {"contact.creep.table": os.path.abspath(snakemake.input.table[0])}
 folder = Path(snakemake.output.table).with_name("profiles") / plan_mark(*load_wear_plan(plan, changes))[:12]
-table = evolve(plan, folder, print, changes)  # a job that was killed goes on there
+table = evolve(plan, folder, print, changes, snakemake.threads)  # a job that was killed goes on there
 profiles = profiles_over_distance(folder)
 table.to_csv(snakemake.output.table, index=False)
 save_figure(plot_evolution(profiles, table), snakemake.output.figure, snakemake.output.svg)

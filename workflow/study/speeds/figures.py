@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from wrcore.analysis.motion import SIDES
 from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
-from wrcore.analysis.wheels import hunting, quotient, wheel_forces, wheelsets_of
+from wrcore.analysis.wheels import hunting, wheel_forces, wheelsets_of
+from wrcore.run.derived import quotient
 
 KN = 1e-3
 

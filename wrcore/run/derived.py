@@ -1,0 +1,153 @@
+"""Channels that follow from those of contacts: forces on the rails, wear and pressure of wheels, sum of Y of wheelsets.
+
+Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: its lateral force on the rail in the plane
+of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Sum of
+Y: lateral force of a wheelset on the track, to the left. Wear number T gamma: |Fx xi + Fy eta| summed over the patches
+(N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed
+over the patches (W); see :mod:`wrcore.run.wear`. Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+
+import numpy as np
+
+from wrcore.geometry.surface import SIDES
+from wrcore.run.wear import creep_work
+
+UNLOADED = 1e3
+"""Below this Q counts as no contact and Y/Q is left out, N."""
+
+OF_WHEELS = {
+    "Q": "Q_N", "Y": "Y_N", "Y_over_Q": "Y_over_Q", "T_gamma": "T_gamma_N", "T_gamma_spin": "T_gamma_spin_N",
+    "creep_power": "creep_power_W", "p_max": "p_max_Pa",
+}  # fmt: skip
+OF_WHEELSETS = {"sum_Y": "sum_Y_N"}
+"""Names in ``output.channels`` of a scene, and the channels of wheels or wheelsets that they stand for."""
+
+Groups = Mapping[str, Mapping[str, np.ndarray]]
+
+
+def forces_on_rail(contact: Mapping[str, np.ndarray], side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of a wheel on its rail.
+
+    Parameters
+    ----------
+    contact : mapping of str to ndarray, shape (n, patches)
+        Channels N_N, Fy_N and contact_angle_rad of its contacts.
+    side : {"left", "right"}
+
+    Returns
+    -------
+    Q, Y : ndarray, shape (n,)
+        Vertical (downwards) and lateral (to the field side) force, N.
+    """
+    loads = contact["N_N"]
+    vertical, lateral = np.zeros(len(loads)), np.zeros(len(loads))
+    for patch in range(loads.shape[1]):
+        rows = np.flatnonzero(~np.isnan(loads[:, patch]))  # few have a second patch
+        normal, aside, angle = (contact[name][rows, patch] for name in ("N_N", "Fy_N", "contact_angle_rad"))
+        cosine, sine = np.cos(angle), np.sin(angle)
+        vertical[rows] += normal * cosine + aside * sine
+        lateral[rows] += aside * cosine - normal * sine
+    return vertical, -SIDES[side] * lateral
+
+
+def quotient(vertical: np.ndarray, lateral: np.ndarray) -> np.ndarray:
+    """Y/Q; NaN where the wheel is as good as unloaded."""
+    return np.divide(lateral, vertical, out=np.full(np.shape(vertical), np.nan), where=np.asarray(vertical) > UNLOADED)
+
+
+def rolling_speed(body: Mapping[str, np.ndarray], speed: float) -> np.ndarray | float:
+    """Speed of a wheelset, m/s: that of its channels, or the scene's where a run does not hold velocities."""
+    return np.hypot(body["vx_m_per_s"], body["vy_m_per_s"]) if "vx_m_per_s" in body else speed
+
+
+def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Callable[[], np.ndarray]]:
+    """Channels that a group does not hold, but that follow from those that it and its wheels hold.
+
+    Parameters
+    ----------
+    groups : mapping of str to mapping of str to ndarray
+        Of a run.
+    group : str
+        Of a wheel (``wheelset/left``) or of a wheelset.
+    speed : float
+        Of the scene, m/s.
+
+    Returns
+    -------
+    dict of str to callable
+        What computes each of them, by name.
+    """
+    wheelset, _, side = group.rpartition("/")
+    if side not in SIDES or not wheelset:
+        return _of_wheelset(groups, group, speed)
+    contact = groups[group]
+    found: dict[str, Callable[[], np.ndarray]] = {}
+    if {"N_N", "Fy_N", "contact_angle_rad"} <= contact.keys():
+        found |= {name: partial(_force, contact, side, at) for at, name in enumerate(("Q_N", "Y_N"))}
+    if {"Q_N", "Y_N"} <= contact.keys() | found.keys():
+        found["Y_over_Q"] = lambda: quotient(*(_known(contact, found, name) for name in ("Q_N", "Y_N")))
+    if {"Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"} <= contact.keys():
+        found |= {name: partial(_work, contact, at) for at, name in enumerate(("T_gamma_N", "T_gamma_spin_N"))}
+        found["creep_power_W"] = lambda: _work(contact, 2) * rolling_speed(groups[wheelset], speed)
+    if {"N_N", "a_m", "b_m"} <= contact.keys():
+        found["p_max_Pa"] = partial(_pressure, contact)
+    return {name: compute for name, compute in found.items() if name not in contact}
+
+
+def _of_wheelset(groups, group, speed):
+    wheels = {side: f"{group}/{side}" for side in SIDES}
+    if "sum_Y_N" in groups[group] or not all(wheel in groups for wheel in wheels.values()):
+        return {}
+    known = {side: (groups[wheel], derived_channels(groups, wheel, speed)) for side, wheel in wheels.items()}
+    if not all("Y_N" in stored or "Y_N" in derived for stored, derived in known.values()):
+        return {}
+    return {"sum_Y_N": lambda: sum(SIDES[side] * _known(*known[side], "Y_N") for side in SIDES)}
+
+
+def _known(stored, derived, name):
+    return stored[name] if name in stored else derived[name]()
+
+
+def _force(contact, side, at):
+    return forces_on_rail(contact, side)[at]
+
+
+def _work(contact, at):
+    return creep_work(*(contact[name] for name in ("Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m")))[at]
+
+
+def _pressure(contact):
+    a, b = contact["a_m"], contact["b_m"]
+    return 1.5 * contact["N_N"] / (np.pi * np.where(a > 0.0, a * b, np.nan))
+
+
+def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, dict[str, np.ndarray]]:
+    """Derived channels that a scene asks for by name.
+
+    Parameters
+    ----------
+    wanted : iterable of str
+        ``output.channels`` of the scene.
+    groups : mapping of str to mapping of str to ndarray
+        Of a wheelset and its wheels, with all channels of contacts.
+    speed : float
+        Of the scene, m/s.
+
+    Returns
+    -------
+    dict of str to dict of str to ndarray
+        By group; groups without any are left out.
+    """
+    found = {}
+    for group, stored in groups.items():
+        kinds = OF_WHEELS if "/" in group else OF_WHEELSETS
+        derived = derived_channels(groups, group, speed)
+        own = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
+        if own:
+            found[group] = own
+    return found
