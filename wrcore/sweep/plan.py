@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +106,7 @@ def load_sweep(
     Sweep 'hunting': 15 runs over speed, initial.y; 1 batches
     """
     if isinstance(source, Mapping):
-        name, folder, data = "sweep", Path(), json.loads(json.dumps(source))
+        name, folder, data = "sweep", Path(), json.loads(json.dumps(source, default=fspath))
     else:
         name, folder, data = str(source), Path(source).parent, read_yaml(source)
     data = validate(data, "sweep", name)
