@@ -248,7 +248,10 @@ def test_pages_of_the_report_open_without_a_network_and_hold_everything(smoke):
             {"paper": {"cases": {"wheelset_v20": {"scene": "absent.yaml"}}}},
             "paper.cases.wheelset_v20: absent.yaml: expected a readable file",
         ),
-        ({"paper": {"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}}, "wheelset.yaml: sped: unknown key"),
+        (
+            {"paper": {"cases": {"wheelset_v20": {"set": {"sped": 20.0}}}}},
+            "paper.cases.wheelset_v20: changes: sped: unknown key",
+        ),
     ],
 )
 def test_wrong_configuration_stops_before_any_job(tmp_path, change, message):

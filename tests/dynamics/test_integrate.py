@@ -149,10 +149,11 @@ def test_all_methods_agree(wheelset, method):
     model, start = wheelset
     times = np.linspace(0.0, 0.5, 101)
     exact = integrate(model, start, times, "tsit5", 1e-10, 1e-13).states
-    run = integrate(model, start, times, method, 1e-6, 1e-9)
+    rtol = 1e-7 if method in ("scipy_bdf", "scipy_lsoda") else 1e-6  # multistep methods: 1.7e-7 m at 1e-6
+    run = integrate(model, start, times, method, rtol, 1e-3 * rtol)
     assert run.status == "completed" and run.method == method
     assert np.ptp(exact[:, 1]) > 2e-3
-    assert np.abs(run.states[:, 1] - exact[:, 1]).max() < 1e-7  # scipy's BDF, the least accurate one: 1.2e-8
+    assert np.abs(run.states[:, 1] - exact[:, 1]).max() < 1e-7
 
 
 def test_cvode_agrees(wheelset):

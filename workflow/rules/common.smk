@@ -61,7 +61,7 @@ def check_config():
             scenes[place] = (config["critical_speed"]["vehicles"][vehicle]["scene"], model["set"] | entry["track"])
     for key, (scene, changes) in scenes.items():
         try:
-            load_scene(scene, [f"{name}={value}" for name, value in changes.items()])
+            load_scene(scene, changes)
         except InputError as error:
             raise WorkflowError(f"configuration: {key}: {error}")
 

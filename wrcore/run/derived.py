@@ -90,7 +90,8 @@ def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Call
     if {"N_N", "Fy_N", "contact_angle_rad"} <= contact.keys():
         found |= {name: partial(_force, contact, side, at) for at, name in enumerate(("Q_N", "Y_N"))}
     if {"Q_N", "Y_N"} <= contact.keys() | found.keys():
-        found["Y_over_Q"] = lambda: quotient(*(_known(contact, found, name) for name in ("Q_N", "Y_N")))
+        forces = dict(found)  # a copy: what refers to itself keeps its arrays alive
+        found["Y_over_Q"] = lambda: quotient(*(_known(contact, forces, name) for name in ("Q_N", "Y_N")))
     if {"Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"} <= contact.keys():
         found |= {name: partial(_work, contact, at) for at, name in enumerate(("T_gamma_N", "T_gamma_spin_N"))}
         found["creep_power_W"] = lambda: _work(contact, 2) * rolling_speed(groups[wheelset], speed)
@@ -146,6 +147,8 @@ def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, 
     found = {}
     for group, stored in groups.items():
         kinds = OF_WHEELS if "/" in group else OF_WHEELSETS
+        if kinds.keys().isdisjoint(wanted):
+            continue
         derived = derived_channels(groups, group, speed)
         own = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
         if own:

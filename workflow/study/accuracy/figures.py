@@ -83,7 +83,7 @@ def speed_against_error(tables, finest, doubts=None, resolved=None):
             axes.axvline(resolved[title], color=MODEL, ls="--", lw=0.9, label="resolution of exact contact")
         axes.set(xscale="log", yscale="log", xlabel="error of y, rms / m", ylabel="real-time factor / 1")
         if doubts:  # often far below all marks: the range is theirs
-            axes.set_xlabel(f"error of y, rms / m (references differ by {doubts[title]:.0e} m)")
+            axes.set_xlabel(f"error of y, rms / m (references: {doubts[title]:.0e} m)")
             axes.set_xlim(left=least)
         axes.set_title(title, loc="left")
     for axes in panels[len(tables) :]:
