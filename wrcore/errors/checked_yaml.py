@@ -4,11 +4,11 @@ import copy
 import math
 import os
 import re
+import sys
 from functools import cache
 from importlib.resources import files
 from itertools import islice
 
-import jsonschema
 import yaml
 
 from wrcore.errors import InputError, similar
@@ -16,8 +16,25 @@ from wrcore.errors import InputError, similar
 MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
 """A longer document, one with more values, or nested deeper, is none that a person wrote."""
 
+_GRAMMAR = "rfc3987_syntax"
+"""Of JupyterLab: jsonschema would build it, most of a second, for a format that no schema here has."""
+
 _TAG = "tag:yaml.org,2002:"
 _LIBYAML = yaml.__with_libyaml__
+
+
+@cache
+def _validator():
+    """The class of jsonschema's validators, without that grammar."""
+    hidden = _GRAMMAR not in sys.modules
+    if hidden:
+        sys.modules[_GRAMMAR] = None  # type: ignore[assignment]
+    try:
+        from jsonschema import Draft202012Validator
+    finally:
+        if hidden:
+            del sys.modules[_GRAMMAR]
+    return Draft202012Validator
 
 
 class _Loader(yaml.CSafeLoader if _LIBYAML else yaml.SafeLoader):
@@ -214,7 +231,7 @@ def validate(data, schema_name, source):
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
-    found = islice(jsonschema.Draft202012Validator(schema).iter_errors(data), 1000)
+    found = islice(_validator()(schema).iter_errors(data), 1000)
     errors = sorted(found, key=lambda e: (len(e.path), str(e.path)))
     if errors:
         field, expected = _explain(errors[0], schema)
