@@ -113,6 +113,15 @@ def test_the_public_function_is_not_hidden_by_the_file_of_its_name():
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
 
 
+def test_a_run_starts_without_what_it_does_not_need():
+    code = (
+        "import sys; from wrcore.scene.description import load_scene; load_scene('config/scenes/wheelset.yaml');"
+        "slow = {'scipy.interpolate', 'scipy.optimize', 'rfc3987_syntax', 'matplotlib', 'pandas'};"
+        "assert not slow & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
 def test_import_is_cheap_and_names_are_complete():
     code = "import sys, wrcore; assert not {'numpy', 'numba', 'matplotlib', 'pandas'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
