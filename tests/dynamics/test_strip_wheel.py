@@ -67,6 +67,25 @@ def test_a_wheel_feels_what_the_patch_alone_gives(exact):
     np.testing.assert_allclose(wrench[3:], moment, rtol=1e-6, atol=1e-2)
 
 
+def test_forces_do_not_step_where_the_number_of_strips_changes(exact):
+    equations, model, state = exact
+    contact = NormalContact(model.contact.geometry, 8.2e10 / 0.72, "coarse")
+    left, counts = [], []
+    for y in np.arange(0.8e-3, 1.0e-3, 1e-6):
+        moved = state.copy()
+        moved[[1, 2, 4, 5, 6]] = y, state[2] - 2e-5, 0.0, 0.0, 0.0
+        moved[3] = 1.0
+        equations(0.0, moved)
+        row = equations.work.patches[0, 0, 0].copy()
+        (patch,) = contact.at_height("left", y, moved[2])
+        assert row[columns.NORMAL] == pytest.approx(patch.normal_force, rel=1e-9)
+        left.append(row[columns.NORMAL])
+        counts.append(patch.centre.size)
+    increments = np.diff(left)
+    assert len(set(counts)) > 1
+    assert np.abs(np.diff(increments)).max() < 0.05 * np.median(np.abs(increments))
+
+
 def test_left_and_right_are_mirror_images(exact):
     equations, _, state = exact
     rates = equations(0.0, state)
