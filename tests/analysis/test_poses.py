@@ -10,7 +10,8 @@ import wrcore as wr
 from tests.conftest import SCENES
 from tests.contact.patch import contact_reference as contact
 from tests.contact.patch.test_grid import some_cases
-from wrcore.analysis.loaded import Rolling, loaded_wheels
+from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.analysis.poses import ROLLING_FIELDS, loaded_poses
 from wrcore.cli import main
 from wrcore.contact import reduction as columns

@@ -6,7 +6,8 @@ import math
 from typing import NamedTuple
 
 from wrcore.analysis.contact import pair_geometry
-from wrcore.analysis.loaded import GRIDS, Rolling, Strips
+from wrcore.analysis.loaded import GRIDS, Strips
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.result import Patch

@@ -4,7 +4,8 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.loaded import Rolling, loaded_wheels
+from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact import reduction as columns
 from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number

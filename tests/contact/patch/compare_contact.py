@@ -15,7 +15,8 @@ import pandas as pd
 
 from tests.analysis.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
-from wrcore.analysis.loaded import Rolling, loaded_wheels
+from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact import reduction as columns
 
 QUANTITIES = {

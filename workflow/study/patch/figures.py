@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from study.patch.tables import REFERENCE, radius_differences
-from wrcore.analysis.loaded import Rolling, loaded_wheels
+from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.analysis.style import MM, shared_legend, styled
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.loaded import Rolling, loaded_wheels
+from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact import reduction as columns
 
 REFERENCE = "exact, fine"
@@ -35,7 +36,7 @@ def carried(found, rolling):
 
     Parameters
     ----------
-    found : sequence of wrcore.analysis.loaded.Found
+    found : sequence of wrcore.analysis.loaded_base.Found
     rolling : Rolling
         With which they were found; its rate is given.
     """
