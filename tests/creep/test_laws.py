@@ -42,6 +42,19 @@ def test_polach_with_pure_spin(data, phi, published, tolerance):
     assert lateral("polach", data, 0.0, phi) == pytest.approx(published, abs=tolerance)
 
 
+@pytest.mark.parametrize("adhesion, slip", [(1.0, 1.0), (1.0, 0.4), (0.3, 0.1)])
+def test_polach_reduced_in_adhesion_and_slip(adhesion, slip):
+    """FACTS 6.5 and Polach (2005): (2/pi) (k_A e/(1 + (k_A e)^2) + atan(k_S e)), e = (pi/4) C11 xi' without spin."""
+    data, g = creep_data(0.28, factors=(adhesion, slip)), 1.7
+    c11 = kalker_coefficients(g, data.table.kalker)[0]
+    for xi in (1e-6, 0.3, 2.0, 40.0):
+        e = 0.25 * np.pi * c11 * xi
+        exact = 2 / np.pi * (adhesion * e / (1 + (adhesion * e) ** 2) + np.arctan(slip * e))
+        assert creep_force(LAWS["polach"], data, g, 0.0, xi, 0.0, 0.0)[0] == pytest.approx(-exact, rel=1e-14)
+    slope = -creep_force(LAWS["polach"], data, g, 0.0, 1e-6, 0.0, 0.0)[0] / 1e-6
+    assert slope == pytest.approx(0.5 * (adhesion + slip) * c11, rel=1e-6)  # of Kalker's
+
+
 def test_pure_lateral_creepage(data):
     """FACTS 6.5: Polach 0.317, FASTSIM 0.299 of mu N (FASTSIM depends on the grid: 1.5 %)."""
     assert lateral("polach", data, 6.25e-4, 0.0) == pytest.approx(-0.317, abs=0.001)

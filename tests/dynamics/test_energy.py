@@ -127,7 +127,15 @@ EVERYTHING = [
     {"kind": "damper", "direction": "line", "at": [[0.3, 0.2, 1.8], [-0.4, 0.2, 1.2]], "series_stiffness": 30.0,
      "characteristic": {"velocity": [0.0, 0.2, 1.0], "force": [0.0, 5.0, 5.0]}},
     {"kind": "friction", "direction": "x", "at": [0.1, 0.2, 1.5], "force": 2.0, "series_stiffness": 40.0},
-    {"kind": "bump_stop", "direction": "y", "at": [0, 0.2, 1.5],
+    {"kind": "friction", "direction": "x", "at": [0.2, 0.2, 1.5], "mu": 0.3, "normal": "e0", "series_stiffness": 40.0},
+    {"kind": "friction", "direction": "line", "at": [[0.3, 0.2, 1.8], [-0.4, 0.2, 1.2]], "mu": 0.3, "normal": "stop",
+     "force": 1.0, "approach": 0.1},
+    {"kind": "friction", "direction": "z", "at": [0.1, -0.2, 1.5], "force": 2.0, "approach": 0.05},
+    {"kind": "friction", "direction": "y", "at": [0.1, -0.2, 1.5], "mu": 0.2, "normal": "e0", "approach": 0.05,
+     "pendulum": 0.5},
+    {"kind": "bushing", "at": [0.2, 0.2, 1.5], "stiffness": [5.0, 2.0, 3.0], "cubic_stiffness": [4.0, 0.0, 7.0],
+     "damping": [0.3, 0.2, 0.1], "rotation_stiffness": [2.0, 3.0, 4.0], "rotation_cubic_stiffness": [3.0, 1.0, 2.0]},
+    {"name": "stop", "kind": "bump_stop", "direction": "y", "at": [0, 0.2, 1.5],
      "characteristic": {"displacement": [-0.5, -0.1, 0.2, 0.4], "force": [-20.0, -1.0, 2.0, 30.0]}},
     {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0,
      "preload": 4.0},
@@ -138,7 +146,8 @@ EVERYTHING = [
 @pytest.mark.parametrize("path", ["tangent", [{"transition": 2.0}, {"curve": 50, "radius": 20, "cant": 0.02}]])
 def test_energy_of_every_kind_of_element_adds_up(contact, path):  # noqa: F811
     # large motions of two bodies, one of them pulled along a track by a moving frame
-    pulled = [{**item, "bodies": ["lower", "frame"]} for item in EVERYTHING if item["kind"] != "anti_roll_bar"]
+    single = [item for item in EVERYTHING if item["kind"] != "anti_roll_bar" and "normal" not in item]
+    pulled = [{**item, "name": f"pulled_{k}", "bodies": ["lower", "frame"]} for k, item in enumerate(single)]
     model = model_with(contact, [*EVERYTHING, *pulled], speed=2.0)
     track = build_track({"path": path, "rounding": 1.0}, "test")
     model = model._replace(track=TrackModel(path == "tangent", track.path, track.irregularity), gravity=1.5)

@@ -107,6 +107,10 @@ CONSERVATIVE = {
         {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 600.0, "preload": 40.0}
     ],
     "anti_roll_bar": [SPRING, {"kind": "anti_roll_bar", "stiffness": 90.0}],
+    "bushing": [
+        {**SPRING, "kind": "bushing", "cubic_stiffness": [900.0, 0.0, 500.0], "rotation_stiffness": [9.0, 1.0, 4.0],
+         "rotation_cubic_stiffness": [3.0, 5.0, 2.0]}
+    ],
 }  # fmt: skip
 
 
@@ -123,7 +127,15 @@ def energy_of(kind, state):
     if kind == "bump_stop":
         return 0.5 * 500.0 * np.sum(np.maximum(np.abs(stretch) - 0.1, 0.0) ** 2)
     energy = 0.5 * np.sum(item["stiffness"] * stretch**2) - np.sum(np.array(item.get("preload", [0, 0, 0])) * stretch)
-    k = {"rotation stiffness": [90.0, 10.0, 40.0], "anti_roll_bar": [90.0, 0, 0], "shear_spring": [60.0, 60.0, 0]}
+    if kind == "bushing":
+        energy += 0.25 * np.sum(item["cubic_stiffness"] * stretch**4)
+        energy += np.sum(item["rotation_cubic_stiffness"] * (0.5 * (1.0 - np.trace(R)) + np.diag(R)) ** 2)
+    k = {
+        "rotation stiffness": [90.0, 10.0, 40.0],
+        "bushing": [9.0, 1.0, 4.0],
+        "anti_roll_bar": [90.0, 0, 0],
+        "shear_spring": [60.0, 60.0, 0],
+    }
     kx, ky, kz = k.get(kind, [0.0, 0.0, 0.0])
     return energy + 0.5 * (np.array([ky + kz - kx, kx + kz - ky, kx + ky - kz]) @ (1.0 - np.diag(R)))
 

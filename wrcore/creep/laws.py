@@ -22,6 +22,15 @@ _TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3
 FASTSIM_GRID = 40
 
 
+class PolachFactors(NamedTuple):
+    """Reduction factors of Polach's law, both 1 for clean, dry rails."""
+
+    adhesion: float
+    """k_A, of the slope at small creepages and in the area of adhesion."""
+    slip: float
+    """k_S, in the area of slip; k_S <= k_A <= 1."""
+
+
 class CreepData(NamedTuple):
     """What the laws need beside their arguments; a kernel argument.
 
@@ -30,13 +39,15 @@ class CreepData(NamedTuple):
     table : CreepTableData
         Without nodes where the law is not the table; its ``kalker`` serves all laws.
     fastsim : FastsimData
+    polach : PolachFactors
     """
 
     table: CreepTableData
     fastsim: FastsimData
+    polach: PolachFactors
 
 
-def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
+def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 1.0)):
     """Data for `creep_force`.
 
     Parameters
@@ -49,6 +60,8 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
         FASTSIM's steps along x and strips across.
     elliptic : bool
         FASTSIM's bound: Hertzian instead of parabolic.
+    factors : tuple of float
+        k_A and k_S of Polach's law.
 
     Returns
     -------
@@ -56,7 +69,8 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False):
     """
     if table is None:
         table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker_data(nu), np.zeros(0, np.float32))
-    return CreepData(table, FastsimData(int(grid), int(grid), int(elliptic)))
+    fastsim_data = FastsimData(int(grid), int(grid), int(elliptic))
+    return CreepData(table, fastsim_data, PolachFactors(float(factors[0]), float(factors[1])))
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -93,17 +107,18 @@ def she(kalker, g, xi, eta, phi):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def polach(kalker, g, xi, eta, phi):
+def polach(kalker, factors, g, xi, eta, phi):
     """Polach: one saturation curve for the force, a separate one for the part that spin makes; no moment (mz = 0).
 
     With the creepages s, s_yc = s_y + phi a where that is larger in size than s_y, s_c = sqrt(s_x^2 + s_yc^2):
-    eps = (pi/4) c_jj s_c, F = (2/pi) (eps/(1 + eps^2) + atan eps), F_x = -F s_x/s_c,
+    eps = (pi/4) c_jj s_c, F = (2/pi) (k_A eps/(1 + (k_A eps)^2) + atan(k_S eps)), F_x = -F s_x/s_c,
     F_y = -F s_y/s_c + (9/16) a k K phi/s_c, k = 1 + 6.3 (1 - exp(-a/b)), K(eps_s) from
-    eps_s = (8/3) b C23 abs(s_yc)/k (lengths over c).
+    eps_s = (8/3) b C23 abs(s_yc)/k (lengths over c). The factors k_A and k_S do not touch the part that spin makes.
 
     References
     ----------
     Polach, A fast wheel-rail forces calculation computer code, Vehicle System Dynamics Suppl. 33 (1999) 728-739.
+    Polach, Creep forces in simulations of traction vehicles running on adhesion limit, Wear 258 (2005) 992-1000.
     """
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
@@ -115,7 +130,8 @@ def polach(kalker, g, xi, eta, phi):
     plain = np.sqrt(xi * xi + eta * eta) + 1e-300
     stiffness = np.sqrt((c11 * xi / plain) ** 2 + (c22 * eta / plain) ** 2)
     eps = 0.25 * np.pi * stiffness * total
-    force = 2 / np.pi * (eps / (1 + eps * eps) + np.arctan(eps))
+    held = factors.adhesion * eps
+    force = 2 / np.pi * (held / (1 + held * held) + np.arctan(factors.slip * eps))
     k = 1 + 6.3 * (1 - np.exp(-g))
     eps_spin = 8 / 3 * b * c23 * abs(lateral) / k
     delta = (eps_spin * eps_spin - 1) / (eps_spin * eps_spin + 1)
@@ -135,7 +151,7 @@ def _other_law(law, data, log_g, g, psi, xi, eta, phi):
     elif law == _SHE:
         fx, fy, mz = she(kalker, g, xi, eta, phi)
     elif law == _POLACH:
-        fx, fy, mz = polach(kalker, g, xi, eta, phi)
+        fx, fy, mz = polach(kalker, data.polach, g, xi, eta, phi)
     else:
         fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, xi, eta, phi)
     return fx, fy, mz, outside

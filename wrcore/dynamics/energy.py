@@ -30,12 +30,17 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.support import support_places
 from wrcore.dynamics.suspension import (
+    APPROACH,
+    CUBIC,
     DISPLACEMENT,
     LINE,
     SERIES,
     SERIES_VELOCITY,
+    SLIDER,
     VELOCITY,
     characteristic,
+    friction_force,
+    friction_limit,
     pack_elements,
 )
 from wrcore.dynamics.system import Equations, derivatives_at, independent_at
@@ -92,7 +97,26 @@ def _directed_energy(elements, k, stretch, speed, own):
         stored += _polygon_integral(table, law[2], law[3], stretch) - _polygon_integral(table, law[2], law[3], 0.0)
     elif law[1] == VELOCITY:
         viscous += characteristic(table, law[2], law[3], speed)
+    elif law[1] == CUBIC:
+        elastic += table[law[2], 0] * stretch**3
+        stored += 0.25 * table[law[2], 0] * stretch**4
     return elastic + viscous, stored, elastic * speed, viscous * speed
+
+
+@jit
+def _friction_energy(elements, k, stretch, speed, own, limit):
+    """As `_directed_energy` for an element with a limit.
+
+    Approach stores what it would at the limit of the nominal position; what a limit that varies does counts as lost.
+    """
+    row, law = elements.directed[k], elements.law[k]
+    force, rate = friction_force(elements, k, stretch, speed, own, limit)
+    if law[1] == APPROACH:
+        nominal, distance, hanging = elements.table[law[2], 1], row[8], row[7]
+        stored = 0.5 * nominal * (own**2 / distance + hanging * stretch**2)
+        storing = nominal * (own * rate / distance + hanging * stretch * speed)
+        return force, stored, storing, force * speed - storing
+    return force, 0.5 * row[7] * (stretch - own) ** 2, force * (speed - rate), force * rate
 
 
 @jit
@@ -129,13 +153,16 @@ def element_energies(elements, track, t, speed, state, rotations, turns):
         apart = state[at : at + 3] - origin
         rho, u = into @ apart, into @ (state[at + 7 : at + 10] - velocity - np.cross(turn, apart))
         W = into @ (turns[i] - turn)
-        c, d = elements.turning[p]
+        c, d, h = elements.turning[p]
+        single = 0.5 * (1.0 - np.trace(R)) + np.diag(R)  # T of each axis
+        stored += np.sum(h * single**2)
+        c = c + np.sum(h * single) - 2.0 * h * single
         moment = np.array([
             c[2] * R[1, 2] - c[1] * R[2, 1] - d[0] * W[0], c[0] * R[2, 0] - c[2] * R[0, 2] - d[1] * W[1],
             c[1] * R[0, 1] - c[0] * R[1, 0] - d[2] * W[2],
         ])  # fmt: skip
         loss = np.sum(d * W * W)
-        stored += np.sum(c) - c[0] * R[0, 0] - c[1] * R[1, 1] - c[2] * R[2, 2]
+        stored += np.sum(elements.turning[p, 0] * (1.0 - np.diag(R)))
         rate -= np.sum(moment * W) + loss
         lost += loss
         force = np.zeros(3)
@@ -161,7 +188,14 @@ def element_energies(elements, track, t, speed, state, rotations, turns):
                 n[law[0]] = 1.0
             along = np.sum(n * (u + np.cross(W, arm)))
             inner = state[own + law[4]] if law[4] >= 0 else 0.0
-            against, energy, power, loss = _directed_energy(elements, k, np.sum(n * line) - row[6], along, inner)
+            stretch = np.sum(n * line) - row[6]
+            if law[1] < SLIDER:
+                against, energy, power, loss = _directed_energy(elements, k, stretch, along, inner)
+            else:
+                rotation = (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2])
+                motion = (rho[0], rho[1], rho[2]), (u[0], u[1], u[2]), (W[0], W[1], W[2])
+                limit = friction_limit(elements, k, rotation, motion[0], motion[1], motion[2])
+                against, energy, power, loss = _friction_energy(elements, k, stretch, along, inner, limit)
             stored, rate, lost = stored + energy, rate + power, lost + loss
             force -= against * n
             moment -= np.cross(arm, against * n)

@@ -13,8 +13,25 @@ same holds for rotation stiffnesses (kx, ky, kz) about the axes of j: their mome
     U(R) = c . (1 - diag R),   cx = (ky + kz - kx)/2 and so on,
 
 which is kx roll^2/2 + ky pitch^2/2 + kz yaw^2/2 for small angles and kx (1 - cos roll) for a rotation about x alone.
+Cubic stiffnesses hx, hy, hz add hx Tx^2 + hy Ty^2 + hz Tz^2 with Tx = (1 + Rxx - Ryy - Rzz)/2 and so on, which is what
+a stiffness of 1 stores: to kx they add 2 hx Tx, for small angles hx roll^2.
+
+Friction whose limit L is its own plus mu times the force N that presses in another element of the same pair sticks
+and slips by one of two laws, both with a displacement as own state. A *slider* at s behind a stiffness c holds
+f = c (x - s); above L it gives way, s' = (|f| - L) sign(f)/(c T), T being a millisecond. *Approach* is Fancher's
+exponential one to the envelope within a distance b, f = L z/b with z' = x' - |x'| z/b: without reversal f - L falls by
+1/e in b, at any speed. At a constant L it stores L z^2/(2 b) and loses L |x'| (z/b)^2. A link of length l that hangs
+under N adds N x/l.
 
 The angular velocity w of a wheelset leaves out the spin (its frame does not spin, see wrcore.dynamics.body).
+
+References
+----------
+Fancher, Ervin, MacAdam, Winkler, Measurement and representation of the mechanical properties of truck leaf springs,
+SAE technical paper 800905 (1980): the approach. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14
+(1976) 1675-1682: the same as a differential equation. Iwnicki, Stichel, Orlova, Hecht, Dynamics of railway freight
+vehicles, Vehicle System Dynamics 53 (2015) 995-1033: a spring and a slider in series, both laws for leaf springs and
+links, friction by the load in Lenoir links and wedges.
 """
 
 import math
@@ -27,8 +44,8 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.track import moving_frame
 from wrcore.kernels.jit import FUSED, jit
 
-LINEAR, DISPLACEMENT, VELOCITY, SERIES, SERIES_VELOCITY = range(5)
-"""Laws of an element that acts along one direction."""
+LINEAR, DISPLACEMENT, VELOCITY, CUBIC, SERIES, SERIES_VELOCITY, SLIDER, APPROACH = range(8)
+"""Laws of an element that acts along one direction; from SERIES on with an own state, from SLIDER on with a limit."""
 
 LINE = 3
 """Direction along the line between the markers; 0, 1 and 2 are the axes of the second body."""
@@ -42,7 +59,8 @@ class Elements(NamedTuple):
     ahead: np.ndarray
     """(p,): for the moving frame, arc length of its cross-section ahead of the frame's origin, m."""
     turning: np.ndarray
-    """(p, 2, 3): factors c of the energy U(R) (N m/rad) and damping (N m s/rad) about the second body's axes."""
+    """(p, 3, 3): factors c of the energy U(R) (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) about
+    the second body's axes."""
     first_spring: np.ndarray
     """(p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]."""
     springs: np.ndarray
@@ -52,12 +70,16 @@ class Elements(NamedTuple):
     """(p + 1,) int, as first_spring."""
     directed: np.ndarray
     """(m, 10): along one direction; marker of i, marker of j or rest position (m), length at rest (LINE only, m),
-    stiffness (N/m; of the series spring for series laws), damping (N s/m), preload (N; positive pushes i along
-    the direction)."""
+    stiffness (N/m; of the series spring for series laws and SLIDER; APPROACH: N/(L l), 1/m), damping (N s/m; SLIDER:
+    above its limit; APPROACH: distance b, m), preload (N; positive pushes i along the direction)."""
     law: np.ndarray
-    """(m, 5) int: direction, law, first and last + 1 point of the characteristic, number of the element's own state."""
+    """(m, 5) int: direction, law, first and last + 1 point of the characteristic, number of the element's own state.
+    From SLIDER on, not the last point but the element that presses: a spring, -1 for none, or -2 - k for the k-th along
+    one direction."""
     table: np.ndarray
-    """(q, 2): points of all characteristics: displacement or speed and force; SERIES_VELOCITY: force and speed."""
+    """(q, 2): points of all characteristics: displacement or speed and force; SERIES_VELOCITY: force and speed; CUBIC:
+    cubic stiffness (N/m^3), 0; with a limit: its own part (N) and the whole of it in nominal position (N), then mu for
+    a pressing force that is positive and for one that is negative."""
     states: int
     """Number of own states: displacements (m) of dampers that act in series with a spring; and what else is counted
     with them, see `wrcore.dynamics.system.fill_derivatives`."""
@@ -71,10 +93,11 @@ def pack_elements(springs=(), directed=(), turning=()):
     springs : sequence of (pair, row)
         Elements along three axes: pair = (first body, second body, ahead) and the 15 numbers of a row of
         ``Elements.springs``.
-    directed : sequence of (pair, row, direction, law, points)
-        Elements along one direction: the 10 numbers of a row of ``Elements.directed``, direction, law, and the points
-        (q, 2) of the characteristic, or None.
-    turning : sequence of (pair, stiffness, damping)
+    directed : sequence of (pair, row, direction, law, points, pressing)
+        Elements along one direction: the 10 numbers of a row of ``Elements.directed``, direction, law, the points
+        (q, 2) of the characteristic, or None, and the element that presses: None, or (0, k) and (1, k) for the k-th of
+        ``springs`` and of ``directed``.
+    turning : sequence of (pair, stiffness, damping, cubic stiffness)
         Against relative rotation about the second body's axes, three numbers each; summed pair by pair.
 
     Returns
@@ -82,17 +105,22 @@ def pack_elements(springs=(), directed=(), turning=()):
     Elements
     """
     pairs = sorted({item[0] for group in (springs, directed, turning) for item in group})
-    springs, directed = (sorted(group, key=lambda item: item[0]) for group in (springs, directed))
-    rotational = np.zeros((len(pairs), 2, 3))
-    for pair, stiffness, damping in turning:
-        rotational[pairs.index(pair)] += (0.5 * np.sum(stiffness) - np.asarray(stiffness, float), damping)
+    orders = [sorted(range(len(group)), key=lambda k: group[k][0]) for group in (springs, directed)]
+    springs, directed = ([group[k] for k in order] for group, order in zip((springs, directed), orders, strict=True))
+    rotational = np.zeros((len(pairs), 3, 3))
+    for pair, stiffness, damping, cubic in turning:
+        rotational[pairs.index(pair)] += (0.5 * np.sum(stiffness) - np.asarray(stiffness, float), damping, cubic)
     points, laws, states = [], [], 0
-    for _, _, direction, law, polygon in directed:
-        own = states if law in (SERIES, SERIES_VELOCITY) else -1
+    for _, _, direction, law, polygon, pressing in directed:
+        own = states if law >= SERIES else -1
         states += own >= 0
         start = len(points)
         points += [] if polygon is None else list(polygon)
-        laws.append((direction, law, start, len(points), own))
+        last = len(points)
+        if law >= SLIDER:
+            number = -1 if pressing is None else orders[pressing[0]].index(pressing[1])
+            last = -2 - number if pressing is not None and pressing[0] == 1 else number
+        laws.append((direction, law, start, last, own))
     first_spring, first_directed = (
         np.array([sum(item[0] < pair for item in group) for pair in pairs] + [len(group)], np.int64)
         for group in (springs, directed)
@@ -130,7 +158,51 @@ def _directed_force(elements, k, stretch, speed, state, own):
         force += characteristic(elements.table, law[2], law[3], stretch)
     elif law[1] == VELOCITY:
         force += characteristic(elements.table, law[2], law[3], speed)
+    elif law[1] == CUBIC:
+        force += elements.table[law[2], 0] * stretch * stretch * stretch
     return force, 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def friction_limit(elements, k, rotation, place, velocity, turn):
+    """Force at which the k-th element along one direction, one with a limit, slips, N.
+
+    Parameters
+    ----------
+    elements : Elements
+    k : int
+    rotation : tuple of 3 tuples of 3 float
+        R of the pair.
+    place, velocity, turn : tuples of 3 float
+        rho (m), u (m/s) and W (rad/s) of the pair.
+    """
+    first, other = elements.law[k, 2], elements.law[k, 3]
+    if other == -1:
+        return elements.table[first, 0]
+    x, y, z = rotation
+    row = elements.springs[other] if other >= 0 else elements.directed[-2 - other]
+    bx = x[0] * row[0] + x[1] * row[1] + x[2] * row[2]
+    by = y[0] * row[0] + y[1] * row[1] + y[2] * row[2]
+    bz = z[0] * row[0] + z[1] * row[1] + z[2] * row[2]
+    if other >= 0:
+        stretch, along = place[2] + bz - row[5], velocity[2] + turn[0] * by - turn[1] * bx
+        press = row[14] - row[8] * stretch - row[11] * along
+    else:
+        ends = place[0] + bx - row[3], place[1] + by - row[4], place[2] + bz - row[5]
+        law = elements.law[-2 - other]
+        press = -characteristic(elements.table, law[2], law[3], ends[law[0]])
+    mu = elements.table[first + 1]
+    return elements.table[first, 0] + max(mu[0] * press, -mu[1] * press)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def friction_force(elements, k, stretch, speed, inner, limit):
+    """Force against stretch and speed of the k-th element, one with a limit, and the rate of its state ``inner``."""
+    row = elements.directed[k]
+    if elements.law[k, 1] == APPROACH:
+        return limit * (inner / row[8] + row[7] * stretch), speed - abs(speed) * inner / row[8]
+    force = row[7] * (stretch - inner)
+    return force, math.copysign(max(abs(force) - limit, 0.0), force) / row[8]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -199,6 +271,11 @@ def element_forces(elements, track, t, speed, state, rotations, turns, wrenches,
         turning = elements.turning[p]
         fx = fy = fz = 0.0
         c0, c1, c2 = turning[0, 0], turning[0, 1], turning[0, 2]
+        if turning[2, 0] != 0.0 or turning[2, 1] != 0.0 or turning[2, 2] != 0.0:
+            h0 = turning[2, 0] * (1.0 + r00 - r11 - r22)
+            h1 = turning[2, 1] * (1.0 - r00 + r11 - r22)
+            h2 = turning[2, 2] * (1.0 - r00 - r11 + r22)
+            c0, c1, c2 = c0 + 0.5 * (h1 + h2 - h0), c1 + 0.5 * (h0 + h2 - h1), c2 + 0.5 * (h0 + h1 - h2)
         mx = c2 * r12 - c1 * r21 - turning[1, 0] * ox
         my = c0 * r20 - c2 * r02 - turning[1, 1] * oy
         mz = c1 * r01 - c0 * r10 - turning[1, 2] * oz
@@ -225,7 +302,13 @@ def element_forces(elements, track, t, speed, state, rotations, turns, wrenches,
                 nx, ny, nz = ex / length, ey / length, ez / length
             stretch = nx * ex + ny * ey + nz * ez - row[6]
             along = nx * (ux + oy * bz - oz * by) + ny * (uy + oz * bx - ox * bz) + nz * (uz + ox * by - oy * bx)
-            force, own_rate = _directed_force(elements, k, stretch, along, state, own)
+            if elements.law[k, 1] < SLIDER:
+                force, own_rate = _directed_force(elements, k, stretch, along, state, own)
+            else:
+                rotation = (r00, r01, r02), (r10, r11, r12), (r20, r21, r22)
+                limit = friction_limit(elements, k, rotation, (px, py, pz), (ux, uy, uz), (ox, oy, oz))
+                inner = state[own + elements.law[k, 4]]
+                force, own_rate = friction_force(elements, k, stretch, along, inner, limit)
             if elements.law[k, 4] >= 0:
                 rate[own + elements.law[k, 4]] = own_rate
             gx, gy, gz = -force * nx, -force * ny, -force * nz

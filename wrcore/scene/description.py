@@ -150,14 +150,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
     wheel, rail = wheel_and_rail(data, folder, source)
     pairs = own_pairs(data, vehicle, wheel, rail, folder, source)
-    data["contact"]["creep"].setdefault("tolerance", DEFAULT_TOLERANCE)
-    if data["contact"]["creep"]["planes"] == "sdec" and (
-        data["contact"]["patch"] != "moment" or data["contact"]["creep"]["model"] != "table"
-    ):
-        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
-    if "table" in data["contact"]["creep"]:
-        table = find_file(data["contact"]["creep"]["table"], folder, source, "contact.creep.table")
-        data["contact"]["creep"]["table"] = str(table)
+    _check_creep(data["contact"], source, folder)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
     check_support(data["track"].get("support"), source)
@@ -215,6 +208,22 @@ def _set(data, key, value, source):
     data[last] = value
 
 
+def _check_creep(contact, source, folder):
+    """Complete what a scene says of its creep law, and refuse what does not belong to the law."""
+    creep = contact["creep"]
+    creep.setdefault("tolerance", DEFAULT_TOLERANCE)
+    if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
+        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
+    for key in ("k_A", "k_S"):
+        if key in creep and creep["model"] != "polach":
+            raise InputError(source, f"contact.creep.{key}", f"expected model polach with it, got {creep['model']}")
+    if creep.get("k_S", 0.0) > creep.get("k_A", 1.0):
+        expected = f"expected no more than k_A, {creep['k_A']:g}, got {creep['k_S']:g}"
+        raise InputError(source, "contact.creep.k_S", expected)
+    if "table" in creep:
+        creep["table"] = str(find_file(creep["table"], folder, source, "contact.creep.table"))
+
+
 def _with_points(track, folder, source):
     """The scene's track with the place of its measured irregularity, which is looked for as all other files are."""
     irregularity = track.get("irregularity")
@@ -236,7 +245,7 @@ def _creep(scene, progress):
     """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
     creep, nu = scene.data["contact"]["creep"], scene.data["contact"]["material"]["poisson_ratio"]
     if creep["model"] != "table":
-        return creep_data(nu)
+        return creep_data(nu, factors=(creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))))
     if "table" in creep:
         table = load_table(creep["table"])
     else:

@@ -21,7 +21,19 @@ KEYS = {
         ),
     ),
     "damper": (("at",), ("direction", "damping", "characteristic", "series_stiffness")),
-    "friction": (("at", "direction", "force", "series_stiffness"), ()),
+    "bushing": (
+        ("at",),
+        (
+            "stiffness",
+            "cubic_stiffness",
+            "damping",
+            "rotation_stiffness",
+            "rotation_cubic_stiffness",
+            "rotation_damping",
+            "preload",
+        ),
+    ),
+    "friction": (("at", "direction"), ("force", "mu", "normal", "series_stiffness", "approach", "pendulum")),
     "bump_stop": (("at", "direction"), ("characteristic", "gap", "stiffness")),
     "traction_rod": (("at", "stiffness"), ("damping", "preload")),
     "anti_roll_bar": (("stiffness",), ("at", "damping")),
@@ -30,6 +42,7 @@ KEYS = {
 
 VECTORS = {
     "spring_damper": ("stiffness", "damping", "preload"),
+    "bushing": ("stiffness", "cubic_stiffness", "rotation_cubic_stiffness", "damping", "preload"),
     "shear_spring": ("stiffness", "damping", "preload"),
     "air_spring": ("preload",),
 }
@@ -46,15 +59,17 @@ def check_element(item, source):
     for key in item:
         if key not in ("name", "kind", "bodies", *needed, *optional):
             raise InputError(source, f"{field}.{key}", f"unknown for kind {kind}; {one_of(needed + optional, key)}")
-    for key in ("stiffness", "damping", "preload", "series_stiffness"):
+    for key in ("stiffness", "cubic_stiffness", "rotation_cubic_stiffness", "damping", "preload", "series_stiffness"):
         if key in item:
             _check_quantity(item, key, f"{field}.{key}", source)
-    if kind == "spring_damper" and not any(key in item for key in optional):
+    if kind in ("spring_damper", "bushing") and not any(key in item for key in optional):
         raise InputError(source, field, f"expected one of {', '.join(optional)}")
     if kind == "air_spring" and ("reservoir" in item) != ("orifice_damping" in item):
         raise InputError(source, field, "expected both a reservoir and its orifice_damping, or neither")
     if "orifice_exponent" in item and "reservoir" not in item:
         raise InputError(source, f"{field}.orifice_exponent", "expected a reservoir")
+    if kind == "friction":
+        _check_friction(item, field, source)
     if kind == "damper":
         _check_damper(item, field, source)
     given = {key for key in ("characteristic", "gap", "stiffness") if key in item}
@@ -75,6 +90,21 @@ def _check_quantity(item, key, field, source):
         raise InputError(source, field, f"expected {expected} for kind {kind}, got {value!r}")
     if key != "preload" and np.min(value) < 0.0:
         raise InputError(source, field, f"expected no negative value, got {np.min(value):g}")
+
+
+def _check_friction(item, field, source):
+    """A limit of its own or by another element's force, and one law of slipping."""
+    if ("mu" in item) != ("normal" in item):
+        raise InputError(source, field, "expected both mu and normal, the name of the element that presses, or neither")
+    if "force" not in item and "mu" not in item:
+        raise InputError(source, f"{field}.force", "expected a value, or mu and normal")
+    if "series_stiffness" not in item and "approach" not in item:
+        expected = "expected a value, as kind friction needs one, or approach"
+        raise InputError(source, f"{field}.series_stiffness", expected)
+    if "series_stiffness" in item and "approach" in item:
+        raise InputError(source, f"{field}.approach", "expected either approach or series_stiffness")
+    if "pendulum" in item and ("approach" not in item or "mu" not in item or "force" in item):
+        raise InputError(source, f"{field}.pendulum", "expected mu, normal and approach with it, and no force")
 
 
 def _check_damper(item, field, source):

@@ -25,7 +25,12 @@ def single_elements(items, layout):
 
 
 def _along_axes(item):
-    """A damper with a value per axis is a damper along each of them."""
+    """A damper with a value per axis is one along each of them, a bushing a spring and what is cubic along each."""
+    if item["kind"] == "bushing":
+        cubic = zip("xyz", item.get("cubic_stiffness", [0.0, 0.0, 0.0]), strict=True)
+        ends = {key: item[key] for key in ("name", "kind", "bodies", "at", "points")}
+        parts = [{**ends, "direction": axis, "cubic_stiffness": value} for axis, value in cubic if value > 0.0]
+        return [{**item, "kind": "spring_damper"}, *parts]
     if item["kind"] != "damper" or "direction" in item:
         return [item]
     singles = []
@@ -74,24 +79,24 @@ def end_points(item):
 
 
 def rotational(item, layout):
-    """Stiffness (N m/rad) and damping (N m s/rad) of an element against relative rotation, shapes (3,).
+    """Stiffness (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) against relative rotation, shape (3, 3).
 
     A spring that bends does not bend in pitch of a wheelset, nor of an axle box that is part of one.
     """
     zero = [0.0, 0.0, 0.0]
     if item["kind"] == "anti_roll_bar":
-        return np.array([item["stiffness"], 0.0, 0.0]), np.array([item.get("damping", 0.0), 0.0, 0.0])
+        return np.array([[item["stiffness"], 0.0, 0.0], [item.get("damping", 0.0), 0.0, 0.0], zero])
     bend = item.get("bending_stiffness", 0.0)
-    stiffness = np.array(item.get("rotation_stiffness", [bend, bend, 0.0]), float)
-    damping = np.array(item.get("rotation_damping", zero), float)
+    keys = {"rotation_stiffness": [bend, bend, 0.0], "rotation_damping": zero, "rotation_cubic_stiffness": zero}
+    rows = np.array([item.get(key, left_out) for key, left_out in keys.items()], float)
     turns = [name in layout.names and layout.spins[layout.names.index(name)] for name in item["bodies"]]
-    for key, values in (("rotation_stiffness", stiffness), ("rotation_damping", damping)):
+    for key, values in zip(keys, rows, strict=True):
         if any(turns) and key in item and values[1] != 0.0:
             expected = "expected 0 as the second value (pitch), in which the wheelset turns"
             raise InputError(layout.source, f"elements.{item['name']}.{key}", expected)
         if any(turns) or any(name in layout.aliases for name in item["bodies"]):
             values[1] = 0.0
-    return stiffness, damping
+    return rows
 
 
 def _polygon(item):

@@ -73,6 +73,8 @@ def repeated(data, count, spacing):
             for item in data[group]:
                 ends = [end if end == FRAME_NAME else prefix + end for end in item["bodies"]]
                 moved = {**item, "name": prefix + item["name"], "bodies": ends}
+                if "normal" in item:
+                    moved["normal"] = prefix + item["normal"]
                 if "at" in item:
                     moved["at"] = _moved(item["at"], shift)
                 train[group].append(moved)

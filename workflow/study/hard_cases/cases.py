@@ -142,7 +142,7 @@ def with_forces(setting, body, markers):
     first = len(elements.springs)
     elements = elements._replace(
         pairs=np.vstack([elements.pairs, [[body, FRAME]]]), ahead=np.append(elements.ahead, setting.state[0] * 0.0),
-        turning=np.concatenate([elements.turning, np.zeros((1, 2, 3))]),
+        turning=np.concatenate([elements.turning, np.zeros((1, 3, 3))]),
         springs=np.vstack([elements.springs, rows]),
         first_spring=np.append(elements.first_spring, first + len(markers)),
         first_directed=np.append(elements.first_directed, elements.first_directed[-1]),
