@@ -24,14 +24,6 @@ INERT = MASS + TRAIN + 4 * SPIN / RADIUS**2
 """Mass that rolling accelerates, kg."""
 
 
-def brakes(force):
-    """The four brakes of the locomotive with a force (number or table)."""
-    return [
-        {"name": f"brake_{k}", "bodies": [f"wheelset_{k}", f"bogie_{(k + 1) // 2}"], "force": force}
-        for k in (1, 2, 3, 4)
-    ]
-
-
 def test_tables_are_linear_between_their_points_and_constant_beyond():
     tables = [np.array([[0.0, 3.0]]), np.array([[-1.0, 2.0], [0.5, -1.0], [0.6, 4.0], [7.0, 5.0]])]
     packed, x = pack_schedules(tables), np.linspace(-2.0, 8.0, 301)
@@ -143,13 +135,8 @@ def test_a_limit_holds_and_nothing_winds_up():
 
 def test_wheels_lock_slide_to_standstill_and_start_again():
     """From 40 m/s on mu = 0.05: sliding at mu g until the train stands, off again with wheels that spin."""
-    pull = {"time": [0.0, 377.5, 378.5], "speed": [0.0, 0.0, 5.0]}
-    force = {"time": [1.0, 2.0, 377.0, 377.5], "force": [0.0, 3e4, 3e4, 0.0]}
-    changes = {
-        "speed": 40, "contact.friction": 0.05, "drive.controller.speed": pull, "drive.brakes": brakes(force),
-        "integration.duration": 388.0, "output.rate": 100.0, "output.channels": ["pose", "velocity", "energy"],
-    }  # fmt: skip
-    found = wr.simulate(wr.load_scene(LOCOMOTIVE, changes))
+    channels = {"output.channels": ["pose", "velocity", "energy"]}
+    found = wr.simulate(wr.load_scene(SCENES / "wheel_slide.yaml", channels))
     assert found.status == "completed"
     speed, t = found["train"]["vx_m_per_s"], found.t
     rims = RADIUS * np.array([found[f"wheelset_{k}"]["wy_rad_per_s"] for k in (1, 2, 3, 4)])

@@ -36,6 +36,8 @@ def test_each_key_is_in_the_report():
     initial = _schema("scene")["properties"]["initial"]["properties"]
     keys = {
         *initial,
+        "k_A",
+        "k_S",
         *initial["bodies"]["additionalProperties"]["properties"],
         *drive,
         *drive["controller"]["properties"],

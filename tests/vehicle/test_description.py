@@ -81,6 +81,10 @@ BAD = [
     (set_in("lateral_bump_stop_1", gap=0.02), "elements.lateral_bump_stop_1", "either a characteristic"),
     (set_in("lateral_bump_stop_1", characteristic=None), "elements.lateral_bump_stop_1", "gap and stiffness"),
     (add(kind="friction", at=[9.5, 0, 0.7], direction="y", force=1e3), "elements.new.series_stiffness", "needs one"),
+    (add(kind="friction", at=[9.5, 0, 0.7], direction="y", mu=0.1, normal="coupler", approach=1e-3),
+     "elements.new.normal", "between the same two bodies"),
+    (add(kind="bushing", at=[9.5, 0, 0.7], cubic_stiffness=[1e9, -1.0, 0.0]), "elements.new.cubic_stiffness", "-1"),
+    (add(kind="bushing", at=[9.5, 0, 0.7]), "elements.new", "expected one of stiffness"),
     (add(kind="traction_rod", at=[9.5, 0, 0.6], stiffness=5e6), "elements.new.at", "two points at least 1 mm apart"),
     (add(kind="damper", at=[9.5, 0, 0.6], direction="line", damping=5e3), "elements.new.at", "two points"),
     # characteristics
