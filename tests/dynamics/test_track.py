@@ -91,6 +91,20 @@ def irregular(tmp_path, **shapes):
     return {"irregularity": {"points": str(path), "fade_in": 20.0, "fade_out": 20.0}}
 
 
+def test_a_widening_of_one_rail_leaves_the_other_where_it_is():
+    def patches(widening, widened):
+        path = [{"transition": 40}, {"curve": 200, "radius": 300, "widening": widening}]
+        _, model, _ = compiled({"path": path, "widened": widened})
+        return evaluated(model, placed(model, 100.0, 0.001, 0.4594, 0.0, 1e-3), 100.0)[1]
+
+    none, both = patches(0.0, "both"), patches(0.004, "both")
+    for widened, side in (("left", 0), ("right", 1)):
+        found = patches(0.002, widened)
+        for wheel, expected in enumerate((both, none) if side == 0 else (none, both)):
+            np.testing.assert_allclose(found[wheel][:, SAME], expected[wheel][:, SAME], rtol=1e-9)
+        assert np.abs(found[side][:, columns.U_RAIL] - none[side][:, columns.U_RAIL]).max() > 1e-4
+
+
 def test_rails_moved_together_move_the_contact_with_them(tmp_path):
     # lateral 2 mm and vertical 3 mm over a plateau: the same patches in a pose moved by as much
     shift, lift = (lambda s: 0.002 + 0 * s), (lambda s: 0.003 + 0 * s)

@@ -35,9 +35,6 @@ def check_config():
             raise WorkflowError(f"configuration: speeds.{key}: expected a name under speeds.tracks, got {speeds[key]!r}")
     if not set(speeds["shown"]) <= set(speeds["values"]):
         raise WorkflowError("configuration: speeds.shown: expected some of speeds.values")
-    for vehicle in speeds["vehicles"]:
-        if vehicle not in config["critical_speed"]["vehicles"]:
-            raise WorkflowError(f"configuration: speeds.vehicles.{vehicle}: expected under critical_speed.vehicles, too")
     creep = config["creep"]
     if creep["shown"] not in [table["name"] for table in creep["tables"]]:
         raise WorkflowError(f"configuration: creep.shown: expected a name under tables, got {creep['shown']!r}")

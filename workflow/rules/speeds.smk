@@ -2,6 +2,7 @@
 
 SPEEDS = config["speeds"]
 VEHICLES = list(SPEEDS["vehicles"])
+WITH_LINEAR = [vehicle for vehicle in VEHICLES if vehicle in config["critical_speed"]["vehicles"]]
 SHOWN = [
     (track, detection, speed)
     for track in SPEEDS["tracks"]
@@ -16,6 +17,11 @@ wildcard_constraints:
 
 def vehicle_scene(wildcards):
     return SPEEDS["vehicles"][wildcards.vehicle]["scene"]
+
+
+def vehicle_linear(wildcards):
+    known = wildcards.vehicle in WITH_LINEAR
+    return [f"<results>/critical_speed/{wildcards.vehicle}_linear.csv"] if known else []
 
 
 def vehicle_overrides(wildcards):
@@ -80,7 +86,7 @@ rule vehicle_guiding_forces:
     input:
         core=CORE["vehicle_figures"],
         run=f"<results>/speeds/{{vehicle}}/{SPEEDS['disturbed']}_spatial_v{SPEEDS['shown'][1]:g}.h5",
-        linear="<results>/critical_speed/{vehicle}_linear.csv",
+        linear=vehicle_linear,
     output:
         report(
             "<results>/speeds/vehicle_guiding_forces_{vehicle}.png",
@@ -103,11 +109,11 @@ rule vehicle_guiding_forces:
 
 rule vehicle_over_speed:
     message:
-        "Figures and tables: wheelset and trailer vehicle over speed"
+        "Figures and tables: vehicles over speed"
     input:
         core=CORE["vehicle_figures"],
         speeds=expand(rules.sweep_speeds.output.speeds, vehicle=VEHICLES),
-        linear=expand("<results>/critical_speed/{vehicle}_linear.csv", vehicle=VEHICLES),
+        linear=expand("<results>/critical_speed/{vehicle}_linear.csv", vehicle=WITH_LINEAR),
         benchmarks=expand("<benchmarks>/sweep_speeds/{vehicle}.tsv", vehicle=VEHICLES),
     output:
         report(
@@ -134,6 +140,7 @@ rule vehicle_over_speed:
         "<logs>/vehicle_over_speed.log",
     params:
         titles={vehicle: entry["title"] for vehicle, entry in SPEEDS["vehicles"].items()},
+        with_linear=WITH_LINEAR,
         released=SPEEDS["released"],
         disturbed=SPEEDS["disturbed"],
     script:

@@ -102,10 +102,11 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
     _, y, z = _turn_into(frame, dx, dy, dz)
     for wheel in range(2):
         side, rail, row = 1.0 - 2.0 * wheel, rails[wheel], motions[wheel]
-        shift = side * 0.5 * station.widening + values[0, 2 * wheel]
+        share = side * 0.5 + track.path.aside
+        shift = share * station.widening + values[0, 2 * wheel]
         lift = values[0, 2 * wheel + 1]
         place = side * distances[wheel]
-        slope_y = side * 0.5 * station.widening_rate + values[1, 2 * wheel]
+        slope_y = share * station.widening_rate + values[1, 2 * wheel]
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
         _rail_frame(frame, lateral, vertical, rail)
         # the wheelset's centre from the rail's origin, turned into the rail's frame

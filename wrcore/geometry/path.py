@@ -51,6 +51,9 @@ class PathData(NamedTuple):
     lookup_start: float
     lookup_step: float
     """The grid, m."""
+    aside: float
+    """Part of the widening by which the middle of both rails moves to the left: 0, or 1/2 where the left rail has all
+    of it, -1/2 where the right one has."""
 
 
 class Station(NamedTuple):
@@ -81,7 +84,7 @@ class Station(NamedTuple):
     roll_rate_rate: float
     """1/m^2."""
     widening: float
-    """Gauge widening, m; half of it belongs to each rail."""
+    """Gauge widening, m; half of it belongs to each rail unless the path says otherwise."""
     widening_rate: float
 
 
@@ -92,10 +95,12 @@ def tangent_path():
     -------
     PathData
     """
-    return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0)
+    return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0, 0.0)
 
 
-def path_data(knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None):
+def path_data(
+    knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None, aside=0.0
+):
     """Cut a path into pieces.
 
     Parameters
@@ -113,6 +118,8 @@ def path_data(knots, curvature, cant, widening, rounding, shapes=None, cant_abou
         What keeps its height; inner_rail: that of the curve.
     incline : wrcore.geometry.ramps.Incline, optional
         Height of the alignment before cant, and its slope.
+    aside : float
+        See `PathData`.
 
     Returns
     -------
@@ -124,7 +131,7 @@ def path_data(knots, curvature, cant, widening, rounding, shapes=None, cant_abou
     cells = min(16 * len(pieces), 100_000)
     grid, step = np.linspace(borders[0], borders[-1], cells, endpoint=False, retstep=True)
     lookup = np.searchsorted(starts, grid, side="right") - 1
-    return PathData(pieces, starts, lookup, float(borders[0]), float(step))
+    return PathData(pieces, starts, lookup, float(borders[0]), float(step), float(aside))
 
 
 @jit(inline="always")

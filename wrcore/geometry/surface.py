@@ -49,9 +49,9 @@ def rail_surface(rail, track, side, u, s):
     """Points of a rail's surface in the track's absolute frame, Eqs. (1)-(3).
 
     r_P = r_r(s) + A_r(s) {0, u, f(u)}, A_r = [t n b]. The rail's origin r_r lies in the track's cross-section at s,
-    at half the gauge plus half the widening, moved by the irregularity. The profile lies in that cross-section, too,
-    without turning: A_r is the frame of the track. Square to the rail's own line it would differ by the square of the
-    angle between both, 1e-5 of the profile's size in a steep cant ramp.
+    at half the gauge plus its part of the widening, moved by the irregularity. The profile lies in that cross-section,
+    too, without turning: A_r is the frame of the track. Square to the rail's own line it would differ by the square of
+    the angle between both, 1e-5 of the profile's size in a steep cant ramp.
 
     Parameters
     ----------
@@ -86,5 +86,5 @@ def _along(track, s, side):
         irregularity_at(track.irregularity, at, values)
         position[i] = station.x, station.y, station.z
         deviation[i] = values[0, first : first + 2]
-        deviation[i, 0] += 0.5 * SIDES[side] * station.widening
+        deviation[i, 0] += (0.5 * SIDES[side] + track.path.aside) * station.widening
     return position.reshape(*s.shape, 3), frames.reshape(*s.shape, 3, 3), deviation.reshape(*s.shape, 2)

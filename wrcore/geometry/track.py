@@ -42,6 +42,10 @@ _OWN_KEYS = {
 _SYNONYMS = {"hermite": "bloss"}
 
 
+WIDENED = {"both": 0.0, "left": 0.5, "right": -0.5}
+"""Part of the widening by which the middle of both rails moves to the left, by which of them has it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """A track with two rails of the same profile.
@@ -72,7 +76,7 @@ class Track:
     def rail_distance(self, rail):
         """Distance from the track's centre line to the origin (highest point) of a rail's profile, m.
 
-        Half of the widening and the irregularity come on top.
+        Its part of the widening, half unless the path says otherwise, and the irregularity come on top.
 
         Parameters
         ----------
@@ -114,7 +118,8 @@ def build_track(data, source, folder="."):
     if segments or data["gradients"]:
         climb = _incline(data["gradients"], data["rounding"], source) if data["gradients"] else None
         knots, values, shapes = _knots(segments or [{"tangent": 1.0}], data["rounding"], source)
-        path = path_data(knots, *values, data["rounding"], shapes, data["cant_about"], climb)
+        aside = WIDENED[data["widened"]]
+        path = path_data(knots, *values, data["rounding"], shapes, data["cant_about"], climb, aside)
     irregularity = no_irregularity()
     if "irregularity" in data:
         irregularity = _irregularity(data["irregularity"], source, Path(folder))

@@ -1,4 +1,4 @@
-"""Wheelset and trailer vehicle, planar and spatial, over speed: motion, response, cost."""
+"""Vehicles, planar and spatial, over speed: motion, response, cost."""
 
 import sys
 
@@ -11,7 +11,8 @@ from wrcore.analysis.style import save_figure
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 tables = dict(zip(snakemake.params.titles.values(), map(pd.read_csv, snakemake.input.speeds), strict=True))
 linear = [pd.read_csv(path).set_index("variant").loc["spatial"] for path in snakemake.input.linear]
-critical = dict(zip(tables, (row["critical_speed_m_per_s"] for row in linear), strict=True))
+titles = [snakemake.params.titles[vehicle] for vehicle in snakemake.params.with_linear]
+critical = dict(zip(titles, (row["critical_speed_m_per_s"] for row in linear), strict=True))
 save_figure(over_speed(tables, snakemake.params.released, HUNTING, critical), *snakemake.output[:2])
 save_figure(over_speed(tables, snakemake.params.disturbed, RESPONSE, critical), *snakemake.output[2:4])
 job_seconds = [pd.read_csv(path, sep="\t")["s"].iloc[0] for path in snakemake.input.benchmarks]

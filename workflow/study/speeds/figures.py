@@ -13,7 +13,11 @@ from wrcore.run.derived import quotient
 
 KN = 1e-3
 
-VEHICLES = ({"marker": "o", "markersize": 3.5}, {"marker": "s", "markersize": 3.5, "markerfacecolor": "white"})
+VEHICLES = (
+    {"marker": "o", "markersize": 3.5},
+    {"marker": "s", "markersize": 3.5, "markerfacecolor": "white"},
+    {"marker": "^", "markersize": 4.0, "markerfacecolor": "white"},
+)
 """Markers of the vehicles that one figure compares, in order."""
 
 CRITICAL = ({"linestyle": "-."}, {"linestyle": ":"})

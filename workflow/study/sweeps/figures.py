@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -67,13 +68,18 @@ def _over(axes: Axes, table: pd.DataFrame, key: str, values: np.ndarray) -> None
         codes, names = pd.factorize(table[key].astype(str))
         spread = (np.arange(len(table)) % 29 - 14) / 50  # side by side, for what would lie on one line
         places, label = codes + spread, key.rpartition(".")[2]
-        axes.set_xticks(range(len(names)), names)
+        axes.set_xticks(range(len(names)), [_short(name) for name in names])
     for end, style in ENDS.items():
         here = (table["status"] == end).to_numpy()
         if here.any():
             size = style["s"] * (4.0 if len(table) < FEW else 1.0)
             axes.scatter(places[here], values[here], label=end, rasterized=True, **{**style, "s": size})
     axes.set(xlabel=label.replace("_", " "))
+
+
+def _short(name: str) -> str:
+    """A word, or a file's name without folder and ending, in lines."""
+    return PurePath(name).stem.replace("_", "\n") if "/" in name and name.endswith((".yaml", ".csv")) else name
 
 
 def _printed(column: str, values: pd.Series) -> tuple[np.ndarray, str]:
