@@ -81,8 +81,34 @@ def _polygon_integral(table, first, last, x):
 
 
 @jit
-def _directed_energy(elements, k, stretch, speed, own):
+def _limit(elements, k, R, rho, u, W):
+    """`friction_limit` with the pair's motion in arrays."""
+    rotation = (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2])
+    place, velocity, turn = (rho[0], rho[1], rho[2]), (u[0], u[1], u[2]), (W[0], W[1], W[2])
+    return friction_limit(elements, k, rotation, place, velocity, turn)
+
+
+@jit
+def _friction_energy(elements, k, stretch, speed, own, limit):
+    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit.
+
+    Approach stores what it would at the limit of the nominal position; what a limit that varies does counts as lost.
+    """
+    row, law = elements.directed[k], elements.law[k]
+    force, rate = friction_force(elements, k, stretch, speed, own, limit)
+    if law[1] == APPROACH:
+        nominal, distance, hanging = elements.table[law[2], 1], row[8], row[7]
+        stored = 0.5 * nominal * (own**2 / distance + hanging * stretch**2)
+        storing = nominal * (own * rate / distance + hanging * stretch * speed)
+        return force, stored, storing, force * speed - storing
+    return force, 0.5 * row[7] * (stretch - own) ** 2, force * (speed - rate), force * rate
+
+
+@jit
+def _directed_energy(elements, k, stretch, speed, own, limit):
     """Force against stretch (N), energy (J), its rate and the loss (W) of the k-th element along one direction."""
+    if elements.law[k, 1] >= SLIDER:
+        return _friction_energy(elements, k, stretch, speed, own, limit)
     row, law, table = elements.directed[k], elements.law[k], elements.table
     stiffness, damping, preload = row[7], row[8], row[9]
     if law[1] == SERIES or law[1] == SERIES_VELOCITY:
@@ -101,22 +127,6 @@ def _directed_energy(elements, k, stretch, speed, own):
         elastic += table[law[2], 0] * stretch**3
         stored += 0.25 * table[law[2], 0] * stretch**4
     return elastic + viscous, stored, elastic * speed, viscous * speed
-
-
-@jit
-def _friction_energy(elements, k, stretch, speed, own, limit):
-    """As `_directed_energy` for an element with a limit.
-
-    Approach stores what it would at the limit of the nominal position; what a limit that varies does counts as lost.
-    """
-    row, law = elements.directed[k], elements.law[k]
-    force, rate = friction_force(elements, k, stretch, speed, own, limit)
-    if law[1] == APPROACH:
-        nominal, distance, hanging = elements.table[law[2], 1], row[8], row[7]
-        stored = 0.5 * nominal * (own**2 / distance + hanging * stretch**2)
-        storing = nominal * (own * rate / distance + hanging * stretch * speed)
-        return force, stored, storing, force * speed - storing
-    return force, 0.5 * row[7] * (stretch - own) ** 2, force * (speed - rate), force * rate
 
 
 @jit
@@ -189,13 +199,8 @@ def element_energies(elements, track, t, speed, state, rotations, turns):
             along = np.sum(n * (u + np.cross(W, arm)))
             inner = state[own + law[4]] if law[4] >= 0 else 0.0
             stretch = np.sum(n * line) - row[6]
-            if law[1] < SLIDER:
-                against, energy, power, loss = _directed_energy(elements, k, stretch, along, inner)
-            else:
-                rotation = (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2])
-                motion = (rho[0], rho[1], rho[2]), (u[0], u[1], u[2]), (W[0], W[1], W[2])
-                limit = friction_limit(elements, k, rotation, motion[0], motion[1], motion[2])
-                against, energy, power, loss = _friction_energy(elements, k, stretch, along, inner, limit)
+            limit = 0.0 if law[1] < SLIDER else _limit(elements, k, R, rho, u, W)
+            against, energy, power, loss = _directed_energy(elements, k, stretch, along, inner, limit)
             stored, rate, lost = stored + energy, rate + power, lost + loss
             force -= against * n
             moment -= np.cross(arm, against * n)
