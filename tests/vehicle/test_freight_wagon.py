@@ -64,3 +64,10 @@ def test_friction_in_links_and_leaves_keeps_hunting_small(tmp_path):
         assert found.status == "completed"
         amplitudes.append(np.ptp(found["wheelset_2"].y_m[found.t > 15.0]) / 2)
     assert 1e-4 < amplitudes[0] < 0.25 * amplitudes[1]
+
+
+def test_friction_in_a_train_is_pressed_by_its_own_vehicle():
+    one, two = scene_of("empty").vehicle, scene_of("empty", vehicle={"count": 2, "spacing": 14.0}).vehicle
+    assert two.elements.states == 2 * one.elements.states
+    pressed = two.elements.law[two.elements.law[:, 4] >= 0, 3]
+    assert sorted(pressed) == sorted(3 * [k for k, row in enumerate(two.elements.springs) if row[8] > 0.0])
