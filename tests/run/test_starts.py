@@ -60,6 +60,15 @@ def test_what_a_checkpoint_would_override_is_refused(run):
     for key, value in (("initial", {"y": 0.001}), ("initial__y", 0.001), ("initial.y", 0.001)):
         with pytest.raises(InputError, match="simulate: initial: expected either this or a start"):
             simulate(scene_of(), progress=False, start=run.end, **{key: value})
+    for overrides in (["initial.y=0.001"], {"initial.y": 0.001}):
+        with pytest.raises(InputError, match="simulate: initial: expected either this or a start"):
+            simulate(scene_of(), overrides, progress=False, start=run.end)
+
+
+def test_overrides_are_those_of_load_scene():
+    plain = simulate(scene_of(speed=17), progress=False)
+    for overrides in (["speed=17"], {"speed": 17}, iter(["speed=17"])):
+        assert np.array_equal(simulate(scene_of(), overrides, progress=False)["wheelset"].y_m, plain["wheelset"].y_m)
 
 
 def test_no_checkpoint_is_no_start(run, tmp_path):
@@ -69,7 +78,9 @@ def test_no_checkpoint_is_no_start(run, tmp_path):
 
 
 def test_tolerances_are_those_of_the_scene_after_a_checkpoint(run):
-    loose, tight = (simulate(scene_of(), False, run.end, integration__rtol=rtol) for rtol in (1e-3, 1e-8))
+    loose, tight = (
+        simulate(scene_of(), progress=False, start=run.end, integration__rtol=rtol) for rtol in (1e-3, 1e-8)
+    )
     assert tight.counters["steps"] > 1.2 * loose.counters["steps"]
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -26,6 +27,7 @@ from wrcore.scene.description import Scene, Source, load_scene
 
 def simulate(
     scene: Source,
+    overrides: Iterable[str] | Mapping[str, Any] = (),
     progress: Callable[[float], object] | Literal[False] | None = None,
     start: Checkpoint | np.ndarray | Literal["initial"] = "initial",
     **changes: Any,
@@ -36,6 +38,8 @@ def simulate(
     ----------
     scene : Scene, path or dict
         From :func:`wrcore.load_scene`, or what that function takes.
+    overrides : sequence of str, or dict
+        ``key.path=value``, or values by ``key.path``, as :func:`wrcore.load_scene` takes them.
     progress : callable or False, optional
         Called now and then with the simulated time reached, s. Left out: a bar where the run takes more than a second
         and somebody watches (a terminal or a notebook, not a log); False: none.
@@ -44,7 +48,7 @@ def simulate(
         its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit), or a
         state at time 0. The scene's ``initial`` does not count then.
     **changes
-        Keys of the scene with other values, as :func:`wrcore.load_scene` takes them.
+        Further values by key, as :func:`wrcore.load_scene` takes them.
 
     Returns
     -------
@@ -68,10 +72,11 @@ def simulate(
         expected = "expected a checkpoint, a state or 'initial', got None, as a run has that no run can go on from"
         raise InputError("simulate", "start", f"{expected}; it may have an end_state")
     begin_at: Any = None if isinstance(start, str) and start == "initial" else start
-    if begin_at is not None and any(key.partition("__")[0].partition(".")[0] == "initial" for key in changes):
+    overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
+    if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", key) for key in (*overrides, *changes)):
         raise InputError("simulate", "initial", "expected either this or a start")
-    if changes or not isinstance(scene, Scene):
-        scene = load_scene(scene, **changes)
+    if overrides or changes or not isinstance(scene, Scene):
+        scene = load_scene(scene, overrides, **changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
     begin = start.t if isinstance(start, Checkpoint) else 0.0
     check_memory(scene)
