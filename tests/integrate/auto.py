@@ -1,9 +1,12 @@
 """Is `auto` at its default tolerance near the best choice? ``python -m tests.integrate.auto [words of scenes]``.
 
-Per scene: what `auto` takes and errs (lateral position of the wheelsets, normal force of the wheels over its mean, both
-root mean squares against Tsit5 at 1e-9), the cheapest of all methods and tolerances that errs no more in either, and the
-ratio of their costs. Cost: processor time, the least of five runs in turn, evaluations beside it. The twin of the
-reference (RK45 at 1e-9) says how far its errors can be trusted.
+First table, per scene: what `auto` takes and errs (lateral position of the wheelsets, normal force of the wheels over its
+mean, both root mean squares against Tsit5 at 1e-9), the cheapest of all methods and tolerances that errs no more in
+either, and the ratio of their costs. Cost: processor time, the least of five runs in turn, evaluations beside it. The
+twin of the reference (RK45 at 1e-9) says how far its errors can be trusted.
+
+Second table: the error of y that the default tolerance buys, by method and kind of scene: median and most. Left out are
+doubtful scenes and choices too dear for a scene.
 """
 
 import sys
@@ -23,6 +26,9 @@ from wrcore.scene.description import compile_scene, load_scene
 
 RTOLS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 DEFAULT = ("auto", 1e-4)
+KINDS = {"wheelset": "wheelsets", "trailer": "coach, straight", "metro": "metro car, straight", "loco": "locomotive",
+         "R ": "curves", "ballast": "rails that give"}  # fmt: skip
+"""Kinds of scenes by what their names hold; the last one counts."""
 REFERENCE, TWIN = ("tsit5", 1e-9), ("rk45", 1e-9)
 TOO_DEAR, REPETITIONS = 4.0, 5
 """A choice that takes this many times as long as `auto` is given up; those that may be the cheapest run so often."""
@@ -37,7 +43,10 @@ def curve(radius, cant=0.1):
     return {"track.path": [{"tangent": 20}, ramp, {"curve": 60, "radius": radius, "cant": cant}, ramp, {"tangent": 99}]}
 
 
-SMOOTH = {"track.irregularity": None}
+def kept_at(speed):
+    return {"drive.controller.speed": speed, "contact.friction": 0.3}
+
+
 BALLAST = {"track.support": {
     "rail": {"mass": 79.0, "lateral": {"stiffness": 4.34e7, "damping": 1.45e5},
              "vertical": {"stiffness": 1.88e8, "damping": 2.17e5}},
@@ -45,7 +54,6 @@ BALLAST = {"track.support": {
                 "vertical": {"stiffness": 2.87e8, "damping": 1.18e5}},
 }}  # fmt: skip
 FREE = {"contact.patch": "moment"}
-ROLLING = {"drive": None, "contact.friction": 0.3}
 STIFF = "stiff damper"
 
 SCENES = [  # of the accuracy study; of nobody
@@ -59,7 +67,7 @@ SCENES = [  # of the accuracy study; of nobody
     ("wheelset, friction 0.1", 45, 0.6, FREE | {"contact.friction": 0.1}),
     ("suspended wheelset, rough, friction 0.6", 10, 10.0, rough() | {"contact.friction": 0.6}),
     ("suspended wheelset, rough, friction 0.1", 45, 5.0, rough("high", 5) | {"contact.friction": 0.1}),
-    ("suspended wheelset, hunting", 80, 1.5, {}),
+    ("suspended wheelset, hunting", 80, 0.3, {}),
     ("suspended wheelset, ballast, rough", 45, 5.0, rough() | BALLAST),
     ("trailer vehicle, rough, friction 0.6", 10, 5.0, rough("high", 7) | {"contact.friction": 0.6}),
     ("trailer vehicle", 45, 5.0, {}),
@@ -71,13 +79,12 @@ SCENES = [  # of the accuracy study; of nobody
     ("trailer vehicle, ballast, rough", 60, 3.0, rough() | BALLAST),
     ("metro car, rough", 20, 5.0, {}),
     ("metro car, rough", 45, 3.0, rough("high", 2)),
-    ("metro car", 80, 3.0, SMOOTH | {"initial.y": 0.002}),
+    ("metro car, rough", 80, 3.0, rough("low", 6)),
     ("metro car, R 300, rough", 16.7, 12.0, curve(300.0) | rough()),
     (f"metro car, {STIFF}", 10, 5.0, {}),
     (f"metro car, {STIFF}, rough", 45, 3.0, {}),
-    ("locomotive, rough", 20, 3.0, ROLLING | rough()),
-    ("locomotive, rough, friction 0.1", 45, 3.0, ROLLING | rough() | {"contact.friction": 0.1}),
-    ("locomotive, from a crawl", 0.01, 4.0, {}),
+    ("locomotive, rough", 20, 3.0, kept_at(20.0) | rough()),
+    ("locomotive, rough, friction 0.1", 45, 3.0, kept_at(45.0) | rough() | {"contact.friction": 0.1}),
 ]
 
 
@@ -146,7 +153,8 @@ class Measured:
         contenders = [choice for choice in enough if self.cost[choice] <= 1.5 * least] + [DEFAULT]
         for choice in (REPETITIONS - 1) * contenders:
             self.cost[choice] = min(self.cost[choice], self.run(choice)[0])
-        return min((choice for choice in contenders), key=self.cost.get)
+        self.doubtful = bool(np.any(self.doubt > 0.2 * self.found[DEFAULT]))
+        return min(contenders, key=self.cost.get)
 
     def once(self, choice, longest=np.inf):
         self.cost[choice], run = self.run(choice, longest)
@@ -154,25 +162,63 @@ class Measured:
         self.found[choice] = np.full(2, np.inf) if run.status == "stalled" else self.errors(run)
 
 
-def main():
-    wanted = sys.argv[1:]
-    print("| scene | m/s | auto | y, µm | N, % | evaluations | ms | cheapest | y, µm | N, % | evaluations | ms | ratio |"
-          "\n" + "|---" * 13 + "|")  # fmt: skip
+def row(scene, best):
+    """Cells of the first table, after the scene's name and speed."""
+    cells = []
+    for choice in (DEFAULT, best):
+        run, (y, normal) = scene.runs[choice], scene.found[choice]
+        title = run.method if choice is DEFAULT else f"{choice[0]}, {choice[1]:g}"
+        cells += [title, f"{1e6 * y:.2g}", f"{100 * normal:.2g}", str(run.rhs_evaluations),
+                  f"{1e3 * scene.cost[choice]:.1f}"]  # fmt: skip
+    return [*cells, f"{scene.cost[DEFAULT] / scene.cost[best]:.2f}" + " (doubtful)" * scene.doubtful]
+
+
+def print_table(head, rows):
+    for cells in (head, ["---"] * len(head)):
+        print("| " + " | ".join(cells) + " |")
+    for cells in rows:
+        print("| " + " | ".join(cells) + " |", flush=True)
+
+
+def measured(wanted, errors):
+    """Rows of the first table; fills errors of y (um) at the default tolerance by method and kind of scene."""
     with tempfile.TemporaryDirectory() as folder:
         for name, speed, duration, changes in SCENES:
             if wanted and not any(word in f"{name} {speed}" for word in wanted):
                 continue
             scene = Measured(*compiled(name, speed, changes, folder), duration)
-            best = scene.all_choices()
-            cells = []
-            for choice in (DEFAULT, best):
-                run, (y, normal) = scene.runs[choice], scene.found[choice]
-                title = run.method if choice is DEFAULT else f"{choice[0]}, {choice[1]:g}"
-                cells += [title, f"{1e6 * y:.2g}", f"{100 * normal:.2g}", str(run.rhs_evaluations),
-                          f"{1e3 * scene.cost[choice]:.1f}"]  # fmt: skip
-            ratio = f"{scene.cost[DEFAULT] / scene.cost[best]:.2f}"
-            doubt = " (doubtful)" if np.any(scene.doubt > 0.2 * scene.found[DEFAULT]) else ""
-            print("| " + " | ".join([name, f"{speed:g}", *cells, ratio + doubt]) + " |", flush=True)
+            yield [name, f"{speed:g}", *row(scene, scene.all_choices())]
+            kind = [title for word, title in KINDS.items() if word in name][-1]
+            for method in METHODS:
+                found = scene.found[method, DEFAULT[1]][0]
+                if np.isfinite(found) and not scene.doubtful:
+                    errors.setdefault(method, {}).setdefault(kind, []).append(1e6 * found)
+
+
+def main():
+    errors = {}
+    head = [
+        "scene",
+        "m/s",
+        "auto",
+        "y, µm",
+        "N, %",
+        "evaluations",
+        "ms",
+        "cheapest",
+        "y, µm",
+        "N, %",
+        "evaluations",
+        "ms",
+    ]
+    print_table([*head, "ratio"], measured(sys.argv[1:], errors))
+    print()
+    kinds = list(dict.fromkeys(kind for by_kind in errors.values() for kind in by_kind))
+    rows = [
+        [method, *(f"{np.median(y):.2g}, {max(y):.2g} ({len(y)})" for y in (by_kind.get(k, [np.nan]) for k in kinds))]
+        for method, by_kind in errors.items()
+    ]
+    print_table(["method", *kinds], rows)
 
 
 if __name__ == "__main__":
