@@ -1,7 +1,7 @@
 """Is `auto` at its default tolerance near the best choice? ``python -m tests.integrate.auto [words of scenes]``.
 
-First table, per scene: what `auto` takes and errs (lateral position of the wheelsets, normal force of the wheels over its
-mean, both root mean squares against Tsit5 at 1e-9), the cheapest of all methods and tolerances that errs no more in
+First table, per scene: what `auto` takes and errs (lateral position of the wheelsets; normal force of the wheels over
+its mean; root mean squares against Tsit5 at 1e-9), the cheapest of all methods and tolerances that errs no more in
 either, and the ratio of their costs. Cost: processor time, the least of five runs in turn, evaluations beside it. The
 twin of the reference (RK45 at 1e-9) says how far its errors can be trusted.
 

@@ -28,7 +28,7 @@ TIGHTER, SHORTER = 0.1, 0.6
 """From one run to the next: the tolerance, and the longest step, lest two runs take the same steps and agree."""
 
 FIRST_RTOL = {"y": 30.0, "Y": 1e-7, "Q": 1e-7, "wear": 1e-2}
-"""First tolerance per unit of accuracy: a position errs by some tenths of a micrometre at 1e-4, a wheel force by 100 N."""
+"""First tolerance per unit of accuracy: a position errs by tenths of a micrometre at 1e-4, a wheel force by 100 N."""
 
 LOOSEST, TIGHTEST = 1e-4, 1e-11
 """Range of tolerances. Looser ones save little: stability, or the motion itself, bounds the steps there."""
