@@ -32,7 +32,7 @@ def test_what_is_stated_bounds_the_error(name, of, accuracy):
     run, found = simulate_to_accuracy(wr.load_scene(*SCENES[name]), accuracy, of)
     assert found.reached and found.found <= accuracy
     assert difference(run, tight(*SCENES[name]), of) <= accuracy
-    assert found.cost >= 1.0  # a ratio of times: how large it is, the study says
+    assert found.cost >= 1.0  # a ratio of evaluations: how large it is, the study says
 
 
 def test_mean_wear_number():

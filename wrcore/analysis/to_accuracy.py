@@ -59,7 +59,7 @@ class Accuracy:
     rtol : float
         Relative tolerance of the run.
     cost : float
-        Time of all runs over that of the one that is handed out.
+        Evaluations of the equations in all runs over those in the one that is handed out.
     reason : str
         One line.
     """
@@ -120,10 +120,10 @@ def simulate_to_accuracy(
     if not {"pose", "contact"} <= set(scene.data["output"]["channels"]):
         raise InputError(scene.source, "output.channels", "expected pose and contact among them")
     rtol = min(max(FIRST_RTOL[of] * accuracy, TIGHTEST / TIGHTER), LOOSEST)
-    before, spent, differences, longest = None, 0.0, [], 1.0
+    before, spent, differences, longest = None, 0, [], 1.0
     while True:
         run = simulate(_at(scene, rtol, longest), progress=False)
-        spent += run.counters["wall_s"]
+        spent += run.counters["rhs_evaluations"]
         if before is not None:
             differences.append(difference(before, run, of))
             if progress is not None:
@@ -139,7 +139,7 @@ def simulate_to_accuracy(
     reason = f"{of} within {found:.2g} {QUANTITIES[of]} of a run with ten times the tolerance, {rtol:g}"
     if not reached:
         reason = f"{accuracy:g} {QUANTITIES[of]} not reached: {reason}; {why}"
-    cost = spent / max(run.counters["wall_s"], 1e-9)
+    cost = spent / max(run.counters["rhs_evaluations"], 1)
     return run, Accuracy(of, accuracy, found, reached, rtol, cost, reason)
 
 

@@ -1,6 +1,6 @@
 """Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
 
-Measured on wheelsets, coach, metro car and locomotive at 10 to 80 m/s, straight and in curves: where something excites
+Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites
 motion on and on, Rodas4 takes six or seven steps per metre (nine on rails that give), else few more than the longest
 step asks for. A step costs as much as four of Tsit5, and more where the whole Jacobian is renewed each time.
 `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
