@@ -191,6 +191,8 @@ def test_auto_takes_what_the_scene_needs(wheelset):
     assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4"
     rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 5}}"
     curve = "track.path=[{transition: 40}, {curve: 300, radius: 300}]"
+    rails = "lateral: {stiffness: 1.8e+7, damping: 5e+4}, vertical: {stiffness: 8.1e+7, damping: 6e+4}"
+    ballast = f"track.support={{rail: {{{rails}}}}}"
     for scene, overrides, expected in (
         ("suspended_wheelset", ["speed=0.1"], "rodas4"),
         ("suspended_wheelset", ["speed=60"], "tsit5"),
@@ -198,6 +200,8 @@ def test_auto_takes_what_the_scene_needs(wheelset):
         ("trailer_vehicle", ["speed=60", rough], "tsit5"),
         ("trailer_vehicle", ["speed=15", rough], "rodas4"),
         ("trailer_vehicle", ["speed=15", curve], "rodas4"),
+        ("suspended_wheelset", ["speed=50", ballast], "rodas4"),
+        ("suspended_wheelset", ["speed=50", ballast, rough], "tsit5"),  # a whole Jacobian, and that in each step
         ("metro_car", ["speed=60"], "tsit5"),
     ):
         model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", overrides))

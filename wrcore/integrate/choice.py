@@ -1,23 +1,25 @@
 """Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
 
-Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: a step of Rodas4 costs as much as
-four of Tsit5 at equal error; where something excites motion on and on it takes six or seven steps per metre, else few
-more than the longest step asks for.
+Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites
+motion on and on, Rodas4 takes six or seven steps per metre (nine on rails that give), else few more than the longest
+step asks for. A step costs as much as four of Tsit5, and more where the whole Jacobian is renewed each time.
+`python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
 """
 
 import math
 
 import numpy as np
 
+from wrcore.integrate.jacobian import contacts_alone, plan_sweep
 from wrcore.integrate.tolerances import step_tolerances
 
-STABLE = 2.4
+STABLE = 2.5
 """Length of the steps of Tsit5 where stability bounds them, times the fastest rate as it is found here."""
 
-EXPLICIT_PER_STIFF = 4.0
-"""Cost of a step of Rodas4, in steps of Tsit5."""
+EXPLICIT_PER_STIFF, OF_EVALUATIONS = 4.0, 1.0 / 6.0
+"""Cost of a step of Rodas4, in steps of Tsit5, and of each evaluation on top for a whole Jacobian."""
 
-STEPS_PER_METRE = 6.5
+STEPS_PER_METRE, ON_GIVING_RAILS = 6.5, 9.0
 """Of Rodas4, on irregular rails or with wheelsets that may hunt."""
 
 PASSES, SETTLED, DISTURBANCE = 30, 10, 1e-8
@@ -73,7 +75,10 @@ def cheaper_method(model, equations, t, state, longest_step):
     bodies = model.bodies
     if len(model.drive.rows):  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4"
-    excited = model.track.irregularity.coefficients.shape[0] > 0 or len(bodies.wheelsets) == len(bodies.mass)
-    steps = 1.0 / longest_step + (STEPS_PER_METRE * model.speed if excited else 0.0)
-    explicit = fastest_rate(model, equations, t, state) / STABLE
-    return "tsit5" if explicit < EXPLICIT_PER_STIFF * steps else "rodas4"
+    rough, cost = model.track.irregularity.coefficients.shape[0] > 0, EXPLICIT_PER_STIFF
+    excited = rough or len(bodies.wheelsets) == len(bodies.mass)
+    per_metre = ON_GIVING_RAILS if rough and len(model.support.mass) else STEPS_PER_METRE
+    steps = 1.0 / longest_step + (per_metre * model.speed if excited else 0.0)
+    if rough and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps than that
+        cost += OF_EVALUATIONS * len(plan_sweep(model).starts)
+    return "tsit5" if fastest_rate(model, equations, t, state) / STABLE < cost * steps else "rodas4"

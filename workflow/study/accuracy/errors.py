@@ -252,9 +252,9 @@ def front_table(tables, references):
     Returns
     -------
     pandas.DataFrame
-        kind, speed_m_per_s, the fields of a choice, y_rms_m and real_time_factor.
+        kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
     """
-    columns = [*Choice._fields, "y_rms_m", "real_time_factor"]
+    columns = [*Choice._fields, "y_rms_m", "N_rms_relative", "real_time_factor"]
     parts = [
         pareto_front(table)[columns].assign(**references[title].iloc[0][["kind", "speed_m_per_s"]].to_dict())
         for title, table in tables.items()

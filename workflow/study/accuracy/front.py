@@ -19,7 +19,7 @@ def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
     str
     """
     front = measured_front() if front is None else front
-    head = ("scene", "error below", "detection, creep, method, rtol", "error", "times real time")
+    head = ("scene", "error below", "detection, creep, method, rtol", "error", "of N", "times real time")
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for (kind, speed), rows in front.groupby(["kind", "speed_m_per_s"], sort=False):
         last = None
@@ -30,7 +30,8 @@ def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
             row = enough.loc[enough["real_time_factor"].idxmax()]
             line = (
                 f"{row['detection']}, {row['creep']}, {row['method']}, {row['rtol']:g} |"
-                f" {1e6 * row['y_rms_m']:.2g} µm | {row['real_time_factor']:.3g} |"
+                f" {1e6 * row['y_rms_m']:.2g} µm | {100 * row['N_rms_relative']:.2g} % |"
+                f" {row['real_time_factor']:.3g} |"
             )
             scene = f"| {kind.replace('_', ' ')}, {speed:g} m/s | {1e6 * accuracy:g} µm | "
             if line != last:
