@@ -6,6 +6,7 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.analysis import evolve as ev
+from wrcore.analysis.worn_profiles import file_of, flange, hollow, limits_reached, read_points, smooth
 from wrcore.cli import main
 from wrcore.errors import InputError
 
@@ -32,7 +33,7 @@ def worn(tmp_path_factory):
 
 def test_flange_of_s1002(s1002):
     """28 mm high, 32.5 mm thick, qR 10.8 mm: EN 13715 and the drawings of UIC 510-2 (recalled)."""
-    found = ev.flange(s1002)
+    found = flange(s1002)
     assert found["Sh_m"] == pytest.approx(28e-3, abs=5e-5) and found["Sd_m"] == pytest.approx(32.5e-3, abs=5e-5)
     assert found["qR_m"] == pytest.approx(10.8e-3, abs=5e-5)
 
@@ -41,7 +42,7 @@ def test_steps_add_up_to_the_distance_and_the_volume(worn):
     folder, table = worn
     assert table["step_m"].sum() == pytest.approx(3e5) and table["step_m"].iloc[-1] == 0.0
     np.testing.assert_allclose(table["distance_m"], np.concatenate([[0.0], np.cumsum(table["step_m"])[:-1]]))
-    new, now = (ev._read_profile(folder, step)[1] for step in (0, len(table) - 1))
+    new, now = (read_points(file_of(folder, "profile", step))[1] for step in (0, len(table) - 1))
     radius = 0.46  # of the wheels; their centres keep this height to 0.1 %
     assert np.sum(now - new) * ev.POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
     assert (now - new).min() >= -1e-15 and table["worn_m"].iloc[-1] == pytest.approx((now - new).max())
@@ -103,11 +104,47 @@ def test_a_scene_that_does_not_end_is_named(tmp_path):
         ev.evolve(plan, tmp_path)
 
 
+def test_hollow_is_the_height_of_the_false_flange():
+    f = np.array([0.0, -0.02, -0.028, -0.01, 0.0, 0.003, 0.002, 0.0005, 0.001, 0.004])
+    assert hollow(f) == pytest.approx(0.0025) and hollow(f[:6]) == 0.0
+
+
+def test_limits():
+    row = {"Sh_m": 0.0362, "Sd_m": 0.030, "qR_m": 0.0064, "hollow_m": 0.001}
+    limits = {"Sh": 0.036, "Sd": 0.022, "qR": 0.0065, "hollow": 0.002}
+    assert limits_reached(limits, row) == ["Sh", "qR"] and limits_reached({}, row) == []
+
+
+@pytest.fixture(scope="module")
+def limit(worn):
+    """A flange height that the wheel of the plan has reached at its last step but not before."""
+    heights = worn[1]["Sh_m"].to_numpy()
+    return {"Sh": 0.5 * (heights[-1] + heights[-2])}
+
+
+def test_a_wheel_ends_at_its_limit(worn, limit, tmp_path):
+    """The same steps up to there, and none from there."""
+    table, said = ev.evolve(PLAN | {"limits": limit, "distance": 9e5}, tmp_path, None), []
+    assert table["at_limit"].tolist() == [0] * (len(worn[1]) - 1) + [1] and table["step_m"].iloc[-1] == 0.0
+    np.testing.assert_allclose(table["distance_m"], worn[1]["distance_m"])
+    ev.evolve(PLAN | {"limits": limit, "distance": 9e5}, tmp_path, said.append)
+    assert said == []  # it stays ended
+
+
+def test_a_turned_wheel_is_new_and_goes_on(worn, limit, tmp_path):
+    table = ev.evolve(PLAN | {"limits": limit, "turning": True, "distance": 4.5e5}, tmp_path)
+    turned = int(np.flatnonzero(table["at_limit"])[0])
+    assert turned == len(worn[1]) - 1 and table["step_m"].sum() == pytest.approx(4.5e5)
+    again, first = table.iloc[turned + 1], table.iloc[0]
+    assert again["worn_m"] == 0.0 and again["distance_m"] == table["distance_m"].iloc[turned]
+    assert again["rate_max"] == first["rate_max"] and again["Sh_m"] == first["Sh_m"]
+
+
 def test_smoothing_keeps_the_sum():
     values = np.zeros(400)
     values[[3, 200, 397]] = 1.0
-    assert ev._smooth(values, 3e-3).sum() == pytest.approx(3.0)
-    np.testing.assert_array_equal(ev._smooth(values, 0.0), values)
+    assert smooth(values, 3e-3).sum() == pytest.approx(3.0)
+    np.testing.assert_array_equal(smooth(values, 0.0), values)
 
 
 def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
@@ -117,6 +154,7 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
+        ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),
         ({"law": ARCHARD, "set": {"contact.friction": {"left": 0.3, "right": 0.2}}}, "scenes.0.set: expected contact"),
     ):

@@ -28,6 +28,18 @@ import pandas as pd
 from wrcore import __version__
 from wrcore.analysis.local_wear import BIN, local_wear
 from wrcore.analysis.wear_laws import check_friction, wear_law
+from wrcore.analysis.worn_profiles import (
+    POINTS,
+    edges_of,
+    file_of,
+    flange,
+    hollow,
+    limits_reached,
+    points_of,
+    read_points,
+    smooth,
+    write_points,
+)
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
@@ -40,14 +52,14 @@ from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
 from wrcore.vehicle.description import GRAVITY
 
-POINTS = 2.5e-4
-"""Distance of the points of a stored profile, m."""
-
 AMPLITUDE = 3e-3
 """Of the equivalent conicity in the table, m."""
 
 MT = 1e9
 """A million gross tonnes, kg."""
+
+STILL = (np.zeros(1), 0.0)
+"""Rate and volume of a step of no length."""
 
 MOST_STEPS = 10_000
 TABLE = "steps.csv"
@@ -127,7 +139,9 @@ def evolve(
     Returns
     -------
     pandas.DataFrame
-        ``steps.csv``: a row per step, see `wear_row`. The last row is the end: its profile, and no step from there.
+        ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (m per
+        m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step), at_limit (limits reached: no step from
+        there, and the next row's wheel is turned, if any follows). The last row is the end: its profile, and no step.
 
     Raises
     ------
@@ -152,32 +166,35 @@ def evolve(
     shares /= shares.sum()
     rows = _known_rows(folder)
     if not rows:
-        _write_profile(folder, 0, *_points(scenes[0].wheel))
-    while not rows or rows[-1]["step_m"] > 0.0:
+        write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
+    while not rows or _goes_on(data, rows[-1]):
         step = len(rows)
         if step >= MOST_STEPS:
             raise InputError(folder, "steps", f"expected at most {MOST_STEPS} steps: largest_wear is too small")
         gone = rows[-1]["distance_m"] + rows[-1]["step_m"] if rows else 0.0
-        u, f = _read_profile(folder, step)
-        left = data["distance"] - gone
-        rate, volume = np.zeros(len(u)), 0.0
-        if left > 1e-9 * data["distance"]:
-            rate, volume = _wear_rate(data, scenes, shares, folder, step, u, threads, {} if spent is None else spent)
-        length = min(left, data["largest_step"], data["largest_wear"] / max(rate.max(), 1e-300)) if volume else left
-        length = length if left > 1e-9 * data["distance"] else 0.0
-        if length > 0.0:
-            _write_profile(folder, step + 1, u, f + rate * length)
-        rows.append(wear_row(scenes[0], folder, step, gone, length, rate, volume))
+        u, f = read_points(file_of(folder, "profile", step))
+        left, worn, length = data["distance"] - gone, STILL, 0.0
+        row = profile_row(scenes[0], folder, step, gone)
+        reached = limits_reached(data["limits"], row)
+        if left > 1e-9 * data["distance"] and not reached:
+            worn = _wear_rate(data, scenes, shares, folder, step, u, threads, {} if spent is None else spent)
+            length = min(left, data["largest_step"], data["largest_wear"] / worn[0].max()) if worn[1] else left
+            write_points(file_of(folder, "profile", step + 1), u, f + worn[0] * length)
+        elif reached and data["turning"]:
+            write_points(file_of(folder, "profile", step + 1), *read_points(file_of(folder, "profile", 0)))
+        row |= {"step_m": length, "rate_max": float(np.max(worn[0])), "volume_m3_per_m": worn[1]}
+        rows.append(row | {"worn_volume_m3": worn[1] * length, "at_limit": len(reached)})
         _write_table(folder, rows)
         if say:
-            say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km")
+            turned = f", {' and '.join(reached)} at the limit" if reached else ""
+            say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km{turned}")
     return pd.DataFrame(rows)
 
 
 def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Distance (m), u and f (m) at the start of each step in a folder of `evolve`."""
     folder = Path(folder)
-    return [(row["distance_m"], *_read_profile(folder, row["step"])) for row in _known_rows(folder)]
+    return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in _known_rows(folder)]
 
 
 def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -197,7 +214,7 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
     """
     folder = Path(folder)
     parts = [
-        pd.read_csv(_file(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
+        pd.read_csv(file_of(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
         for row in _known_rows(folder)
         if row["step_m"] > 0.0
     ]
@@ -205,80 +222,32 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
 
 
-def wear_row(scene, folder, step, gone, length, rate, volume):
-    """What the table says of a step: the profile at its start, and what is worn off over it.
+def profile_row(scene, folder, step, gone):
+    """What the table says of the profile at the start of a step.
 
     Returns
     -------
     dict
-        step, distance_m, step_m, worn_m (deepest loss of the ordinate since new), rate_max (m per m), volume_m3_per_m
-        (a wheel), worn_volume_m3 (a wheel, over the step), Sh_m, Sd_m, qR_m (flange height, thickness, slope as in EN
-        15313, recalled), equivalent_conicity (3 mm).
+        step, distance_m, worn_m (deepest loss of the ordinate since new or turned), Sh_m, Sd_m, qR_m (flange height,
+        thickness, slope as in EN 15313, recalled), hollow_m, equivalent_conicity (3 mm).
     """
-    curve = ProfileCurve.from_points(*_read_profile(folder, step), "wheel", f"profile {step}")
-    new, now = _read_profile(folder, 0)[1], _read_profile(folder, step)[1]
+    u, now = read_points(file_of(folder, "profile", step))
+    curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")
+    new = read_points(file_of(folder, "profile", 0))[1]
     vehicle = scene.vehicle
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
+    conicity = float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0])
     return {
-        "step": step, "distance_m": gone, "step_m": length, "worn_m": float(np.max(now - new)),
-        "rate_max": float(rate.max()), "volume_m3_per_m": volume, "worn_volume_m3": volume * length,
-        **flange(curve),
-        "equivalent_conicity": float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0]),
+        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)), **flange(curve),
+        "hollow_m": hollow(now), "equivalent_conicity": conicity,
     }  # fmt: skip
 
 
-def flange(curve):
-    """Flange height, thickness and slope of a wheel profile whose inner face is 70 mm from the tape circle.
-
-    Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
-    Slope qR: along u from there to where the flange is 2 mm short of its tip. EN 15313, recalled.
-
-    Parameters
-    ----------
-    curve : ProfileCurve
-
-    Returns
-    -------
-    dict
-        Sh_m, Sd_m, qR_m; NaN where the profile does not reach as far.
-    """
-    below = curve.u < 0.0
-    u, f = curve.u[below], curve.f[below] - curve(0.0)
-    tip = int(np.argmin(f))
-
-    def flank(depth):  # between tip and tape circle the ordinate rises with u
-        inside = f[tip:]
-        return float(np.interp(-depth, inside, u[tip:])) if inside[0] <= -depth else float("nan")
-
-    height = -float(f[tip])
-    return {"Sh_m": height, "Sd_m": 0.070 + flank(0.010), "qR_m": flank(0.010) - flank(height - 0.002)}
-
-
-def _points(curve):
-    """The curve at the points that are stored."""
-    u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
-    return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
-
-
-def _file(folder, kind, step):
-    return folder / f"{kind}_{step:03d}.csv"
-
-
-def _write_profile(folder, step, u, f):
-    with appearing(_file(folder, "profile", step)) as file:
-        lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
-        file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
-
-
-def _read_profile(folder, step):
-    path = _file(folder, "profile", step)
-    try:
-        points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
-    if points.shape[1] != 2 or not np.isfinite(points).all() or np.ptp(np.diff(points[:, 0])) > 1e-6 * POINTS:
-        raise InputError(path, "", f"expected a profile that an earlier step has written, points every {POINTS:g} m")
-    return points[:, 0], points[:, 1]
+def _goes_on(data, row):
+    """Whether a step follows: there was one, or the wheel is turned and there is a way left."""
+    if row["at_limit"]:
+        return data["turning"] and data["distance"] - row["distance_m"] > 1e-9 * data["distance"]
+    return row["step_m"] > 0.0
 
 
 class SceneWear(NamedTuple):
@@ -296,8 +265,8 @@ class SceneWear(NamedTuple):
 
 def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
     """Rise of the ordinate at the stored points (m per m), smoothed, and volume (m^3 per m of a wheel)."""
-    profile = {"points": str(_file(folder, "profile", step).resolve()), "unit": "m"}
-    one = partial(_scene_wear, data, profile, np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS), threads > 1)
+    profile = {"points": str(file_of(folder, "profile", step).resolve()), "unit": "m"}
+    one = partial(_scene_wear, data, profile, edges_of(u), threads > 1)
     total, volume, rails = np.zeros(len(u)), 0.0, []
     with ThreadPoolExecutor(threads) as pool:
         found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
@@ -307,9 +276,9 @@ def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
             rails.append({"scene": len(rails), "share": share} | worn.rails)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
-    with appearing(_file(folder, "rails", step)) as file:
+    with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
-    return _smooth(total, data["smoothing"]), volume
+    return smooth(total, data["smoothing"]), volume
 
 
 def _scene_wear(data, profile, edges, quiet, place, scene):
@@ -329,18 +298,6 @@ def _scene_wear(data, profile, edges, quiet, place, scene):
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
     return SceneWear(rise, volume, rails, (simulated - began, time.thread_time() - simulated))
-
-
-def _smooth(values, width):
-    """Mean over a width (m) around each point, the sum kept: what would go beyond the ends stays at them."""
-    half = int(round(0.5 * width / POINTS))
-    if half == 0:
-        return values
-    padded = np.convolve(values, np.full(2 * half + 1, 1.0 / (2 * half + 1)))
-    inner = padded[half:-half].copy()
-    inner[0] += padded[:half].sum()
-    inner[-1] += padded[-half:].sum()
-    return inner
 
 
 def plan_mark(data, scenes):
