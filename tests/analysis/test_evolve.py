@@ -6,7 +6,7 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.analysis import evolve as ev
-from wrcore.analysis.worn_profiles import file_of, flange, hollow, limits_reached, read_points, smooth
+from wrcore.analysis.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
 from wrcore.cli import main
 from wrcore.errors import InputError
 
@@ -44,7 +44,7 @@ def test_steps_add_up_to_the_distance_and_the_volume(worn):
     np.testing.assert_allclose(table["distance_m"], np.concatenate([[0.0], np.cumsum(table["step_m"])[:-1]]))
     new, now = (read_points(file_of(folder, "profile", step))[1] for step in (0, len(table) - 1))
     radius = 0.46  # of the wheels; their centres keep this height to 0.1 %
-    assert np.sum(now - new) * ev.POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
+    assert np.sum(now - new) * POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
     assert (now - new).min() >= -1e-15 and table["worn_m"].iloc[-1] == pytest.approx((now - new).max())
     assert table["worn_m"].is_monotonic_increasing
 

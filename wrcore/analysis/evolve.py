@@ -29,17 +29,18 @@ from wrcore import __version__
 from wrcore.analysis.local_wear import BIN, local_wear
 from wrcore.analysis.wear_laws import check_friction, wear_law
 from wrcore.analysis.worn_profiles import (
-    POINTS,
-    edges_of,
+    across,
     file_of,
     flange,
     hollow,
     limits_reached,
+    onto_points,
     points_of,
     read_points,
     smooth,
     write_points,
 )
+from wrcore.analysis.worn_rails import LaidRails, falls_of, keep_rails, laid_rails, lay_rails, to_renewal, wear_rails
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
@@ -57,9 +58,6 @@ AMPLITUDE = 3e-3
 
 MT = 1e9
 """A million gross tonnes, kg."""
-
-STILL = (np.zeros(1), 0.0)
-"""Rate and volume of a step of no length."""
 
 MOST_STEPS = 10_000
 TABLE = "steps.csv"
@@ -139,9 +137,10 @@ def evolve(
     Returns
     -------
     pandas.DataFrame
-        ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (m per
-        m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step), at_limit (limits reached: no step from
-        there, and the next row's wheel is turned, if any follows). The last row is the end: its profile, and no step.
+        ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (largest
+        depth, normal to the profile, m per m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step),
+        at_limit (limits reached: no step from there, and the next row's wheel is turned, if any follows). The last row
+        is the end: its profile, and no step.
 
     Raises
     ------
@@ -167,6 +166,8 @@ def evolve(
     rows = _known_rows(folder)
     if not rows:
         write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
+        if data["rails"]:
+            lay_rails(folder, scenes)
     while not rows or _goes_on(data, rows[-1]):
         step = len(rows)
         if step >= MOST_STEPS:
@@ -177,13 +178,15 @@ def evolve(
         row = profile_row(scenes[0], folder, step, gone)
         reached = limits_reached(data["limits"], row)
         if left > 1e-9 * data["distance"] and not reached:
-            worn = _wear_rate(data, scenes, shares, folder, step, u, threads, {} if spent is None else spent)
-            length = min(left, data["largest_step"], data["largest_wear"] / worn[0].max()) if worn[1] else left
-            write_points(file_of(folder, "profile", step + 1), u, f + worn[0] * length)
+            worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, {} if spent is None else spent)
+            length = _step_length(data, gone, worn)
+            write_points(file_of(folder, "profile", step + 1), u, f + worn.rise * length)
         elif reached and data["turning"]:
             write_points(file_of(folder, "profile", step + 1), *read_points(file_of(folder, "profile", 0)))
-        row |= {"step_m": length, "rate_max": float(np.max(worn[0])), "volume_m3_per_m": worn[1]}
-        rows.append(row | {"worn_volume_m3": worn[1] * length, "at_limit": len(reached)})
+        if data["rails"]:
+            _next_rails(data, folder, step, worn, gone, length)
+        row |= {"step_m": length, "rate_max": worn.deepest, "volume_m3_per_m": worn.volume}
+        rows.append(row | {"worn_volume_m3": worn.volume * length, "at_limit": len(reached)})
         _write_table(folder, rows)
         if say:
             turned = f", {' and '.join(reached)} at the limit" if reached else ""
@@ -250,6 +253,41 @@ def _goes_on(data, row):
     return row["step_m"] > 0.0
 
 
+def _step_length(data, gone, worn):
+    """How far the rates of a step hold, m."""
+    length = min(data["distance"] - gone, to_renewal(gone, data["rails"].get("renewal")))
+    return min(length, data["largest_step"], data["largest_wear"] / worn.fastest) if worn.volume else length
+
+
+def _next_rails(data, folder, step, worn, gone, length):
+    """Store the rails for the step that follows."""
+    if length == to_renewal(gone, data["rails"].get("renewal")):
+        keep_rails(folder, step, data["scenes"], renewed=True)
+    elif worn.falls:
+        wear_rails(folder, step, worn.falls, length)
+    else:
+        keep_rails(folder, step, data["scenes"], renewed=False)
+
+
+class StepWear(NamedTuple):
+    """What all scenes of a step take off."""
+
+    rise: np.ndarray
+    """Of a wheel's ordinate at the stored points, smoothed, m per m."""
+    volume: float
+    """m^3 per m of a wheel."""
+    falls: list[dict[str, np.ndarray]]
+    """Of each scene's rails at their stored points, smoothed, m per m that the vehicle runs; none unless rails wear."""
+    deepest: float
+    """Largest loss normal to the wheel's profile, m per m."""
+    fastest: float
+    """The same of wheels and rails."""
+
+
+STILL = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0)
+"""A step of no length."""
+
+
 class SceneWear(NamedTuple):
     """What a run of a scene takes off."""
 
@@ -259,45 +297,55 @@ class SceneWear(NamedTuple):
     """m^3 per m of a wheel."""
     rails: dict[str, float]
     """Area of each rail's section, m^2 per million gross tonnes."""
+    falls: dict[str, np.ndarray]
+    """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
+    laid: LaidRails | None
+    """The rails, if they wear."""
     seconds: tuple[float, float]
     """Processor time of simulating and of local wear."""
 
 
-def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
-    """Rise of the ordinate at the stored points (m per m), smoothed, and volume (m^3 per m of a wheel)."""
-    profile = {"points": str(file_of(folder, "profile", step).resolve()), "unit": "m"}
-    one = partial(_scene_wear, data, profile, edges_of(u), threads > 1)
-    total, volume, rails = np.zeros(len(u)), 0.0, []
+def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
+    """`StepWear` of the profile (u and f) at the start of a step."""
+    one = partial(_scene_wear, data, folder, step, profile[0], threads > 1)
+    total, volume, rails, falls, fastest = np.zeros(len(profile[0])), 0.0, [], [], 0.0
     with ThreadPoolExecutor(threads) as pool:
         found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
         for share, worn in zip(shares, found, strict=True):
             total += share * worn.rise
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
+            if worn.laid:
+                fall = {side: smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
+                fastest = max(fastest, *(across(*worn.laid.points[side], fall[side]) for side in SIDES))
+                falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
     with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
-    return smooth(total, data["smoothing"]), volume
+    total = smooth(total, data["smoothing"])
+    deepest = across(*profile, total)
+    return StepWear(total, volume, falls, deepest, max(deepest, fastest))
 
 
-def _scene_wear(data, profile, edges, quiet, place, scene):
+def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
-    run = simulate(load_scene(scene, {"wheel.profile": profile}), progress=False if quiet else None)
+    path = file_of(folder, "profile", step).resolve()
+    laid = laid_rails(folder, step, place, scene) if data["rails"] else None
+    changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
+    run = simulate(load_scene(scene, changes), progress=False if quiet else None)
     if run.status != "completed":
         expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
-        raise InputError(profile["points"], f"scenes.{place}", expected)
+        raise InputError(path, f"scenes.{place}", expected)
     simulated = time.thread_time()
     wheels = local_wear(run, data["begin"], data["law"])
-    rise = np.zeros(len(edges) - 1)
-    for wheel in wheels.values():
-        worn = np.concatenate([[0.0], np.cumsum(wheel.wheel_depth) * BIN])
-        rise += np.diff(np.interp(edges, wheel.wheel_edges, worn)) / (POINTS * len(wheels))
+    rise = sum(onto_points(u, wheel.wheel_edges, wheel.wheel_depth) for wheel in wheels.values()) / len(wheels)
     volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
-    return SceneWear(rise, volume, rails, (simulated - began, time.thread_time() - simulated))
+    falls = falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
+    return SceneWear(rise, volume, rails, falls, laid, (simulated - began, time.thread_time() - simulated))
 
 
 def plan_mark(data, scenes):

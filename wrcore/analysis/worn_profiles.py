@@ -76,6 +76,11 @@ def smooth(values, width):
     return inner
 
 
+def across(u, f, loss):
+    """Largest depth, normal to a profile, of what its ordinate loses."""
+    return float(np.max(loss / np.sqrt(1.0 + np.gradient(f, u) ** 2)))
+
+
 def points_of(curve):
     """The curve at the points that are stored."""
     u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
@@ -85,6 +90,26 @@ def points_of(curve):
 def edges_of(u):
     """Edges of the bins around stored points."""
     return np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS)
+
+
+def onto_points(u, edges, depth):
+    """Depths over the bins around stored points from those over bins of a run; what is beyond the ends stays at them.
+
+    Parameters
+    ----------
+    u : numpy.ndarray, shape (n,)
+        Stored points, m.
+    edges, depth : numpy.ndarray, shapes (m + 1,) and (m,)
+        Bins of a run, m, and what is lost in them.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        Of the same sum times width.
+    """
+    area = np.concatenate([[0.0], np.cumsum(depth * np.diff(edges))])
+    inner = np.interp(edges_of(u)[1:-1], edges, area)
+    return np.diff(np.concatenate([[0.0], inner, area[-1:]])) / POINTS
 
 
 def file_of(folder, kind, step):
