@@ -7,8 +7,10 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.analysis import evolve as ev
 from wrcore.analysis.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
+from wrcore.analysis.worn_rails import laid_rails, rail_file
 from wrcore.cli import main
 from wrcore.errors import InputError
+from wrcore.scene.description import load_scene
 
 PLAN = {
     "name": "short", "scene": str(SCENES / "suspended_wheelset.yaml"), "distance": 3e5, "largest_step": 1e5,
@@ -154,6 +156,7 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
+        ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
         ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),
         ({"law": ARCHARD, "set": {"contact.friction": {"left": 0.3, "right": 0.2}}}, "scenes.0.set: expected contact"),
@@ -165,3 +168,63 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ev.evolve(PLAN | {"distance": 4e5}, folder)
     assert main(["evolve", str(tmp_path / "none.yaml"), "--out", str(tmp_path / "x")]) == 2
     assert "none.yaml" in capsys.readouterr().err
+
+
+def curved(radius):
+    """A curve of two steps over rails that wear; one to the right is the mirror image of one to the left."""
+    path = [{"transition": 6}, {"curve": 100, "radius": radius, "cant": 0.02}]
+    changes = {"speed": 12, "initial.y": 0.0, "integration.duration": 1.0, "integration.rtol": 1e-7, "track.path": path}
+    rails = {"tonnage": 200.0, "renewal": 1.5e5}
+    return PLAN | {"distance": 2.5e5, "rails": rails, "scenes": [{"share": 1.0, "set": changes}]}
+
+
+@pytest.fixture(scope="module")
+def curves(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("curves")
+    return {side: (folder / side, ev.evolve(curved(r), folder / side)) for side, r in (("left", 400), ("right", -400))}
+
+
+def rail_loss(folder, step, side, since=0):
+    f = [read_points(rail_file(folder, k, 0, side))[1] for k in (since, step)]
+    return f[0] - f[1]
+
+
+def test_rails_lose_what_the_traffic_takes(curves):
+    """The area between the stored profiles is that of the vehicle's local wear, times the tonnage."""
+    folder, table = curves["left"]
+    assert table["step_m"].tolist() == pytest.approx([1e5, 5e4, 1e5, 0.0])  # up to the renewal, and beyond
+    for step in (0, 2):
+        tonnes = 200.0 * table["step_m"].iloc[step] / 1e9  # million
+        taken = ev.rail_wear(folder).iloc[step]
+        for side in ("left", "right"):
+            loss = rail_loss(folder, step + 1, side, step)
+            assert np.sum(loss) * POINTS == pytest.approx(taken[f"{side}_m2_per_Mt"] * tonnes, rel=1e-6)
+            assert loss.min() > -1e-12 and loss.max() > 1e-7
+
+
+def test_renewed_rails_are_new(curves):
+    folder, _ = curves["left"]
+    for side in ("left", "right"):
+        assert np.all(rail_loss(folder, 2, side) == 0.0) and rail_loss(folder, 1, side).max() > 0.0
+
+
+def test_a_mirrored_curve_wears_mirrored_rails(curves):
+    (here, table), (there, mirrored) = curves["left"], curves["right"]
+    for side, other in (("left", "right"), ("right", "left")):
+        loss = rail_loss(here, 3, side)
+        np.testing.assert_allclose(rail_loss(there, 3, other), loss, atol=1e-3 * loss.max())
+    np.testing.assert_allclose(mirrored["worn_m"], table["worn_m"], rtol=1e-3)
+    assert rail_loss(here, 3, "right").sum() > 2.0 * rail_loss(here, 3, "left").sum()  # the outer rail of a left curve
+
+
+def test_worn_rails_keep_their_place(curves):
+    """What wears lies lower and farther from the other rail; what does not stays where it was, to 1 um."""
+    folder, _ = curves["left"]
+    _, (scene,) = ev.load_wear_plan(curved(400))
+    new, worn = (load_scene(scene, laid_rails(folder, step, 0, scene).changes) for step in (0, 3))
+    places = [[s.track.rail_distance(pair.rail) for pair in s.pairs[:2]] for s in (new, worn)]
+    shifts = [laid_rails(folder, step, 0, scene).shifts for step in (0, 3)]
+    for k, side in enumerate(("left", "right")):
+        moved = places[1][k] - shifts[1][side] - places[0][k] + shifts[0][side]
+        assert abs(moved) < 1e-6
+    assert places[0][0] == pytest.approx(scene.track.rail_distance(scene.rail), abs=1e-6)
