@@ -333,7 +333,10 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
     path = file_of(folder, "profile", step).resolve()
     laid = laid_rails(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
-    run = simulate(load_scene(scene, changes), progress=False if quiet else None)
+    try:
+        run = simulate(load_scene(scene, changes), progress=False if quiet else None)
+    except InputError as error:
+        raise InputError(path, f"scenes.{place}", str(error)) from None
     if run.status != "completed":
         expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
         raise InputError(path, f"scenes.{place}", expected)
