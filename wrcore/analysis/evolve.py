@@ -3,8 +3,9 @@
 A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
 wheel profile, averages the depths that all wheels lose (:mod:`wrcore.analysis.local_wear`), smooths them and goes on
 over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
-curves to both sides. The rail stays as it is: a wheel sees all rails of a line, a rail all vehicles. What this vehicle
-takes off the rails of each scene is stated per gross tonnes instead.
+curves to both sides. At ``limits`` the wheel ends, or is turned to its new profile. Rails stay as they are, a wheel
+sees all of a line and a rail all vehicles, unless the plan says how much traffic wears them
+(:mod:`wrcore.analysis.worn_rails`).
 
 A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
 step. A step counts when its row is there; whoever is killed goes on after the last one.
