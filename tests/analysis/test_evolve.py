@@ -149,6 +149,15 @@ def test_smoothing_keeps_the_sum():
     np.testing.assert_array_equal(smooth(values, 0.0), values)
 
 
+@pytest.mark.parametrize("wave", [1.0e-3, 1.5e-3, 2.0e-3, 2.5e-3, 4e-3, 8e-3])
+def test_smoothing_turns_no_wave_over(wave):
+    """What is worn on ridges must not be taken from valleys."""
+    u = POINTS * np.arange(400)
+    ridges = np.cos(2.0 * np.pi * u / wave)
+    inside = slice(100, 300)
+    assert np.dot(smooth(ridges, 3e-3)[inside], ridges[inside]) > -1e-9
+
+
 def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
     folder, _ = worn
     for changes, says in (
