@@ -38,7 +38,7 @@ LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
 LARGEST_SLIP, NEARBY = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
 
-BESIDE = 1e-3, -1e-3, 2e-3, -2e-3
+BESIDE = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
 """Where wheels or rails differ, equilibrium is sought from these places, too, m: they need not rest in the middle, and
 between worn profiles little tells where."""
 
