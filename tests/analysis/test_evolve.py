@@ -6,8 +6,11 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.analysis import evolve as ev
+from wrcore.analysis.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
+from wrcore.analysis.worn_rails import laid_rails, rail_file
 from wrcore.cli import main
 from wrcore.errors import InputError
+from wrcore.scene.description import load_scene
 
 PLAN = {
     "name": "short", "scene": str(SCENES / "suspended_wheelset.yaml"), "distance": 3e5, "largest_step": 1e5,
@@ -32,7 +35,7 @@ def worn(tmp_path_factory):
 
 def test_flange_of_s1002(s1002):
     """28 mm high, 32.5 mm thick, qR 10.8 mm: EN 13715 and the drawings of UIC 510-2 (recalled)."""
-    found = ev.flange(s1002)
+    found = flange(s1002)
     assert found["Sh_m"] == pytest.approx(28e-3, abs=5e-5) and found["Sd_m"] == pytest.approx(32.5e-3, abs=5e-5)
     assert found["qR_m"] == pytest.approx(10.8e-3, abs=5e-5)
 
@@ -41,9 +44,9 @@ def test_steps_add_up_to_the_distance_and_the_volume(worn):
     folder, table = worn
     assert table["step_m"].sum() == pytest.approx(3e5) and table["step_m"].iloc[-1] == 0.0
     np.testing.assert_allclose(table["distance_m"], np.concatenate([[0.0], np.cumsum(table["step_m"])[:-1]]))
-    new, now = (ev._read_profile(folder, step)[1] for step in (0, len(table) - 1))
+    new, now = (read_points(file_of(folder, "profile", step))[1] for step in (0, len(table) - 1))
     radius = 0.46  # of the wheels; their centres keep this height to 0.1 %
-    assert np.sum(now - new) * ev.POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
+    assert np.sum(now - new) * POINTS * 2 * np.pi * radius == pytest.approx(table["worn_volume_m3"].sum(), rel=2e-3)
     assert (now - new).min() >= -1e-15 and table["worn_m"].iloc[-1] == pytest.approx((now - new).max())
     assert table["worn_m"].is_monotonic_increasing
 
@@ -103,11 +106,56 @@ def test_a_scene_that_does_not_end_is_named(tmp_path):
         ev.evolve(plan, tmp_path)
 
 
+def test_hollow_is_the_height_of_the_false_flange():
+    f = np.array([0.0, -0.02, -0.028, -0.01, 0.0, 0.003, 0.002, 0.0005, 0.001, 0.004])
+    assert hollow(f) == pytest.approx(0.0025) and hollow(f[:6]) == 0.0
+
+
+def test_limits():
+    row = {"Sh_m": 0.0362, "Sd_m": 0.030, "qR_m": 0.0064, "hollow_m": 0.001}
+    limits = {"Sh": 0.036, "Sd": 0.022, "qR": 0.0065, "hollow": 0.002}
+    assert limits_reached(limits, row) == ["Sh", "qR"] and limits_reached({}, row) == []
+
+
+@pytest.fixture(scope="module")
+def limit(worn):
+    """A flange height that the wheel of the plan has reached at its last step but not before."""
+    heights = worn[1]["Sh_m"].to_numpy()
+    return {"Sh": 0.5 * (heights[-1] + heights[-2])}
+
+
+def test_a_wheel_ends_at_its_limit(worn, limit, tmp_path):
+    """The same steps up to there, and none from there."""
+    table, said = ev.evolve(PLAN | {"limits": limit, "distance": 9e5}, tmp_path, None), []
+    assert table["at_limit"].tolist() == [0] * (len(worn[1]) - 1) + [1] and table["step_m"].iloc[-1] == 0.0
+    np.testing.assert_allclose(table["distance_m"], worn[1]["distance_m"])
+    ev.evolve(PLAN | {"limits": limit, "distance": 9e5}, tmp_path, said.append)
+    assert said == []  # it stays ended
+
+
+def test_a_turned_wheel_is_new_and_goes_on(worn, limit, tmp_path):
+    table = ev.evolve(PLAN | {"limits": limit, "turning": True, "distance": 4.5e5}, tmp_path)
+    turned = int(np.flatnonzero(table["at_limit"])[0])
+    assert turned == len(worn[1]) - 1 and table["step_m"].sum() == pytest.approx(4.5e5)
+    again, first = table.iloc[turned + 1], table.iloc[0]
+    assert again["worn_m"] == 0.0 and again["distance_m"] == table["distance_m"].iloc[turned]
+    assert again["rate_max"] == first["rate_max"] and again["Sh_m"] == first["Sh_m"]
+
+
 def test_smoothing_keeps_the_sum():
     values = np.zeros(400)
     values[[3, 200, 397]] = 1.0
-    assert ev._smooth(values, 3e-3).sum() == pytest.approx(3.0)
-    np.testing.assert_array_equal(ev._smooth(values, 0.0), values)
+    assert smooth(values, 3e-3).sum() == pytest.approx(3.0)
+    np.testing.assert_array_equal(smooth(values, 0.0), values)
+
+
+@pytest.mark.parametrize("wave", [1.0e-3, 1.5e-3, 2.0e-3, 2.5e-3, 4e-3, 8e-3])
+def test_smoothing_turns_no_wave_over(wave):
+    """What is worn on ridges must not be taken from valleys."""
+    u = POINTS * np.arange(400)
+    ridges = np.cos(2.0 * np.pi * u / wave)
+    inside = slice(100, 300)
+    assert np.dot(smooth(ridges, 3e-3)[inside], ridges[inside]) > -1e-9
 
 
 def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
@@ -117,6 +165,8 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
+        ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
+        ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),
         ({"law": ARCHARD, "set": {"contact.friction": {"left": 0.3, "right": 0.2}}}, "scenes.0.set: expected contact"),
     ):
@@ -127,3 +177,63 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ev.evolve(PLAN | {"distance": 4e5}, folder)
     assert main(["evolve", str(tmp_path / "none.yaml"), "--out", str(tmp_path / "x")]) == 2
     assert "none.yaml" in capsys.readouterr().err
+
+
+def curved(radius):
+    """A curve of two steps over rails that wear; one to the right is the mirror image of one to the left."""
+    path = [{"transition": 6}, {"curve": 100, "radius": radius, "cant": 0.02}]
+    changes = {"speed": 12, "initial.y": 0.0, "integration.duration": 1.0, "integration.rtol": 1e-7, "track.path": path}
+    rails = {"tonnage": 200.0, "renewal": 1.5e5}
+    return PLAN | {"distance": 2.5e5, "rails": rails, "scenes": [{"share": 1.0, "set": changes}]}
+
+
+@pytest.fixture(scope="module")
+def curves(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("curves")
+    return {side: (folder / side, ev.evolve(curved(r), folder / side)) for side, r in (("left", 400), ("right", -400))}
+
+
+def rail_loss(folder, step, side, since=0):
+    f = [read_points(rail_file(folder, k, 0, side))[1] for k in (since, step)]
+    return f[0] - f[1]
+
+
+def test_rails_lose_what_the_traffic_takes(curves):
+    """The area between the stored profiles is that of the vehicle's local wear, times the tonnage."""
+    folder, table = curves["left"]
+    assert table["step_m"].tolist() == pytest.approx([1e5, 5e4, 1e5, 0.0])  # up to the renewal, and beyond
+    for step in (0, 2):
+        tonnes = 200.0 * table["step_m"].iloc[step] / 1e9  # million
+        taken = ev.rail_wear(folder).iloc[step]
+        for side in ("left", "right"):
+            loss = rail_loss(folder, step + 1, side, step)
+            assert np.sum(loss) * POINTS == pytest.approx(taken[f"{side}_m2_per_Mt"] * tonnes, rel=1e-6)
+            assert loss.min() > -1e-12 and loss.max() > 1e-7
+
+
+def test_renewed_rails_are_new(curves):
+    folder, _ = curves["left"]
+    for side in ("left", "right"):
+        assert np.all(rail_loss(folder, 2, side) == 0.0) and rail_loss(folder, 1, side).max() > 0.0
+
+
+def test_a_mirrored_curve_wears_mirrored_rails(curves):
+    (here, table), (there, mirrored) = curves["left"], curves["right"]
+    for side, other in (("left", "right"), ("right", "left")):
+        loss = rail_loss(here, 3, side)
+        np.testing.assert_allclose(rail_loss(there, 3, other), loss, atol=1e-3 * loss.max())
+    np.testing.assert_allclose(mirrored["worn_m"], table["worn_m"], rtol=1e-3)
+    assert rail_loss(here, 3, "right").sum() > 2.0 * rail_loss(here, 3, "left").sum()  # the outer rail of a left curve
+
+
+def test_worn_rails_keep_their_place(curves):
+    """What wears lies lower and farther from the other rail; what does not stays where it was, to 1 um."""
+    folder, _ = curves["left"]
+    _, (scene,) = ev.load_wear_plan(curved(400))
+    new, worn = (load_scene(scene, laid_rails(folder, step, 0, scene).changes) for step in (0, 3))
+    places = [[s.track.rail_distance(pair.rail) for pair in s.pairs[:2]] for s in (new, worn)]
+    shifts = [laid_rails(folder, step, 0, scene).shifts for step in (0, 3)]
+    for k, side in enumerate(("left", "right")):
+        moved = places[1][k] - shifts[1][side] - places[0][k] + shifts[0][side]
+        assert abs(moved) < 1e-6
+    assert places[0][0] == pytest.approx(scene.track.rail_distance(scene.rail), abs=1e-6)

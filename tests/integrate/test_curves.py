@@ -5,6 +5,7 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.integrate.engine import NEXT, T
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.moving_axes import carry, rates_of_increments
 from wrcore.scene.description import compile_scene, load_scene
@@ -83,3 +84,17 @@ def test_steps_and_errors_fall_with_the_tolerance_in_a_transition(method):
     errors = [np.abs(run.states[-1] - exact)[places].max() for run in runs]
     assert runs[0].rhs_evaluations < runs[1].rhs_evaluations < runs[2].rhs_evaluations
     assert errors[1] < 1e-6 and errors[2] < 3e-8
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas4"])
+def test_a_rejected_step_leaves_wheelsets_on_their_lap(method):
+    """Far too long an attempt, after which the path's next lap (its circle goes on without end) is nearer."""
+    model, start = coach(curve(300.0), **{"initial.y": 0.0})
+    before = integrate(model, start, [0.0, 5.0], method, 1e-3).end
+    plain = integrate(model, before, [5.0, 5.1], method, 1e-3)
+    before.memory.clock[NEXT] = 2.0 * np.pi * 300.0 / 16.7
+    wild = integrate(model, before, [5.0, 5.1], method, 1e-3)
+    assert wild.rejected > plain.rejected
+    ahead = 16.7 * (wild.end.memory.clock[T] - plain.end.memory.clock[T])  # the last step reaches beyond the end
+    np.testing.assert_allclose(wild.end.arc_lengths, plain.end.arc_lengths + ahead, atol=0.05)
+    np.testing.assert_allclose(wild.states[-1], plain.states[-1], atol=1e-2)

@@ -2,7 +2,8 @@
 
 WEAR = config["wear"]
 CORE["wear"] = CORE["simulation"] + sources(
-    "analysis/evolve", "analysis/local_wear", "analysis/wear_laws", "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
+    "analysis/evolve", "analysis/worn_profiles", "analysis/worn_rails", "analysis/local_wear", "analysis/wear_laws",
+    "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
 )  # fmt: skip
 
 

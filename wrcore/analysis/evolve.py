@@ -3,8 +3,9 @@
 A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
 wheel profile, averages the depths that all wheels lose (:mod:`wrcore.analysis.local_wear`), smooths them and goes on
 over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
-curves to both sides. The rail stays as it is: a wheel sees all rails of a line, a rail all vehicles. What this vehicle
-takes off the rails of each scene is stated per gross tonnes instead.
+curves to both sides. At ``limits`` the wheel ends, or is turned to its new profile. Rails stay as they are, a wheel
+sees all of a line and a rail all vehicles, unless the plan says how much traffic wears them
+(:mod:`wrcore.analysis.worn_rails`).
 
 A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
 step. A step counts when its row is there; whoever is killed goes on after the last one.
@@ -28,6 +29,19 @@ import pandas as pd
 from wrcore import __version__
 from wrcore.analysis.local_wear import BIN, local_wear
 from wrcore.analysis.wear_laws import check_friction, wear_law
+from wrcore.analysis.worn_profiles import (
+    across,
+    file_of,
+    flange,
+    hollow,
+    limits_reached,
+    onto_points,
+    points_of,
+    read_points,
+    smooth,
+    write_points,
+)
+from wrcore.analysis.worn_rails import LaidRails, falls_of, keep_rails, laid_rails, lay_rails, to_renewal, wear_rails
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
@@ -39,9 +53,6 @@ from wrcore.kernels.cache import source_digest
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
 from wrcore.vehicle.description import GRAVITY
-
-POINTS = 2.5e-4
-"""Distance of the points of a stored profile, m."""
 
 AMPLITUDE = 3e-3
 """Of the equivalent conicity in the table, m."""
@@ -127,7 +138,10 @@ def evolve(
     Returns
     -------
     pandas.DataFrame
-        ``steps.csv``: a row per step, see `wear_row`. The last row is the end: its profile, and no step from there.
+        ``steps.csv``: a row per step. The profile at its start: see `profile_row`. The step: step_m, rate_max (largest
+        depth, normal to the profile, m per m), volume_m3_per_m (a wheel), worn_volume_m3 (a wheel, over the step),
+        at_limit (limits reached: no step from there, and the next row's wheel is turned, if any follows). The last row
+        is the end: its profile, and no step.
 
     Raises
     ------
@@ -152,32 +166,39 @@ def evolve(
     shares /= shares.sum()
     rows = _known_rows(folder)
     if not rows:
-        _write_profile(folder, 0, *_points(scenes[0].wheel))
-    while not rows or rows[-1]["step_m"] > 0.0:
+        write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
+        if data["rails"]:
+            lay_rails(folder, scenes)
+    while not rows or _goes_on(data, rows[-1]):
         step = len(rows)
         if step >= MOST_STEPS:
             raise InputError(folder, "steps", f"expected at most {MOST_STEPS} steps: largest_wear is too small")
         gone = rows[-1]["distance_m"] + rows[-1]["step_m"] if rows else 0.0
-        u, f = _read_profile(folder, step)
-        left = data["distance"] - gone
-        rate, volume = np.zeros(len(u)), 0.0
-        if left > 1e-9 * data["distance"]:
-            rate, volume = _wear_rate(data, scenes, shares, folder, step, u, threads, {} if spent is None else spent)
-        length = min(left, data["largest_step"], data["largest_wear"] / max(rate.max(), 1e-300)) if volume else left
-        length = length if left > 1e-9 * data["distance"] else 0.0
-        if length > 0.0:
-            _write_profile(folder, step + 1, u, f + rate * length)
-        rows.append(wear_row(scenes[0], folder, step, gone, length, rate, volume))
+        u, f = read_points(file_of(folder, "profile", step))
+        left, worn, length = data["distance"] - gone, STILL, 0.0
+        row = profile_row(scenes[0], folder, step, gone)
+        reached = limits_reached(data["limits"], row)
+        if left > 1e-9 * data["distance"] and not reached:
+            worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, {} if spent is None else spent)
+            length = _step_length(data, gone, worn)
+            write_points(file_of(folder, "profile", step + 1), u, f + worn.rise * length)
+        elif reached and data["turning"]:
+            write_points(file_of(folder, "profile", step + 1), *read_points(file_of(folder, "profile", 0)))
+        if data["rails"]:
+            _next_rails(data, folder, step, worn, gone, length)
+        row |= {"step_m": length, "rate_max": worn.deepest, "volume_m3_per_m": worn.volume}
+        rows.append(row | {"worn_volume_m3": worn.volume * length, "at_limit": len(reached)})
         _write_table(folder, rows)
         if say:
-            say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km")
+            turned = f", {' and '.join(reached)} at the limit" if reached else ""
+            say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km{turned}")
     return pd.DataFrame(rows)
 
 
 def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Distance (m), u and f (m) at the start of each step in a folder of `evolve`."""
     folder = Path(folder)
-    return [(row["distance_m"], *_read_profile(folder, row["step"])) for row in _known_rows(folder)]
+    return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in _known_rows(folder)]
 
 
 def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -197,7 +218,7 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
     """
     folder = Path(folder)
     parts = [
-        pd.read_csv(_file(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
+        pd.read_csv(file_of(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
         for row in _known_rows(folder)
         if row["step_m"] > 0.0
     ]
@@ -205,80 +226,67 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
 
 
-def wear_row(scene, folder, step, gone, length, rate, volume):
-    """What the table says of a step: the profile at its start, and what is worn off over it.
+def profile_row(scene, folder, step, gone):
+    """What the table says of the profile at the start of a step.
 
     Returns
     -------
     dict
-        step, distance_m, step_m, worn_m (deepest loss of the ordinate since new), rate_max (m per m), volume_m3_per_m
-        (a wheel), worn_volume_m3 (a wheel, over the step), Sh_m, Sd_m, qR_m (flange height, thickness, slope as in EN
-        15313, recalled), equivalent_conicity (3 mm).
+        step, distance_m, worn_m (deepest loss of the ordinate since new or turned), Sh_m, Sd_m, qR_m (flange height,
+        thickness, slope as in EN 15313, recalled), hollow_m, equivalent_conicity (3 mm).
     """
-    curve = ProfileCurve.from_points(*_read_profile(folder, step), "wheel", f"profile {step}")
-    new, now = _read_profile(folder, 0)[1], _read_profile(folder, step)[1]
+    u, now = read_points(file_of(folder, "profile", step))
+    curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")
+    new = read_points(file_of(folder, "profile", 0))[1]
     vehicle = scene.vehicle
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
+    conicity = float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0])
     return {
-        "step": step, "distance_m": gone, "step_m": length, "worn_m": float(np.max(now - new)),
-        "rate_max": float(rate.max()), "volume_m3_per_m": volume, "worn_volume_m3": volume * length,
-        **flange(curve),
-        "equivalent_conicity": float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0]),
+        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)), **flange(curve),
+        "hollow_m": hollow(now), "equivalent_conicity": conicity,
     }  # fmt: skip
 
 
-def flange(curve):
-    """Flange height, thickness and slope of a wheel profile whose inner face is 70 mm from the tape circle.
-
-    Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
-    Slope qR: along u from there to where the flange is 2 mm short of its tip. EN 15313, recalled.
-
-    Parameters
-    ----------
-    curve : ProfileCurve
-
-    Returns
-    -------
-    dict
-        Sh_m, Sd_m, qR_m; NaN where the profile does not reach as far.
-    """
-    below = curve.u < 0.0
-    u, f = curve.u[below], curve.f[below] - curve(0.0)
-    tip = int(np.argmin(f))
-
-    def flank(depth):  # between tip and tape circle the ordinate rises with u
-        inside = f[tip:]
-        return float(np.interp(-depth, inside, u[tip:])) if inside[0] <= -depth else float("nan")
-
-    height = -float(f[tip])
-    return {"Sh_m": height, "Sd_m": 0.070 + flank(0.010), "qR_m": flank(0.010) - flank(height - 0.002)}
+def _goes_on(data, row):
+    """Whether a step follows: there was one, or the wheel is turned and there is a way left."""
+    if row["at_limit"]:
+        return data["turning"] and data["distance"] - row["distance_m"] > 1e-9 * data["distance"]
+    return row["step_m"] > 0.0
 
 
-def _points(curve):
-    """The curve at the points that are stored."""
-    u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
-    return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
+def _step_length(data, gone, worn):
+    """How far the rates of a step hold, m."""
+    length = min(data["distance"] - gone, to_renewal(gone, data["rails"].get("renewal")))
+    return min(length, data["largest_step"], data["largest_wear"] / worn.fastest) if worn.volume else length
 
 
-def _file(folder, kind, step):
-    return folder / f"{kind}_{step:03d}.csv"
+def _next_rails(data, folder, step, worn, gone, length):
+    """Store the rails for the step that follows."""
+    if length == to_renewal(gone, data["rails"].get("renewal")):
+        keep_rails(folder, step, data["scenes"], renewed=True)
+    elif worn.falls:
+        wear_rails(folder, step, worn.falls, length)
+    else:
+        keep_rails(folder, step, data["scenes"], renewed=False)
 
 
-def _write_profile(folder, step, u, f):
-    with appearing(_file(folder, "profile", step)) as file:
-        lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
-        file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
+class StepWear(NamedTuple):
+    """What all scenes of a step take off."""
+
+    rise: np.ndarray
+    """Of a wheel's ordinate at the stored points, smoothed, m per m."""
+    volume: float
+    """m^3 per m of a wheel."""
+    falls: list[dict[str, np.ndarray]]
+    """Of each scene's rails at their stored points, smoothed, m per m that the vehicle runs; none unless rails wear."""
+    deepest: float
+    """Largest loss normal to the wheel's profile, m per m."""
+    fastest: float
+    """The same of wheels and rails."""
 
 
-def _read_profile(folder, step):
-    path = _file(folder, "profile", step)
-    try:
-        points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
-    if points.shape[1] != 2 or not np.isfinite(points).all() or np.ptp(np.diff(points[:, 0])) > 1e-6 * POINTS:
-        raise InputError(path, "", f"expected a profile that an earlier step has written, points every {POINTS:g} m")
-    return points[:, 0], points[:, 1]
+STILL = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0)
+"""A step of no length."""
 
 
 class SceneWear(NamedTuple):
@@ -290,57 +298,58 @@ class SceneWear(NamedTuple):
     """m^3 per m of a wheel."""
     rails: dict[str, float]
     """Area of each rail's section, m^2 per million gross tonnes."""
+    falls: dict[str, np.ndarray]
+    """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
+    laid: LaidRails | None
+    """The rails, if they wear."""
     seconds: tuple[float, float]
     """Processor time of simulating and of local wear."""
 
 
-def _wear_rate(data, scenes, shares, folder, step, u, threads, spent):
-    """Rise of the ordinate at the stored points (m per m), smoothed, and volume (m^3 per m of a wheel)."""
-    profile = {"points": str(_file(folder, "profile", step).resolve()), "unit": "m"}
-    one = partial(_scene_wear, data, profile, np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS), threads > 1)
-    total, volume, rails = np.zeros(len(u)), 0.0, []
+def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
+    """`StepWear` of the profile (u and f) at the start of a step."""
+    one = partial(_scene_wear, data, folder, step, profile[0], threads > 1)
+    total, volume, rails, falls, fastest = np.zeros(len(profile[0])), 0.0, [], [], 0.0
     with ThreadPoolExecutor(threads) as pool:
         found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
         for share, worn in zip(shares, found, strict=True):
             total += share * worn.rise
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
+            if worn.laid:
+                fall = {side: smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
+                fastest = max(fastest, *(across(*worn.laid.points[side], fall[side]) for side in SIDES))
+                falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
-    with appearing(_file(folder, "rails", step)) as file:
+    with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
-    return _smooth(total, data["smoothing"]), volume
+    total = smooth(total, data["smoothing"])
+    deepest = across(*profile, total)
+    return StepWear(total, volume, falls, deepest, max(deepest, fastest))
 
 
-def _scene_wear(data, profile, edges, quiet, place, scene):
+def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
-    run = simulate(load_scene(scene, {"wheel.profile": profile}), progress=False if quiet else None)
+    path = file_of(folder, "profile", step).resolve()
+    laid = laid_rails(folder, step, place, scene) if data["rails"] else None
+    changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
+    try:
+        run = simulate(load_scene(scene, changes), progress=False if quiet else None)
+    except InputError as error:
+        raise InputError(path, f"scenes.{place}", str(error)) from None
     if run.status != "completed":
         expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
-        raise InputError(profile["points"], f"scenes.{place}", expected)
+        raise InputError(path, f"scenes.{place}", expected)
     simulated = time.thread_time()
     wheels = local_wear(run, data["begin"], data["law"])
-    rise = np.zeros(len(edges) - 1)
-    for wheel in wheels.values():
-        worn = np.concatenate([[0.0], np.cumsum(wheel.wheel_depth) * BIN])
-        rise += np.diff(np.interp(edges, wheel.wheel_edges, worn)) / (POINTS * len(wheels))
+    rise = sum(onto_points(u, wheel.wheel_edges, wheel.wheel_depth) for wheel in wheels.values()) / len(wheels)
     volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
-    return SceneWear(rise, volume, rails, (simulated - began, time.thread_time() - simulated))
-
-
-def _smooth(values, width):
-    """Mean over a width (m) around each point, the sum kept: what would go beyond the ends stays at them."""
-    half = int(round(0.5 * width / POINTS))
-    if half == 0:
-        return values
-    padded = np.convolve(values, np.full(2 * half + 1, 1.0 / (2 * half + 1)))
-    inner = padded[half:-half].copy()
-    inner[0] += padded[:half].sum()
-    inner[-1] += padded[-half:].sum()
-    return inner
+    falls = falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
+    return SceneWear(rise, volume, rails, falls, laid, (simulated - began, time.thread_time() - simulated))
 
 
 def plan_mark(data, scenes):

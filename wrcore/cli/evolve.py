@@ -10,19 +10,24 @@ Wear a wheel profile over the distance of a plan, or go on with an interrupted o
 unit, range and default: 'wrcore keys wear'. The method: reports/wear.md.
 """
 
-FILES = "FOLDER gets profile_000.csv (u_m, f_m) and so on, and steps.csv.\n\n" + columns(
-    "steps.csv, a row per step",
-    step="number, that of its profile",
-    distance_m="run so far, at the step's beginning",
-    step_m="length of the step",
-    worn_m="deepest loss of the ordinate since new",
-    rate_max="greatest wear rate, m per m",
-    volume_m3_per_m="volume that a wheel loses per distance",
-    worn_volume_m3="the same over the step",
-    Sh_m="flange height",
-    Sd_m="flange thickness",
-    qR_m="flange slope",
-    equivalent_conicity="at an amplitude of 3 mm",
+FILES = (
+    "FOLDER gets profile_000.csv (u_m, f_m) and so on, rail_0_left_000.csv if rails wear, and steps.csv.\n\n"
+    + columns(
+        "steps.csv, a row per step",
+        step="number, that of its profile",
+        distance_m="run so far, at the step's beginning",
+        step_m="length of the step",
+        worn_m="deepest loss of the ordinate since new or turned",
+        rate_max="greatest wear rate, depth normal to the profile, m per m",
+        volume_m3_per_m="volume that a wheel loses per distance",
+        worn_volume_m3="the same over the step",
+        Sh_m="flange height",
+        Sd_m="flange thickness",
+        qR_m="flange slope",
+        hollow_m="depth of the tread's hollow",
+        equivalent_conicity="at an amplitude of 3 mm",
+        at_limit="limits of the plan that are reached: the wheel is turned, or ends there",
+    )
 )
 
 

@@ -28,6 +28,9 @@ LEAST_STEP = 1e-13
 COLLAPSE = 3
 """Rejections in a row that make a collapse of the step size: each may shorten the step fivefold."""
 
+WILD = 10.0
+"""A stage whose wheelset is so far along the track from where it was, m, is none of a step that is accepted."""
+
 STILL = (0.0, 0.0)
 """Axes that do not turn."""
 
@@ -87,6 +90,8 @@ class Scratch(NamedTuple):
     """(n,)."""
     still: np.ndarray
     """(n,): zeros."""
+    arc_lengths: np.ndarray
+    """(k,): of the wheelsets before the attempt, m."""
 
 
 class Record(NamedTuple):
@@ -124,9 +129,9 @@ def new_memory(state, start, stages, first_step):
     return Memory(clock, counters, state, np.zeros_like(state), state.copy(), np.zeros((stages, len(state))))
 
 
-def new_scratch(size):
-    """Scratch arrays for a state vector of a length."""
-    return Scratch(*np.zeros((4, size)))
+def new_scratch(size, wheelsets):
+    """Scratch arrays for a state vector of a length and for a number of wheelsets."""
+    return Scratch(*np.zeros((4, size)), np.zeros(wheelsets))
 
 
 @jit(allocates=False, inline="always")
@@ -217,6 +222,18 @@ def accept(control, memory, trial, step):
     for i in range(trial.shape[0]):
         memory.old[i] = memory.state[i]
         memory.state[i] = trial[i]
+
+
+@jit(allocates=False)
+def forget_wild_places(scratch, work):
+    """After a rejected attempt: undo arc lengths that wild stages have found.
+
+    The search for a wheelset's arc length starts from the last one. On a circle that its path goes round more than
+    once, one that a wild stage has led to another lap would be kept.
+    """
+    for k in range(work.arc_lengths.shape[0]):
+        if abs(work.arc_lengths[k] - scratch.arc_lengths[k]) > WILD or math.isnan(work.arc_lengths[k]):
+            work.arc_lengths[k] = scratch.arc_lengths[k]
 
 
 @jit(allocates=False)
@@ -321,6 +338,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
             return outcome
         budget -= 1
         work.strips.warm[0] = 1
+        copy_into(scratch.arc_lengths, work.arc_lengths)
         step = clock[NEXT]
         for i in range(last + 1):
             stage = stages[i]
@@ -350,3 +368,5 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
             copy_into(memory.rate, stages[last])
         elif control.fixed_step > 0.0:
             return NOT_FINITE
+        else:
+            forget_wild_places(scratch, work)

@@ -127,7 +127,7 @@ def integrate(
         if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
             memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
             memory.clock[engine.NEXT] = step
-    scratch = new_scratch(len(memory.state))
+    scratch = new_scratch(len(memory.state), len(work.arc_lengths))
     record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
     control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
 

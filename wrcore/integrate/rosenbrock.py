@@ -28,6 +28,7 @@ from wrcore.integrate.engine import (
     accept,
     copy_into,
     error_size,
+    forget_wild_places,
     judge,
     take_stock,
 )
@@ -172,6 +173,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
             return outcome
         budget -= 1
         work.strips.warm[0] = 1
+        copy_into(scratch.arc_lengths, work.arc_lengths)
         step, regular = clock[NEXT], True
         for i in range(last + 1):
             trial[:] = 0.0
@@ -224,3 +226,5 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                 copy_into(memory.rate, slope)
         elif control.fixed_step > 0.0:
             return NOT_FINITE
+        else:
+            forget_wild_places(scratch, work)

@@ -38,6 +38,10 @@ LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
 LARGEST_SLIP, NEARBY = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
 
+BESIDE = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
+"""Where wheels or rails differ, equilibrium is sought from these places, too, m: they need not rest in the middle, and
+between worn profiles little tells where."""
+
 REST_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
 
@@ -61,17 +65,35 @@ def rest(scene, model):
     InputError
         If there is none near the nominal position.
     """
-    vehicle, wheelsets, model = scene.vehicle, scene.vehicle.bodies.wheelsets, undriven(model)
+    vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
     if unit is not None:
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(rest(dataclasses.replace(scene, vehicle=unit), alone), vehicle)
     track = TrackModel(True, model.track.path, model.track.irregularity)
     level = frictionless(model)._replace(track=track, speed=REST_SPEED)
+    expected = "expected a vehicle that rests on its wheels near its nominal position, got"
+    limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
+    for aside in (0.0, *(BESIDE if model.contact.geometries else ())):
+        try:
+            equilibrium = solve_equilibrium(level, _standing(scene, model, aside))
+        except np.linalg.LinAlgError as error:
+            raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
+        if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
+            return equilibrium
+    raise InputError(
+        scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
+        f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
+    )  # fmt: skip
+
+
+def _standing(scene, model, aside):
+    """State of the bodies at their nominal places, moved to the left by ``aside`` (m), wheels on their rails."""
+    vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
     state = np.zeros(state_size(model))
-    for body, position in enumerate(vehicle.positions):
+    for body, (x, y, z) in enumerate(vehicle.positions):
         at = STATE_SIZE * body
-        state[at : at + 8] = *position, 1.0, 0.0, 0.0, 0.0, REST_SPEED
+        state[at : at + 8] = x, y + aside, z, 1.0, 0.0, 0.0, 0.0, REST_SPEED
         if body in wheelsets:
             load = vehicle.nominal_wheel_load(body)
             if load <= 0.0:
@@ -79,21 +101,10 @@ def rest(scene, model):
                     scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 )
             k = int(np.flatnonzero(wheelsets == body)[0])
-            roll, state[at + 2] = _settled(scene, model, k, 0.0, 0.0, load, state)
+            roll, state[at + 2] = _settled(scene, model, k, aside, 0.0, load, state)
             if model.contact.geometries:
                 state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
-    expected = "expected a vehicle that rests on its wheels near its nominal position, got"
-    try:
-        equilibrium = solve_equilibrium(level, state)
-    except np.linalg.LinAlgError as error:
-        raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
-    limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
-    if not (equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0)):
-        raise InputError(
-            scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
-            f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
-        )  # fmt: skip
-    return equilibrium
+    return state
 
 
 def static_equilibrium(scene, model):

@@ -1,0 +1,145 @@
+"""Worn profiles as points and files: their points, what is smoothed, and the numbers by which a wheel is judged."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.errors.new_files import appearing
+
+POINTS = 2.5e-4
+"""Distance of the points of a stored profile, m."""
+
+
+def flange(curve):
+    """Flange height, thickness and slope of a wheel profile whose inner face is 70 mm from the tape circle.
+
+    Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
+    Slope qR: along u from there to where the flange is 2 mm short of its tip. EN 15313, recalled.
+
+    Parameters
+    ----------
+    curve : ProfileCurve
+
+    Returns
+    -------
+    dict
+        Sh_m, Sd_m, qR_m; NaN where the profile does not reach as far.
+    """
+    below = curve.u < 0.0
+    u, f = curve.u[below], curve.f[below] - curve(0.0)
+    tip = int(np.argmin(f))
+
+    def flank(depth):  # between tip and tape circle the ordinate rises with u
+        inside = f[tip:]
+        return float(np.interp(-depth, inside, u[tip:])) if inside[0] <= -depth else float("nan")
+
+    height = -float(f[tip])
+    return {"Sh_m": height, "Sd_m": 0.070 + flank(0.010), "qR_m": flank(0.010) - flank(height - 0.002)}
+
+
+def hollow(f):
+    """Depth of a tread's hollow, m: by how much the wheel's radius grows again towards the field side (false flange).
+
+    Parameters
+    ----------
+    f : numpy.ndarray
+        Ordinates of a wheel profile, field side last.
+    """
+    outwards = f[int(np.argmin(f)) :]
+    return float(np.max(np.maximum.accumulate(outwards) - outwards))
+
+
+def limits_reached(limits, row):
+    """Names of the limits of a wear plan that a row of its table has reached.
+
+    Parameters
+    ----------
+    limits : mapping
+        ``Sh`` and ``hollow`` (at most), ``Sd``, ``qR`` (at least), m.
+    row : mapping
+        With Sh_m, Sd_m, qR_m and hollow_m.
+    """
+    signs = {"Sh": 1.0, "hollow": 1.0, "Sd": -1.0, "qR": -1.0}
+    return [name for name, limit in limits.items() if signs[name] * (row[f"{name}_m"] - limit) >= 0.0]
+
+
+def smooth(values, width):
+    """Depths smoothed over a width (m): the mean over width/sqrt(2) around each point, twice; the sum is kept.
+
+    One mean over the whole width is as wide, but turns waves of half to once its length over: what wears on ridges
+    would be taken from the valleys beside them, and ridges 2 mm apart would grow from step to step.
+    """
+    return _mean(_mean(values, width / math.sqrt(2.0)), width / math.sqrt(2.0))
+
+
+def _mean(values, width):
+    """Mean over a width (m) around each point; what would go beyond the ends stays at them."""
+    half = int(round(0.5 * width / POINTS))
+    if half == 0:
+        return values
+    padded = np.convolve(values, np.full(2 * half + 1, 1.0 / (2 * half + 1)))
+    inner = padded[half:-half].copy()
+    inner[0] += padded[:half].sum()
+    inner[-1] += padded[-half:].sum()
+    return inner
+
+
+def across(u, f, loss):
+    """Largest depth, normal to a profile, of what its ordinate loses."""
+    return float(np.max(loss / np.sqrt(1.0 + np.gradient(f, u) ** 2)))
+
+
+def points_of(curve):
+    """The curve at the points that are stored."""
+    u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
+    return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
+
+
+def edges_of(u):
+    """Edges of the bins around stored points."""
+    return np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS)
+
+
+def onto_points(u, edges, depth):
+    """Depths over the bins around stored points from those over bins of a run; what is beyond the ends stays at them.
+
+    Parameters
+    ----------
+    u : numpy.ndarray, shape (n,)
+        Stored points, m.
+    edges, depth : numpy.ndarray, shapes (m + 1,) and (m,)
+        Bins of a run, m, and what is lost in them.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n,)
+        Of the same sum times width.
+    """
+    area = np.concatenate([[0.0], np.cumsum(depth * np.diff(edges))])
+    inner = np.interp(edges_of(u)[1:-1], edges, area)
+    return np.diff(np.concatenate([[0.0], inner, area[-1:]])) / POINTS
+
+
+def file_of(folder, kind, step):
+    """Path of a step's file in a folder of `wrcore.analysis.evolve.evolve`."""
+    return Path(folder) / f"{kind}_{step:03d}.csv"
+
+
+def write_points(path, u, f):
+    """Store a profile."""
+    with appearing(path) as file:
+        lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
+        file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
+
+
+def read_points(path):
+    """Read a profile that was stored; an `InputError` where it is none."""
+    try:
+        points = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
+    if points.shape[1] != 2 or not np.isfinite(points).all() or np.ptp(np.diff(points[:, 0])) > 1e-6 * POINTS:
+        raise InputError(path, "", f"expected a profile that an earlier step has written, points every {POINTS:g} m")
+    return points[:, 0], points[:, 1]

@@ -1,0 +1,124 @@
+"""Rails that wear beside the wheels of a plan: a left and a right one for each scene, where all wheels pass.
+
+A rail is worn by the traffic of its line: while the vehicle of a plan runs one metre, so many kilograms pass on the
+rails of each scene (``rails.tonnage``). All of that is taken for vehicles like this one, with wheels worn like these.
+Rails keep their place and their cant; what the gauge face loses widens the gauge, by the mean of both rails.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.analysis.worn_profiles import file_of, onto_points, points_of, read_points, write_points
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.surface import SIDES
+
+
+class LaidRails(NamedTuple):
+    """The rails of a scene at a step."""
+
+    changes: dict
+    """Of the scene's keys."""
+    points: dict
+    """u and f of the stored points of each side, m."""
+    shifts: dict
+    """What brings u of a run to that of the points, m: a run counts from the rail's highest point."""
+
+
+DEPTH = 0.010
+"""Below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge."""
+
+
+def _new_rails(scene):
+    return dict(zip(SIDES, [pair.rail for pair in scene.pairs[:2]] or [scene.rail, scene.rail], strict=True))
+
+
+def lay_rails(folder, scenes):
+    """Store the new rails of all scenes."""
+    for place, scene in enumerate(scenes):
+        for side, rail in _new_rails(scene).items():
+            write_points(rail_file(folder, 0, place, side), *points_of(rail))
+
+
+def rail_file(folder, step, place, side):
+    """Path of a scene's rail at the start of a step."""
+    return file_of(folder, f"rail_{place}_{side}", step)
+
+
+def laid_rails(folder, step, place, scene):
+    """The rails of a scene as they lie at the start of a step.
+
+    Parameters
+    ----------
+    folder : path-like
+    step, place : int
+        Of the step, and of the scene in the plan.
+    scene : Scene
+        As the plan has it.
+
+    Returns
+    -------
+    LaidRails
+    """
+    changes, points, shifts, gauge = {}, {}, {}, 0.0
+    for side, new in _new_rails(scene).items():
+        path = rail_file(folder, step, place, side)
+        u, f = points[side] = read_points(path)
+        curve = ProfileCurve.from_points(u, f, "rail", str(path))
+        first = curve.outline.curve(0.0)
+        shifts[side] = float(u[np.argmin(np.abs(f[: len(f) // 2] - f.max() - first[1]))] - first[0])
+        gauge += scene.track.rail_distance(new) + shifts[side] - curve.gauge_offset(DEPTH)
+        changes[f"rail.{side}"] = {"profile": {"points": str(path.resolve()), "unit": "m"}, "inclination": 0.0}
+    return LaidRails(changes | {"track.gauge": gauge, "track.gauge_depth": DEPTH}, points, shifts)
+
+
+def falls_of(laid, wheels, passages):
+    """By what the rails' ordinates fall at the stored points, m per metre that the vehicle runs.
+
+    Parameters
+    ----------
+    laid : LaidRails
+    wheels : mapping of (str, str) to WheelWear
+        From :func:`wrcore.analysis.local_wear.local_wear`.
+    passages : float
+        Of vehicles per metre that one of them runs, 1/m.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+    """
+    return {
+        side: passages
+        * sum(
+            onto_points(laid.points[side][0], wear.rail_edges + laid.shifts[side], wear.rail_depth)
+            for (_, of), wear in wheels.items()
+            if of == side
+        )
+        for side in SIDES
+    }
+
+
+def wear_rails(folder, step, falls, length):
+    """Store the rails as they are after a step, from what each scene's lose, m per m."""
+    for place, fall in enumerate(falls):
+        for side in SIDES:
+            u, f = read_points(rail_file(folder, step, place, side))
+            write_points(rail_file(folder, step + 1, place, side), u, f - fall[side] * length)
+
+
+def keep_rails(folder, step, scenes, renewed):
+    """Store the rails of a step again for the next one, or new ones."""
+    for place in range(len(scenes)):
+        for side in SIDES:
+            found = read_points(rail_file(folder, 0 if renewed else step, place, side))
+            write_points(rail_file(folder, step + 1, place, side), *found)
+
+
+def to_renewal(gone, renewal):
+    """Way (m) from a distance to the next renewal of the rails, the whole interval at one."""
+    if not renewal:
+        return math.inf
+    return renewal * (math.floor(gone / renewal + 1e-9) + 1.0) - gone
