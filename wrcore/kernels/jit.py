@@ -7,10 +7,9 @@ fresh cache.
 
 import numba
 from numba.core import types
-from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 
-from wrcore.kernels.cache import kernel_folder, warn
+from wrcore.kernels.forms import KernelCache, KernelDispatcher
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
@@ -21,30 +20,6 @@ FUSED = {"contract"}
 Which ones do depends on the code around. A kernel that is called, not inlined, exists once in each kernel that calls
 it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
 where this showed, goes without the flag so that all copies give the same bits."""
-
-_FOLDER = str(kernel_folder())
-
-
-class _Cache(FunctionCache):
-    """Numba's cache of a kernel; one that is damaged, or full, stops nothing."""
-
-    def load_overload(self, *args):
-        try:
-            return super().load_overload(*args)
-        except Exception as error:  # pickles fail in many ways
-            warn(f"cache {self.cache_path}: damaged ({type(error).__name__}); kernels are compiled anew")
-            self._tried(self.flush)
-        return None
-
-    def save_overload(self, *args):
-        self._tried(super().save_overload, *args)
-
-    def _tried(self, act, *args):
-        try:
-            act(*args)
-        except Exception as error:
-            warn(f"cache {self.cache_path}: {getattr(error, 'strerror', None) or error}; kernels are not kept")
-
 
 def jit(function=None, *, allocates=True, **options):
     """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
@@ -63,16 +38,12 @@ def jit(function=None, *, allocates=True, **options):
     """
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
-    settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, **options}
+    settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}
     if not allocates:
         settings["_nrt"] = False
     dispatcher = numba.njit(function, **settings)
-    before = numba.config.CACHE_DIR
-    try:
-        numba.config.CACHE_DIR = _FOLDER
-        dispatcher._cache = _Cache(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    dispatcher.__class__ = KernelDispatcher
+    dispatcher._cache = KernelCache(function)
     return dispatcher
 
 
