@@ -40,6 +40,7 @@ class _Register(AnalysisPass):
         super().__init__()
 
     def run_pass(self, state):
+        """Register what was lowered."""
         lowered = state["cr"]._replace(cfunc=object())
         state.targetctx.insert_user_function(lowered.cfunc, lowered.fndesc, [state.library])
         state.reload_init.extend(state.library._reload_init)
@@ -51,6 +52,7 @@ class _LinkedCompiler(CompilerBase):
     """Numba's passes but for the last one, which makes machine code."""
 
     def define_pipelines(self):
+        """Numba's passes without machine code."""
         state = self.state
         state.flags.no_compile = True
         state.library = _Intermediate(state.targetctx.codegen(), state.func_id.func_qualname)
@@ -64,12 +66,14 @@ class _LinkedFile(CompileResultCacheImpl):
     """What of a linked kernel is kept on disk."""
 
     def reduce(self, result):
+        """What is written."""
         result.library._ensure_finalized()
         result.fndesc.typemap = result.fndesc.calltypes = None
         kept = result.fndesc, result.environment, result.signature, result.reload_init
         return result.library.name, result.library._final_module.as_bitcode(), kept
 
     def rebuild(self, target_context, payload):
+        """What was written, as a result of compiling again."""
         name, code, (description, environment, signature, reload_init) = payload
         for prepare in reload_init:
             prepare()
@@ -101,6 +105,7 @@ class KernelCache(FunctionCache):
         return (self._form, *super()._index_key(*args))
 
     def load_overload(self, *args):
+        """The kernel for some types, or None."""
         try:
             return super().load_overload(*args)
         except Exception as error:  # pickles fail in many ways
@@ -109,6 +114,7 @@ class KernelCache(FunctionCache):
         return None
 
     def save_overload(self, *args):
+        """Keep the kernel for some types."""
         self._tried(super().save_overload, *args)
 
     def _tried(self, act, *args):
@@ -128,6 +134,7 @@ class _Form(CPUDispatcher):
     """A kernel in a form that Python cannot call."""
 
     def add_overload(self, result):
+        """Keep a result; Python's table of calls gets nothing."""
         self.overloads[tuple(result.signature.args)] = result
         if not isinstance(result.library, _Intermediate):
             _set_environments(result)
@@ -137,13 +144,16 @@ class KernelDispatcher(CPUDispatcher):
     """A kernel as Python calls it; other kernels get it linked."""
 
     def get_call_template(self, args, kws):
+        """How another kernel calls this one."""
         return self.in_form("linked").get_call_template(args, kws)
 
     def get_overload(self, sig):
+        """What another kernel calls for these types."""
         return self.in_form("linked").get_overload(sig)
 
     @property
     def is_compiling(self):
+        """Whether it is being compiled, so that a call from within is one to itself."""
         return self._compiling_counter or self.in_form("linked").is_compiling
 
     def in_form(self, form):
@@ -157,5 +167,6 @@ class KernelDispatcher(CPUDispatcher):
         return forms[form]
 
     def add_overload(self, result):
+        """Keep a result for calls from Python."""
         super().add_overload(result)
         _set_environments(result)

@@ -5,11 +5,17 @@ folder is therefore named after the content of all sources in the rooms that hol
 fresh cache.
 """
 
+from unittest.mock import patch
+
 import numba
 from numba.core import types
 from numba.extending import intrinsic
+from numba.np import linalg
 
 from wrcore.kernels.forms import KernelCache, KernelDispatcher
+
+with patch.object(linalg, "ensure_blas"):
+    from numba.np import arraymath  # noqa: F401  it would import scipy.linalg, a tenth of every start, to see it is there
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
@@ -18,8 +24,8 @@ FUSED = {"contract"}
 """Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once.
 
 Which ones do depends on the code around. A kernel that is called, not inlined, exists once in each kernel that calls
-it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
-where this showed, goes without the flag so that all copies give the same bits."""
+it; the search for overlaps, where this showed, goes without the flag so that all copies give the same bits."""
+
 
 def jit(function=None, *, allocates=True, **options):
     """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
