@@ -107,7 +107,7 @@ def test_without_a_home_kernels_are_compiled_all_the_same(tmp_path, home):
 import os, pwd
 pwd.getpwuid = lambda _: (_ for _ in ()).throw(KeyError())
 from wrcore.creep.axes import _stretch
-from wrcore.kernels.jit import _FOLDER
+from wrcore.kernels.forms import _FOLDER
 assert 0.0 <= _stretch(0.5) <= 1.0
 print(_FOLDER)
 """

@@ -2,6 +2,8 @@
 
 import importlib
 import re
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numba
@@ -78,3 +80,8 @@ def test_a_handle_holds_what_a_kernel_would_write():
 def test_the_release_of_numba_is_one_that_was_tested():
     bounds = re.search(r'"numba(.*?)"', (ROOT / "pyproject.toml").read_text())[1]
     assert "<" in bounds and SpecifierSet(bounds).contains(numba.__version__)
+
+
+def test_numba_does_not_import_scipy_at_every_start():
+    code = "import sys; from wrcore.creep.axes import _stretch; _stretch(0.5); assert 'scipy.linalg' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,6 +1,7 @@
 """How kernels are compiled; nothing about rails.
 
 ``jit``      the compile decorator and a cache that never serves stale kernels
+``forms``    what of a kernel is compiled: for Python, for its address, or for other kernels
 ``lanes``    four or eight float64 side by side in kernels
 ``handles``  models behind a pointer, kernels behind an address
 
@@ -8,7 +9,11 @@ What this room relies on beyond numba's documented interface. ``tests/kernels/te
 release of numba has moved some of it, and ``pyproject.toml`` admits no release that was not tested.
 
 jit       ``njit(_nrt=False)``: no reference counts in kernels that create no arrays; ``forceinline``;
-          ``numba.config.CACHE_DIR`` read while a function is decorated
+          ``numba.np.linalg.ensure_blas``, which imports scipy.linalg for ``numba.np.arraymath``
+forms     ``JITCodeLibrary`` makes machine code in ``_finalize_final_module`` alone; ``flags.no_compile``,
+          ``NativeLowering``, ``insert_user_function``; dispatchers ask for other kernels by ``get_call_template`` and
+          ``get_overload``; ``CompileResultCacheImpl``, ``FunctionCache._index_key``; ``numba.config.CACHE_DIR`` read
+          when a cache is made
 lanes     ``intrinsic`` and ``register_model`` for a type of one's own, its operators by ``infer_global`` and
           ``lower_builtin``; ``cgutils.get_or_insert_function``, ``unpack_tuple``; ``context.make_array``
 handles   ``compute_fingerprint`` of a named tuple as the key of its layout; ``AttributeTemplate``, ``infer_getattr``,

@@ -189,6 +189,7 @@ class Kernel:
 
     def __init__(self, function, *examples):
         signature = tuple(typeof(example) for example in examples)
+        function = function.in_form("addressed")
         if signature not in function.overloads:
             function.compile(signature)
         compiled = function.overloads[signature]

@@ -5,12 +5,17 @@ folder is therefore named after the content of all sources in the rooms that hol
 fresh cache.
 """
 
+from unittest.mock import patch
+
 import numba
 from numba.core import types
-from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
+from numba.np import linalg
 
-from wrcore.kernels.cache import kernel_folder, warn
+from wrcore.kernels.forms import KernelCache, KernelDispatcher
+
+with patch.object(linalg, "ensure_blas"):
+    from numba.np import arraymath  # noqa: F401  it would import scipy.linalg, a tenth of every start, to see it is there
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""
@@ -19,31 +24,7 @@ FUSED = {"contract"}
 """Fast-math flag for any kernel: a product and a sum may become one instruction, rounded once.
 
 Which ones do depends on the code around. A kernel that is called, not inlined, exists once in each kernel that calls
-it, and which copy runs depends on whether the process compiled it or found it in the cache; the search for overlaps,
-where this showed, goes without the flag so that all copies give the same bits."""
-
-_FOLDER = str(kernel_folder())
-
-
-class _Cache(FunctionCache):
-    """Numba's cache of a kernel; one that is damaged, or full, stops nothing."""
-
-    def load_overload(self, *args):
-        try:
-            return super().load_overload(*args)
-        except Exception as error:  # pickles fail in many ways
-            warn(f"cache {self.cache_path}: damaged ({type(error).__name__}); kernels are compiled anew")
-            self._tried(self.flush)
-        return None
-
-    def save_overload(self, *args):
-        self._tried(super().save_overload, *args)
-
-    def _tried(self, act, *args):
-        try:
-            act(*args)
-        except Exception as error:
-            warn(f"cache {self.cache_path}: {getattr(error, 'strerror', None) or error}; kernels are not kept")
+it; the search for overlaps, where this showed, goes without the flag so that all copies give the same bits."""
 
 
 def jit(function=None, *, allocates=True, **options):
@@ -63,16 +44,12 @@ def jit(function=None, *, allocates=True, **options):
     """
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
-    settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, **options}
+    settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}
     if not allocates:
         settings["_nrt"] = False
     dispatcher = numba.njit(function, **settings)
-    before = numba.config.CACHE_DIR
-    try:
-        numba.config.CACHE_DIR = _FOLDER
-        dispatcher._cache = _Cache(function)
-    finally:
-        numba.config.CACHE_DIR = before
+    dispatcher.__class__ = KernelDispatcher
+    dispatcher._cache = KernelCache(function)
     return dispatcher
 
 

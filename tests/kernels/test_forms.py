@@ -1,0 +1,112 @@
+"""What of a kernel is compiled, and that what a process compiled and what it found in the cache are the same."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from wrcore.kernels.forms import KernelDispatcher
+from wrcore.kernels.handles import Kernel
+from wrcore.kernels.jit import jit
+
+
+@jit(allocates=False)
+def half(x):
+    return 0.5 * x
+
+
+@jit(allocates=False)
+def fill_halves(values):
+    for i in range(values.shape[0]):
+        values[i] = half(values[i])
+
+
+def symbols(kernel):
+    """Names of what a kernel's library defines."""
+    (result,) = kernel.overloads.values()
+    return [f.name for f in result.library._final_module.functions if not f.is_declaration], result
+
+
+def fresh(function):
+    """The kernel once more, compiled whatever the cache holds."""
+    kernel = jit(allocates=False)(function.py_func)
+    for each in (kernel, kernel.in_form("addressed")):
+        each._cache.disable()
+    return kernel
+
+
+def test_a_kernel_that_only_kernels_call_has_no_machine_code_and_no_wrapper():
+    inner = jit(allocates=False)(lambda x: 0.25 * x)
+    outer = jit(allocates=False)(lambda x: inner(x) + 1.0)
+    assert outer(4.0) == 2.0 and not inner.overloads
+    names, result = symbols(inner.in_form("linked"))
+    assert not any("cpython" in name or "cfunc" in name for name in names)
+    with pytest.raises(RuntimeError, match="no compiled object"):
+        result.library.enable_object_caching()
+        result.library._get_compiled_object()
+    assert inner(4.0) == 1.0 and len(inner.overloads) == 1  # compiled anew for Python
+
+
+def test_a_kernel_called_by_its_address_has_no_wrapper():
+    kernel = fresh(fill_halves)
+    assert Kernel(kernel, np.zeros(2)).address > 0 and not kernel.overloads
+    names, _ = symbols(kernel.in_form("addressed"))
+    assert names and not any("cpython" in name or "cfunc" in name for name in names)
+
+
+def test_python_gets_no_wrapper_for_c():
+    kernel, values = fresh(fill_halves), np.full(2, 3.0)
+    kernel(values)
+    names, _ = symbols(kernel)
+    assert values.tolist() == [1.5, 1.5] and isinstance(kernel, KernelDispatcher)
+    assert any("cpython" in name for name in names) and not any("cfunc" in name for name in names)
+
+
+@jit
+def factorial(n):
+    return 1 if n < 2 else n * factorial(n - 1)
+
+
+@jit
+def halved(rows):
+    if rows.shape[0] < 2:
+        raise ValueError("two rows, please")
+    return (half(1.0) * rows) @ rows
+
+
+@jit
+def squared(rows):
+    return halved(rows) * 2.0
+
+
+SCRIPT = """
+import json, sys
+import numpy as np
+from tests.kernels import test_forms as forms
+rows = np.arange(4.0).reshape(2, 2)
+try:
+    forms.squared(rows[:1, :1].copy())
+except ValueError as error:
+    said = str(error)
+before = "scipy.linalg" in sys.modules
+out = [forms.squared(rows).tolist(), forms.factorial(5), said, before]
+kernels = (forms.squared, forms.halved, forms.half, forms.factorial)
+forms_of = [form for kernel in kernels for form in (kernel, *vars(kernel).get('forms', {}).values())]
+print(json.dumps([out, sum(sum(k.stats.cache_misses.values()) for k in forms_of)]))
+"""
+
+
+def test_the_cache_gives_what_was_compiled(tmp_path):
+    environment = os.environ | {"WRCORE_CACHE": str(tmp_path)}
+
+    def run():
+        done = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True)
+        assert done.returncode == 0 and not done.stderr, done.stderr
+        return json.loads(done.stdout)
+
+    (first, compiled), (second, again) = run(), run()
+    assert first[:3] == second[:3] == [[[2.0, 3.0], [6.0, 11.0]], 120, "two rows, please"]
+    assert compiled > 0 and again == 0

@@ -1,0 +1,172 @@
+"""The three forms in which a kernel is compiled, each only when somebody asks for it.
+
+called     from Python: machine code, and the wrapper that takes Python's arguments apart
+addressed  by its address (`wrcore.kernels.handles.Kernel`): machine code
+linked     from other kernels: what LLVM links into them, no machine code
+
+Numba makes all of it for every kernel, with a wrapper for C besides. Most kernels are called by other kernels alone.
+"""
+
+import numba
+from llvmlite import binding
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+from wrcore.kernels.cache import kernel_folder, warn
+
+_FOLDER = str(kernel_folder())
+
+
+class _Intermediate(JITCodeLibrary):
+    """A kernel's optimised code before any machine's, for others to link."""
+
+    def _finalize_final_module(self):
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _Register(AnalysisPass):
+    """Let other kernels find a linked kernel, as numba does with those that have machine code."""
+
+    _name = "wrcore_register_linked"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state):
+        """Register what was lowered."""
+        lowered = state["cr"]._replace(cfunc=object())
+        state.targetctx.insert_user_function(lowered.cfunc, lowered.fndesc, [state.library])
+        state.reload_init.extend(state.library._reload_init)
+        state["cr"] = lowered
+        return False
+
+
+class _LinkedCompiler(CompilerBase):
+    """Numba's passes but for the last one, which makes machine code."""
+
+    def define_pipelines(self):
+        """Numba's passes without machine code."""
+        state = self.state
+        state.flags.no_compile = True
+        state.library = _Intermediate(state.targetctx.codegen(), state.func_id.func_qualname)
+        passes = DefaultPassBuilder.define_nopython_pipeline(state)
+        passes.add_pass_after(_Register, NativeLowering)
+        passes.finalize()
+        return [passes]
+
+
+class _LinkedFile(CompileResultCacheImpl):
+    """What of a linked kernel is kept on disk."""
+
+    def reduce(self, result):
+        """What is written."""
+        result.library._ensure_finalized()
+        result.fndesc.typemap = result.fndesc.calltypes = None
+        kept = result.fndesc, result.environment, result.signature, result.reload_init
+        return result.library.name, result.library._final_module.as_bitcode(), kept
+
+    def rebuild(self, target_context, payload):
+        """What was written, as a result of compiling again."""
+        name, code, (description, environment, signature, reload_init) = payload
+        for prepare in reload_init:
+            prepare()
+        library = _Intermediate(target_context.codegen(), name)
+        library._final_module = binding.parse_bitcode(code)
+        library._finalize_final_module()
+        return CompileResult(
+            typing_context=target_context.typing_context, target_context=target_context, entry_point=object(),
+            typing_error=None, type_annotation="", signature=signature, objectmode=False, lifted=(),
+            fndesc=description, library=library, call_helper=None, environment=environment, metadata=None,
+            reload_init=reload_init, referenced_envs=(),
+        )  # fmt: skip
+
+
+class KernelCache(FunctionCache):
+    """Numba's cache of a kernel in one form; one that is damaged, or full, stops nothing."""
+
+    def __init__(self, function, form="called"):
+        self._form = form
+        self._impl_class = _LinkedFile if form == "linked" else CompileResultCacheImpl
+        before = numba.config.CACHE_DIR
+        try:
+            numba.config.CACHE_DIR = _FOLDER
+            super().__init__(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    def _index_key(self, *args):
+        return (self._form, *super()._index_key(*args))
+
+    def load_overload(self, *args):
+        """The kernel for some types, or None."""
+        try:
+            return super().load_overload(*args)
+        except Exception as error:  # pickles fail in many ways
+            warn(f"cache {self.cache_path}: damaged ({type(error).__name__}); kernels are compiled anew")
+            self._tried(self.flush)
+        return None
+
+    def save_overload(self, *args):
+        """Keep the kernel for some types."""
+        self._tried(super().save_overload, *args)
+
+    def _tried(self, act, *args):
+        try:
+            act(*args)
+        except Exception as error:
+            warn(f"cache {self.cache_path}: {getattr(error, 'strerror', None) or error}; kernels are not kept")
+
+
+def _set_environments(result):
+    """Hand kernels linked into this one the globals that some error messages need, as numba does after loading."""
+    for environment in result._find_referenced_environments():
+        result.library.codegen.set_env(environment.env_name, environment)
+
+
+class _Form(CPUDispatcher):
+    """A kernel in a form that Python cannot call."""
+
+    def add_overload(self, result):
+        """Keep a result; Python's table of calls gets nothing."""
+        self.overloads[tuple(result.signature.args)] = result
+        if not isinstance(result.library, _Intermediate):
+            _set_environments(result)
+
+
+class KernelDispatcher(CPUDispatcher):
+    """A kernel as Python calls it; other kernels get it linked."""
+
+    def get_call_template(self, args, kws):
+        """How another kernel calls this one."""
+        return self.in_form("linked").get_call_template(args, kws)
+
+    def get_overload(self, sig):
+        """What another kernel calls for these types."""
+        return self.in_form("linked").get_overload(sig)
+
+    @property
+    def is_compiling(self):
+        """Whether it is being compiled, so that a call from within is one to itself."""
+        return self._compiling_counter or self.in_form("linked").is_compiling
+
+    def in_form(self, form):
+        """The kernel "linked" or "addressed": a dispatcher of its own."""
+        forms = self.__dict__.setdefault("forms", {})
+        if form not in forms:
+            options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            compiler = {"pipeline_class": _LinkedCompiler} if form == "linked" else {}
+            forms[form] = _Form(self.py_func, dict(self.locals), options, **compiler)
+            forms[form]._cache = KernelCache(self.py_func, form)
+        return forms[form]
+
+    def add_overload(self, result):
+        """Keep a result for calls from Python."""
+        super().add_overload(result)
+        _set_environments(result)
