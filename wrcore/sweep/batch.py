@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from wrcore.dynamics.system import Equations, Model, with_kernels
+from wrcore.dynamics.system import Equations, Model, with_kernels_of
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.channels import unit_of
@@ -76,7 +76,7 @@ class _Outcome(NamedTuple):
 
 
 class _Series:
-    """Equations of motion that a thread uses again for all runs with the same parts; finds the wheels' kernel anew."""
+    """Equations of motion that a thread uses again for all runs with the same parts."""
 
     def __init__(self, model: Model) -> None:
         self.equations = Equations(model)
@@ -87,7 +87,8 @@ class _Series:
         """The equations of another model, with scratch arrays as if they were new."""
         for array, values in zip(self.scratch, self.fresh, strict=True):
             array[...] = values
-        self.equations.arguments[1].renew(with_kernels(model, self.equations.work))
+        handle = self.equations.arguments[1]
+        handle.renew(with_kernels_of(model, handle.value))
         return self.equations
 
 
