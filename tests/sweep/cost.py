@@ -1,7 +1,7 @@
 """What a sweep's run costs beside its integration: ``python -m tests.sweep.cost [runs]``.
 
-For each scene of reports/sweeps.md: processor time per run in the integration and in everything else, in one process and
-one thread, and the gain of two threads on the clock, which means something on an idle machine only.
+For each scene of reports/sweeps.md: processor time per run in the integration and in everything else, in one process
+and one thread, and the gain of two threads on the clock, which means something on an idle machine only.
 """
 
 import sys
@@ -66,8 +66,8 @@ def main():
         sweep = sweep_of(scene, runs)
         inside, beside, evaluations = np.median([measured(sweep) for _ in range(3)], axis=0)
         gain = np.median([on_the_clock(sweep, 1) / on_the_clock(sweep, 2) for _ in range(3)])
-        share = 100.0 * beside / (inside + beside)
-        print(f"{scene}, {evaluations:.0f}, {1e3 * inside:.2f}, {1e3 * beside:.2f}, {share:.1f}, {gain:.2f}", flush=True)
+        times = f"{1e3 * inside:.2f}, {1e3 * beside:.2f}, {100.0 * beside / (inside + beside):.1f}"
+        print(f"{scene}, {evaluations:.0f}, {times}, {gain:.2f}", flush=True)
 
 
 if __name__ == "__main__":

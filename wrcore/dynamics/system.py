@@ -299,21 +299,12 @@ def fill_many(equations, t, states, model, work, rates):
         derivatives_at(equations, t, states[i], model, work, rates[i])
 
 
-def _with_wheels(contact):
+def with_wheels(contact):
     """Contact with what each wheel runs on where they differ."""
     if not contact.geometries:
         return contact
     alone = contact._replace(geometries=())
     return alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
-
-
-def with_kernels_of(model, other):
-    """The model with the addresses of another one of the same types, from :func:`with_kernels`."""
-    contact = model.contact
-    if contact.strips.strips:
-        contact = contact._replace(strips=contact.strips._replace(fallback=other.contact.strips.fallback))
-    kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
-    return model._replace(contact=_with_wheels(contact), **kept)
 
 
 def with_kernels(model, work):
@@ -329,7 +320,7 @@ def with_kernels(model, work):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 
         wrenches = shaped_wrenches
-    model = model._replace(contact=_with_wheels(contact))  # what follows is compiled for the model as it will be
+    model = model._replace(contact=with_wheels(contact))  # what follows is compiled for the model as it will be
     if model.joints.equations:
         kernel = Kernel(add_reactions, Kind(model), 0.0, np.empty(0), Kind(work))
         model = model._replace(reactions=kernel.address)
@@ -371,13 +362,6 @@ class Equations:
         model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
         state = np.empty(0)
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
-
-    def renew(self, model):
-        """Turn to another model of the same types, in fresh scratch arrays: a series of runs looks nothing up again."""
-        self.work = workspace(model)
-        self.arguments[1].renew(with_kernels_of(model, self.arguments[1].value))
-        self.arguments[2].renew(self.work)
-        return self
 
     def __call__(self, t, state):
         """Rate of a state, shape (size,), at a time (s)."""

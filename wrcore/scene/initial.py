@@ -8,7 +8,6 @@ accelerates them vertically, in roll or about their axles.
 
 import dataclasses
 import math
-import threading
 
 import numpy as np
 
@@ -19,13 +18,14 @@ from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.series import equations_of
 from wrcore.dynamics.support import rails_at
-from wrcore.dynamics.system import Equations, independent_at, own_states, state_size
+from wrcore.dynamics.system import independent_at, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.track import rotation
-from wrcore.kernels.handles import Handle, Kind
+from wrcore.kernels.handles import Handle
 from wrcore.scene.bodies import put_bodies
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
@@ -206,7 +206,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
     at_rest : Equilibrium, optional
         Of the same vehicle, from :func:`rest`.
     shared : dict, optional
-        Keeps equations for the next scene whose model has the same types.
+        Keeps equations of motion for the next scene, see `wrcore.dynamics.series.equations_of`.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
         state = _steady(vehicle, level, state)
     if moved:
         _move(scene, model, moved, at_rest, state)
-    state = _balanced(vehicle, level, _equations(level, shared), state)
+    state = _balanced(vehicle, level, equations_of(level, shared), state)
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
         state = _with_axle_boxes(vehicle, state)
@@ -293,17 +293,6 @@ def _steady(vehicle, model, state):
     turning, moving = (np.linalg.norm(rows[:, 10:13], axis=1) for rows in wheelsets)
     aside = np.abs(wheelsets[0][:, 1] - wheelsets[1][:, 1])
     return found if np.all(np.abs(turning - moving) < LARGEST_SLIP * moving) and np.all(aside < NEARBY) else state
-
-
-def _equations(model, shared):
-    """Equations of motion of a model; each thread turns its own to one model after the other."""
-    if shared is None:
-        return Equations(model)
-    key = "equations", threading.get_ident(), Kind(model)._numba_type_
-    if key in shared:
-        return shared[key].renew(model)
-    shared[key] = Equations(model)
-    return shared[key]
 
 
 @np.errstate(all="ignore")  # what overflows is no better
