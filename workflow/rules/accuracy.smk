@@ -15,9 +15,10 @@ def measured_scene(wildcards):
 
 def measured_settings(wildcards):
     entry, grids = ACCURACY["scenes"][wildcards.measured], ACCURACY["grids"]
+    own = {"models": entry.get("models", {}), "fastsim": entry.get("models", {})}
     return {
         "overrides": changes(entry["set"]),
-        "grids": [{**grid, **(entry.get("models", {}) if name == "models" else {})} for name, grid in grids.items()],
+        "grids": [{**grid, **own.get(name, {})} for name, grid in grids.items()],
         "reference": ACCURACY["reference"],
         "twins": ACCURACY["twins"],
         "until": entry.get("until"),
@@ -27,7 +28,9 @@ def measured_settings(wildcards):
 
 def exact_settings(wildcards):
     entry = ACCURACY["scenes"][wildcards.measured]
-    return {"overrides": changes(entry["set"]), "exact": ACCURACY["exact"], "duration": entry["exact"]["duration"]}
+    own = dict(entry["exact"])
+    duration = own.pop("duration")
+    return {"overrides": changes(entry["set"]), "exact": {**ACCURACY["exact"], **own}, "duration": duration}
 
 
 rule accuracy_exact:

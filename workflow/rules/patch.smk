@@ -145,6 +145,11 @@ def runs_overrides(wildcards):
     return changes(RUNS["models"][wildcards.patch]["set"])
 
 
+def runs_start(wildcards):
+    start = RUNS["models"][wildcards.patch].get("start")
+    return None if start is None else changes(start)
+
+
 rule patch_runs:
     message:
         "{wildcards.hunter} with {wildcards.patch}: limit cycle, irregular track"
@@ -161,6 +166,7 @@ rule patch_runs:
         "<benchmarks>/patch_runs/{hunter}_{patch}.tsv"
     params:
         overrides=runs_overrides,
+        start=runs_start,
         settings=runs_settings,
     script:
         "../scripts/patch/patch_runs.py"

@@ -150,7 +150,9 @@ def root_locus(vehicle, model, state, speeds):
     """
     tables = []
     for speed in speeds:
-        table, _, _ = linear_modes(vehicle, steady_motion(model, state, speed))
+        motion = steady_motion(model, state, speed)
+        model, state = model._replace(speed=float(speed)), motion.state  # the next one is found from here at once
+        table, _, _ = linear_modes(vehicle, motion)
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -158,7 +160,12 @@ def root_locus(vehicle, model, state, speeds):
 
 def growth(model, state, speed):
     """Largest real part of all eigenvalues that are not neutral, 1/s; arguments as for :func:`steady_motion`."""
-    values = np.linalg.eigvals(steady_motion(model, state, speed).matrix)
+    return fastest_growth(steady_motion(model, state, speed))
+
+
+def fastest_growth(motion):
+    """:func:`growth` of a `Linearisation`."""
+    values = np.linalg.eigvals(motion.matrix)
     return float(np.max(values.real[np.abs(values) >= NEUTRAL]))
 
 
@@ -182,17 +189,26 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
         Minus infinity if the lowest speed is unstable, infinity if none is; then without a mode.
     """
     nothing = {"mode": "", "frequency_Hz": np.nan, "wavelength_m": np.nan}
-    before = None
+    before, motions = None, {}
+
+    def growth_at(speed):
+        """Each speed once; the steady motion of the last one is where that of the next is looked for."""
+        nonlocal model, state
+        if speed not in motions:
+            motions[speed] = steady_motion(model, state, speed)
+            model, state = model._replace(speed=float(speed)), motions[speed].state
+        return fastest_growth(motions[speed])
+
     for speed in speeds:
-        if growth(model, state, speed) > 0.0:
+        if growth_at(speed) > 0.0:
             break
         before = speed
     else:
         return {"critical_speed_m_per_s": np.inf, **nothing}
     if before is None:
         return {"critical_speed_m_per_s": -np.inf, **nothing}
-    found = brentq(lambda v: growth(model, state, v), before, speed, xtol=tolerance)
-    table, _, _ = linear_modes(vehicle, steady_motion(model, state, found))
+    found = brentq(growth_at, before, speed, xtol=tolerance)
+    table, _, _ = linear_modes(vehicle, motions[found] if found in motions else steady_motion(model, state, found))
     lost = table.loc[table["real_per_s"].where(table["damping_ratio"].notna()).idxmax()]
     with np.errstate(divide="ignore"):
         wavelength = np.float64(found) / lost["frequency_Hz"]

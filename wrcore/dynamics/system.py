@@ -24,7 +24,7 @@ from wrcore.dynamics.support import Support, SupportWork, no_support, support_wo
 from wrcore.dynamics.suspension import Elements, element_forces
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
-from wrcore.kernels.handles import Handle, Kernel, call_address, call_at
+from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
 
@@ -299,40 +299,45 @@ def fill_many(equations, t, states, model, work, rates):
         derivatives_at(equations, t, states[i], model, work, rates[i])
 
 
+def with_wheels(contact):
+    """Contact with what each wheel runs on where they differ."""
+    if not contact.geometries:
+        return contact
+    alone = contact._replace(geometries=())
+    return alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
+
+
 def with_kernels(model, work):
     """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
     wrenches, contact = wheel_wrenches, model.contact
     if contact.strips.strips:
         from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
 
-        fallback = Kernel(solve_on_grid, Handle(contact._replace(geometries=())), work.motions[0, 0], work.strips.force)
+        fallback = Kernel(solve_on_grid, Kind(contact._replace(geometries=())), work.motions[0, 0], work.strips.force)
         contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
         wrenches = strip_wrenches
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 
         wrenches = shaped_wrenches
-    if contact.geometries:
-        alone = contact._replace(geometries=())
-        contact = alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
-    model = model._replace(contact=contact)  # what follows is compiled for the model as it will be
+    model = model._replace(contact=with_wheels(contact))  # what follows is compiled for the model as it will be
     if model.joints.equations:
-        kernel = Kernel(add_reactions, Handle(model), 0.0, np.empty(0), Handle(work))
+        kernel = Kernel(add_reactions, Kind(model), 0.0, np.empty(0), Kind(work))
         model = model._replace(reactions=kernel.address)
     if len(model.drive.rows):
-        kernel = Kernel(add_drive, Handle(model), 0.0, np.empty(0), Handle(work), np.empty(0))
+        kernel = Kernel(add_drive, Kind(model), 0.0, np.empty(0), Kind(work), np.empty(0))
         model = model._replace(torques=kernel.address)
     if len(model.friction.points):
-        kernel = Kernel(fill_rail_friction, Handle(model), np.empty(0), Handle(work))
+        kernel = Kernel(fill_rail_friction, Kind(model), np.empty(0), Kind(work))
         model = model._replace(rail_friction=kernel.address)
     if not len(model.bodies.wheelsets):
         return model
     if len(model.support.mass):
-        kernel = Kernel(support_wrenches, Handle(model), np.empty(0), Handle(work), np.empty(0))
+        kernel = Kernel(support_wrenches, Kind(model), np.empty(0), Kind(work), np.empty(0))
         model = model._replace(rails=kernel.address)
     kernel = Kernel(
-        wrenches, Handle(contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, Handle(work.strips),
+        wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+        work.counters, Kind(work.strips),
     )  # fmt: skip
     return model._replace(wheels=kernel.address)
 
@@ -357,13 +362,6 @@ class Equations:
         model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
         state = np.empty(0)
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
-
-    def renew(self, model):
-        """Turn to another model of the same types, in fresh scratch arrays: a series of runs looks nothing up again."""
-        self.work = workspace(model)
-        self.arguments[1].renew(with_kernels(model, self.work))
-        self.arguments[2].renew(self.work)
-        return self
 
     def __call__(self, t, state):
         """Rate of a state, shape (size,), at a time (s)."""

@@ -151,6 +151,13 @@ class Handle:
         _write(value, self._memory)
 
 
+class Kind:
+    """The type of a `Handle` without its value: what kernels are compiled for."""
+
+    def __init__(self, value):
+        self._numba_type_, _ = _layout(value)
+
+
 _LAYOUTS = {}
 
 

@@ -318,7 +318,7 @@ def compile_scene(
         *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
     at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
-    return model, initial_state(scene, model, at_rest)
+    return model, initial_state(scene, model, at_rest, shared)
 
 
 def _once(shared, name, key, make):

@@ -18,8 +18,9 @@ from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.series import equations_of
 from wrcore.dynamics.support import rails_at
-from wrcore.dynamics.system import Equations, independent_at, own_states, state_size
+from wrcore.dynamics.system import independent_at, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
@@ -41,6 +42,9 @@ LARGEST_SLIP, NEARBY = 0.01, 5e-3
 BESIDE = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
 """Where wheels or rails differ, equilibrium is sought from these places, too, m: they need not rest in the middle, and
 between worn profiles little tells where."""
+
+NOISE = 1e-9
+"""Accelerations of wheelsets below this may be rounding, m/s^2 or rad/s^2."""
 
 REST_SPEED = 20.0
 """Speed at which equilibria are solved, m/s; nothing of them depends on it but the velocities."""
@@ -199,7 +203,7 @@ def _settled(scene, model, k, y, yaw, load, state):
     return roll, z
 
 
-def initial_state(scene, model, at_rest=None):
+def initial_state(scene, model, at_rest=None, shared=None):
     """State at the start: steady running, moved sideways by ``initial.y``, each wheelset turned by ``initial.yaw``.
 
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
@@ -212,6 +216,8 @@ def initial_state(scene, model, at_rest=None):
     model : Model
     at_rest : Equilibrium, optional
         Of the same vehicle, from :func:`rest`.
+    shared : dict, optional
+        Keeps equations of motion for the next scene, see `wrcore.dynamics.series.equations_of`.
 
     Returns
     -------
@@ -236,7 +242,7 @@ def initial_state(scene, model, at_rest=None):
         state = _steady(vehicle, level, state)
     if moved:
         _move(scene, model, moved, at_rest, state)
-    state = _balanced(vehicle, level, state)
+    state = _balanced(vehicle, level, equations_of(level, shared), state)
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
         state = _with_axle_boxes(vehicle, state)
@@ -301,12 +307,13 @@ def _steady(vehicle, model, state):
 
 
 @np.errstate(all="ignore")  # what overflows is no better
-def _balanced(vehicle, model, state):
+def _balanced(vehicle, model, equations, state):
     """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates.
 
     Newton's method for all wheelsets at once: as long as the other bodies stay, none of them acts on another.
     """
-    equations, wheelsets = Equations(model), model.bodies.wheelsets
+    wheelsets = model.bodies.wheelsets
+    boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
     rolls, _, yaws = angles(parts[:, 3:7])
     axles = np.array([matrix_of(part[3:7])[:, 1] for part in parts])
@@ -319,7 +326,7 @@ def _balanced(vehicle, model, state):
         for body, turned, (z, _, rate) in zip(wheelsets, axes, stands, strict=True):
             part = new[STATE_SIZE * body : STATE_SIZE * (body + 1)]
             part[2:7], part[10:13] = (z, *euler_of(turned)), rate * turned[:, 1]
-        new = _with_axle_boxes(vehicle, new)
+        new = _with_axle_boxes(vehicle, new) if boxes else new
         rates = _parts(vehicle, equations(0.0, new))[wheelsets]
         about = [row[10:13] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
         return new, np.column_stack([rates[:, 9:11], about])
@@ -332,21 +339,30 @@ def _balanced(vehicle, model, state):
 
 
 def _improved(standing, stands, steps):
-    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve."""
-    own = slice(len(steps))
+    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
+
+    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding.
+    """
+    own, slopes = slice(len(steps)), None
     left = standing(stands)[1][:, own]
     for _ in range(20):
-        ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
-        slopes = np.stack([(high - low)[:, own] / width for high, low, width in ends], axis=-1)
+        if slopes is None:
+            ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
+            slopes = np.stack([(high - low)[:, own] / width for high, low, width in ends], axis=-1)
         new = stands.copy()
         try:
             new[:, own] -= np.linalg.solve(slopes, left[..., None])[..., 0]
         except np.linalg.LinAlgError:
             break
         still_left = standing(new)[1][:, own]
-        if not np.max(np.abs(still_left)) < np.max(np.abs(left)):
+        part = np.max(np.abs(still_left)) / np.max(np.abs(left))
+        if not part < 1.0:
             break
         stands, left = new, still_left
+        if part > 0.1:
+            if np.max(np.abs(left)) < NOISE:
+                break
+            slopes = None
     return stands
 
 

@@ -12,9 +12,8 @@ import io
 import json
 import os
 import shutil
-import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from os import PathLike
@@ -25,7 +24,7 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from wrcore.dynamics.system import Equations, Model, with_kernels
+from wrcore.dynamics.series import equations_of
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.channels import unit_of
@@ -73,31 +72,6 @@ class _Outcome(NamedTuple):
     record: dict[str, Any]
     motion: np.ndarray
     forces: np.ndarray | None
-
-
-class _Series:
-    """Equations of motion that a thread uses again for all runs with the same parts; finds the wheels' kernel anew."""
-
-    def __init__(self, model: Model) -> None:
-        self.equations = Equations(model)
-        self.scratch = list(_arrays(self.equations.work))
-        self.fresh = [array.copy() for array in self.scratch]
-
-    def turn_to(self, model: Model) -> Equations:
-        """The equations of another model, with scratch arrays as if they were new."""
-        for array, values in zip(self.scratch, self.fresh, strict=True):
-            array[...] = values
-        self.equations.arguments[1].renew(with_kernels(model, self.equations.work))
-        return self.equations
-
-
-def _arrays(part: Any) -> Iterator[np.ndarray]:
-    """All arrays of a tuple of arrays, tuples and numbers."""
-    if isinstance(part, np.ndarray):
-        yield part
-    elif isinstance(part, tuple):
-        for item in part:
-            yield from _arrays(item)
 
 
 def run_sweep(
@@ -192,10 +166,7 @@ def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
 def _run(task: _Task, measures: list[str]) -> _Outcome:
     scene = _changed(task.scene, task.values)
     model, state = compile_scene(scene, shared=task.shared)
-    key = "series", threading.get_ident()
-    if key not in task.shared:
-        task.shared[key] = _Series(model)
-    settings, equations = scene.data["integration"], task.shared[key].turn_to(model)
+    settings, equations = scene.data["integration"], equations_of(model, task.shared)
     times = _times(settings["duration"], scene.data["output"]["rate"])
     trajectory = integrate(
         model, state, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],

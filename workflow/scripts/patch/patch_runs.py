@@ -10,7 +10,9 @@ settings, source = snakemake.params.settings, snakemake.input.scene
 table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
 changes = snakemake.params.overrides
 own = any(change.startswith("contact.creep.planes=") for change in changes)  # builds, or finds, a table of its own
-row = model_runs(source, [*([] if own else [f"contact.creep.table={table}"]), *changes], **settings)
+row = model_runs(
+    source, [*([] if own else [f"contact.creep.table={table}"]), *changes], **settings, start=snakemake.params.start
+)
 row.insert(0, "vehicle", snakemake.wildcards.hunter)
 row.insert(1, "model", snakemake.wildcards.patch)
 row.to_csv(snakemake.output[0], index=False)

@@ -14,7 +14,7 @@ MEASURES = ("linear_critical_speed_m_per_s", "cycle_amplitude_m", "cycle_frequen
 """Columns whose deviation from exact contact is given."""
 
 
-def limit_cycle(source, overrides, cycle):
+def limit_cycle(source, overrides, cycle, start=None):
     """What a large disturbance settles to at one speed, on perfect track.
 
     Parameters
@@ -23,13 +23,27 @@ def limit_cycle(source, overrides, cycle):
         Scene, as for :func:`wrcore.load_scene`.
     cycle : dict
         speed (m/s), shift (m, of the vehicle, sideways) and settling, as for `wrcore.analysis.limit_cycles.Settling`.
+    start : list of str, optional
+        Further changes of a scene that is cheaper to run: what the disturbance settles to there is what it starts from.
 
     Returns
     -------
     dict
     """
-    model, state = at_speed(*straight_ahead(load_scene(source, [*overrides, "initial.y=0.0"])), cycle["speed"])
-    found, _ = settle_motion(model, shifted(model, state, cycle["shift"]), Settling(**cycle["settling"]))
+    settling = Settling(**cycle["settling"])
+
+    def straight(*changes):
+        scene = load_scene(source, [*overrides, "initial.y=0.0", *changes])
+        return at_speed(*straight_ahead(scene), cycle["speed"])
+
+    if start is None:
+        model, state = straight()
+        disturbed = shifted(model, state, cycle["shift"])
+    else:
+        cheap, state = straight(*start)
+        _, disturbed = settle_motion(cheap, shifted(cheap, state, cycle["shift"]), settling)
+        model, _ = straight()
+    found, _ = settle_motion(model, disturbed, settling)
     return {f"cycle_{name}": found[name] for name in ("speed_m_per_s", "amplitude_m", "frequency_Hz", "status")}
 
 
@@ -59,9 +73,10 @@ def irregular_run(source, overrides, changes, begin):
     }  # fmt: skip
 
 
-def model_runs(source, overrides, cycle, track, begin):
+def model_runs(source, overrides, cycle, track, begin, start=None):
     """`limit_cycle` and `irregular_run` of one vehicle with one patch model: a table of one row."""
-    return pd.DataFrame([limit_cycle(source, overrides, cycle) | irregular_run(source, overrides, track, begin)])
+    cycle = limit_cycle(source, overrides, cycle, start)
+    return pd.DataFrame([cycle | irregular_run(source, overrides, track, begin)])
 
 
 def compared(rows, exact):

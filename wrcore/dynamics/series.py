@@ -1,0 +1,67 @@
+"""Equations of motion for many runs, one after the other: kernels are looked up and scratch arrays allocated once."""
+
+import threading
+
+import numpy as np
+
+from wrcore.dynamics.system import Equations, own_states, with_wheels, workspace
+from wrcore.dynamics.wheel import shaped
+from wrcore.kernels.handles import Kind
+
+
+def equations_of(model, shared=None):
+    """Equations of motion that each thread turns from one model to the next.
+
+    Parameters
+    ----------
+    model : Model
+    shared : dict, optional
+        Keeps them for the next call, which takes them away. Left out: new ones.
+
+    Returns
+    -------
+    Equations
+        As if new.
+    """
+    if shared is None:
+        return Equations(model)
+    key = "equations", threading.get_ident(), *structure(model)
+    if key not in shared:
+        equations, new = Equations(model), workspace(model)
+        shared[key] = equations, list(zip(_arrays(equations.work), _arrays(new), strict=True))
+        return equations
+    equations, scratch = shared[key]
+    handle = equations.arguments[1]
+    handle.renew(with_kernels_of(model, handle.value))
+    for array, values in scratch:
+        array[...] = values
+    return equations
+
+
+def structure(model):
+    """What kernels are compiled and scratch arrays allocated for; models of equal structure can take turns in both."""
+    contact, strips = model.contact, model.contact.strips
+    sizes = tuple(array.shape for array in _arrays(strips)) if strips.strips else ()
+    return (
+        Kind(model)._numba_type_, id(model.bodies), id(model.joints), own_states(model), len(model.drive.rows),
+        len(model.friction.points), len(model.support.mass), len(contact.geometries), shaped(contact), strips[:4],
+        sizes,
+    )  # fmt: skip
+
+
+def with_kernels_of(model, other):
+    """The model with the addresses of another one of the same structure, from `wrcore.dynamics.system.with_kernels`."""
+    contact = model.contact
+    if contact.strips.strips:
+        contact = contact._replace(strips=contact.strips._replace(fallback=other.contact.strips.fallback))
+    kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
+    return model._replace(contact=with_wheels(contact), **kept)
+
+
+def _arrays(part):
+    """All arrays of a tuple of arrays, tuples and numbers."""
+    if isinstance(part, np.ndarray):
+        yield part
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from _arrays(item)
