@@ -10,6 +10,7 @@ from tests.conftest import SCENES
 from tests.dynamics import test_jacobian as jacobian_tests
 from tests.dynamics.giving_track import EXAMPLES
 from wrcore.analysis.motion import first_flange_contact
+from wrcore.analysis.stability import modes
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import energy_balance
 from wrcore.dynamics.support import RAILS, support_places
@@ -154,6 +155,29 @@ def test_mirrored_scenes_give_mirrored_runs(support):
     assert np.ptp(one.rail_z_left_m) > 1e-5
 
 
+@BOTH
+def test_a_centred_run_begins_in_steady_running(support):
+    model, state = compile_scene(scene_on(support, initial__y=0.0, speed=33.0))
+    n = len(model.bodies.mass)
+    rate = Equations(model)(0.0, state)
+    moves = np.concatenate([rate[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 7:].ravel(), rate[STATE_SIZE * n :]])
+    assert np.abs(moves).max() < 1e-6  # without spin's lateral forces: some 0.01 m/s^2
+
+
+@BOTH
+def test_modes_of_the_track_are_named_after_it(support):
+    table, _ = modes(scene_on(support), 40.0)
+    own = table[table["name"].str.startswith(("rails", "sleeper"))]
+    kinds = own["name"].str.split(",").str[0]
+    expected = {"rails lateral", "rails vertical"}
+    if "sleeper" in support:
+        expected |= {"sleeper lateral", "sleeper vertical", "sleeper roll"}
+    assert set(kinds) == expected and (own["most_energy"] == kinds).all()
+    names = set(table["name"])
+    assert {"rails vertical, in phase", "rails vertical, in antiphase"} < names
+    assert {"wheelset hunting", "wheelset contact bounce", "wheelset contact roll"} < names
+
+
 def test_a_stiffer_track_tends_to_rigid_rails_at_first_order():
     def run(factor):
         rail = {
@@ -178,9 +202,9 @@ def test_methods_agree_on_rough_track(support):
         np.testing.assert_allclose(one["wheelset"][name], other["wheelset"][name], rtol=0, atol=2e-7, err_msg=name)
 
 
-@pytest.mark.parametrize("patch", ["moment", "strips"])
+@pytest.mark.parametrize("patch", ["moment", "strips", "exact"])
 def test_rails_without_mass_are_in_balance(patch):
-    model, state = compile_scene(scene_on(MASSLESS, contact__patch=patch))
+    model, state = compile_scene(scene_on(MASSLESS, contact__patch=patch, contact__resolution="coarse"))
     places, equations = support_places(model)[0], Equations(model)
     random = np.random.default_rng(1)
     for _ in range(5):
@@ -190,6 +214,51 @@ def test_rails_without_mass_are_in_balance(patch):
         rate, forces = equations(0.0, moved), equations.work.support.forces[0].ravel()
         left = model.support.damping @ rate[places] + model.support.stiffness @ moved[places] - forces
         assert np.abs(left).max() < 1e-6 * np.abs(forces).max() and np.abs(rate[places]).max() > 1e-3
+
+
+@pytest.mark.parametrize(("damping", "counted"), [(None, False), (1.0, True)], ids=["as given", "next to none"])
+def test_evaluations_without_a_balance_are_counted(damping, counted):
+    rail = json.loads(json.dumps(MASSLESS["rail"]))
+    for way in rail.values():
+        way["damping"] = damping or way["damping"]
+    run = simulate(scene_on({"rail": rail}, initial__y=0.004, integration__duration=0.01))
+    assert (run.counters["rails_unbalanced"] > 0) == counted
+
+
+def exact_wrenches(support, prepare):
+    """Wrenches of the rails with exact contact, in a state that ``prepare(model, state)`` changes."""
+    track = {"support": support} if support else {}
+    scene = load_scene(SCENE, {"contact": {"patch": "exact", "resolution": "coarse"}, "track": track})
+    model, _ = compile_scene(scene)
+    state = np.concatenate([exact_wrenches.start, np.zeros(own_states(model))])
+    prepare(model, state)
+    equations = Equations(model)
+    equations(0.0, state)
+    return equations.work.rail_wrenches.copy()
+
+
+exact_wrenches.start = np.array([0.0, 0.002, 0.45985, 1.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0, 20.0 / 0.46, 0.0])
+
+
+def test_with_exact_contact_a_wheelset_that_moves_with_its_rails_feels_rigid_ones():
+    def carried(model, state):
+        q = support_places(model)[0]
+        aside, up, moving, rising = 3e-4, -2e-4, 0.02, -0.01
+        state[1:3] += aside, up
+        state[8:10] += moving, rising
+        state[q[:RAILS]], state[q[7 : 7 + RAILS]] = [aside, up] * 2, [moving, rising] * 2
+
+    rigid, found = exact_wrenches(None, lambda *_: None), exact_wrenches(MASSES, carried)
+    assert rigid[..., 2].min() > 1e4
+    np.testing.assert_allclose(found, rigid, rtol=1e-6, atol=1e-6 * np.abs(rigid).max())
+
+
+def test_exact_contact_on_stiffer_rails_tends_to_that_on_rigid_ones():
+    rigid, gaps = exact_wrenches(None, lambda *_: None), []
+    for factor in (1e2, 1e3):
+        rail = {way: {key: factor * value for key, value in own.items()} for way, own in MASSLESS["rail"].items()}
+        gaps.append(np.abs(exact_wrenches({"rail": rail}, lambda *_: None) - rigid)[..., :3].max())
+    assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=0.3) and gaps[1] < 0.01 * np.abs(rigid).max()
 
 
 def with_track(name, support, changes):

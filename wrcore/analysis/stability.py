@@ -127,7 +127,8 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     4.8
     """
     scene, (speed,) = as_scene(scene), rising([speed])
-    table, shapes, energies = linear_modes(scene.vehicle, steady_motion(*straight_ahead(scene), speed))
+    model, state = straight_ahead(scene)
+    table, shapes, energies = linear_modes(scene.vehicle, steady_motion(model, state, speed), model.support)
     full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
     return full, shape_table(scene.vehicle, table, shapes)
 
@@ -150,7 +151,7 @@ def root_locus(vehicle, model, state, speeds):
     """
     tables = []
     for speed in speeds:
-        table, _, _ = linear_modes(vehicle, steady_motion(model, state, speed))
+        table, _, _ = linear_modes(vehicle, steady_motion(model, state, speed), model.support)
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -192,7 +193,7 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
     if before is None:
         return {"critical_speed_m_per_s": -np.inf, **nothing}
     found = brentq(lambda v: growth(model, state, v), before, speed, xtol=tolerance)
-    table, _, _ = linear_modes(vehicle, steady_motion(model, state, found))
+    table, _, _ = linear_modes(vehicle, steady_motion(model, state, found), model.support)
     lost = table.loc[table["real_per_s"].where(table["damping_ratio"].notna()).idxmax()]
     with np.errstate(divide="ignore"):
         wavelength = np.float64(found) / lost["frequency_Hz"]
