@@ -311,7 +311,11 @@ def test_methods_agree_with_independent_wheels_a_controller_and_a_curve(support,
 
 def test_a_scene_without_has_none():
     model, state = compile_scene(load_scene(SCENE))
-    assert own_states(model) == 0 and len(state) == STATE_SIZE and Equations(model).arguments[1].value.rails == 0
+    compiled = Equations(model).arguments[1].value
+    assert own_states(model) == 0 and len(state) == STATE_SIZE and compiled.wheels
+    for kernel in ("rails", "torques", "rail_friction", "reactions"):  # what a scene leaves out is not even compiled
+        assert getattr(compiled, kernel) == 0, kernel
+    assert not compiled.contact.geometries and not compiled.contact.strips.strips
 
 
 BAD = [
