@@ -85,6 +85,21 @@ def test_percentiles_and_limits_of_a_triangular_wave():
     assert freight.loc["sum_Y", "limit"] == pytest.approx(0.85 * (10e3 + 2 * LOAD / 3), rel=1e-3)
 
 
+@pytest.mark.parametrize(("load", "limit"), [(112e3, 200e3), (115e3, np.nan)])
+def test_limit_of_heavy_wheels(load, limit):
+    found = assess(synthetic(lambda t, sign: (np.full_like(t, load), np.zeros_like(t)), duration=1.0))
+    assert found.summary.set_index("quantity").loc["Q", "limit"] == pytest.approx(limit, nan_ok=True)
+
+
+def test_what_lies_before_the_beginning_does_not_count():
+    def forces(t, sign):
+        return np.where(t < 1.0, 2.0 * LOAD, LOAD), np.zeros_like(t)
+
+    whole, late = (assess(synthetic(forces, duration=4.0), begin=begin).summary for begin in (0.0, 2.0))
+    assert whole.set_index("quantity").loc["Q", "value"] > 1.9 * LOAD
+    assert late.set_index("quantity").loc["Q", "value"] == pytest.approx(LOAD, rel=1e-3)
+
+
 def test_quasi_static_values_are_medians_of_full_curves():
     path = [{"tangent": 200.0}, {"transition": 50.0}, {"curve": 900.0, "radius": 600.0}]
 

@@ -95,6 +95,14 @@ def test_whole_body_vibration_of_two_sines(run):
     assert assess(run, "ISO 2631", begin=5.0).summary.equals(whole_body_table(run, begin=5.0))
 
 
+def test_running_rms_is_one_over_a_second(run):
+    quiet = np.abs(run.t - 10.0) > 0.25  # half a second of 8 Hz is half of what a second counts
+    run.groups["car_body"]["az_m_per_s2"][quiet] = 0.0
+    table = whole_body_table(run).set_index("direction")
+    burst = 0.2 * abs(WEIGHTINGS["Wk"].response(8.0)) / np.sqrt(2.0)
+    assert table.loc["z", "MTVV_m_per_s2"] == pytest.approx(burst * np.sqrt(0.5), rel=0.05)
+
+
 def test_what_cannot_be_assessed_is_refused(run):
     with pytest.raises(InputError, match="unknown|expected one of Wk"):
         weighted([0.0, 1.0], 100.0, "Wz")

@@ -1,6 +1,6 @@
-"""Limit cycles and forces on flanges with rigid rails and on the tracks of reports/tracks.md.
+"""Limit cycles, forces on flanges and critical speeds with rigid rails and on the tracks of reports/tracks.md.
 
-``python -m tests.dynamics.giving_track`` prints the table of that page.
+``python -m tests.dynamics.giving_track`` prints the tables of that page.
 """
 
 import re
@@ -8,6 +8,7 @@ import re
 import numpy as np
 
 from tests.conftest import ROOT, SCENES
+from wrcore.analysis.stability import critical_speeds
 from wrcore.analysis.wheels import wheelset_channels
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.run.simulate import simulate
@@ -44,12 +45,33 @@ def row(name, speed):
     )
 
 
+def stiffer(lateral, vertical):
+    """The track without mass, its springs and dampers times a factor in each direction."""
+    rail, factors = TRACKS["massless"]["support"]["rail"], {"lateral": lateral, "vertical": vertical}
+    return {"support": {"rail": {way: {key: factor * value for key, value in rail[way].items()}
+                                 for way, factor in factors.items()}}}  # fmt: skip
+
+
+STIFFER = {f"massless, {a} x lateral, {b} x vertical": stiffer(a, b) for a, b in ((10, 10), (1, 100), (100, 1))}
+
+
+def critical(vehicle, tracks):
+    """Rows of the linear critical speeds of a vehicle on tracks."""
+    start, names = SCENES / f"{vehicle}.yaml", list(tracks)
+    scenes = {name: load_scene(start, {"initial.y": 0.0, "track": tracks[name]}) for name in names}
+    found = critical_speeds(scenes, np.linspace(50.0, 90.0, 5)).set_index("variant")["critical_speed_m_per_s"]
+    return [f"| {vehicle} | {name} | {found[name]:.1f} |" for name in names]
+
+
 def main():
     print("| m/s | rails | amplitude mm | Hz | greatest Q kN | greatest Y kN |")
     print("|---|---|---|---|---|---|")
     for speed in SPEEDS:
         for name in TRACKS:
             print(row(name, speed), flush=True)
+    print("\n| vehicle | rails | critical speed m/s |\n|---|---|---|")
+    for vehicle in ("suspended_wheelset", "trailer_vehicle"):
+        print("\n".join(critical(vehicle, TRACKS | (STIFFER if vehicle == "trailer_vehicle" else {}))), flush=True)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ from tests.conftest import SCENES
 from tests.dynamics import test_jacobian as jacobian_tests
 from tests.dynamics.giving_track import EXAMPLES
 from wrcore.analysis.motion import first_flange_contact
+from wrcore.analysis.stability import modes
+from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import energy_balance
 from wrcore.dynamics.support import RAILS, support_places
@@ -154,6 +156,29 @@ def test_mirrored_scenes_give_mirrored_runs(support):
     assert np.ptp(one.rail_z_left_m) > 1e-5
 
 
+@BOTH
+def test_a_centred_run_begins_in_steady_running(support):
+    model, state = compile_scene(scene_on(support, initial__y=0.0, speed=33.0))
+    n = len(model.bodies.mass)
+    rate = Equations(model)(0.0, state)
+    moves = np.concatenate([rate[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 7:].ravel(), rate[STATE_SIZE * n :]])
+    assert np.abs(moves).max() < 1e-6  # without spin's lateral forces: some 0.01 m/s^2
+
+
+@BOTH
+def test_modes_of_the_track_are_named_after_it(support):
+    table, _ = modes(scene_on(support), 40.0)
+    own = table[table["name"].str.startswith(("rails", "sleeper"))]
+    kinds = own["name"].str.split(",").str[0]
+    expected = {"rails lateral", "rails vertical"}
+    if "sleeper" in support:
+        expected |= {"sleeper lateral", "sleeper vertical", "sleeper roll"}
+    assert set(kinds) == expected and (own["most_energy"] == kinds).all()
+    names = set(table["name"])
+    assert {"rails vertical, in phase", "rails vertical, in antiphase"} < names
+    assert {"wheelset hunting", "wheelset contact bounce", "wheelset contact roll"} < names
+
+
 def test_a_stiffer_track_tends_to_rigid_rails_at_first_order():
     def run(factor):
         rail = {
@@ -190,6 +215,36 @@ def test_rails_without_mass_are_in_balance(patch):
         rate, forces = equations(0.0, moved), equations.work.support.forces[0].ravel()
         left = model.support.damping @ rate[places] + model.support.stiffness @ moved[places] - forces
         assert np.abs(left).max() < 1e-6 * np.abs(forces).max() and np.abs(rate[places]).max() > 1e-3
+
+
+@pytest.mark.parametrize(("damping", "counted"), [(None, False), (1.0, True)], ids=["as given", "next to none"])
+def test_evaluations_without_a_balance_are_counted(damping, counted):
+    rail = json.loads(json.dumps(MASSLESS["rail"]))
+    for way in rail.values():
+        way["damping"] = damping or way["damping"]
+    run = simulate(scene_on({"rail": rail}, initial__y=0.004, integration__duration=0.01))
+    assert (run.counters["rails_unbalanced"] > 0) == counted
+
+
+def test_a_wheelset_that_moves_with_its_rails_feels_rigid_ones():
+    aside, up, moving, rising = 3e-4, -2e-4, 0.02, -0.01
+    _, start = compile_scene(load_scene(SCENE))
+    found = []
+    for support in (None, MASSES):
+        model, _ = compile_scene(load_scene(SCENE, {"track": {"support": support} if support else {}}))
+        state = np.concatenate([start, np.zeros(own_states(model))])
+        if support:
+            q = support_places(model)[0]
+            state[1:3] += aside, up
+            state[8:10] += moving, rising
+            state[q[:RAILS]], state[q[7 : 7 + RAILS]] = [aside, up] * 2, [moving, rising] * 2
+        equations = Equations(model)
+        equations(0.0, state)
+        found.append((equations.work.rail_wrenches[0], equations.work.patches[0, :, 0][:, [Y, Z]].T.copy()))
+    (rigid, places), (carried, moved) = found
+    assert rigid[:, 2].min() > 1e4
+    np.testing.assert_allclose(carried, rigid, rtol=1e-6, atol=1e-6 * np.abs(rigid).max())
+    np.testing.assert_allclose(moved - places, np.full((2, 2), [[aside], [up]]), rtol=0.0, atol=1e-9)
 
 
 def with_track(name, support, changes):
@@ -242,7 +297,11 @@ def test_methods_agree_with_independent_wheels_a_controller_and_a_curve(support,
 
 def test_a_scene_without_has_none():
     model, state = compile_scene(load_scene(SCENE))
-    assert own_states(model) == 0 and len(state) == STATE_SIZE and Equations(model).arguments[1].value.rails == 0
+    compiled = Equations(model).arguments[1].value
+    assert own_states(model) == 0 and len(state) == STATE_SIZE and compiled.wheels
+    for kernel in ("rails", "torques", "rail_friction", "reactions"):  # what a scene leaves out is not even compiled
+        assert getattr(compiled, kernel) == 0, kernel
+    assert not compiled.contact.geometries and not compiled.contact.strips.strips
 
 
 BAD = [

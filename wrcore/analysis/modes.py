@@ -3,6 +3,9 @@
 Bodies form families: those named alike up to a number and a side (``bogie_1`` and ``bogie_2``, or
 ``axle_box_1_left`` and others). Energies are kinetic, as parts of the mode's whole. In this order:
 
+* *rails* or *sleeper* lateral, vertical, roll: the mass of a track that gives has more energy than all bodies together,
+  or, of rails without mass, hardly oscillates and rails move more than any body. Both rails of the wheelset that moves
+  most go *in phase* or *in antiphase*, or one of them alone;
 * *neutral*: the eigenvalue is below `NEUTRAL`; a displacement that nothing resists, such as that along the track;
 * *series damper*: hardly oscillates (`OVERDAMPED`), and dampers in series with springs move more than any body;
 * *spin, lateral, yaw creep*: hardly oscillates, wheelsets have most energy, in that coordinate;
@@ -24,6 +27,7 @@ import pandas as pd
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.linear import DIRECTIONS
+from wrcore.dynamics.support import RAILS, no_support, support_size
 
 NEUTRAL = 1e-3
 """Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
@@ -43,6 +47,11 @@ ALONE = 0.9
 WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
 CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
 Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
+
+
+TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
+TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
+"""Which of `TRACK` each freedom of a :class:`wrcore.dynamics.support.Support` belongs to."""
 
 
 def families(vehicle):
@@ -139,7 +148,42 @@ class _Namer:
         return f"{name}, in {'phase' if together else 'antiphase'}"
 
 
-def linear_modes(vehicle, linearisation):
+class _Track:
+    """The track under all wheelsets in one mode: its energy, and what of it moves."""
+
+    def __init__(self, support, own):
+        d, size = len(support.mass), support_size(support)
+        rows = own[support.first :][: size * (len(own[support.first :]) // size)].reshape(-1, size) if d else own[:0]
+        self.massless = size == d
+        self.place = rows[:, :d] if d else np.zeros((0, 0))
+        weight = np.abs(self.place) ** 2 if self.massless else support.mass * np.abs(rows[:, d:]) ** 2
+        self.shares = np.array([weight[:, TRACK_FREEDOMS[:d] == kind].sum() for kind in range(len(TRACK))])
+        self.energy = 0.0 if self.massless else self.shares.sum()  # twice the kinetic energy, as the namer's
+
+    def leads(self, eigenvalue, bodies, place):
+        """Whether the mode is the track's; energy (twice the kinetic one) and displacements of the bodies."""
+        if not self.place.size or abs(eigenvalue) < NEUTRAL:
+            return False
+        if not self.massless:
+            return bool(self.energy > bodies)
+        slow = -eigenvalue.real > OVERDAMPED * abs(eigenvalue)
+        return bool(slow and np.max(np.abs(self.place)) > np.max(np.abs(place)))
+
+    def name(self):
+        """What moves, rails with their phase, and its part of the track's own energy (or squares, without mass)."""
+        kind = int(np.argmax(self.shares))
+        name, part = TRACK[kind], self.shares[kind] / self.shares.sum()
+        if kind < 2:
+            sides = self.place[:, kind:RAILS:2]
+            left, right = sides[np.argmax(np.sum(np.abs(sides) ** 2, axis=1))]
+            one = abs(left) ** 2 / (abs(left) ** 2 + abs(right) ** 2)
+            if one > ALONE or one < 1.0 - ALONE:
+                return f"{name}, {'left' if one > ALONE else 'right'}", part
+            return f"{name}, in {'phase' if np.real(left * np.conj(right)) > 0.0 else 'antiphase'}", part
+        return name, part
+
+
+def linear_modes(vehicle, linearisation, support=None):
     """Modes of small motions.
 
     Parameters
@@ -147,18 +191,21 @@ def linear_modes(vehicle, linearisation):
     vehicle : Vehicle
     linearisation : Linearisation
         Of this vehicle.
+    support : Support, optional
+        The model's track, if it gives.
 
     Returns
     -------
     table : pandas.DataFrame
         One row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s, imag_rad_per_s (not
         negative), frequency_Hz, damping_ratio (negative for a growing mode, NaN for a neutral one), the coordinate
-        with most energy, and its part.
+        with most energy, and its part; of modes of the track, the kind of freedom and its part of the track.
     shapes : numpy.ndarray, shape (rows, n, 6), complex
         Displacements (m) and rotations (rad) of the bodies, see `wrcore.dynamics.linear.DIRECTIONS`; the largest is 1.
         Zero for a mode in which only speeds change.
     energies : numpy.ndarray, shape (rows, n, 6)
-        Kinetic energies of the same coordinates (of a wheelset's spin instead of its pitch) as parts of the whole.
+        Kinetic energies of the same coordinates (of a wheelset's spin instead of its pitch) as parts of the whole,
+        the track's own included.
     """
     values, vectors = np.linalg.eig(linearisation.matrix)
     kept = np.flatnonzero(values.imag >= 0.0)
@@ -169,16 +216,22 @@ def linear_modes(vehicle, linearisation):
     rows, shapes, energies = [], np.zeros((len(kept), n, 6), complex), np.zeros((len(kept), n, 6))
     for k, (value, vector) in enumerate(zip(values[kept], vectors, strict=True)):
         place, speed = vector[: 12 * n].reshape(2, n, 6)
+        whole, track = np.sum(namer.mass * np.abs(speed) ** 2), _Track(support or no_support(), vector[12 * n :])
         if np.any(speed):
-            energies[k] = namer.energies(speed)
+            energies[k] = namer.energies(speed) * (whole / (whole + track.energy))
         body, direction = np.unravel_index(np.argmax(energies[k]), (n, 6))
         largest = place.flat[np.argmax(np.abs(place))]
         shapes[k] = place / largest if largest != 0.0 else 0.0
+        name = namer(value, place, speed, vector[12 * n :][: vehicle.elements.states])
+        most, part = f"{vehicle.body_names[body]} {DIRECTIONS[direction]}", energies[k, body, direction]
+        if track.leads(value, whole, place):
+            name, part = track.name()
+            most = name.split(",")[0]
         rows.append({
-            "name": namer(value, place, speed, vector[12 * n :][: vehicle.elements.states]),
+            "name": name,
             "real_per_s": value.real, "imag_rad_per_s": value.imag, "frequency_Hz": value.imag / (2.0 * np.pi),
             "damping_ratio": -value.real / abs(value) if abs(value) >= NEUTRAL else np.nan,
-            "most_energy": f"{vehicle.body_names[body]} {DIRECTIONS[direction]}", "part": energies[k, body, direction],
+            "most_energy": most, "part": part,
         })  # fmt: skip
     return pd.DataFrame(rows), shapes, energies
 

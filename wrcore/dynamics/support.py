@@ -14,7 +14,12 @@ rail that is displaced by q and moves at q': in the rail's frame the wheelset's 
 
 Without mass, q' follows from forces that depend on it, by creepages and contact damping. The more a rail gives way, the
 less it is pushed, so that there is one solution; Newton's method finds it for all rails at once, with steps that are
-halved where they do not come closer. It starts from rest each time: a state has one rate, whatever was before.
+halved where they do not come closer. Derivatives by differences cost as much as two steps: they are taken at the first
+one, and again where a step does not do what it should; else Broyden's update (Math. Comp. 19 (1965) 577) follows the
+last step. It starts from rest each time: a state has one rate, whatever was before.
+
+A friction that falls with slip can push more the more a rail gives way, and leave a weak damper no balance, or several.
+Evaluations that end without one are counted.
 """
 
 import math
@@ -31,9 +36,13 @@ from wrcore.kernels.jit import jit
 RAILS = 4
 """Freedoms of both rails; those of the sleeper come after them."""
 
-DIFFERENCE, LAST, ENOUGH, MOST = 1e-7, 1e-8, 0.1, 60
+DIFFERENCE, LAST, ENOUGH, WELL, MOST = 1e-7, 1e-8, 0.1, 0.5, 60
 """Newton's method for rails without mass: difference of velocities (m/s), length of its last step (m/s; the error left
-goes with the square of it), part of what is left that a full step has to take off, and most steps."""
+is a small part of it), part of what is left that a full step has to take off, largest part left with which derivatives
+are kept, and most steps."""
+
+UNBALANCED = 1e-4
+"""Part of the forces on a rail that is left where there is no balance."""
 
 
 class Support(NamedTuple):
@@ -63,16 +72,22 @@ class SupportWork(NamedTuple):
     """(k, 2, 2): f without a difference in q', N."""
     slopes: np.ndarray
     """(k, 2, 2, 2): derivatives of f (last index) by q' (the one before), N s/m."""
+    matrix: np.ndarray
+    """(k, 2, 2, 2): derivatives of C q' + K q - f (the index before the last) by q' (the last), N s/m."""
     residuals: np.ndarray
     """(k, 2, 2): C q' + K q - f, N."""
+    began: np.ndarray
+    """(k, 2, 2): the same where the step began, N."""
     steps: np.ndarray
     """(k, 2, 2): of Newton's method, m/s."""
     left: np.ndarray
-    """(k, 2): size of the residuals where the step began, N."""
+    """(k, 2): its size, N."""
     parts: np.ndarray
     """(k, 2): of Newton's full steps."""
     power: np.ndarray
     """(1,): f q', summed over all rails, W; 0 for a rigid track."""
+    unbalanced: np.ndarray
+    """(1,) int: counts evaluations in which rails without mass found no balance."""
 
 
 def no_support():
@@ -88,8 +103,8 @@ def support_size(support):
 def support_work(support, wheelsets):
     """Scratch arrays for a `Support` and a number of wheelsets."""
     k = wheelsets if len(support.mass) else 0
-    shapes = [(k, 2, 2)] * 4 + [(k, 2, 2, 2), (k, 2, 2), (k, 2, 2), (k, 2), (k, 2), (1,)]
-    return SupportWork(*(np.zeros(shape) for shape in shapes))
+    shapes = [(k, 2, 2)] * 4 + [(k, 2, 2, 2)] * 2 + [(k, 2, 2)] * 3 + [(k, 2)] * 2 + [(1,)]
+    return SupportWork(*(np.zeros(shape) for shape in shapes), np.zeros(1, np.int64))
 
 
 def support_places(model):
@@ -196,46 +211,84 @@ def _find_slopes(model, work):
 
 
 @jit(allocates=False)
-def _step(support, own, k, wheel, a, b):
-    """Newton's step of one rail with a and b left, or half of the last one, back, where that came no closer."""
-    step, left = own.steps[k, wheel], math.sqrt(a * a + b * b)
-    if left > (1.0 - ENOUGH * own.parts[k, wheel]) * own.left[k, wheel]:
+def _renew_matrix(support, own, k, wheel, a, b, differences):
+    """Derivatives of one rail's residuals a and b: by differences, or those before with Broyden's update."""
+    matrix, step = own.matrix[k, wheel], own.steps[k, wheel]
+    if differences:
+        for i in range(2):
+            for j in range(2):
+                matrix[i, j] = -own.slopes[k, wheel, j, i]
+            matrix[i, i] += support.damping[2 * wheel + i, 2 * wheel + i]
+        return
+    rest, scale = 1.0 - own.parts[k, wheel], 1.0 / (step[0] * step[0] + step[1] * step[1])
+    a, b = scale * (a - rest * own.began[k, wheel, 0]), scale * (b - rest * own.began[k, wheel, 1])
+    for j in range(2):
+        matrix[0, j] += a * step[j]
+        matrix[1, j] += b * step[j]
+
+
+@jit(allocates=False)
+def _step(support, own, k, wheel, differences):
+    """Newton's step of one rail, or half of the last one, back, where that came no closer.
+
+    Returns whether the next step wants derivatives by differences.
+    """
+    a, b = own.residuals[k, wheel, 0], own.residuals[k, wheel, 1]
+    step, left, before = own.steps[k, wheel], math.sqrt(a * a + b * b), own.left[k, wheel]
+    if left > (1.0 - ENOUGH * own.parts[k, wheel]) * before:
         own.parts[k, wheel] *= 0.5
         for i in range(2):
             step[i] *= 0.5
             own.speeds[k, wheel, i] -= step[i]
-        return
+        return True
+    _renew_matrix(support, own, k, wheel, a, b, differences)
     own.left[k, wheel], own.parts[k, wheel] = left, 1.0
-    slopes, at = own.slopes[k, wheel], 2 * wheel
-    p, q = support.damping[at, at] - slopes[0, 0], -slopes[1, 0]
-    r, s = -slopes[0, 1], support.damping[at + 1, at + 1] - slopes[1, 1]
-    scale = -1.0 / (p * s - q * r)
-    step[0], step[1] = scale * (s * a - q * b), scale * (p * b - r * a)
+    own.began[k, wheel, 0], own.began[k, wheel, 1] = a, b
+    matrix = own.matrix[k, wheel]
+    scale = -1.0 / (matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
+    step[0] = scale * (matrix[1, 1] * a - matrix[0, 1] * b)
+    step[1] = scale * (matrix[0, 0] * b - matrix[1, 0] * a)
     for i in range(2):
         own.speeds[k, wheel, i] += step[i]
+    return left > WELL * before and before < math.inf
+
+
+@jit(allocates=False)
+def _find_residuals(support, own, state, first):
+    """Fill the residuals of all rails; whether one is out of balance."""
+    out = False
+    for k in range(own.speeds.shape[0]):
+        for i in range(RAILS):
+            wheel, j = i // 2, i % 2
+            spring = support.stiffness[i, i] * state[first + RAILS * k + i]
+            damper, force = support.damping[i, i] * own.speeds[k, wheel, j], own.forces[k, wheel, j]
+            left = spring + damper - force
+            own.residuals[k, wheel, j] = left
+            out |= abs(left) > UNBALANCED * (abs(spring) + abs(damper) + abs(force))
+    return out
 
 
 @jit(allocates=False)
 def _give_way(model, state, work, first, missed, on_grid):
     """Find the speeds of rails without mass, with all wrenches there; the last two arguments restore counters."""
     support, own, strips = model.support, work.support, work.strips
-    held = strips.held[0]
-    own.left[:] = np.inf
+    held, differences, moving = strips.held[0], True, True
+    own.left[:] = math.inf
     strips.held[0] = PATCHES_HELD
-    for _ in range(MOST):
-        for k in range(own.speeds.shape[0]):
-            for i in range(RAILS):
-                at, wheel, j = first + RAILS * k + i, i // 2, i % 2
-                balance = support.stiffness[i, i] * state[at] + support.damping[i, i] * own.speeds[k, wheel, j]
-                own.residuals[k, wheel, j] = balance - own.forces[k, wheel, j]
-        _find_slopes(model, work)
-        largest = 0.0
+    for n in range(MOST):
+        _find_residuals(support, own, state, first)
+        if differences:
+            _find_slopes(model, work)
+        fresh, differences, moving = differences, False, False
         for k in range(own.speeds.shape[0]):
             for wheel in range(2):
-                _step(support, own, k, wheel, own.residuals[k, wheel, 0], own.residuals[k, wheel, 1])
-                largest = max(largest, abs(own.steps[k, wheel, 0]), abs(own.steps[k, wheel, 1]))
+                step = own.steps[k, wheel]
+                if n == 0 or abs(step[0]) > LAST or abs(step[1]) > LAST:  # else it has arrived
+                    differences |= _step(support, own, k, wheel, fresh)
+                    moving |= abs(step[0]) > LAST or abs(step[1]) > LAST
         work.counters[1], work.counters[2] = missed, on_grid
         _press(model, work, -1)
-        if not largest > LAST:
+        if not moving:
             break
+    own.unbalanced[0] += _find_residuals(support, own, state, first)
     strips.held[0] = held

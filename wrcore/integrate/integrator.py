@@ -156,7 +156,7 @@ def integrate(
         Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy(), work.strips.memory.copy()),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
-        int(work.counters[2]),
+        int(work.counters[2]), int(work.support.unbalanced[0]),
     )  # fmt: skip
 
 

@@ -58,6 +58,8 @@ class Trajectory:
         factorised matrices.
     out_of_range, on_grid : int
         Creep look-ups out of range; patches that strips did not solve and a grid did.
+    unbalanced : int
+        Evaluations in which rails without mass found no balance.
     smallest_step : float
         Smallest accepted step, s.
     wall_s : float
@@ -91,6 +93,7 @@ class Trajectory:
     end_state: np.ndarray | None = None
     collapses: int = 0
     on_grid: int = 0
+    unbalanced: int = 0
 
 
 def derailment(model, t, state, arc_lengths, limit=-1.0):

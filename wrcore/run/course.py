@@ -155,7 +155,7 @@ class Course:
             "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
             "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses,
             "table_out_of_range": trajectory.out_of_range, "patches_on_grid": trajectory.on_grid,
-            "wall_s": trajectory.wall_s, "compile_s": compiled,
+            "rails_unbalanced": trajectory.unbalanced, "wall_s": trajectory.wall_s, "compile_s": compiled,
             "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
         }  # fmt: skip
         groups, limits = self._channels(trajectory)

@@ -48,6 +48,7 @@ LIMITS = {
     "both_flanges": "wheelsets with both flanges on the rails",
     "table_out_of_range": "creep look-ups out of the table's range",
     "step_collapses": "collapses of the step size",
+    "rails_unbalanced": "evaluations without a balance of rails without mass",
     "beyond_irregularity": "wheelsets past the end of the irregularity",
 }
 """Counters of a run, as a person reads them."""
