@@ -51,7 +51,7 @@ def extreme_cases():
 
 @pytest.fixture(scope="session")
 def ellipse_table():
-    """The table of the resolution that is built by default."""
+    """A table coarser than the default one, of 28 080 cases."""
     return build_data(0.28, "ellipse", RESOLUTIONS["ellipse"][1][1])
 
 

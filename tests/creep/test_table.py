@@ -8,10 +8,19 @@ import pytest
 
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import _atan2, _stretch, creepages_at, node_distances, table_lookup
-from wrcore.creep.build import RESOLUTIONS, Resolution, axis_values, build_data, count_cases, table_axes
+from wrcore.creep.build import RESOLUTIONS, Resolution, axis_values, build_data, count_cases, random_errors, table_axes
 from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.creep.table import build_table, ensure_table, load_table, table_info, table_path, write_table
+from wrcore.creep.table import (
+    DEFAULT_TOLERANCE,
+    SHIPPED,
+    build_table,
+    ensure_table,
+    load_table,
+    table_info,
+    table_path,
+    write_table,
+)
 from wrcore.errors import InputError
 from wrcore.kernels.jit import jit
 
@@ -253,6 +262,22 @@ def test_ensure_builds_once(cache, monkeypatch):
     monkeypatch.setattr(table_module, "build_data", None)
     again = ensure_table(0.28, "ellipse", 0.5)
     assert np.array_equal(first.data.coefficients, again.data.coefficients)
+
+
+def test_the_default_table_comes_with_the_package(cache, monkeypatch):
+    monkeypatch.setattr(table_module, "build_data", None)
+    name = table_path(0.28, "ellipse", DEFAULT_TOLERANCE).name
+    assert [path.name for path in SHIPPED.iterdir()] == [name], f"expected: wrcore table build --out {SHIPPED / name}"
+    table = ensure_table()
+    assert (table.nu, table.planes, table.tolerance) == (0.28, "ellipse", DEFAULT_TOLERANCE)
+    assert table.resolution in [resolution for _, resolution in RESOLUTIONS["ellipse"]]
+    assert not list(cache.rglob("*.h5"))
+
+
+def test_the_default_table_is_that_of_the_solver():
+    table = ensure_table()
+    force, _ = random_errors(table.data, table.resolution.level, patches=6, per_patch=20, seed=7)
+    assert np.percentile(force, 99) < DEFAULT_TOLERANCE and np.median(force) < 2.0 * table.force_error[0]
 
 
 def test_cache_is_keyed_by_everything(cache, monkeypatch):

@@ -1,5 +1,8 @@
 """Creep tables on disk: built to a wanted error when first needed, cached, loaded in milliseconds.
 
+The default table comes with the package (``tables/``): a scene that asks for nothing else builds none. Its name holds
+`creep_digest`; after a change to what tables depend on it is one of the past, and not found.
+
 A table holds Fx, Fy, Mz of steady rolling for one Poisson's ratio, either for ellipses (four inputs) or for SDEC
 patches (five). Its error is measured, not assumed: random patches and creepages are solved exactly and compared, and a
 finer table is built until the 99 % quantile of the force error is below the tolerance. The numbers stay in the file.
@@ -11,6 +14,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +33,9 @@ DEFAULT_TOLERANCE = 0.005
 """Error of a table that nobody asked another of. A critical speed depends on it more than on the detection: that of the
 trailer vehicle is 74.84 m/s at 0.015, 74.73 at 0.01 and 0.007 (one resolution) and 74.95 from 0.005 to 0.003 (one
 resolution, whose 99 % error was found to be 0.0027); planar detection changes it by 0.0015 m/s."""
+
+SHIPPED = Path(__file__).parent / "tables"
+"""Folder of the package's own tables: `wrcore table build --out` under the name that `table_path` gives."""
 
 CHECK_LEVEL = 20
 QUANTILES = ("median", "95 %", "99 %", "max")
@@ -258,13 +265,19 @@ def table_path(nu, planes, tolerance):
     return table_folder() / f"{planes}_nu{nu:.6g}_tol{tolerance:.6g}_{creep_digest()}.h5"
 
 
+def kept_tables(nu, planes, tolerance):
+    """Files that hold the table with these properties: the package's own, that of the cache; none of both may exist."""
+    path = table_path(nu, planes, tolerance)
+    return [place for place in (SHIPPED / path.name, path) if place.exists()]
+
+
 def ensure_table(
     nu: float = 0.28,
     planes: str = "ellipse",
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable | None = None,
 ) -> CreepTable:
-    """The table from the cache; built and cached first where it is not there yet, or is damaged or another one.
+    """The table from the package or the cache; built and cached first where there is none, or a damaged or other one.
 
     Two processes that need the same table at once both build it and the later rename wins, with equal content.
 
@@ -285,16 +298,15 @@ def ensure_table(
     ('ellipse', 0.005, True)
     """
     _check_arguments(nu, planes, tolerance)
-    path = table_path(nu, planes, tolerance)
-    if path.exists():
+    for place in kept_tables(nu, planes, tolerance):
         try:
-            table = load_table(path)
+            table = load_table(place)
             if (table.nu, table.planes, table.tolerance) == (nu, planes, tolerance):
                 return table
-            warn(f"{path}: another table than its name says; it is built anew")
+            warn(f"{place}: another table than its name says; it is built anew")
         except InputError as error:
             warn(f"{error}; it is built anew")
-    table = build_table(nu, planes, tolerance, progress)
+    path, table = table_path(nu, planes, tolerance), build_table(nu, planes, tolerance, progress)
     try:
         write_table(path, table)
     except OSError as error:

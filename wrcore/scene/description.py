@@ -20,7 +20,7 @@ from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.creep.laws import LAWS, creep_data
-from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, load_table, table_path
+from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
@@ -249,7 +249,7 @@ def _creep(scene, progress):
     if "table" in creep:
         table = load_table(creep["table"])
     else:
-        if not table_path(nu, creep["planes"], creep["tolerance"]).exists():
+        if not kept_tables(nu, creep["planes"], creep["tolerance"]):
             announce(f"building a creep table ({creep['planes']}, {creep['tolerance']:g}): some ten seconds, once")
         table = ensure_table(nu, creep["planes"], creep["tolerance"], progress)
     if abs(table.nu - nu) > 1e-9:
