@@ -50,7 +50,7 @@ def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[fl
     ...         advance(5.0)
     """
     if not any(kernel_folder().rglob("*advance_*.nbi")):
-        announce("compiling for the first run of this version: about a minute, once")
+        announce("compiling for the first run of this version: about half a minute, once")
     if not somebody_watches():
         yield None
         return
