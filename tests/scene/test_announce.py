@@ -1,7 +1,5 @@
 """One line on stderr before work that takes long, terminal or not."""
 
-from pathlib import Path
-
 import pytest
 
 from wrcore.run.progress import simulated_time
@@ -23,7 +21,7 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
         raise Known
 
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
-    monkeypatch.setattr(description, "table_path", lambda *_: Path(__file__ if there else "nowhere"))
+    monkeypatch.setattr(description, "kept_tables", lambda *_: ["a table"] if there else [])
     monkeypatch.setattr(description, "ensure_table", ensure)
     with pytest.raises(Known):
         _creep(scene, None)
