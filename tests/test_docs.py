@@ -126,7 +126,8 @@ def test_numbers_in_the_theory_are_those_of_the_code():
             f"b = {irregularity.HALF_BASE} m", *spectra,
         ],
         "integration": [
-            f"${choice.STABLE}/", f"({choice.STEPS_PER_METRE} steps per metre)", f"{tolerances.LENGTH}\\ \\mathrm m",
+            f"${choice.STABLE}/", f"{tolerances.LENGTH}\\ \\mathrm m",
+            f"({choice.STEPS_PER_METRE} steps per metre, {choice.ON_GIVING_RAILS:g} on rails that give)",
             f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
             f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", "a tenth of the last",
         ],
