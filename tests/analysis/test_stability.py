@@ -107,7 +107,7 @@ def test_critical_speed_is_where_the_largest_real_part_changes_sign(suspended):
     vehicle, model, state = suspended
     found = critical_speed(vehicle, model, state, [30.0, 50.0, 70.0, 90.0], 1e-4)
     speed = found["critical_speed_m_per_s"]
-    assert growth(model, state, speed - 0.01) < 0.0 < growth(model, state, speed + 0.01)
+    assert growth(steady_motion(model, state, speed - 0.01)) < 0.0 < growth(steady_motion(model, state, speed + 0.01))
     assert found["mode"] == "wheelset hunting"
     assert found["wavelength_m"] == pytest.approx(speed / found["frequency_Hz"])
     assert critical_speed(vehicle, model, state, [30.0, 40.0])["critical_speed_m_per_s"] == math.inf
@@ -126,7 +126,9 @@ def test_where_a_scene_starts_is_of_no_influence(suspended):
         straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml", [f"initial.y={y}"])) for y in (0.0, 0.003)
     )
     np.testing.assert_allclose(there, centred, atol=1e-12)
-    assert growth(aside, there, 70.0) == pytest.approx(growth(model, state, 70.0), rel=1e-6)
+    assert growth(steady_motion(aside, there, 70.0)) == pytest.approx(
+        growth(steady_motion(model, state, 70.0)), rel=1e-6
+    )
 
 
 def test_root_locus_is_a_table_of_modes_over_speed(suspended):

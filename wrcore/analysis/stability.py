@@ -159,13 +159,8 @@ def root_locus(vehicle, model, state, speeds):
     return pd.concat(tables, ignore_index=True)
 
 
-def growth(model, state, speed):
-    """Largest real part of all eigenvalues that are not neutral, 1/s; arguments as for :func:`steady_motion`."""
-    return fastest_growth(steady_motion(model, state, speed))
-
-
-def fastest_growth(motion):
-    """:func:`growth` of a `Linearisation`."""
+def growth(motion):
+    """Largest real part of all eigenvalues of a `Linearisation` that are not neutral, 1/s."""
     values = np.linalg.eigvals(motion.matrix)
     return float(np.max(values.real[np.abs(values) >= NEUTRAL]))
 
@@ -198,7 +193,7 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
         if speed not in motions:
             motions[speed] = steady_motion(model, state, speed)
             model, state = model._replace(speed=float(speed)), motions[speed].state
-        return fastest_growth(motions[speed])
+        return growth(motions[speed])
 
     for speed in speeds:
         if growth_at(speed) > 0.0:

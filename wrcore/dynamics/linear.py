@@ -127,11 +127,10 @@ def steady_running(model, state, iterations=10):
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
         step = np.linalg.lstsq(weights[:, None] * slopes, -weights * best.residual[places:], rcond=RANK)[0]
         new = linearise(model, moved_states(model, best.state, (best.basis[:, columns] @ step)[None, :])[0])
-        sooner, later = (weights * np.abs(linear.residual[places:]) for linear in (best, new))
-        better = np.max(np.abs(new.residual)) < np.max(np.abs(best.residual))
-        if not (
-            better or np.max(later) < 0.5 * np.max(sooner)
-        ):  # rails that go far aside may hide behind a wheel's spin
+        before, after = (np.max(np.abs(linear.residual)) for linear in (best, new))
+        # by weights, too: a wheel's spin that grows may hide rails that come to rest
+        weighted, less = (np.max(weights * np.abs(linear.residual[places:])) for linear in (best, new))
+        if not (after < before or less < 0.5 * weighted):
             break
         best = new
     return best
