@@ -130,9 +130,8 @@ class Measured:
         y = states[:, STATE_SIZE * wheelsets + 1].copy()
         if not self.model.track.tangent:
             for k, body in enumerate(wheelsets):
-                own = np.empty((len(states), 5))
-                track_poses(self.model.track, states, STATE_SIZE * body, states[0, STATE_SIZE * body], own)
-                y[:, k] = own[:, 1]
+                at = STATE_SIZE * body
+                y[:, k] = track_poses(self.model.track, states, at, states[0, at])[0][:, 1]
         return y, np.nansum(evaluated(self.model, trajectory)[0][..., reduction.NORMAL], axis=-1)
 
     def errors(self, trajectory):

@@ -51,6 +51,60 @@ def test_in_a_curve_places_are_relative_to_the_track():
         assert found[channel][0] == pytest.approx(body[key], rel=1e-6), key
 
 
+CURVE = [{"tangent": 5}, {"transition": 20}, {"curve": 300, "radius": 1500, "cant": 0.04}]
+CLIMBING = [{"gradient": 0.0, "length": 10.0}, {"gradient": 0.02, "radius": 3000.0}]
+
+
+def bodies_at(run, i):
+    """What the channels of a run say of its bodies at an output, as a scene's ``initial.bodies``."""
+    keys = CHANNELS | {"pitch": "pitch_rad"}
+    names = [name for name in run if "/" not in name]
+    return {name: {key: float(run[name][keys[key]][i]) for key in keys if keys[key] in run[name]} for name in names}
+
+
+@pytest.mark.parametrize("at", [10, 30], ids=["transition", "curve"])
+def test_in_a_curve_too_a_run_goes_on_from_the_channels_of_another(at):
+    # a free wheelset; ground axes, as velocities once were: derailed at once
+    changes = {
+        "speed": 20, "integration.rtol": 1e-8, "output.rate": 20, "contact.creep.model": "she", "initial.y": 0.002,
+        "track.path": CURVE, "track.gradients": CLIMBING, "integration.duration": 0.05 * at + 0.25,
+    }  # fmt: skip
+    whole = wr.simulate(SCENES / "wheelset.yaml", changes)
+    later = {**changes, "initial.y": 0.0, "integration.duration": 0.25, "initial.bodies": bodies_at(whole, at)}
+    rest = wr.simulate(SCENES / "wheelset.yaml", later)
+    assert rest.status == "completed"
+    for channel in ("y_m", "yaw_rad", "roll_rad", "vx_m_per_s", "vy_m_per_s", "wz_rad_per_s"):
+        ours, theirs = rest["wheelset"][channel], whole["wheelset"][channel][at:]
+        assert np.max(np.abs(ours - theirs)) < 1e-3 * np.max(np.abs(theirs)) + 1e-6, channel
+
+
+def test_all_channels_of_bodies_can_be_written_as_a_beginning():
+    changes = {"integration.duration": 1.5, "output.rate": 20, "track.path": CURVE, "track.gradients": CLIMBING}
+    changes["contact.creep.model"] = "she"
+    bodies = bodies_at(beginning(changes), -1)
+    again = bodies_at(beginning({**changes, "integration.duration": 0.01, "initial.bodies": bodies}), 0)
+    for name, values in bodies.items():
+        assert again[name] == pytest.approx(values, rel=1e-9, abs=1e-10), name
+
+
+def test_a_body_that_follows_the_curve_moves_along_it_and_turns_and_accelerates_as_circles_say():
+    speed, radius, cant = 20.0, 400.0, 0.06
+    run = beginning({"speed": speed, "track.path": [{"transition": 20}, {"curve": 900, "radius": radius, "cant": cant}],
+                     "integration.duration": 30.0, "output.rate": 20, "contact.creep.model": "she",
+                     "output.channels": ["pose", "velocity", "acceleration"]})  # fmt: skip
+    roll = np.arcsin(cant / 1.5)  # of the track: about t, negative in a curve to the left
+    body = {name: float(np.mean(values[-100:])) for name, values in run["car_body"].items()}
+    centre = radius - body["y_m"] * np.cos(roll) - body["z_m"] * np.sin(roll)  # horizontal distance of the body's centre
+    rate = body["vx_m_per_s"] / centre
+    assert body["vx_m_per_s"] == pytest.approx(speed, rel=0.02)
+    assert abs(body["vy_m_per_s"]) < 1e-4 and abs(body["vz_m_per_s"]) < 1e-4
+    assert body["wz_rad_per_s"] == pytest.approx(rate * np.cos(roll), rel=1e-4)
+    assert body["wy_rad_per_s"] == pytest.approx(-rate * np.sin(roll), rel=1e-2)
+    assert body["ay_m_per_s2"] == pytest.approx(rate**2 * centre * np.cos(roll), rel=1e-3)
+    assert body["az_m_per_s2"] == pytest.approx(rate**2 * centre * np.sin(roll), rel=1e-2)
+    np.testing.assert_allclose(run["car_body"]["x_m"], run["car_body"]["s_m"], rtol=0, atol=0)
+
+
 def test_a_moved_wheelset_stands_on_the_rails_and_carries_its_axle_boxes():
     alone = {"wheelset_1": {"y": 0.003, "vx": 20.4, "vy": 0.1, "wz": 0.02}}
     scene = wr.load_scene(TRAILER, {"speed": 20, "initial.bodies": alone, "integration.duration": 0.02, **BOXES})

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.reduction import Y, Z
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.geometry.irregularity import IrregularityData, irregularity_at
 from wrcore.geometry.path import PathData, arc_length_of, frame_turn, rail_direction, track_frame
 from wrcore.kernels.jit import FUSED, jit
@@ -168,8 +168,8 @@ def moving_frame(track, speed, t, ahead, axes):
 
 
 @jit
-def track_poses(track, states, at, guess, out):
-    """Arc length and pose of one body in the track's frame for each row of ``states``.
+def track_poses(track, states, at, guess):
+    """Where one body is in the track's frame, and that frame, for each row of ``states``.
 
     Parameters
     ----------
@@ -179,18 +179,25 @@ def track_poses(track, states, at, guess, out):
         Start of the body's state.
     guess : float
         Arc length of the first row, roughly, m.
-    out : numpy.ndarray, shape (n, 5)
-        Filled: s, y, z (m), roll, yaw (rad) relative to the track's frame.
+
+    Returns
+    -------
+    poses : numpy.ndarray, shape (n, 6)
+        Arc length s, y, z (m), roll, yaw and pitch (rad) relative to the track's frame at s.
+    axes : numpy.ndarray, shape (n, 3, 3)
+        That frame.
     """
-    frame = np.empty((3, 3))
+    poses, axes, body = np.empty((len(states), 6)), np.empty((len(states), 3, 3)), np.empty((3, 3))
     s = guess
-    for i in range(states.shape[0]):
-        state = states[i, at : at + STATE_SIZE]
+    for i in range(len(states)):
+        state, frame, out = states[i, at : at + STATE_SIZE], axes[i], poses[i]
         s = arc_length_of(track.path, state[0], state[1], state[2], s)
         station = track_frame(track.path, s, frame)
         _, y, z = _turn_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
-        e0, e1, e2, e3 = state[3], state[4], state[5], state[6]
-        ax, ay, az = 2.0 * (e1 * e2 - e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 + e0 * e1)
-        ax, ay, az = _turn_into(frame, ax, ay, az)
-        out[i, 0], out[i, 1], out[i, 2] = s, y, z
-        out[i, 3], out[i, 4] = math.asin(min(max(az, -1.0), 1.0)), math.atan2(-ax, ay)
+        rotation_matrix(state, 0, body)
+        ax, ay, az = _turn_into(frame, body[0, 1], body[1, 1], body[2, 1])
+        _, _, forward = _turn_into(frame, body[0, 0], body[1, 0], body[2, 0])
+        _, _, upward = _turn_into(frame, body[0, 2], body[1, 2], body[2, 2])
+        out[0], out[1], out[2], out[3] = s, y, z, math.asin(min(max(az, -1.0), 1.0))
+        out[4], out[5] = math.atan2(-ax, ay), math.atan2(-forward, upward)
+    return poses, axes

@@ -114,12 +114,11 @@ def derailment(model, t, state, arc_lengths, limit=-1.0):
     -------
     str
     """
-    worst, pose = 0.0, np.empty((1, 5))
+    worst = 0.0
     for k, body in enumerate(model.bodies.wheelsets):
         y = state[STATE_SIZE * body + 1]
         if not model.track.tangent:
-            track_poses(model.track, state[None, :], STATE_SIZE * body, arc_lengths[k], pose)
-            y = pose[0, 1]
+            y = track_poses(model.track, state[None, :], STATE_SIZE * body, arc_lengths[k])[0][0, 1]
         worst = abs(y) if not abs(y) <= worst else worst
     if worst <= limit:
         return ""

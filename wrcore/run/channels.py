@@ -1,4 +1,9 @@
-"""What the channels of a run are: unit by the end of the name, and meaning."""
+"""What the channels of a run are: unit by the end of the name, and meaning.
+
+A body's channels are in the axes of the track at its centre of mass: t ahead, n left in the canted plane, b up, at the
+arc length x. Its angles are relative to them; its velocity, angular velocity and acceleration are those in inertial
+space, resolved along them.
+"""
 
 UNIT_SUFFIXES = {
     "_m3_per_m": "m^2",
@@ -20,22 +25,22 @@ UNIT_SUFFIXES = {
 
 DESCRIPTIONS = {
     "t": "time",
-    "x_m": "position along the track (body: centre of mass; contact: contact point), forward positive",
-    "s_m": "arc length along the track's centre line (tracks that are not tangent)",
-    "y_m": "lateral position in the track frame, left positive",
+    "x_m": "place along the track (body: arc length of its centre of mass; contact: contact point), forward positive",
+    "s_m": "arc length along the track's centre line, the same as x (tracks that are not tangent)",
+    "y_m": "lateral position in the track's axes, left positive",
     "z_m": "height above the plane of the rails' highest points",
-    "roll_rad": "roll about x, right-handed",
-    "pitch_rad": "pitch about y, right-handed",
-    "yaw_rad": "yaw about z, right-handed",
-    "vx_m_per_s": "velocity along x",
-    "vy_m_per_s": "velocity along y",
-    "vz_m_per_s": "velocity along z",
-    "ax_m_per_s2": "acceleration of the centre of mass along x",
-    "ay_m_per_s2": "acceleration of the centre of mass along y",
-    "az_m_per_s2": "acceleration of the centre of mass along z",
-    "wx_rad_per_s": "angular velocity about x",
-    "wy_rad_per_s": "angular velocity about y",
-    "wz_rad_per_s": "angular velocity about z",
+    "roll_rad": "roll about the track's x, right-handed",
+    "pitch_rad": "pitch about y, right-handed (bodies that do not spin)",
+    "yaw_rad": "yaw about the track's z, right-handed",
+    "vx_m_per_s": "velocity, along the track's x",
+    "vy_m_per_s": "velocity, along the track's y",
+    "vz_m_per_s": "velocity, along the track's z",
+    "ax_m_per_s2": "acceleration of the centre of mass in inertial space, along the track's x",
+    "ay_m_per_s2": "acceleration of the centre of mass in inertial space, along the track's y",
+    "az_m_per_s2": "acceleration of the centre of mass in inertial space, along the track's z",
+    "wx_rad_per_s": "angular velocity in inertial space, about the track's x",
+    "wy_rad_per_s": "angular velocity in inertial space, about the track's y",
+    "wz_rad_per_s": "angular velocity in inertial space, about the track's z",
     "rolling_rate_left_rad_per_s": "rate at which a left wheel turns that does so independently of the right one",
     "rolling_rate_right_rad_per_s": "rate at which a right wheel turns that does so independently of the left one",
     "rail_y_left_m": "displacement of the left rail under the wheelset, to the left (track that gives)",

@@ -175,16 +175,17 @@ class Course:
         wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
         work = self._workspace()
         patches, bounds, rates = evaluated(model, trajectory, work)
-        poses = self._poses(states)
+        poses, axes = self._poses(states)
         energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
         if len(states):
             self.places = Places(work.arc_lengths.copy(), poses[-1, :, 0].copy())
         groups = {}
         for body, name in enumerate(scene.vehicle.body_names):
-            own = slice(STATE_SIZE * body, STATE_SIZE * (body + 1))
-            groups[name] = _body_channels(states[:, own], rates[:, own], poses[:, body], wanted)
+            own, pitches = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), not model.bodies.spins[body]
+            place, turned = poses[:, body], axes[:, body]
+            groups[name] = _body_channels(states[:, own], rates[:, own], place, turned, wanted, pitches)
             if "pose" in wanted and not model.track.tangent:
-                groups[name]["s_m"] = poses[:, body, 0]
+                groups[name]["s_m"] = place[:, 0]
             if "pose" in wanted and body in wheelsets and len(model.support.mass):
                 groups[name] |= self._track_places(states, body)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
@@ -194,7 +195,7 @@ class Course:
                 contacts = self._contact_channels(name, patches[:, k])
                 if "contact" in wanted:
                     groups |= contacts
-                moving = {name: _body_channels(states[:, own], rates[:, own], poses[:, body], ("velocity",))}
+                moving = {name: _body_channels(states[:, own], rates[:, own], place, turned, ("velocity",))}
                 for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
                     groups[group] = groups.get(group, {}) | channels
                 if "contact" in wanted and scene.detection == "auto":
@@ -256,19 +257,19 @@ class Course:
         return work
 
     def _poses(self, states):
-        """Arc length, y, z, roll and yaw of all bodies relative to the track, shape (n, bodies, 5)."""
+        """Arc length, y, z, roll, yaw and pitch of all bodies relative to the track, (n, bodies, 6), and its axes there."""
         count = len(self.model.bodies.mass)
-        poses = np.empty((len(states), count, 5))
+        poses, axes = np.empty((len(states), count, 6)), np.broadcast_to(np.eye(3), (len(states), count, 3, 3))
+        if not self.model.track.tangent:
+            axes = axes.copy()
         for body in range(count):
             at = STATE_SIZE * body
             if self.model.track.tangent:
-                roll, _, yaw = angles(states[:, at + 3 : at + 7])
-                poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw])
+                roll, pitch, yaw = angles(states[:, at + 3 : at + 7])
+                poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw, pitch])
             else:
-                own = np.empty((len(states), 5))
-                track_poses(self.model.track, states, at, self.places.bodies[body], own)
-                poses[:, body] = own
-        return poses
+                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.places.bodies[body])
+        return poses, axes
 
 
 def evaluated(
@@ -299,17 +300,17 @@ def evaluated(
     return patches, bounds, rates
 
 
-def _body_channels(state, rate, pose, wanted):
-    """Channels of a body; its pose is relative to the track, but for x, which stays absolute."""
+def _body_channels(state, rate, pose, axes, wanted, pitches=False):
+    """Channels of a body in the axes of the track where it is; one that spins has no pitch."""
     channels: dict[str, np.ndarray] = {}
     if "pose" in wanted:
-        channels |= {"x_m": state[:, 0]}
-        channels |= dict(zip(("y_m", "z_m", "roll_rad", "yaw_rad"), pose[:, 1:].T, strict=True))
-    if "velocity" in wanted:
-        names = ("vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s", "wy_rad_per_s", "wz_rad_per_s")
-        channels |= {name: state[:, 7 + i] for i, name in enumerate(names)}
-    if "acceleration" in wanted:
-        channels |= {f"a{axis}_m_per_s2": rate[:, 7 + i] for i, axis in enumerate("xyz")}
+        names = ("x_m", "y_m", "z_m", "roll_rad", "yaw_rad", *(("pitch_rad",) if pitches else ()))
+        channels |= dict(zip(names, pose.T, strict=False))
+    kinds = {"velocity": (("v{}_m_per_s", state[:, 7:10]), ("w{}_rad_per_s", state[:, 10:13]))}
+    kinds["acceleration"] = (("a{}_m_per_s2", rate[:, 7:10]),)
+    for name, vectors in (pair for kind, pairs in kinds.items() if kind in wanted for pair in pairs):
+        along = np.einsum("nij,ni->jn", axes, vectors)
+        channels |= {name.format(axis): values for axis, values in zip("xyz", along, strict=True)}
     return channels
 
 

@@ -62,7 +62,7 @@ def quotient(vertical: np.ndarray, lateral: np.ndarray) -> np.ndarray:
 
 def rolling_speed(body: Mapping[str, np.ndarray], speed: float) -> np.ndarray | float:
     """Speed of a wheelset, m/s: that of its channels, or the scene's where a run does not hold velocities."""
-    return np.hypot(body["vx_m_per_s"], body["vy_m_per_s"]) if "vx_m_per_s" in body else speed
+    return np.linalg.norm([body[f"v{axis}_m_per_s"] for axis in "xyz"], axis=0) if "vx_m_per_s" in body else speed
 
 
 def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Callable[[], np.ndarray]]:

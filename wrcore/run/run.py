@@ -103,7 +103,8 @@ class Run:
     t : ndarray, shape (n,)
         Output times, s.
     groups : dict of str to dict of str to ndarray
-        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,); a contact's group
+        Channels by group. A body's group (``wheelset``) holds arrays of shape (n,), in the axes of the track where the
+        body is (:mod:`wrcore.run.channels`); a contact's group
         (``wheelset/left``) arrays of shape (n, patches), NaN where a patch is absent; ``energy``, if asked for, the
         whole model's energies and powers. Names carry the unit.
     counters : dict

@@ -4,6 +4,7 @@ import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_parameters, matrix_of
 from wrcore.errors import InputError, one_of
+from wrcore.geometry.path import centreline, frame_turn
 
 PLACES, ANGLES, RATES = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("vx", "vy", "vz", "wx", "wy", "wz")
 """Keys of a body, named like the channels of runs."""
@@ -21,16 +22,17 @@ def check_bodies(bodies, vehicle, source):
             raise InputError(source, f"{field}.pitch", "expected no pitch of a wheelset: its rotation is wy")
 
 
-def put_bodies(bodies, vehicle, state):
+def put_bodies(bodies, vehicle, state, path):
     """Write what a scene says of its bodies into a state on a tangent track; all else stays.
 
     Parameters
     ----------
     bodies : dict of str to dict
-        Values by name of the body and key: m, rad, m/s and rad/s in the track's axes.
+        Values by name of the body and key, as channels have them (:mod:`wrcore.run.channels`): m, rad, m/s and rad/s.
     vehicle : Vehicle
     state : numpy.ndarray
-        Changed in place.
+        Changed in place: relative to the axes of the track, which turn as they go along the path with the body.
+    path : PathData
     """
     for name, values in bodies.items():
         at = STATE_SIZE * vehicle.body_names.index(name)
@@ -39,7 +41,11 @@ def put_bodies(bodies, vehicle, state):
         if values.keys() & set(ANGLES):
             turned = np.array(angles(part[3:7]))
             part[3:7] = euler_parameters(*(values.get(key, now) for key, now in zip(ANGLES, turned, strict=True)))
-        part[7:] = [values.get(key, now) for key, now in zip(RATES, part[7:], strict=True)]
+        turn = np.array(frame_turn(centreline(path, part[0])))
+        carried = np.concatenate([np.cross(turn, [0.0, part[1], part[2]]), turn])  # by the axes, per m/s along the path
+        part[7] = values["vx"] / (1.0 + carried[0]) if "vx" in values else part[7]
+        for i, key in enumerate(RATES[1:], start=1):
+            part[7 + i] = values[key] - part[7] * carried[i] if key in values else part[7 + i]
         _carry_boxes(name, vehicle, state)
 
 

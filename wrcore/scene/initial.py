@@ -246,10 +246,12 @@ def initial_state(scene, model, at_rest=None, shared=None):
     if not model.track.tangent:
         stand_on_rails(model, state, at_rest.wheel_loads)
         state = _with_axle_boxes(vehicle, state)
-    put_bodies(moved, vehicle, state)
+    put_bodies(moved, vehicle, state, model.track.path)
     if not model.track.tangent:
-        for name, part, (s, _, _) in zip(vehicle.body_names, _parts(vehicle, state), vehicle.positions, strict=True):
-            part[:] = _on_path(model.track.path, moved.get(name, {}).get("x", s), part)
+        parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
+        moves = {name: (part[0], part[7]) for name, part in parts.items()}
+        for name, part in parts.items():  # an axle box is where its wheelset is
+            part[:] = _on_path(model.track.path, *moves[vehicle.data["bodies"][name].get("wheelset", name)], part)
     return np.concatenate([state, np.zeros(own_states(driven) - own_states(model))])
 
 
@@ -263,7 +265,7 @@ def _move(scene, model, moved, at_rest, state):
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             _roll_as_it_stands(scene, model, k, state)
         part[10:13] *= own.get("vx", part[7]) / part[7]
-    put_bodies(moved, scene.vehicle, state)
+    put_bodies(moved, scene.vehicle, state, model.track.path)
 
 
 def _parts(vehicle, state):
@@ -366,11 +368,14 @@ def _improved(standing, stands, steps):
     return stands
 
 
-def _on_path(path, s, part):
-    """State of one body at arc length s of the path, from its state at the same place of a tangent track along x."""
+def _on_path(path, s, speed, part):
+    """State of one body from that on a tangent track along x, with what is at s there (m) now at arc length s of a path.
+
+    ``speed`` is that of the path's axes along it, m/s.
+    """
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)
-    turn = frame @ np.array(frame_turn(station)) * part[7]  # the frame's own turn along the path
+    turn = frame @ np.array(frame_turn(station)) * speed
     arm = frame @ np.array([part[0] - s, part[1], part[2]])
     position = np.array([station.x, station.y, station.z]) + arm
     velocity = frame @ part[7:10] + np.cross(turn, arm)

@@ -146,9 +146,7 @@ def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.
             out[:, k, 0] = states[:, at + 1]
             out[:, k, 1:] = states[:, at + 3 : at + 7]
         else:
-            poses = np.empty((len(states), 5))
-            track_poses(model.track, states, at, starts[k], poses)
-            out[:, k] = poses
+            out[:, k] = track_poses(model.track, states, at, starts[k])[0][:, :5]
     return out
 
 
@@ -170,6 +168,6 @@ def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:
     out[..., 1] = np.nansum(lateral * cosine - normal * sine, axis=-1)
     columns = (reduction.FX, reduction.FY, reduction.MZ, reduction.XI, reduction.ETA, reduction.PHI)
     out[..., 2], out[..., 3], work = creep_work(*(patches[..., column] for column in columns))
-    vx, vy = (trajectory.states[:, STATE_SIZE * model.bodies.wheelsets + k] for k in (7, 8))
-    out[..., 4] = work * np.hypot(vx, vy)[..., None]
+    velocities = trajectory.states[:, STATE_SIZE * model.bodies.wheelsets[:, None] + [7, 8, 9]]
+    out[..., 4] = work * np.linalg.norm(velocities, axis=-1)[..., None]
     return out
