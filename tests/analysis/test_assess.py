@@ -7,6 +7,7 @@ from scipy import signal
 import wrcore as wr
 from tests.synthetic import CONTACT
 from wrcore.analysis.assess import assess, low_pass, section_table, sliding_mean, track_sections
+from wrcore.analysis.wheels import late_in
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.run import Run
@@ -14,11 +15,11 @@ from wrcore.run.run import Run
 RATE, SPEED, LOAD = 1000.0, 20.0, 60e3
 
 
-def synthetic(forces, path="tangent", duration=60.0):
+def synthetic(forces, path="tangent", duration=60.0, places=lambda t: SPEED * t):
     """Run of one wheelset; ``forces`` gives Q and Y of the wheels over time as functions of time and side (+1, -1)."""
     t = np.arange(int(duration * RATE) + 1) / RATE
-    groups = {"wheelset": {"x_m": SPEED * t, "s_m": SPEED * t, "vx_m_per_s": np.full_like(t, SPEED)}}
-    groups["wheelset"]["vy_m_per_s"] = np.zeros_like(t)
+    groups = {"wheelset": {"x_m": places(t), "s_m": places(t), "vx_m_per_s": np.full_like(t, SPEED)}}
+    groups["wheelset"] |= {"vy_m_per_s": np.zeros_like(t), "vz_m_per_s": np.zeros_like(t)}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         channels = {name: np.zeros((len(t), 3)) for name in CONTACT}
         for name in CONTACT:
@@ -51,7 +52,57 @@ def test_sliding_mean_over_the_way():
     np.testing.assert_allclose(wave[200:-200], factor * np.sin(2 * np.pi * s / 5.0)[200:-200], atol=1e-3)
     gap = 3.0 * s + 1.0
     gap[2000] = np.nan
-    assert np.isfinite(sliding_mean(s, gap)).all()
+    whole = (s > s[0] + 1.0) & (s < s[-1] - 1.0)
+    np.testing.assert_array_equal(np.isfinite(sliding_mean(s, gap)), whole)
+
+
+def test_only_whole_windows_count():
+    """A wave of 2 m has a mean of 0 over 2 m, at the ends of a run, too."""
+
+    def forces(t, sign):
+        return np.full_like(t, LOAD), 10e3 * np.cos(2 * np.pi * 10.0 * t) * (sign > 0)
+
+    for duration in (1.0, 20.0):
+        table = assess(synthetic(forces, duration=duration)).summary.set_index("quantity")
+        assert table.loc["sum_Y", "value"] < 5.0 and table.loc["Y_over_Q", "value"] < 1e-4
+    with pytest.raises(InputError, match="at least 2 m of way, got 1.9"):
+        assess(synthetic(forces, duration=0.095))
+
+
+@pytest.mark.parametrize(
+    "path", ["tangent", [{"tangent": 30.0}, {"transition": 20.0}, {"curve": 100.0, "radius": 600}]]
+)
+def test_a_run_that_rolls_back_is_assessed(path):
+    """20 m ahead, at rest for a second, then 60 m back, beyond where it began."""
+
+    def forces(t, sign):
+        return LOAD + 1e3 * sign, np.where(t > 5.0, 7e3, 4e3) * (sign > 0)
+
+    def places(t):
+        return np.interp(t, [0.0, 1.0, 2.0, 5.0], [0.0, 20.0, 20.0, -40.0])
+
+    found = assess(synthetic(forces, path, 6.0, lambda t: places(np.minimum(t, 5.0))))
+    table = found.summary.set_index("quantity")
+    assert table.loc["sum_Y", "value"] == pytest.approx(4e3, rel=1e-9)
+    assert table.loc["Q", "value"] == pytest.approx(LOAD + 1e3, rel=1e-6)
+    assert (table.loc["Q", "begin_m"], table.loc["Q", "end_m"]) == (-40.0, 20.0)
+    back = assess(synthetic(forces, path, 5.0, places), begin=2.0).summary.set_index("quantity")
+    assert back.loc["sum_Y", "begin_m"] == pytest.approx(-39.0, abs=0.03)
+    backwards = assess(synthetic(forces, path, 5.0, lambda t: -SPEED * t)).summary.set_index("quantity")
+    assert backwards.loc["sum_Y", "value"] == pytest.approx(4e3, rel=1e-9)
+
+
+def test_each_wheelset_has_its_own_limit():
+    """The heavy wheelset has the larger force, the light one is nearer to its limit."""
+    run, light = (
+        synthetic(lambda t, sign, q=q, y=y: (np.full_like(t, q), np.full_like(t, y) * (sign > 0)), duration=2.0)
+        for q, y in ((100e3, 30e3), (25e3, 20e3))
+    )
+    run.groups |= {name.replace("wheelset", "light"): channels for name, channels in light.groups.items()}
+    table = assess(run).summary.set_index("quantity")
+    assert table.loc["sum_Y", "wheelset"] == "light"
+    assert table.loc["sum_Y", "value"] == pytest.approx(20e3)
+    assert table.loc["sum_Y", "limit"] == pytest.approx(10e3 + 50e3 / 3)
 
 
 def test_sections_of_a_path():
@@ -64,6 +115,10 @@ def test_sections_of_a_path():
     )
     assert found[5] == (1010.0, 1100.0, -500.0) and np.isinf(found[0][2])
     assert len(track_sections("tangent", 1200.0)) == 4
+    assert found[6][0] == 1100.0 and found[-1] == (1900.0, 2000.0, -500.0)  # the track goes on as it ended
+    assert track_sections(path, 1100.0, -80.0)[:2] == [(-80.0, 260.0, np.inf), (260.0, 600.0, np.inf)]
+    assert track_sections(path[1:], 1030.0, -80.0)[0] == (-80.0, 0.0, np.inf)
+    assert track_sections("tangent", -5.0, -80.0) == [(-80.0, 0.0, np.inf)]
 
 
 def test_percentiles_and_limits_of_a_triangular_wave():
@@ -127,6 +182,11 @@ def test_a_run_without_what_it_takes_is_refused():
     run = synthetic(lambda t, sign: (np.full_like(t, LOAD), np.zeros_like(t)), duration=1.0)
     with pytest.raises(InputError, match="expected one of EN 14363, EN 12299"):
         wr.assess(run, "UIC 518")
+    for begin in (np.nan, -0.1, 1.001):
+        with pytest.raises(InputError, match="begin: expected 0 to 1 s"):
+            wr.assess(run, begin=begin)
+    with pytest.raises(InputError, match="expected output times"):
+        late_in(Run(run.scene, "failed", "at once", run.t[:0], {}), 0.0, "x")
     slow = Run(run.scene, "completed", "", run.t[::5], {})
     with pytest.raises(InputError, match=r"output.rate.*at least 1000 1/s in the scene, got 200"):
         section_table(slow)

@@ -19,6 +19,7 @@ from wrcore.analysis.limit_cycles import (
     shifted,
 )
 from wrcore.analysis.stability import at_speed
+from wrcore.errors import InputError
 from wrcore.run.motion import amplitude
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
@@ -151,3 +152,20 @@ def test_critical_table():
     assert (planar["nonlinear_critical_speed_m_per_s"], planar["uncertainty_m_per_s"]) == (49.0, 2.0)
     assert (planar["amplitude_m"], planar["cycle_frequency_Hz"]) == (5e-3, 7.0)
     assert math.isnan(spatial["nonlinear_critical_speed_m_per_s"])
+
+
+@pytest.mark.parametrize(("wrong", "said"), [
+    ({"resolution": math.nan}, "resolution"), ({"resolution": 0.0}, "resolution"),
+    ({"disturbances": []}, "one or more"), ({"disturbances": [0.006, math.nan]}, "disturbances"),
+    ({"disturbances": [0.06]}, "disturbances"),
+])  # fmt: skip
+def test_wrong_numbers_are_refused_before_anything_runs(wrong, said):
+    with pytest.raises(InputError, match=said):
+        limit_cycles(SCENES / "suspended_wheelset.yaml", [40.0], **wrong)
+
+
+@pytest.mark.parametrize("name", ["window", "longest", "change", "rest", "disturbance", "rate", "rtol"])
+def test_a_settling_is_made_of_positive_numbers(name):
+    for value in (math.nan, 0.0, -1.0):
+        with pytest.raises(InputError, match=f"Settling: {name}"):
+            Settling(**{name: value})

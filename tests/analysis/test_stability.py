@@ -60,6 +60,16 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
     np.testing.assert_allclose(table["damping_ratio"], ratio, rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["freight_wagon_empty", "freight_wagon_laden"])
+def test_a_two_axle_wagon_pitches_with_its_body(name):
+    """Its wheelsets spin to and fro with it: no name for what has nine tenths of its energy in the car body."""
+    scene = load_scene(SCENES / f"{name}.yaml", ["initial.y=0.0"])
+    table, _, energies = linear_modes(scene.vehicle, steady_motion(*compile_scene(scene), 30.0))
+    k = table.index[table["name"] == "car body pitch"]
+    assert len(k) == 1 and energies[k[0], 0, DIRECTIONS.index("pitch")] > 0.9
+    assert not table["name"].str.startswith("wheelset pitch").any()
+
+
 def test_lower_sway_turns_about_a_pole_below_the_centre_of_mass(trailer):
     """A point h above the centre moves by y - h roll: it rests at h = y/roll."""
     vehicle, model, state = trailer

@@ -101,6 +101,9 @@ NEEDED = (*DIRECTIONS, "roll_rad", "pitch_rad", "yaw_rad")
 RUNNING = 1.0
 """Time of the running rms of ISO 2631-1, s."""
 
+SETTLED = 1.0
+"""From this time after its start on a signal under Sperling's weighting has settled (slowest decay: 4 1/s), s."""
+
 
 def weighted(values, rate, weighting):
     """A signal after a weighting, by its response in frequency, as if it had always been at its first value.
@@ -150,10 +153,10 @@ def block_rms(values, rate, block=BLOCK):
     return np.sqrt(np.mean(np.square(np.asarray(values, float)[: count * length]).reshape(count, length), axis=1))
 
 
-def sperling(values, rate, vertical, late=slice(None)):
+def sperling(values, rate, vertical, late=True):
     """Sperling's ride index Wz of an acceleration: (sum of a^2 B^2)^(3/20), a the amplitudes of its parts in cm/s^2.
 
-    The sum is twice the mean square of the weighted signal. 3/20 is what is mostly rounded to 1/6.67.
+    The sum is twice the mean square of the weighted signal, once that has settled. 3/20 is mostly rounded to 1/6.67.
 
     Parameters
     ----------
@@ -162,15 +165,16 @@ def sperling(values, rate, vertical, late=slice(None)):
     rate : float
         1/s.
     vertical : bool
-    late : index
+    late : array_like of bool, shape (n,)
         What of the weighted signal counts.
 
     Returns
     -------
     float
     """
-    felt = 100.0 * weighted(values, rate, "B vertical" if vertical else "B lateral")[late]
-    return float((2.0 * np.mean(felt**2)) ** 0.15)
+    felt = 100.0 * weighted(values, rate, "B vertical" if vertical else "B lateral")
+    settled = np.arange(len(felt)) >= min(SETTLED * rate, len(felt) // 2)
+    return float((2.0 * np.mean(felt[settled & late] ** 2)) ** 0.15)
 
 
 def floor_accelerations(run, body):

@@ -1,0 +1,26 @@
+"""Contact over position and yaw: every pose that is asked for is in the table, or refused."""
+
+import math
+
+import pytest
+
+import wrcore as wr
+from wrcore.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+
+
+def test_all_combinations(pair):
+    table = wr.contact_table(pair, [0.0, 0.002], [0.0, 0.01], wheel_load=5e4)
+    assert len(table.groupby(["y_m", "yaw_rad"])) == 4
+
+
+@pytest.mark.parametrize(("shifts", "yaws", "column"), [
+    ([0.0, math.nan], 0.0, "y_m"), (0.0, [math.nan], "yaw_rad"), (2.0, 0.0, "y_m"), (0.0, -0.6, "yaw_rad"),
+])  # fmt: skip
+def test_a_pose_that_is_none_is_refused(pair, shifts, yaws, column):
+    with pytest.raises(InputError, match=f"contact_table: {column}: expected -"):
+        wr.contact_table(pair, shifts, yaws)
