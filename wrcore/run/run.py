@@ -116,9 +116,10 @@ class Run:
     end_t : float
         Time of the last valid state, s: the end of a completed run, else the last accepted step before whatever
         happened.
-    end_state : ndarray, shape (size,), or None
+    end_state : State, shape (size,), or None
         That state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the force
-        elements' own; :func:`wrcore.run.simulate` takes it as a start.
+        elements' own. An array that knows its time, where the moving frame is and whose it is
+        (:mod:`wrcore.run.state`): :func:`wrcore.run.simulate` takes it as a start.
 
     Examples
     --------
