@@ -7,9 +7,10 @@ What is evaluated, and where from: all recalled from EN 14363:2005 and its succe
 * Q (vertical force of a wheel): low-pass 20 Hz; limit 90 kN + Q0, at most 200 kN where 2 Q0 <= 225 kN.
 * Y_qst, Q_qst (quasi-static, full curves only): medians; limits 60 kN and 145 kN.
 
-The low-pass is a Butterworth filter of fourth order. A sliding mean over 2 m is one over the way the wheelset has gone.
-Percentiles are 0.15 %, 50 % and 99.85 % within a section; the largest absolute value of the outer two counts. What the
-standard adds, statistics over many sections, is not done: the worst section of the run is compared with the limit.
+The low-pass is a Butterworth filter of fourth order. A sliding mean over 2 m is one over the way the wheelset has gone,
+forwards or backwards, and is known where a whole window is. Q0 is the mean of Q over a wheelset's wheels and the whole
+run. Percentiles are 0.15 %, 50 % and 99.85 % within a section; the largest absolute value of the outer two counts. What
+the standard adds, statistics over many sections, is not done: the worst section of the run is compared with the limit.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
-from wrcore.analysis.wheels import wheel_forces, wheelsets_of
+from wrcore.analysis.wheels import late_in, wheel_forces, wheelsets_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import quotient
@@ -73,7 +74,7 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     ----------
     run : Run
         With contact channels, or s or x of wheelsets and Q and Y of wheels (EN 14363; at least 1000 1/s), or
-        accelerations of bodies (the others; at least 200 1/s).
+        poses and accelerations of bodies (the others; at least 200 1/s).
     standard : {"EN 14363", "EN 12299", "ISO 2631"}
     begin : float
         Start of the evaluation, s.
@@ -87,7 +88,8 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     Raises
     ------
     InputError
-        For an unknown standard, a run without the channels, or too low an output rate.
+        For an unknown standard, a run without the channels or shorter than a window of 2 m, too low an output rate,
+        or a begin that is no time of the run.
 
     Examples
     --------
@@ -102,8 +104,8 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     if standard != "EN 14363":
         table = (ride_table if standard == "EN 12299" else whole_body_table)(run, begin)
         return Assessment(standard, table, pd.DataFrame())
-    sections, wheel_load = section_table(run, begin)
-    return Assessment(standard, _summary(sections, wheel_load, 0.85 if freight else 1.0), sections)
+    sections, wheel_loads = section_table(run, begin)
+    return Assessment(standard, _summary(sections, wheel_loads, 0.85 if freight else 1.0), sections)
 
 
 def low_pass(values, rate, cut=CUT):
@@ -127,12 +129,12 @@ def low_pass(values, rate, cut=CUT):
 
 
 def sliding_mean(s, values, window=WINDOW):
-    """Mean over the way gone, a window centred at each place; at the ends over what there is of it.
+    """Mean over the way gone, a window centred at each place.
 
     Parameters
     ----------
     s : array_like, shape (n,)
-        Way gone, m, rising.
+        Way gone, m, never falling.
     values : array_like, shape (n,)
         NaN does not count.
     window : float
@@ -141,6 +143,7 @@ def sliding_mean(s, values, window=WINDOW):
     Returns
     -------
     numpy.ndarray, shape (n,)
+        NaN where the window reaches beyond an end, or all of it is NaN.
     """
     s, values = np.asarray(s, float), np.asarray(values, float)
     known = np.isfinite(values)
@@ -150,18 +153,19 @@ def sliding_mean(s, values, window=WINDOW):
         return np.interp(s + 0.5 * window, s, total) - np.interp(s - 0.5 * window, s, total)
 
     way = integral(known.astype(float))
-    return np.divide(integral(np.where(known, values, 0.0)), way, out=np.full(s.shape, np.nan), where=way > 0.0)
+    there = (way > 0.0) & (np.minimum(s - s[0], s[-1] - s) > 0.5 * window - 1e-6)
+    return np.divide(integral(np.where(known, values, 0.0)), way, out=np.full(s.shape, np.nan), where=there)
 
 
-def track_sections(path, end):
+def track_sections(path, end, begin=0.0):
     """Straight stretches and full curves of a scene's path, cut into sections of the standard's length.
 
     Parameters
     ----------
     path : str or list
         ``track.path`` of a resolved scene.
-    end : float
-        Of the way gone, m: how far what follows the path's last segment counts.
+    end, begin : float
+        Arc lengths, m: how far what follows the path's last segment, and the straight track before its first, count.
 
     Returns
     -------
@@ -169,21 +173,23 @@ def track_sections(path, end):
         Begin and end (m) and radius (m, signed; infinite where it is straight). Stretches shorter than a section are
         one; transitions belong to none.
     """
-    sections, s = [], 0.0
-    if isinstance(path, str):
-        path = [{"tangent": max(end, 0.0)}]
+    path = [{"tangent": max(end, 0.0)}] if isinstance(path, str) else path
+    s = min(begin, 0.0)
+    path = [{"tangent": path[0].get("tangent", 0.0) - s}, *path["tangent" in path[0] :]]
+    stretches = []
     for segment in path:
         kind = next(kind for kind in ("tangent", "transition", "curve") if kind in segment)
-        length = float(segment[kind])
+        radius = float(segment.get("radius", np.inf))
         if kind != "transition":
-            radius = float(segment["radius"]) if kind == "curve" else np.inf
-            target = STRAIGHT_SECTION
-            if kind == "curve":
-                target = WIDE_SECTION if abs(radius) >= TIGHT else TIGHT_SECTION
-            count = max(int(length // target), 1)
-            edges = s + length * np.arange(count + 1) / count
-            sections += [(float(a), float(b), radius) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        s += length
+            stretches.append((s, s + float(segment[kind]), radius))
+        s += float(segment[kind])
+    stretches.append((s, max(end, s), radius))
+    sections = []
+    for low, high, radius in stretches:
+        target = STRAIGHT_SECTION if np.isinf(radius) else WIDE_SECTION if abs(radius) >= TIGHT else TIGHT_SECTION
+        count = max(int((high - low) // target), 1)
+        edges = low + (high - low) * np.arange(count + 1) / count
+        sections += [(float(a), float(b), radius) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
     return sections
 
 
@@ -200,67 +206,75 @@ def section_table(run, begin=0.0):
     -------
     pandas.DataFrame
         Columns section, begin_m, end_m, radius_m, quantity, wheelset, side, p0_15, p50, p99_85 (N; Y/Q a number).
-    wheel_load : float
-        Q0: mean of Q over all wheels and the whole run, N.
+    wheel_loads : dict of str to float
+        Q0 of each wheelset: mean of Q over its wheels and the whole run, N.
 
     Raises
     ------
     InputError
-        For a run without wheels, or with too low a rate.
+        For a run without wheels, with too low a rate, shorter than a window, or nothing after ``begin``.
     """
-    rate = rate_of(run, LEAST_RATE, "EN 14363")
+    rate, late = rate_of(run, LEAST_RATE, "EN 14363"), late_in(run, begin, "EN 14363")
     wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]
     if not wheels or not all(wheel.follows("Q_N") and wheel.follows("Y_N") for wheel in wheels):
         raise InputError("EN 14363", "run", "expected the channels of contacts, or Q and Y, of wheels")
-    late, rows, loads = run.t >= begin, [], []
-    for name in wheelsets_of(run):
-        body = run[name]
-        s = body.s_m if "s_m" in body else body.x_m
-        sections = track_sections(run.scene.get("track", {}).get("path", "tangent"), s[-1])
+    rows, loads = [], {}
+    places = {name: run[name]["s_m" if "s_m" in run[name] else "x_m"] for name in wheelsets_of(run)}
+    reach = max(map(np.max, places.values())), min(map(np.min, places.values()))
+    sections = track_sections(run.scene.get("track", {}).get("path", "tangent"), *reach)
+    for name, s in places.items():
+        way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(s)))])
+        if way[-1] < WINDOW:
+            raise InputError("EN 14363", "run", f"expected at least {WINDOW:g} m of way, got {way[-1]:.3g} m of {name}")
         forces = {side: wheel_forces(run, name, side) for side in SIDES}
-        loads += [np.mean(forces[side][0]) for side in SIDES]
-        for quantity, side, values in _filtered(forces, s, rate):
+        loads[name] = float(np.mean([forces[side][0] for side in SIDES]))
+        for quantity, side, values in _filtered(forces, way, rate):
             for number, (low, high, radius) in enumerate(sections):
                 inside = late & (s >= low) & (s <= high) & np.isfinite(values)
                 if quantity.endswith("_qst") and np.isinf(radius) or np.count_nonzero(inside) < 2:
                     continue
                 found = np.percentile(values[inside], PERCENTILES)
-                place = (number, max(low, s[inside][0]), min(high, s[inside][-1]), radius)
+                place = (number, s[inside].min(), s[inside].max(), radius)
                 rows.append((*place, quantity, name, side, *found))
     columns = ["section", "begin_m", "end_m", "radius_m", "quantity", "wheelset", "side", "p0_15", "p50", "p99_85"]
-    return pd.DataFrame(rows, columns=columns), float(np.mean(loads))
+    return pd.DataFrame(rows, columns=columns), loads
 
 
-def _filtered(forces, s, rate):
+def _filtered(forces, way, rate):
     """Quantity, side and filtered signal of a wheelset and its wheels."""
-    yield "sum_Y", "", sliding_mean(s, sum(SIDES[side] * forces[side][1] for side in SIDES))
+    yield "sum_Y", "", sliding_mean(way, sum(SIDES[side] * forces[side][1] for side in SIDES))
     for side in SIDES:
         vertical, lateral = forces[side]
-        yield "Y_over_Q", side, sliding_mean(s, quotient(vertical, lateral))
+        yield "Y_over_Q", side, sliding_mean(way, quotient(vertical, lateral))
         load = low_pass(vertical, rate)
         yield "Q", side, load
         yield "Q_qst", side, load
         yield "Y_qst", side, low_pass(lateral, rate)
 
 
-def _summary(sections, wheel_load, freight):
-    """Worst value of each quantity, where it was found, and the limit."""
-    limits = {
+def _limits(wheel_load, freight):
+    return {
         "sum_Y": freight * (10e3 + 2.0 * wheel_load / 3.0),
         "Y_over_Q": 0.8,
         "Q": min(90e3 + wheel_load, 200e3) if 2.0 * wheel_load <= 225e3 else np.nan,
         "Y_qst": 60e3,
         "Q_qst": 145e3,
     }
-    rows = []
-    for quantity, limit in limits.items():
+
+
+def _summary(sections, wheel_loads, freight):
+    """Worst value of each quantity by its wheelset's own limit, where it was found, and the limit."""
+    limits, rows = {name: _limits(load, freight) for name, load in wheel_loads.items()}, []
+    for quantity in _limits(0.0, freight):
         part = sections[sections["quantity"] == quantity]
         if part.empty:
             continue
         size = part["p50"].abs() if quantity.endswith("_qst") else part[["p0_15", "p99_85"]].abs().max(axis=1)
-        worst = part.loc[size.idxmax()]
+        limit = part["wheelset"].map(lambda name, quantity=quantity: limits[name][quantity])
+        share = size / limit
+        at = (share if share.notna().any() else size).idxmax()
         rows.append(
-            {"quantity": quantity, "value": size.max(), "limit": limit, "share": size.max() / limit}
-            | {key: worst[key] for key in ("wheelset", "side", "begin_m", "end_m", "radius_m")}
+            {"quantity": quantity, "value": size[at], "limit": limit[at], "share": share[at]}
+            | {key: part.loc[at, key] for key in ("wheelset", "side", "begin_m", "end_m", "radius_m")}
         )
     return pd.DataFrame(rows)

@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
-from wrcore.contact.poses import solve_poses
+from wrcore.contact.poses import POSE_LIMITS, solve_poses
+from wrcore.errors import check_number
 from wrcore.geometry.track import Track
 
 
@@ -41,7 +42,7 @@ def contact_table(
     pair : WheelsetOnTrack
         With equal sides.
     shifts, yaws : array_like
-        Lateral positions (m) and yaw angles (rad) of the wheelset; all combinations.
+        Lateral positions (within 0.1 m) and yaw angles (within 0.5 rad) of the wheelset; all combinations.
     wheel_load : float
         Vertical load of each wheel, N; the default is a wheelset that just touches.
     detection : {"planar", "spatial"}
@@ -52,6 +53,11 @@ def contact_table(
     pandas.DataFrame
         y_m, yaw_rad and the columns of :func:`wrcore.contact.poses.solve_poses`, a row per patch.
 
+    Raises
+    ------
+    InputError
+        For a pose out of these bounds, an unknown choice, or a load in another unit.
+
     Examples
     --------
     >>> import wrcore as wr
@@ -60,6 +66,9 @@ def contact_table(
     [[0.0, 'left', 1], [0.0, 'right', 1], [0.002, 'left', 1], [0.002, 'right', 1]]
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
+    for name, values in (("y_m", y), ("yaw_rad", yaw)):
+        for value in values:
+            check_number(value, -POSE_LIMITS[name], POSE_LIMITS[name], "contact_table", name)
     poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
     patches = solve_poses(poses, pair_geometry(pair), wheel_load, detection, patch)
     placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))

@@ -4,7 +4,8 @@ Sources, recalled, not read. Damage per passage over T gamma, whole life rail mo
 below 15 N, most, 1e-5, at 65 N, none at 175 N, beyond which wear takes cracks away faster than they grow (0 here; the
 model's negative branch is left out). Index of surface fatigue: Ekberg, Kabo and Andersson, Fatigue and Fracture of
 Engineering Materials and Structures 25 (2002) 899-909: FI = |T|/N - 2 pi a b k/(3 N) = |T|/N - k/p_max, above 0 where
-the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24).
+the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 35 (1975) 1-24). Both belong to a patch;
+a wheel has those of its worst one.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.style import styled
-from wrcore.analysis.wheels import greatest_pressure, wear_number, wheelsets_of
+from wrcore.analysis.wheels import greatest_pressure, late_in, wear_number, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.geometry.surface import SIDES
 
@@ -52,14 +53,19 @@ def rcf_damage(wear_number):
 
 
 def utilised_friction(run, wheelset, side):
-    """Largest |T|/N over a wheel's patches over time, shape (n,); 0 without contact."""
+    """|T|/N of a wheel's patches over time, shape (n, patches); NaN without contact."""
     c = run[f"{wheelset}/{side}"]
-    share = np.hypot(c.Fx_N, c.Fy_N) / np.where(c.N_N > 0.0, c.N_N, np.nan)
-    return np.max(np.nan_to_num(share), axis=1)
+    return np.hypot(c.Fx_N, c.Fy_N) / np.where(c.N_N > 0.0, c.N_N, np.nan)
+
+
+def passage_damage(run, wheelset, side):
+    """Damage of a passage (`rcf_damage`) under a wheel's worst patch over time, shape (n,); 0 without contact."""
+    c = run[f"{wheelset}/{side}"]
+    return np.max(rcf_damage(np.nan_to_num(np.abs(c.Fx_N * c.xi + c.Fy_N * c.eta))), axis=1)
 
 
 def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
-    """Index of surface fatigue FI of a wheel over time, shape (n,); -inf without contact.
+    """Index of surface fatigue FI of a wheel's worst patch over time, shape (n,); -inf without contact.
 
     Parameters
     ----------
@@ -69,9 +75,8 @@ def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
     shear_yield : float
         k, Pa.
     """
-    pressure = greatest_pressure(run, wheelset, side)
-    less = np.divide(shear_yield, pressure, out=np.full(pressure.shape, np.inf), where=pressure > 0.0)
-    return utilised_friction(run, wheelset, side) - less
+    index = utilised_friction(run, wheelset, side) - shear_yield / run[f"{wheelset}/{side}"].p_max_Pa
+    return np.max(np.where(np.isnan(index), -np.inf, index), axis=1)
 
 
 def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> pd.DataFrame:
@@ -89,7 +94,7 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     -------
     pandas.DataFrame
         A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share of the time with
-        FI above 0, p_max_Pa.
+        FI above 0, p_max_Pa. Damage and FI are those of the worst patch at each time; T gamma is the sum over patches.
 
     Raises
     ------
@@ -103,16 +108,15 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     >>> wr.damage_table(run)[["wheelset", "side"]].values.tolist()
     [['wheelset', 'left'], ['wheelset', 'right']]
     """
-    if not wheelsets_of(run) or not np.any(run.t >= begin):
-        raise InputError("damage_table", "run", f"expected the channels of wheels after {begin:g} s")
-    late, rows = run.t >= begin, []
+    if not wheelsets_of(run):
+        raise InputError("damage_table", "run", "expected the channels of wheels")
+    late, rows = late_in(run, begin, "damage_table"), []
     for wheelset in wheelsets_of(run):
         for side in SIDES:
-            number = wear_number(run, wheelset, side)[late]
             index = fatigue_index(run, wheelset, side, shear_yield)[late]
             rows.append({
-                "wheelset": wheelset, "side": side, "T_gamma_mean_N": number.mean(),
-                "rcf_damage_mean": rcf_damage(number).mean(), "FI_max": index.max(),
+                "wheelset": wheelset, "side": side, "T_gamma_mean_N": wear_number(run, wheelset, side)[late].mean(),
+                "rcf_damage_mean": passage_damage(run, wheelset, side)[late].mean(), "FI_max": index.max(),
                 "share_above_shakedown": np.mean(index > 0.0),
                 "p_max_Pa": greatest_pressure(run, wheelset, side)[late].max(),
             })  # fmt: skip
@@ -121,7 +125,7 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
 
 @styled
 def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> Figure:
-    """Shakedown map: greatest pressure over k against utilised friction, all wheels and times.
+    """Shakedown map: greatest pressure over k against utilised friction, all patches and times.
 
     Parameters
     ----------
@@ -140,13 +144,13 @@ def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_S
     'utilised friction |T|/N'
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
-    axes, late, top = figure.subplots(), run.t >= begin, 0.0
+    axes, late, top = figure.subplots(), late_in(run, begin, "plot_shakedown"), 0.0
     for wheelset in wheelsets_of(run):
         for side, mark in zip(SIDES, ("o", "^"), strict=True):
-            pressure = greatest_pressure(run, wheelset, side)[late] / shear_yield
-            axes.plot(utilised_friction(run, wheelset, side)[late], pressure, mark, markersize=2.5, alpha=0.5,
+            pressure = run[f"{wheelset}/{side}"].p_max_Pa[late].ravel() / shear_yield
+            axes.plot(utilised_friction(run, wheelset, side)[late].ravel(), pressure, mark, markersize=2.5, alpha=0.5,
                       markeredgewidth=0.0, label=f"{wheelset.replace('_', ' ')}, {side}")  # fmt: skip
-            top = max(top, pressure.max())
+            top = max(top, np.max(np.nan_to_num(pressure)))
     friction = np.linspace(0.1, 0.6, 200)
     axes.plot(friction, 1.0 / friction, "k-", label="shakedown limit of the surface")
     axes.set(xlabel="utilised friction |T|/N", ylabel="greatest pressure over k", xlim=(0.0, 0.6),

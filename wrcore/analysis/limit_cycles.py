@@ -16,6 +16,7 @@ import pandas as pd
 
 from wrcore.analysis.stability import at_speed, rising, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.errors import InputError, check_number
 from wrcore.integrate.integrator import integrate
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulate import DERAILED_Y
@@ -63,6 +64,10 @@ class Settling:
     rate: float = 500.0
     method: str = "auto"
     rtol: float = 1e-5
+
+    def __post_init__(self) -> None:
+        for name in ("window", "longest", "change", "rest", "disturbance", "rate", "rtol"):
+            check_number(getattr(self, name), 1e-12, 1e6, "Settling", name)
 
 
 def _run(model, state, settling):
@@ -208,14 +213,19 @@ def limit_cycles(
     settling : Settling, optional
         Left out: its defaults.
     disturbances : sequence of float
-        Sideways shifts of the vehicle that may end on a cycle, m.
+        Sideways shifts of the vehicle that may end on a cycle, one or more, within 0.05 m.
     resolution : float
-        Of the lowest speed with a limit cycle, m/s.
+        Of the lowest speed with a limit cycle, m/s, at least 1e-3.
 
     Returns
     -------
     pandas.DataFrame
         Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
+
+    Raises
+    ------
+    InputError
+        For speeds that do not rise, a number out of bounds, or no disturbance.
 
     Examples
     --------
@@ -230,6 +240,10 @@ def limit_cycles(
     3   rising           65.0  irregular
     """
     speeds, settling = rising(speeds), settling or Settling()
+    check_number(resolution, 1e-3, 150.0, "limit_cycles", "resolution", "m/s")
+    disturbances = [check_number(y, -DERAILED_Y, DERAILED_Y, "limit_cycles", "disturbances", "m") for y in disturbances]
+    if not disturbances:
+        raise InputError("limit_cycles", "disturbances", "expected one or more, got none")
     model, state = straight_ahead(as_scene(scene))
     tables = {
         "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),

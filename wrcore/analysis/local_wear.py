@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
-from wrcore.analysis.wheels import wheelsets_of
+from wrcore.analysis.wheels import late_in, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError
+from wrcore.errors import InputError, check_number
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import rolling_speed
 from wrcore.scene.friction import read_friction
@@ -79,7 +79,7 @@ def local_wear(
     law : {"sheffield", "energy"} or mapping
         See :func:`wrcore.analysis.wear_laws.wear_law`.
     width : float
-        Of the bins, m.
+        Of the bins, 1e-6 to 0.1 m.
 
     Returns
     -------
@@ -104,13 +104,11 @@ def local_wear(
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):
         raise InputError("local_wear", "output.channels", "expected the channels of poses, for the rolling radius")
-    if not np.any(run.t >= begin):
-        raise InputError("local_wear", "begin", f"expected a time within the run, got {begin:g} s")
+    width, late = check_number(width, 1e-6, 0.1, "local_wear", "width", "m"), late_in(run, begin, "local_wear")
     wheels = [(name, side) for name in wheelsets_of(run) for side in SIDES]
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")
     check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
-    late = run.t >= begin
     return {
         (name, side): _wheel_wear(run[f"{name}/{side}"], late, run[name], SIDES[side], run.scene, loss, width)
         for name, side in wheels

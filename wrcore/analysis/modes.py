@@ -13,11 +13,13 @@ Bodies form families: those named alike up to a number and a side (``bogie_1`` a
 * *hunting*: oscillates (damping ratio below `LIGHT`); wheelsets roll where they point, y' = V psi (the two differ by
   less than half of their sum); they have more energy sideways than in yaw, in both together at least `HUNTING` and two
   thirds of that of any family but the heaviest;
-* else *surge, lateral, bounce, roll, pitch, yaw*: the coordinate with most energy. Of the heaviest family, lateral
-  motion and roll come together: *lower sway* about a pole below its centre of mass, *upper sway* about one above.
+* else *surge, lateral, bounce, roll, pitch, yaw*: the coordinate with most energy of the family with most energy. Of
+  the heaviest family, lateral motion and roll come together: *lower sway* about a pole below its centre of mass,
+  *upper sway* about one above.
 
-Hunting and what follows it are named after the heaviest family that moves at least half as much in that coordinate
-as the one that moves most. A family's front and rear half move *in phase* or *in antiphase*, or one of them alone.
+Hunting is named after the heaviest family that moves at least half as much sideways as the one that moves most, what
+follows it after the heaviest that moves at least half as much in its coordinate as the one with most energy. A family's
+front and rear half move *in phase* or *in antiphase*, or one of them alone.
 """
 
 import re
@@ -108,9 +110,9 @@ class _Namer:
         elif family == self.rolling and direction in (Z, ROLL):
             return self._with_phase(f"{family} contact {WORDS[direction]}", family, direction, speed)
         elif self._hunts(eigenvalue, energy, place):
-            family = self._carrier(Y, speed)
+            family = self._carrier(Y, speed, self.groups)
             return self._with_phase(f"{family} hunting", family, Y, speed)
-        family = self._carrier(direction, speed)
+        family = self._carrier(direction, speed, [family])
         word = WORDS[direction]
         if family == self.heaviest != self.rolling and direction in (Y, ROLL):
             first = self.groups[family][0]
@@ -129,10 +131,10 @@ class _Namer:
         leads = sideways[self.rolling] >= max(others, default=0.0) / 1.5
         return bool(rolls and own[Y] > own[YAW] and leads and sideways[self.rolling] >= HUNTING)
 
-    def _carrier(self, direction, speed):
-        """The heaviest family that moves at least half as much as the one that moves most."""
+    def _carrier(self, direction, speed, leaders):
+        """The heaviest family that moves at least half as much as the one of the leaders that moves most."""
         moves = {name: np.max(np.abs(speed[members, direction])) for name, members in self.groups.items()}
-        return next(name for name, move in moves.items() if move >= 0.5 * max(moves.values()))
+        return next(name for name in moves if moves[name] >= 0.5 * max(moves[leader] for leader in leaders))
 
     def _with_phase(self, name, family, direction, speed):
         """The name, and how the family's front and rear half move."""

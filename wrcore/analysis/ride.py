@@ -1,10 +1,15 @@
 """Ride of a run's bodies: frequency weightings of accelerations, comfort and Sperling's index.
 
+Accelerations are what accelerometers on a body's floor show: in the body's own axes, with the part of gravity that its
+and the track's roll and pitch bring in. A signal is weighted whole, before what is evaluated is cut out of it.
+
 Sources. Weightings Wk, Wd and Wb with its gain: table of ISO 8041 as an instrument's manual prints it (Larson Davis
 HVM200, table 3.1; read). Recalled, not read: ISO 2631-1:1997 (weighted rms, vibration total value with factors 1 as
 for comfort of the seated, crest factor, MTVV over 1 s, VDV); EN 12299:2009 (mean comfort N_MV = 6 sqrt(sum of the
-squares of the 95th percentiles of weighted rms values over 5 s)); Sperling and Betzhold (1956) in the form of Garg and
-Dukkipati (1984). The tests hold Wk and Wd against values of ISO 2631-1's table 3, recalled too.
+squares of the 95th percentiles of weighted rms values over 5 s)); Sperling and Betzhold (1956), Wz = 0.896 (a^3
+F(f)/f)^(1/10) of a sine of amplitude a in cm/s^2, in the form of Garg and Dukkipati (1984), (a B)^(3/10), whose squares
+add up over frequencies. The tests hold Wk and Wd against values of ISO 2631-1's table 3, recalled too, and Wz against
+the older form.
 """
 
 from typing import NamedTuple
@@ -12,7 +17,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from wrcore.analysis.wheels import late_in, wheelsets_of
 from wrcore.errors import InputError, one_of
+from wrcore.geometry.path import track_frame
+from wrcore.geometry.track import build_track
+from wrcore.vehicle.description import GRAVITY
 
 BLOCK = 5.0
 """Length of the stretches that comfort is evaluated over, s."""
@@ -60,12 +69,25 @@ class Weighting(NamedTuple):
         return out
 
 
+class Comfort(NamedTuple):
+    """Weighting B of Sperling's index: the filter without delay that has Garg and Dukkipati's B(f), times a factor."""
+
+    factor: float
+
+    def response(self, frequency):
+        """As of :class:`Weighting`."""
+        s = 1j * np.asarray(frequency, float)
+        return self.factor * s * (np.sqrt(1.911) + 0.25 * s) / (1.0 + s * (1.563 + s * (0.277 + s * 0.0368)))
+
+
 WEIGHTINGS = {
     "Wk": Weighting(0.4, 100.0, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91),
     "Wd": Weighting(0.4, 100.0, 2.0, 2.0, 0.63),
     "Wb": Weighting(0.4, 100.0, 16.0, 16.0, 0.55, 2.5, 0.9, 4.0, 0.95, 1.024),
+    "B vertical": Comfort(0.588),
+    "B lateral": Comfort(0.737),
 }
-"""By name: vertical and horizontal of ISO 2631-1, vertical of EN 12299."""
+"""By name: vertical and horizontal of ISO 2631-1, vertical of EN 12299, both of Sperling."""
 
 DIRECTIONS = {"ax_m_per_s2": "Wd", "ay_m_per_s2": "Wd", "az_m_per_s2": "Wb"}
 """Weighting of each acceleration in EN 12299."""
@@ -73,19 +95,22 @@ DIRECTIONS = {"ax_m_per_s2": "Wd", "ay_m_per_s2": "Wd", "az_m_per_s2": "Wb"}
 DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}
 """The same in ISO 2631-1."""
 
+NEEDED = (*DIRECTIONS, "roll_rad", "pitch_rad", "yaw_rad")
+"""Channels of a body whose ride is evaluated; one that spins has no pitch."""
+
 RUNNING = 1.0
 """Time of the running rms of ISO 2631-1, s."""
 
 
 def weighted(values, rate, weighting):
-    """A signal after a weighting, by its response in frequency; from rest, without periodic continuation.
+    """A signal after a weighting, by its response in frequency, as if it had always been at its first value.
 
     Parameters
     ----------
     values : array_like, shape (n,)
     rate : float
         1/s.
-    weighting : {"Wk", "Wd", "Wb"}
+    weighting : {"Wk", "Wd", "Wb", "B vertical", "B lateral"}
 
     Returns
     -------
@@ -99,8 +124,8 @@ def weighted(values, rate, weighting):
     if weighting not in WEIGHTINGS:
         raise InputError("weighted", "weighting", one_of(WEIGHTINGS, weighting))
     values = np.asarray(values, float)
-    size = 2 * len(values)
-    spectrum = np.fft.rfft(values, size) * WEIGHTINGS[weighting].response(np.fft.rfftfreq(size, 1.0 / rate))
+    size = 2 * len(values)  # nothing comes back from the end
+    spectrum = np.fft.rfft(values - values[0], size) * WEIGHTINGS[weighting].response(np.fft.rfftfreq(size, 1.0 / rate))
     return np.fft.irfft(spectrum, size)[: len(values)]
 
 
@@ -125,8 +150,10 @@ def block_rms(values, rate, block=BLOCK):
     return np.sqrt(np.mean(np.square(np.asarray(values, float)[: count * length]).reshape(count, length), axis=1))
 
 
-def sperling(values, rate, vertical):
-    """Sperling's ride index Wz of an acceleration: (integral of a^2 B^2)^(1/6.67), a in cm/s^2 rms.
+def sperling(values, rate, vertical, late=slice(None)):
+    """Sperling's ride index Wz of an acceleration: (sum of a^2 B^2)^(3/20), a the amplitudes of its parts in cm/s^2.
+
+    The sum is twice the mean square of the weighted signal. 3/20 is what is mostly rounded to 1/6.67.
 
     Parameters
     ----------
@@ -135,26 +162,58 @@ def sperling(values, rate, vertical):
     rate : float
         1/s.
     vertical : bool
+    late : index
+        What of the weighted signal counts.
 
     Returns
     -------
     float
     """
-    values = 100.0 * np.asarray(values, float)
-    spectrum = np.abs(np.fft.rfft(values - values.mean())) ** 2 / len(values) ** 2
-    spectrum[1 : len(values) - len(spectrum) + 1] *= 2.0  # the negative frequencies
-    f = np.fft.rfftfreq(len(values), 1.0 / rate)
-    square = (1.911 * f**2 + (0.25 * f**2) ** 2) / ((1.0 - 0.277 * f**2) ** 2 + (1.563 * f - 0.0368 * f**3) ** 2)
-    return float(np.sum(spectrum * (0.588 if vertical else 0.737) ** 2 * square) ** (1.0 / 6.67))
+    felt = 100.0 * weighted(values, rate, "B vertical" if vertical else "B lateral")[late]
+    return float((2.0 * np.mean(felt**2)) ** 0.15)
 
 
-def ride_table(run, begin=0.0):
-    """Comfort of a run's bodies at their centres of mass.
+def floor_accelerations(run, body):
+    """What accelerometers on a body's floor show, at its centre of mass; nothing where it stands on level track.
 
     Parameters
     ----------
     run : Run
-        With the channels ax, ay and az.
+    body : str
+        With the channels `NEEDED`, in the track's axes.
+
+    Returns
+    -------
+    dict of str to numpy.ndarray
+        By the keys of `DIRECTIONS`, in the body's own axes, m/s^2.
+    """
+    from scipy.spatial.transform import Rotation
+
+    channels = run[body]
+    moved = np.stack([channels[name] for name in DIRECTIONS], axis=-1) + GRAVITY * _upright(run, channels)
+    axes = Rotation.from_euler("ZXY", np.stack([channels[f"{name}_rad"] for name in ("yaw", "roll", "pitch")], axis=-1))
+    return dict(zip(DIRECTIONS, (axes.inv().apply(moved) - [0.0, 0.0, GRAVITY]).T, strict=True))
+
+
+def _upright(run, channels):
+    """The upright direction in the track's axes where a body is, shape (n, 3)."""
+    out, frame = np.tile([0.0, 0.0, 1.0], (len(run.t), 1)), np.empty((3, 3))
+    if "s_m" in channels:
+        plan = {key: value for key, value in run.scene["track"].items() if key not in ("irregularity", "support")}
+        path = build_track(plan, "run").path
+        for row, s in zip(out, channels.s_m, strict=True):
+            track_frame(path, s, frame)
+            row[:] = frame[2]
+    return out
+
+
+def ride_table(run, begin=0.0):
+    """Comfort of a run's bodies at their centres of mass, in their own axes.
+
+    Parameters
+    ----------
+    run : Run
+        With the channels of poses and accelerations.
     begin : float
         Start of the evaluation, s.
 
@@ -172,9 +231,9 @@ def ride_table(run, begin=0.0):
     rate, late, bodies = _bodies(run, begin, BLOCK)
     rows = []
     for body in bodies:
+        felt = floor_accelerations(run, body)
         blocks = {
-            name: block_rms(weighted(run[body][name][late], rate, weighting), rate)
-            for name, weighting in DIRECTIONS.items()
+            name: block_rms(weighted(felt[name], rate, weighting)[late], rate) for name, weighting in DIRECTIONS.items()
         }
         high = {f"{name[:2]}_weighted_95_m_per_s2": float(np.percentile(b, 95.0)) for name, b in blocks.items()}
         rows.append(
@@ -182,20 +241,20 @@ def ride_table(run, begin=0.0):
             | high
             | {
                 "N_MV": 6.0 * float(np.sqrt(sum(value**2 for value in high.values()))),
-                "Wz_lateral": sperling(run[body].ay_m_per_s2[late], rate, vertical=False),
-                "Wz_vertical": sperling(run[body].az_m_per_s2[late], rate, vertical=True),
+                "Wz_lateral": sperling(felt["ay_m_per_s2"], rate, False, late),
+                "Wz_vertical": sperling(felt["az_m_per_s2"], rate, True, late),
             }
         )
     return pd.DataFrame(rows)
 
 
 def whole_body_table(run, begin=0.0):
-    """Whole-body vibration at the centres of mass of a run's bodies by ISO 2631-1.
+    """Whole-body vibration at the centres of mass of a run's bodies, in their own axes, by ISO 2631-1.
 
     Parameters
     ----------
     run : Run
-        With the channels ax, ay and az.
+        With the channels of poses and accelerations.
     begin : float
         Start of the evaluation, s.
 
@@ -214,9 +273,9 @@ def whole_body_table(run, begin=0.0):
     rate, late, bodies = _bodies(run, begin, RUNNING)
     rows = []
     for body in bodies:
-        own = []
+        own, felt = [], floor_accelerations(run, body)
         for name, weighting in DIRECTIONS_ISO.items():
-            values = weighted(run[body][name][late], rate, weighting)
+            values = weighted(felt[name], rate, weighting)[late]
             rms = float(np.sqrt(np.mean(values**2)))
             window = round(RUNNING * rate)
             sums = np.cumsum(np.concatenate([[0.0], values**2]))
@@ -232,12 +291,11 @@ def whole_body_table(run, begin=0.0):
 
 
 def _bodies(run, begin, least):
-    """Output rate, times that count, and the bodies without wheels that have accelerations."""
-    rate, late = rate_of(run, LEAST_RATE, "ride"), run.t >= begin
-    wheels = {group.split("/")[0] for group in run if "/" in group}
-    bodies = [group for group in run if group not in wheels and set(DIRECTIONS) <= set(run[group])]
+    """Output rate, times that count, and the bodies without wheels that have poses and accelerations."""
+    rate, late = rate_of(run, LEAST_RATE, "ride"), late_in(run, begin, "ride")
+    bodies = [group for group in run if group not in wheelsets_of(run) and set(NEEDED) <= set(run[group])]
     if not bodies:
-        raise InputError("ride", "channels", f"expected a body without wheels that has {', '.join(DIRECTIONS)}")
+        raise InputError("ride", "channels", f"expected a body without wheels that has {', '.join(NEEDED)}")
     if np.count_nonzero(late) < least * rate:
         raise InputError("ride", "begin", f"expected at least {least:g} s of the run after it, got {begin:g} s")
     return rate, late, bodies

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from wrcore.errors import InputError, check_number
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import forces_on_rail, quotient
 from wrcore.run.motion import growth_rate, hunting_frequency
@@ -25,6 +26,14 @@ SMALLEST = 1e-6
 def wheelsets_of(run):
     """Names of a run's wheelsets, in the order of their groups."""
     return [name for name in run.groups if f"{name}/left" in run.groups]
+
+
+def late_in(run, begin, what):
+    """Which output times of a run an evaluation that begins at a time (s) counts, shape (n,); others are refused."""
+    if not len(run.t):
+        raise InputError(what, "run", "expected output times, but it ended before the first")
+    check_number(begin, min(0.0, run.t[0]), run.t[-1], what, "begin", "s")
+    return run.t >= begin
 
 
 def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.ndarray]:
@@ -169,7 +178,7 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     >>> (1e-3 * wr.wheel_table(run).set_index("side")["Q_mean_N"]).round().to_dict()
     {'left': 55.0, 'right': 55.0}
     """
-    late = run.t >= begin
+    late = late_in(run, begin, "wheel_table")
     rows = []
     for wheelset in wheelsets_of(run):
         for side in SIDES:
