@@ -46,9 +46,10 @@ def simulate(
         and somebody watches (a terminal or a notebook, not a log); False: none.
     start : Checkpoint, ndarray of shape (size,), or "initial"
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
-        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit), its
-        ``end_state``, which knows its time and where the moving frame is (the same vehicle; all else may differ), or
-        an array as a state at time 0. The scene's ``initial`` does not count then.
+        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit, which
+        on another processor it is not), its ``end_state``, which knows its time and where the moving frame is (the
+        same vehicle; all else may differ), or an array as a state at time 0. The scene's ``initial`` does not count
+        then.
     **changes
         Further values by key, as :func:`wrcore.load_scene` takes them.
 
