@@ -1,5 +1,7 @@
 """Digests of runs, tables and commands, to compare the code before and after a change that must not move a bit.
 
+Both on one machine: another processor's code rounds differently.
+
 python tests/same_bits.py write before.json
 python tests/same_bits.py compare before.json
 """

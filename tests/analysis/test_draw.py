@@ -1,5 +1,6 @@
 """Pictures for users: everything of a vehicle file is in its drawing, a run moves as its channels say, no network."""
 
+import dataclasses
 import json
 import re
 from html.parser import HTMLParser
@@ -16,6 +17,7 @@ from tests.synthetic import hunting_run
 from wrcore.analysis.legible import findings
 from wrcore.analysis.plot_vehicle import box_of
 from wrcore.cli import main
+from wrcore.errors.checked_yaml import _schema
 
 VEHICLES = sorted(path.stem for path in SCENES.glob("*.yaml"))
 
@@ -38,6 +40,43 @@ def test_a_drawing_holds_everything_of_the_vehicle_file_in_both_views(name, tmp_
     assert all(item["name"] in texts for item in data.get("elements", []) + data.get("joints", []))
 
 
+KINDS = _schema("vehicle")["properties"]
+ELEMENTS = {
+    "spring_damper": {"stiffness": [1e5, 1e5, 1e5]}, "bushing": {"stiffness": [1e5, 1e5, 1e5]},
+    "shear_spring": {"stiffness": [1e5, 1e5, 1e6]}, "air_spring": {"effective_area": 0.2, "volume": 0.05},
+    "damper": {"damping": [1e3, 1e3, 1e3]}, "friction": {"direction": "x", "force": 1e3, "series_stiffness": 1e6},
+    "bump_stop": {"direction": "y", "gap": 0.02, "stiffness": 1e6}, "anti_roll_bar": {"stiffness": 1e6},
+    "traction_rod": {"stiffness": 1e6, "at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
+}  # fmt: skip
+JOINTS = {
+    "coordinate": {"axis": "x"}, "spherical": {"at": [0.0, 0.0, 0.5]}, "rigid": {"at": [0.0, 0.0, 0.5]},
+    "revolute": {"axis": "y", "at": [0.0, 0.0, 0.5]}, "rigid_link": {"at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS["elements"]["items"]["properties"]["kind"]["enum"])
+def test_every_kind_of_element_is_drawn(tmp_path, kind):
+    item = {"name": "new", "kind": kind, "bodies": ["wheelset", "frame"]}
+    at = {} if kind == "anti_roll_bar" else {"at": [0.0, 0.3, 0.5]}
+    assert "element:new:side" in drawn_of(tmp_path, "elements", item | at | ELEMENTS[kind])
+
+
+@pytest.mark.parametrize("kind", KINDS["joints"]["items"]["properties"]["kind"]["enum"])
+def test_every_kind_of_joint_is_drawn(tmp_path, kind):
+    bodies = ["wheelset", "frame"] if kind == "coordinate" else ["wheelset", "wheelset"]
+    item = {"name": "new", "kind": kind, "bodies": bodies}
+    assert "joint:new:plan" in drawn_of(tmp_path, "joints", item | JOINTS[kind])
+
+
+def drawn_of(folder, key, item):
+    """Groups in the drawing of the suspended wheelset with one more part, as its file would say it."""
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml")
+    data = {**scene.vehicle.data, key: [*scene.vehicle.data[key], item]}
+    figure = wr.draw(dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, data=data)))
+    figure.savefig(folder / "vehicle.svg")
+    return {part.get("id") for part in ElementTree.parse(folder / "vehicle.svg").getroot().iter()}
+
+
 def test_a_box_has_the_moments_of_its_body():
     body = yaml.safe_load((ROOT / "config/vehicles/trailer_vehicle.yaml").read_text())["bodies"]["bogie_1"]
     length, width, height = box_of(body)
@@ -58,7 +97,7 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.addresses, self.scripts = [], [], []
+        self.open, self.addresses, self.scripts, self.title = [], [], [], ""
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
@@ -73,6 +112,8 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.open and self.open[-1] == "script":
             self.scripts.append(data)
+        if self.open and self.open[-1] == "title":
+            self.title += data
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +141,14 @@ def test_an_animation_moves_as_the_run_does(run, tmp_path):
         patches = wheelset["wheels"][0]["patches"][frame]
         assert [patch[4] for patch in patches] == left.N_N[k][~np.isnan(left.y_m[k])].tolist()
     assert len(patches) == 1 + (run.t[k] >= 2.0) or np.isnan(left.y_m[k, 1])
+
+
+@pytest.mark.parametrize("name", ["DATA", "TITLE", "<!--<script>", "</script><script>", "a & b \u2028"])
+def test_no_name_breaks_a_page(run, name):
+    run = dataclasses.replace(run, scene={**run.scene, "name": name})
+    page = Page(wr.draw(run, SCENES / "wheelset.yaml", end=1.0).html)
+    assert page.open == [] and len(page.scripts) == 2 and json.loads(page.scripts[0])["name"] == name
+    assert page.title == name
 
 
 def test_profiles_of_an_animation_are_those_of_the_scene(run):

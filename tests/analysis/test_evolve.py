@@ -1,11 +1,17 @@
 """Profiles over a distance: flange numbers of S1002, books that balance, resumption, refusals."""
 
+import os
+import shutil
+from contextlib import contextmanager
+
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from tests.conftest import SCENES
 from wrcore.analysis import evolve as ev
+from wrcore.analysis import wear_folder
 from wrcore.analysis.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
 from wrcore.analysis.worn_rails import laid_rails, rail_file
 from wrcore.cli import main
@@ -22,6 +28,7 @@ PLAN = {
 }  # fmt: skip
 
 
+VEHICLE = SCENES.parent / "vehicles" / "suspended_wheelset.yaml"
 OFF = {"speed": 140, "integration.duration": 3.0, "initial.y": 0.015}
 """Far above the critical speed."""
 ARCHARD = {"archard": {"hardness": 2e9, "coefficients": [[1e-4]]}}
@@ -73,30 +80,116 @@ def test_threads_and_cost(worn, tmp_path):
     assert spent["simulate"] > 0.0 and spent["wear"] > 0.0
 
 
-def test_going_on_changes_nothing(worn, tmp_path):
+class Killed(BaseException):
+    """Nobody catches it."""
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """A folder whose plan was killed after its first step."""
+
+    def kill(_):
+        raise Killed
+
+    folder = tmp_path_factory.mktemp("wear") / "killed"
+    with pytest.raises(Killed):
+        ev.evolve(PLAN, folder, kill)
+    return folder
+
+
+@pytest.mark.parametrize("at", ["its row", "the digests"])
+def test_going_on_changes_nothing(worn, killed, tmp_path, monkeypatch, at):
+    """Whoever is killed goes on after the last row that counts."""
     folder, table = worn
-    partly = tmp_path / "partly"
-    partly.mkdir()
-    for name in ("plan.json", "profile_000.csv", "profile_001.csv"):
-        (partly / name).write_bytes((folder / name).read_bytes())
-    table.iloc[:1].to_csv(partly / "steps.csv", index=False)
+    partly = shutil.copytree(killed, tmp_path / "partly")
+    name = "steps.csv" if at == "its row" else "plan.json"
+
+    @contextmanager
+    def until(path, original=wear_folder.appearing):
+        if path.name == name:
+            raise Killed
+        with original(path) as file:
+            yield file
+
+    monkeypatch.setattr(wear_folder, "appearing", until)
+    with pytest.raises(Killed):
+        ev.evolve(PLAN, partly)
+    monkeypatch.undo()
+    assert len(pd.read_csv(partly / "steps.csv")) == (1 if at == "its row" else 2)
     pd.testing.assert_frame_equal(ev.evolve(PLAN, partly), table, rtol=1e-12)
     assert (partly / "profile_003.csv").read_bytes() == (folder / "profile_003.csv").read_bytes()
 
 
-@pytest.mark.parametrize(("name", "text"), [
-    ("steps.csv", "step,distance_m\n0,0\n"), ("steps.csv", "step,distance_m,step_m\n0,0,nan\n"),
-    ("steps.csv", "step,distance_m,step_m\n1,0,1e5\n"), ("profile_001.csv", "u_m,f_m\n0,0\n1,nan\n"),
-    ("profile_001.csv", "u_m,f_m\n0,0\n1e-3,0\n1.1e-3,0\n"),
-])  # fmt: skip
-def test_a_damaged_folder_is_refused(worn, tmp_path, name, text):
-    folder, table = worn
-    for part in ("plan.json", "profile_000.csv", "profile_001.csv"):
-        (tmp_path / part).write_bytes((folder / part).read_bytes())
-    table.iloc[:1].to_csv(tmp_path / "steps.csv", index=False)
-    (tmp_path / name).write_text(text)
-    with pytest.raises(InputError, match=f"{name}: expected"):
-        ev.evolve(PLAN, tmp_path)
+def cell(path, name, value):
+    table = pd.read_csv(path)
+    table.loc[table.index[-1], name] = value
+    table.to_csv(path, index=False)
+
+
+def text(path, change):
+    path.write_text(change(path.read_text()))
+
+
+DAMAGE = {
+    "a cut last row": ("steps.csv", lambda p: text(p, lambda t: t[: t.rindex(",") - 2])),
+    "no last row": ("steps.csv", lambda p: text(p, lambda t: t[: t.rindex("\n", 0, -1) + 1])),
+    "no row": ("steps.csv", lambda p: text(p, lambda t: t.partition("\n")[0] + "\n")),
+    "a step of 1e300 m": ("steps.csv", lambda p: cell(p, "step_m", 1e300)),
+    "no table": ("steps.csv", lambda p: p.unlink()),
+    "an edited profile": ("profile_001.csv", lambda p: text(p, lambda t: t.replace("0.0000", "0.0010", 1))),
+    "an edited first profile": ("profile_000.csv", lambda p: text(p, lambda t: t[:-3] + "9\n")),
+    "no profile": ("profile_001.csv", lambda p: p.unlink()),
+    "a pipe": ("profile_001.csv", lambda p: (p.unlink(), os.mkfifo(p))),
+    "edited rails": ("rails_000.csv", lambda p: text(p, lambda t: t.replace("0.75", "0.25"))),
+    "no digests": ("plan.json", lambda p: text(p, lambda t: t.replace('"files"', '"others"'))),
+}
+
+
+@pytest.mark.parametrize(("name", "damage"), DAMAGE.values(), ids=DAMAGE)
+@pytest.mark.parametrize("of", ["killed", "worn"])
+def test_a_damaged_folder_is_refused(request, tmp_path, name, damage, of):
+    folder = request.getfixturevalue(of)
+    folder = shutil.copytree(folder[0] if of == "worn" else folder, tmp_path / "damaged")
+    damage(folder / name)
+    for read in (lambda: ev.evolve(PLAN, folder), lambda: ev.last_depth(folder), lambda: ev.rail_wear(folder)):
+        with pytest.raises(InputError, match=f"{name}: expected"):
+            read()
+
+
+def test_a_plan_of_other_files_does_not_go_on(tmp_path):
+    """A rail that was edited between two steps made two wear rates in one table."""
+    rail = tmp_path / "rail.csv"
+    u = np.linspace(-0.034, 0.034, 137)
+    rows = [f"{a:.6f},{b:.9f}" for a, b in zip(u, -u * u / 0.6, strict=True)]
+    rail.write_text("\n".join(["u_m,f_m", *rows]))
+    scene = load_scene(PLAN["scene"]).data
+    scene["rail"], scene["vehicle"] = {"profile": "rail.csv"}, scene["vehicle"] | {"parameters": str(VEHICLE)}
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
+    plan = PLAN | {"scene": str(tmp_path / "scene.yaml"), "scenes": PLAN["scenes"][:1]}
+
+    def edit(_):
+        rail.write_text(rail.read_text() + "\n# ")
+
+    with pytest.raises(InputError, match="rail.csv: expected the content with which this began"):
+        ev.evolve(plan, tmp_path / "wear", edit)
+    assert len(pd.read_csv(tmp_path / "wear" / "steps.csv")) == 1
+    with pytest.raises(InputError, match="expected a folder of this plan, of the same input files"):
+        ev.evolve(plan, tmp_path / "wear")
+
+
+def test_two_processes_do_not_wear_one_wheel(tmp_path):
+    """Both computed all of it."""
+    found = []
+
+    def second(_):
+        with pytest.raises(InputError) as caught:
+            ev.evolve(PLAN, tmp_path / "wear")
+        found.append(str(caught.value))
+        raise Killed
+
+    with pytest.raises(Killed):
+        ev.evolve(PLAN, tmp_path / "wear", second)
+    assert len(found) == 1 and "no other process is writing" in found[0]
 
 
 def test_a_scene_that_does_not_end_is_named(tmp_path):

@@ -1,11 +1,13 @@
 """HDF5 files that hold what was written to them, or are refused before anything is read."""
 
 import os
+import re
 
 import h5py
 import numpy as np
 import pytest
 
+from tests.conftest import ROOT
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5, sign
 
@@ -92,3 +94,19 @@ def test_remains_of_a_killed_writer_go_and_links_are_not_followed(path):
     assert (folder / "victim").read_text() == "mine"
     with h5py.File(path) as file:
         assert list(file) == ["x"]
+
+
+def test_there_is_one_door():
+    """HDF5's library crashes, or never ends, on damaged bytes: only `checked_hdf5` hands it a file."""
+    calls = re.compile(r"\bh5py\.(File|h5f)\b\s*\(?|import\s+File\b|read_hdf\b|HDFStore\b")
+    doors = {
+        (path.relative_to(ROOT).as_posix(), line.strip())
+        for path in (ROOT / "wrcore").rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if (found := calls.search(line)) and (found[0].endswith("(") or "h5f" in found[0] or "h5py" not in found[0])
+    }
+    assert {path for path, _ in doors} == {"wrcore/errors/checked_hdf5.py"}
+    assert sorted(line for _, line in doors) == [
+        'with h5py.File(path, "r") as file, np.errstate(over="ignore"):',
+        'with h5py.File(patient, "w", userblock_size=BLOCK, **options) as file:',
+    ]

@@ -73,7 +73,21 @@ def file(path):
     path.write_text("mine")
 
 
+def below(folder, mode=0o700, owner=-1):
+    """A folder in which numba keeps pickles, in a cache that is closed otherwise."""
+    nested = folder / "kernels" / source_digest() / "geometry_1" / "deeper"
+    for part in reversed([nested, *list(nested.parents)[:5]]):
+        part.mkdir(mode=0o700, exist_ok=True, parents=True)
+    os.chown(nested, owner, -1)
+    nested.chmod(mode)
+
+
 UNSAFE = {
+    "others may write where pickles are": lambda folder: below(folder, 0o777),
+    "a link where pickles are": lambda folder: (
+        below(folder),
+        (folder / "kernels" / source_digest() / "contact_1").symlink_to(folder),
+    ),
     "others may write": lambda folder: writable(folder),
     "others may write to its kernels": lambda folder: writable(folder / "kernels" / source_digest()),
     "a file": file,
@@ -99,6 +113,12 @@ def test_a_cache_of_another_user_is_not_used(wanted, monkeypatch, capsys):
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
     with pytest.raises(OSError, match="of one's own"):
         cache_module._with_parts(wanted)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give folders away")
+def test_pickles_of_another_user_are_not_used(wanted, capsys):
+    below(wanted, owner=12345)
+    assert cache_root() != wanted and "expected a folder of one's own" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("home", ["/dev/null/nobody", None])
@@ -133,7 +153,7 @@ def test_a_damaged_kernel_is_compiled_anew(tmp_path, ending):
 
     def run():
         command = [sys.executable, "-c", KERNEL, str(tmp_path)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, umask=0o002)
         assert done.returncode == 0, done.stderr
         return done.stdout.strip(), done.stderr
 

@@ -94,7 +94,9 @@ def test_a_body_that_follows_the_curve_moves_along_it_and_turns_and_accelerates_
                      "output.channels": ["pose", "velocity", "acceleration"]})  # fmt: skip
     roll = np.arcsin(cant / 1.5)  # of the track: about t, negative in a curve to the left
     body = {name: float(np.mean(values[-100:])) for name, values in run["car_body"].items()}
-    centre = radius - body["y_m"] * np.cos(roll) - body["z_m"] * np.sin(roll)  # horizontal distance of the body's centre
+    centre = (
+        radius - body["y_m"] * np.cos(roll) - body["z_m"] * np.sin(roll)
+    )  # horizontal distance of the body's centre
     rate = body["vx_m_per_s"] / centre
     assert body["vx_m_per_s"] == pytest.approx(speed, rel=0.02)
     assert abs(body["vy_m_per_s"]) < 1e-4 and abs(body["vz_m_per_s"]) < 1e-4

@@ -1,5 +1,8 @@
 """Sweeps: each row is the run that `simulate` gives, whatever is shared; batches and interruptions change nothing."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -122,6 +125,132 @@ def test_another_scene_is_another_digest():
     assert wr.load_sweep(small()).digest() == wr.load_sweep(small()).digest()
     digests = {wr.load_sweep(small(**c)).digest() for c in ({}, {"set": {"speed": 21}}, {"measures": ["steps"]})}
     assert len(digests) == 3
+
+
+def of_files(folder):
+    """A sweep over two vehicles and two wheels whose files lie in a folder of the test."""
+    vehicle = (SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
+    for name in ("one.yaml", "other.yaml"):
+        (folder / name).write_text(vehicle)
+    u = np.linspace(-0.060, 0.055, 231)
+    for name in ("wheel.csv", "worn.csv"):
+        rows = (f"{a:.6f},{b:.9f}" for a, b in zip(u, wr.named_profile("S1002", "wheel")(u), strict=True))
+        (folder / name).write_text("\n".join(["u_m,f_m", *rows]))
+    (folder / "track.csv").write_text("s_m,left_lateral_m\n" + "".join(f"{k},0.0\n" for k in range(9)))
+    scene = yaml.safe_load((SCENES / "suspended_wheelset.yaml").read_text())
+    scene["wheel"], scene["vehicle"]["parameters"] = {"profile": "wheel.csv"}, "one.yaml"
+    scene["track"] = {"irregularity": {"points": ["track.csv"], "fade_in": 1.0, "fade_out": 1.0}}
+    scene["contact"]["creep"] = {"model": "she"}
+    (folder / "scene.yaml").write_text(yaml.safe_dump(scene))
+    keys = {
+        "wheel.profile": {"values": ["wheel.csv", {"points": "worn.csv"}]},
+        "vehicle.parameters": {"values": ["one.yaml", "other.yaml"]},
+    }
+    data = small(scene="scene.yaml", keys=keys, sampling={"kind": "grid"})
+    (folder / "sweep.yaml").write_text(yaml.safe_dump(data))
+    return folder / "sweep.yaml"
+
+
+def edit(path):
+    """A change that leaves a file readable: a digit of its last number, or a comment."""
+    text = path.read_text()
+    path.write_text(text + "# \n" if path.suffix == ".yaml" else text.rstrip() + "1\n")
+
+
+FILES = ["wheel.csv", "worn.csv", "one.yaml", "other.yaml", "track.csv"]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_changed_is_another_digest(tmp_path, name):
+    sweep = wr.load_sweep(of_files(tmp_path))
+    assert {Path(path).name for path in sweep.files} == set(FILES)
+    assert wr.load_sweep(tmp_path / "sweep.yaml").digest() == sweep.digest()
+    edit(tmp_path / name)
+    assert wr.load_sweep(tmp_path / "sweep.yaml").digest() != sweep.digest()
+
+
+def test_parts_of_other_files_are_not_gathered(tmp_path, capsys):
+    """Half of a sweep before an edit of the wheel and half after were one table, with status 0."""
+    base = ["sweep", str(of_files(tmp_path)), "--out"]
+    parts = [str(tmp_path / f"part{i}.{ending}") for i, ending in ((1, "csv"), (2, "h5"))]
+    assert main([*base, parts[0], "--batch", "1/2"]) == 0
+    edit(tmp_path / "worn.csv")
+    assert main([*base, parts[1], "--batch", "2/2"]) == 0
+    capsys.readouterr()
+    assert main([*base, str(tmp_path / "all.csv"), "--gather", *parts]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "part1.csv: expected a whole part of this sweep" in said
+    assert not (tmp_path / "all.csv").exists()
+    assert main([*base, parts[0], "--batch", "1/2"]) == 0
+    assert main([*base, str(tmp_path / "all.csv"), "--gather", *parts]) == 0
+
+
+def stopped(monkeypatch, after, act):
+    """Sweeps whose batches do something, once, after so many of them."""
+    count = iter(range(100))
+
+    def run_rows(*args, original=sweep_batch.run_rows):
+        rows = original(*args)
+        if next(count) == after:
+            act()
+        return rows
+
+    monkeypatch.setattr(sweep_batch, "run_rows", run_rows)
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def test_an_interrupted_sweep_whose_files_changed_does_not_go_on(tmp_path, monkeypatch, capsys):
+    source, out = of_files(tmp_path), tmp_path / "table.csv"
+    stopped(monkeypatch, 1, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        sweep_batch.sweep_to_file(wr.load_sweep(source), out)
+    monkeypatch.undo()
+    before = (tmp_path / "wheel.csv").read_text()
+    edit(tmp_path / "wheel.csv")
+    assert main(["sweep", str(source), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert (
+        "expected the sweep, scene and files that the batches in .table.csv." in said and "remove that folder" in said
+    )
+    (tmp_path / "wheel.csv").write_text(before)
+    assert main(["sweep", str(source), "--out", str(out)]) == 0 and not list(tmp_path.glob(".table*"))
+
+
+def test_a_file_that_changes_while_a_sweep_runs_ends_it(tmp_path, monkeypatch):
+    sweep = wr.load_sweep(of_files(tmp_path))
+    stopped(monkeypatch, 0, lambda: edit(tmp_path / "other.yaml"))
+    with pytest.raises(InputError, match=r"other.yaml: expected the content with which this began"):
+        sweep_batch.sweep_to_file(sweep, tmp_path / "table.csv")
+    assert not (tmp_path / "table.csv").exists()
+
+
+def test_two_sweeps_do_not_write_one_table(tmp_path, monkeypatch):
+    """Both computed all of it, and the second ended with "No such file"."""
+    sweep, found = wr.load_sweep(small()), []
+
+    def second():
+        with pytest.raises(InputError) as caught:
+            sweep_batch.sweep_to_file(sweep, tmp_path / "table.csv")
+        found.append(str(caught.value))
+
+    stopped(monkeypatch, 0, second)
+    sweep_batch.sweep_to_file(sweep, tmp_path / "table.csv")
+    assert found == [f"--out: {tmp_path / 'table.csv'}: expected a file that no other process is writing"]
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5"])
+def test_a_pipe_is_neither_a_part_nor_a_table(tmp_path, ending, capsys):
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(small()))
+    os.mkfifo(tmp_path / f"pipe.{ending}")
+    base = ["sweep", str(tmp_path / "small.yaml"), "--out"]
+    assert main([*base, str(tmp_path / "all.csv"), "--gather", str(tmp_path / f"pipe.{ending}")]) == 2
+    assert "no regular file" in capsys.readouterr().err
+    assert main([*base, str(tmp_path / f"pipe.{ending}")]) == 2
+    assert "--out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("ending", ["csv", "h5"])

@@ -6,6 +6,7 @@ one wheelset from behind, true to scale: profiles of wheel and rail where they a
 
 import json
 import math
+import re
 from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
@@ -101,8 +102,9 @@ def animate(run, scene, factor=None, begin=0.0, end=math.inf):
         "wheelsets": [_wheelset(run, scene, name, frames) for name in vehicle.wheelset_names],
     }  # fmt: skip
     page = files("wrcore.analysis").joinpath("animation.html").read_text(encoding="utf-8")
-    content = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-    return Animation(page.replace("TITLE", escape(data["name"])).replace("DATA", content), data)
+    content = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"TITLE": escape(data["name"]), "DATA": content}  # neither is looked for in what takes its place
+    return Animation(re.sub("TITLE|DATA", lambda found: parts[found[0]], page), data)
 
 
 def _frames(run, begin, end):

@@ -12,9 +12,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.animation import Animation, animate
-from wrcore.analysis.evolve import TABLE, profiles_over_distance
+from wrcore.analysis.evolve import profiles_over_distance
 from wrcore.analysis.plot_vehicle import plot_vehicle
 from wrcore.analysis.plot_wear import plot_evolution
+from wrcore.analysis.wear_folder import TABLE, rows_of
 from wrcore.errors import InputError
 from wrcore.run.results import load_run
 from wrcore.run.run import Run
@@ -70,7 +71,7 @@ def draw(
     if not isinstance(source, Scene | Mapping) and os.path.isdir(source):
         if not (Path(source) / TABLE).is_file():
             raise InputError("draw", source, f"expected a folder of evolve, with {TABLE}")
-        return plot_evolution(profiles_over_distance(source), pd.read_csv(Path(source) / TABLE))
+        return plot_evolution(profiles_over_distance(source), pd.DataFrame(rows_of(Path(source))))
     return plot_vehicle(as_scene(source))
 
 

@@ -8,13 +8,12 @@ sees all of a line and a rail all vehicles, unless the plan says how much traffi
 (:mod:`wrcore.analysis.worn_rails`).
 
 A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
-step. A step counts when its row is there; whoever is killed goes on after the last one.
+step. ``plan.json`` holds their digests: a step counts when that of its row is there; whoever is killed goes on after
+the last one; what was edited or damaged since is refused.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
@@ -26,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore import __version__
 from wrcore.analysis.local_wear import BIN, local_wear
+from wrcore.analysis.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear_laws import check_friction, wear_law
 from wrcore.analysis.worn_profiles import (
     across,
@@ -46,12 +45,13 @@ from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
-from wrcore.errors.new_files import appearing
+from wrcore.errors.input_files import check_unchanged
+from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.surface import SIDES
-from wrcore.kernels.cache import source_digest
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
+from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
 
 AMPLITUDE = 3e-3
@@ -61,7 +61,6 @@ MT = 1e9
 """A million gross tonnes, kg."""
 
 MOST_STEPS = 10_000
-TABLE = "steps.csv"
 
 
 def load_wear_plan(
@@ -146,7 +145,8 @@ def evolve(
     Raises
     ------
     InputError
-        For a bad plan, a folder of another plan, or a run that left the rails or failed.
+        For a bad plan, a folder of another plan or of other input files, one whose files were changed, one that another
+        process writes to, or a run that left the rails or failed.
 
     Examples
     --------
@@ -160,11 +160,16 @@ def evolve(
     [[0.0, 0.0], [1.0, 10000.0]]
     """
     data, scenes = load_wear_plan(plan, changes)
-    folder = Path(folder)
-    _claim(folder, data, scenes)
+    folder = Path(folder).resolve()
+    with held(folder, folder):
+        return _evolve(data, scenes, folder, say, threads, {} if spent is None else spent)
+
+
+def _evolve(data, scenes, folder, say, threads, spent):
+    claim(folder, plan_mark(data, scenes), data)
     shares = np.array([part["share"] for part in data["scenes"]])
     shares /= shares.sum()
-    rows = _known_rows(folder)
+    rows = rows_of(folder)
     if not rows:
         write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
         if data["rails"]:
@@ -179,7 +184,7 @@ def evolve(
         row = profile_row(scenes[0], folder, step, gone)
         reached = limits_reached(data["limits"], row)
         if left > 1e-9 * data["distance"] and not reached:
-            worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, {} if spent is None else spent)
+            worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, spent)
             length = _step_length(data, gone, worn)
             write_points(file_of(folder, "profile", step + 1), u, f + worn.rise * length)
         elif reached and data["turning"]:
@@ -188,7 +193,9 @@ def evolve(
             _next_rails(data, folder, step, worn, gone, length)
         row |= {"step_m": length, "rate_max": worn.deepest, "volume_m3_per_m": worn.volume}
         rows.append(row | {"worn_volume_m3": worn.volume * length, "at_limit": len(reached)})
-        _write_table(folder, rows)
+        for scene in scenes:
+            check_unchanged(scene.files)
+        write_rows(folder, rows)
         if say:
             turned = f", {' and '.join(reached)} at the limit" if reached else ""
             say(f"step {step}: {1e-3 * (gone + length):.0f} of {1e-3 * data['distance']:.0f} km{turned}")
@@ -198,7 +205,7 @@ def evolve(
 def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.ndarray, np.ndarray]]:
     """Distance (m), u and f (m) at the start of each step in a folder of `evolve`."""
     folder = Path(folder)
-    return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in _known_rows(folder)]
+    return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in rows_of(folder)]
 
 
 def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -219,7 +226,7 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
     folder = Path(folder)
     parts = [
         pd.read_csv(file_of(folder, "rails", row["step"])).assign(step=row["step"], distance_m=row["distance_m"])
-        for row in _known_rows(folder)
+        for row in rows_of(folder)
         if row["step_m"] > 0.0
     ]
     columns = ["step", "distance_m", "scene", "share", *(f"{side}_m2_per_Mt" for side in SIDES)]
@@ -353,42 +360,6 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
 
 
 def plan_mark(data, scenes):
-    """What a folder belongs to: a digest of plan, scenes, vehicles and version."""
-    vehicles = [scene.vehicle.data for scene in scenes]
-    described = [data, [scene.data for scene in scenes], vehicles, __version__, source_digest()]
-    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()
-
-
-def _claim(folder, data, scenes):
-    """Take a folder for a plan, or refuse one that holds another."""
-    mark = plan_mark(data, scenes)
-    path = folder / "plan.json"
-    if path.exists():
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))["digest"]
-        except (OSError, ValueError, KeyError, TypeError):
-            found = ""
-        if found != mark:
-            raise InputError(folder, "", "expected a folder of this plan and version, or an empty one; remove it")
-        return
-    with appearing(path) as file:
-        file.write(json.dumps({"digest": mark, "plan": data}, indent=2, sort_keys=True).encode())
-
-
-def _known_rows(folder):
-    path = folder / TABLE
-    if not path.exists():
-        return []
-    try:
-        table = pd.read_csv(path)
-        numbers = table[["step", "distance_m", "step_m"]].to_numpy(float)
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(path, "", f"expected the table that an earlier step has written: {error}") from None
-    if not (np.isfinite(numbers).all() and (numbers >= 0.0).all() and (numbers[:, 0] == np.arange(len(table))).all()):
-        raise InputError(path, "", "expected the table that an earlier step has written, a row per step from 0 on")
-    return table.to_dict("records")
-
-
-def _write_table(folder, rows):
-    with appearing(folder / TABLE) as file:
-        pd.DataFrame(rows).to_csv(file, index=False, lineterminator="\n")
+    """What a folder belongs to: a digest of plan, scenes, all files that they read, and version."""
+    files = {path: digest for scene in scenes for path, digest in scene.files.items()}
+    return digest_of_plan([data, [scene.data for scene in scenes]], files)

@@ -93,7 +93,8 @@ def settle_motion(model, state, settling):
     row : dict
         speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN
         if it derails), frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``,
-        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``.
+        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``. Two windows
+        of a chaotic motion may agree by chance: whether it is irregular or a limit cycle then depends on the last bits.
     state : numpy.ndarray
         At the end.
     """
@@ -231,13 +232,13 @@ def limit_cycles(
     --------
     >>> import wrcore as wr
     >>> settling = wr.Settling(window=1.0, longest=20.0)
-    >>> table = wr.limit_cycles(wr.example("suspended_wheelset"), [40.0, 65.0], settling, [0.006], 25.0)
+    >>> table = wr.limit_cycles(wr.example("suspended_wheelset"), [40.0, 60.0], settling, [0.003], 25.0)
     >>> table[["branch", "speed_m_per_s", "status"]]
-        branch  speed_m_per_s     status
-    0  falling           65.0  irregular
-    1  falling           40.0    at rest
-    2   rising           40.0    at rest
-    3   rising           65.0  irregular
+        branch  speed_m_per_s       status
+    0  falling           60.0  limit cycle
+    1  falling           40.0      at rest
+    2   rising           40.0      at rest
+    3   rising           60.0  limit cycle
     """
     speeds, settling = rising(speeds), settling or Settling()
     check_number(resolution, 1e-3, 150.0, "limit_cycles", "resolution", "m/s")

@@ -17,6 +17,7 @@ from wrcore.vehicle.layout import FRAME_NAME
 
 MARKS = {
     "spring_damper": {"marker": "s", "color": "#0072B2", "markerfacecolor": "white"},
+    "bushing": {"marker": "h", "color": "#0072B2"},
     "shear_spring": {"marker": "s", "color": "#0072B2"},
     "air_spring": {"marker": "o", "color": "#0072B2"},
     "damper": {"marker": "D", "color": "#E69F00"},

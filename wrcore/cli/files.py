@@ -14,7 +14,7 @@ def output(path, endings=(".csv",), option="--out"):
     """Refuse an output path that cannot be written, or is of another kind, before any work starts."""
     if Path(path).suffix.lower() not in endings:
         raise InputError(option, path, f"expected a name that ends in {' or '.join(endings)}")
-    if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or os.path.isdir(path):
+    if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or (os.path.exists(path) and not os.path.isfile(path)):
         raise InputError(option, path, "expected a file in an existing folder")
     try:  # permissions do not tell whether a disk is full or a name is too long
         try_out(path)
@@ -27,14 +27,16 @@ def refuse_others(path, attribute, wanted):
     """Refuse to write over an HDF5 file whose attribute (of a scene: its name) says that it is something else."""
     if path.suffix.lower() not in HDF5 or not path.exists():
         return
-    import h5py
+    from wrcore.errors.checked_hdf5 import checked_hdf5, foreign
 
-    try:
-        with h5py.File(path) as file:
-            found = str(file.attrs.get(attribute, "something else"))
-        found = json.loads(found)["name"] if attribute == "scene" else found
-    except (OSError, ValueError, KeyError, TypeError):
-        found = "something else" if h5py.is_hdf5(path) else wanted  # what no program can read may go
+    found = "something else"
+    if not foreign(path):
+        try:
+            with checked_hdf5(path, f"one of {wanted!r}") as (file, _):
+                value = str(file.attrs.get(attribute, found))
+                found = json.loads(value)["name"] if attribute == "scene" and value != found else value
+        except InputError:  # damaged, or what no program can read: it may go
+            return
     if found != wanted:
         raise InputError("--out", path, f"expected no file, or one of {wanted!r}; this one is of {found!r}: remove it")
 

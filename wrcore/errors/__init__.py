@@ -31,7 +31,14 @@ class InputError(ValueError):
 
     def __init__(self, source, field, expected):
         self.source, self.field, self.expected = str(source), str(field), str(expected)
-        super().__init__(": ".join(" ".join(part.split()) for part in (self.source, self.field, self.expected) if part))
+        super().__init__(self.source, self.field, self.expected)  # what copies and other processes build it from
+
+    def __str__(self):
+        return ": ".join(" ".join(part.split()) for part in self.args if part)
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that something looked up by names does not hold."""
 
 
 def check_number(value, low, high, source, field, unit=""):

@@ -7,7 +7,6 @@ The first `BLOCK` bytes, which HDF5 leaves to its users, hold the SHA-256 of all
 import hashlib
 import math
 import os
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -15,6 +14,7 @@ import h5py
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.errors.input_files import check_regular
 from wrcore.errors.new_files import appearing
 
 BLOCK = 512
@@ -131,10 +131,19 @@ def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[tuple[h5py
         raise InputError(path, "", f"expected {kind}, got: {getattr(error, 'strerror', None) or error}") from None
 
 
+def foreign(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is HDF5 without a digest at its head, by its first bytes: the library would have to trust it."""
+    try:
+        check_regular(path)
+        with open(path, "rb") as file:
+            return not file.read(BLOCK).startswith(HEAD) and h5py.is_hdf5(path)
+    except OSError:
+        return False
+
+
 def _check_bytes(path):
     """Whether a file has a digest; ValueError if that, or the file, is wrong."""
-    if not stat.S_ISREG(os.stat(path).st_mode):
-        raise ValueError("no regular file")
+    check_regular(path)
     with open(path, "rb") as file:
         head = file.read(BLOCK)
         if head.startswith(SIGNATURE):

@@ -12,6 +12,7 @@ from itertools import islice
 import yaml
 
 from wrcore.errors import InputError, similar
+from wrcore.errors.input_files import check_regular
 
 MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
 """A longer document, one with more values, or nested deeper, is none that a person wrote."""
@@ -116,6 +117,7 @@ def read_yaml(path):
     """
     text = ""
     try:
+        check_regular(path)
         with open(path, encoding="utf-8-sig") as file:
             text = file.read(MOST_BYTES + 1)
         if len(text) > MOST_BYTES:

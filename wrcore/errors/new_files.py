@@ -10,6 +10,8 @@ from contextlib import contextmanager, suppress
 from io import BufferedRandom
 from pathlib import Path
 
+from wrcore.errors import InputError
+
 try:
     import fcntl
 except ImportError:  # a system without such locks
@@ -75,6 +77,33 @@ def locked(descriptor: int) -> bool:
     except BlockingIOError:
         return False
     return True
+
+
+@contextmanager
+def held(folder: Path, told: object) -> Iterator[None]:
+    """A folder, made if needed, that this process alone writes to meanwhile; else an InputError of ``told``."""
+    lock = hold(folder, told)
+    try:
+        yield
+    finally:
+        os.close(lock)
+
+
+def hold(folder: Path, told: object) -> int:
+    """Descriptor of a folder, made if needed, that this process alone holds until it is closed, however it ends."""
+    while True:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        except (FileExistsError, NotADirectoryError):  # a file or a link
+            raise InputError("--out", told, f"expected a folder or nothing as {folder.name}") from None
+        if not locked(lock):
+            os.close(lock)
+            raise InputError("--out", told, "expected a file that no other process is writing")
+        with suppress(FileNotFoundError):  # whoever held it before may just have removed it
+            if os.path.samestat(os.fstat(lock), os.stat(folder)):
+                return lock
+        os.close(lock)
 
 
 def remove_folder(folder: Path) -> None:

@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.errors.input_files import check_regular
+from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
 
 CHANNELS = ("left_lateral", "left_vertical", "right_lateral", "right_vertical")
@@ -29,6 +31,8 @@ LARGEST = 0.05
 
 _PADDING = 40  # a cubic spline forgets a node by 0.268 per cell: 0.268^40 = 1e-23
 _MOST_CELLS = 2_000_000
+_WIDEST = 5.0
+"""Usual distances of samples over which what lies between them is made up."""
 
 CUTOFF_C, CUTOFF_R, CUTOFF_S = 0.8246, 0.0206, 0.4380
 """Cut-off wave numbers of the German (ERRI B 176) spectra, rad/m."""
@@ -186,14 +190,15 @@ def read_irregularity(path):
     -------
     s : (n,) ndarray
         Uniform arc lengths, m. Samples at varying distances are carried over, by a cubic spline, to a grid of the
-        smallest distance.
+        smallest distance, which is said.
     values : (n, 4) ndarray
         Deviations, m.
 
     Raises
     ------
     InputError
-        Names the file and the line or column at fault.
+        Names the file and the line or column at fault: also samples so far apart, or so close together, that a spline
+        through them would make up what lies between.
     """
     names, lines, table = _read_table(path)
     s, columns = table[:, 0], dict(zip(names[1:], table[:, 1:].T, strict=True))
@@ -210,12 +215,13 @@ def read_irregularity(path):
         values = combine(*(columns.get(f"{name}_m", zero) for name in MEANS))
     else:
         values = np.stack([columns.get(f"{name}_m", zero) for name in CHANNELS], -1)
-    return _uniform(s, values, path)
+    return _uniform(s, values, path, lines)
 
 
 def _read_table(path):
     """Column names, line numbers and numbers of a CSV file."""
     try:
+        check_regular(path)
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -242,17 +248,39 @@ def _numbers(path, line, row, count):
     return numbers
 
 
-def _uniform(s, values, path):
+def _uniform(s, values, path, lines):
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(s)
     if np.ptp(steps) <= 1e-6 * steps.mean():
         return np.linspace(s[0], s[-1], len(s)), values
+    usual, at = float(np.median(steps)), int(np.argmax(steps))
+    if steps[at] > _WIDEST * usual:
+        expected = f"expected samples at most {_WIDEST * usual:g} m apart, as their usual distance is {usual:g} m"
+        raise InputError(path, f"line {lines[at + 1]}", f"{expected}, got a gap of {steps[at]:g} m")
     count = (s[-1] - s[0]) / steps.min()
     if count > _MOST_CELLS:
         raise InputError(path, "s_m", f"expected distances that do not vary so much, got {steps.min():g} m at least")
     grid = np.linspace(s[0], s[-1], math.ceil(count) + 1)
-    return grid, CubicSpline(s, values, bc_type="natural")(grid)
+    carried = CubicSpline(s, values, bc_type="natural")(grid)
+    _check_overshoot(s, values, grid, carried, path, lines)
+    warn(f"{path}: samples {steps.min():g} to {steps.max():g} m apart are carried over to a grid of {steps.min():g} m")
+    return grid, carried
+
+
+def _check_overshoot(s, values, grid, carried, path, lines):
+    """Refuse what goes farther beyond two samples than half the largest step between samples around them."""
+    steps = np.pad(np.abs(np.diff(values, axis=0)), ((2, 2), (0, 0)))
+    near = np.lib.stride_tricks.sliding_window_view(steps, 5, axis=0).max(axis=-1)
+    cell = np.clip(np.searchsorted(s, grid, "right") - 1, 0, len(s) - 2)
+    low, high = np.minimum(values[:-1], values[1:])[cell], np.maximum(values[:-1], values[1:])[cell]
+    beyond = np.maximum(carried - high, low - carried)
+    excess = beyond - 0.5 * near[cell] - 0.02 * np.ptp(values, axis=0)
+    k = int(np.argmax(excess.max(axis=1)))
+    if excess[k].max() > 0.0:
+        where, size = f"line {lines[cell[k] + 1]}", beyond[k].max()
+        expected = "expected samples that a spline can follow, not steeper between two than the others"
+        raise InputError(path, where, f"{expected}, got one that goes {size:.2g} m beyond them")
 
 
 def spectrum(quantity, level, omega):

@@ -2,7 +2,8 @@
 
 Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#`` starts a
 comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns may be
-separated by commas, semicolons or blanks; further columns are not read. The UIC 519 / EN 15302 reference profiles
+separated by commas, semicolons or blanks; beside semicolons numbers may have decimal commas. Without a header further
+columns are not read. The UIC 519 / EN 15302 reference profiles
 (``*.dat``) follow this convention without a header: declare ``unit: mm``. Files of profile meters (MiniProf) begin with
 lines ``Name=value``, which are passed over; in which directions their columns count, and from where, is declared beside
 the path: ``mirrored``, ``downwards``, ``shift``.
@@ -16,10 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.errors import InputError, one_of
+from wrcore.errors.input_files import check_regular
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
 _KEYS = {"points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift"}
+_SEPARATED = "; decimal commas are read beside semicolons only"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
@@ -103,23 +106,26 @@ def _is_distance(value):
 
 def _text(path):
     try:
+        check_regular(path)
         return path.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff")
     except (OSError, ValueError) as error:
-        raise InputError(path, "", f"expected a readable profile file: {error}") from None
+        raise InputError(
+            path, "", f"expected a readable profile file: {getattr(error, 'strerror', None) or error}"
+        ) from None
 
 
 def _numbers(path, line, text):
+    """Two numbers or more of one line; a comma is a decimal one beside semicolons, and separates elsewhere."""
+    text = text.strip(" \t,;")
+    words = text.replace(",", ".").split(";") if ";" in text else re.split(r"\s*,\s*|\s+", text)
+    mixed = ";" not in text and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
     try:
-        return [float(word) for word in re.split(r"[,;\s]+", text.strip(" \t,;"))]
+        numbers = [float(word) for word in words]
     except ValueError:
-        raise InputError(path, f"line {line}", f"expected two numbers, got {text.strip()[:40]!r}") from None
-
-
-def _pair(path, line, text):
-    numbers = _numbers(path, line, text)
-    if len(numbers) < 2:
-        raise InputError(path, f"line {line}", f"expected two numbers, got {text.strip()[:40]!r}")
-    return numbers[:2]
+        numbers = []
+    if len(numbers) < 2 or (mixed and not all(re.search("[.eE]", word) for word in words)):
+        raise InputError(path, f"line {line}", f"expected two numbers, got {text[:40]!r}{_SEPARATED}")
+    return numbers
 
 
 def read_columns(path, text, unit=None):
@@ -141,20 +147,26 @@ def read_columns(path, text, unit=None):
     lines : list of int
         Line number of each point.
     """
-    points, lines = [], []
+    points, lines, stated, whole = [], [], False, True
     for number, line in enumerate(text.splitlines(), 1):
         line = line.partition("#")[0].strip()
         header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line)
         if header and not points:
-            unit = _agreed(path, number, header.groups(), unit)
+            unit, stated = _agreed(path, number, header.groups(), unit), True
         elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
             continue
         elif line:
-            points.append(_pair(path, number, line))
+            points.append(_numbers(path, number, line))
             lines.append(number)
+            count = 2 if stated else len(points[0])
+            if len(points[-1]) != count:
+                raise InputError(path, f"line {number}", f"expected {count} numbers, got {line[:40]!r}{_SEPARATED}")
+            whole = whole and "," in line and not re.search("[.;eE]", line)
+    if points and whole and len(points[0]) > 2:
+        raise InputError(path, f"line {lines[0]}", f"expected numbers with decimal points{_SEPARATED}")
     if unit is None:
         raise InputError(path, "unit", "expected a header u_m,f_m or u_mm,f_mm, or unit: m or mm beside the path")
-    u, f = np.array(points, dtype=float).reshape(-1, 2).T * _UNITS[unit]
+    u, f = np.array([point[:2] for point in points], dtype=float).reshape(-1, 2).T * _UNITS[unit]
     return u, f, lines
 
 
@@ -247,7 +259,7 @@ def _simpack_points(path, text, begin):
         if line == "point.end":
             y, z = np.array(points, dtype=float).reshape(-1, 2).T
             return y, z, np.array(lines, dtype=int)
-        points.append(_pair(path, number, line))
+        points.append(_numbers(path, number, line)[:2])
         lines.append(number)
     raise InputError(path, "point.end", "expected a line point.end after the points, got the end of file (truncated?)")
 

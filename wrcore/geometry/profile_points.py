@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.kernels.cache import warn
 
 if TYPE_CHECKING:  # a third of a second that runs with standard profiles need not wait
     from scipy.interpolate import BSpline
@@ -18,9 +19,11 @@ _LARGEST, _SMALLEST = 1.0, 5e-3  # m; a profile is neither wider nor narrower, s
 _CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
 _DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
 _LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
-_ANY_SLOPE = 1e6
+_ANY_SLOPE, _STEEP = 1e6, 10.0  # beyond the latter no curve goes on
 _NARROWEST = 0.02  # m; less of a profile is left only where its points are faulty
 _LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than this
+_WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
+_STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 
 
@@ -67,9 +70,11 @@ class Outline:
         if high - low < _NARROWEST:
             got = f"got {high - low:.3g} m of it"
             raise InputError(self.name, "points", f"expected a smooth profile around u = 0, {got}")
-        u = self.curve(self._dense())[:, 0]
+        u, f = self.curve(self._dense()).T
+        if trim:  # side faces and chins, but no other head and no flange
+            u = u[f > f[(u >= low) & (u <= high)].max() - _DEEPEST]
         for end, rest in ((low, low - u.min()), (high, u.max() - high)):
-            if not trim and rest > _LEFT_OUT:
+            if rest > _LEFT_OUT:
                 got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond"
                 raise InputError(self.name, "points", f"expected slopes below {steepest:g}, {got}")
         return low, high
@@ -140,8 +145,8 @@ def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0
         u, f = u * c - f * s, u * s + f * c
     if kind == "rail":
         _check_rail(f, name)
-        u, f = _head(u, f)
-    outline = _spline(u, f, name, smoothing)
+        u, f, lines = _head(u, f, lines, name)
+    outline = _spline(u, f, name, lines, smoothing)
     return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline, u, f)
 
 
@@ -177,15 +182,36 @@ def _check_rail(f, name):
         raise InputError(name, "points", "expected a rail head with f positive up, got its highest point at an end")
 
 
-def _head(u, f):
+def _head(u, f, lines, name):
     """The connected run of rail points around the highest one, down to where nothing is touched."""
     top = int(np.argmax(f))
-    low = np.flatnonzero(f < f[top] - _DEEPEST)
-    keep = slice(low[low < top].max(initial=-1) + 1, low[low > top].min(initial=f.size))
-    return u[keep], f[keep]
+    low = f < f[top] - _DEEPEST
+    deep = np.flatnonzero(low)
+    keep = slice(deep[deep < top].max(initial=-1) + 1, deep[deep > top].min(initial=f.size))
+    low[keep] = True
+    if not low.all():
+        i = int(np.argmin(low))
+        got = f"got another one, {f[top] - f[i]:.3g} m below the highest, at u = {u[i]:.4g} m"
+        raise InputError(name, f"line {lines[i]}", f"expected one rail head, {got}: leave it out")
+    return u[keep], f[keep], lines[keep]
 
 
-def _spline(u, f, name, smoothing):
+def _check_gaps(u, f, name, lines):
+    """Say which gaps between points are bridged, and refuse those where nobody knows the shape."""
+    du, df = np.diff(u), np.diff(f)
+    length, angle = np.hypot(du, df), np.arctan2(df, du)
+    turn = np.abs(np.diff(angle, prepend=angle[:1], append=angle[-1:]))
+    bend = length * (turn[:-1] + turn[1:]) / 8.0  # an arc's rise over its chord
+    wide = (length > _USUAL * np.median(length)) & (bend > _STRAIGHT) & (np.abs(df) < _STEEP * du)
+    for i in np.flatnonzero(wide):
+        gap = f"a gap of {length[i]:.2g} m at u = {u[i]:.4g} m, over which the profile bends by {bend[i]:.2g} m"
+        if length[i] > _WIDEST or bend[i] > _BENT:
+            expected = f"expected points at most {_USUAL * np.median(length):.2g} m apart, as elsewhere"
+            raise InputError(name, f"line {lines[i + 1]}", f"{expected}, got {gap}")
+        warn(f"{name}: line {lines[i + 1]}: {gap}, is bridged by a spline")
+
+
+def _spline(u, f, name, lines, smoothing):
     """Parametric cubic spline over chord length; points that nearly coincide with the one before are left out."""
     from scipy.interpolate import BSpline, splprep
 
@@ -195,6 +221,7 @@ def _spline(u, f, name, smoothing):
             kept.append(i)
     if len(kept) < FEWEST:
         raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(kept)}")
+    _check_gaps(u[kept], f[kept], name, lines[kept])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # FITPACK warns where it misses the asked distance

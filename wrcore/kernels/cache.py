@@ -82,6 +82,9 @@ def _with_parts(root):
     for folder in (root, root / "tables", kernels, kernels / source_digest()):
         _claim(folder)
     os.utime(folder)
+    for below, names, _ in os.walk(folder):  # numba's own folders hold the pickles
+        for name in names:
+            _claim(Path(below, name))
     _drop_old(kernels)
     return root
 

@@ -7,6 +7,8 @@ linked     from other kernels: what LLVM links into them, no machine code
 Numba makes all of it for every kernel, with a wrapper for C besides. Most kernels are called by other kernels alone.
 """
 
+import os
+
 import numba
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -94,12 +96,13 @@ class KernelCache(FunctionCache):
     def __init__(self, function, form="called"):
         self._form = form
         self._impl_class = _LinkedFile if form == "linked" else CompileResultCacheImpl
-        before = numba.config.CACHE_DIR
+        before, mask = numba.config.CACHE_DIR, os.umask(0o077)  # folders that it makes are closed to others
         try:
             numba.config.CACHE_DIR = _FOLDER
             super().__init__(function)
         finally:
             numba.config.CACHE_DIR = before
+            os.umask(mask)
 
     def _index_key(self, *args):
         return (self._form, *super()._index_key(*args))

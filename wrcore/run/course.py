@@ -26,6 +26,7 @@ from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.run import Run
+from wrcore.run.state import State, from_state
 from wrcore.run.validity import exceeded
 from wrcore.scene.description import Scene, compile_scene
 
@@ -98,7 +99,7 @@ class Course:
         self.scene = scene
         self.model, state = compile_scene(scene, progress, shared)
         self.mark = model_fingerprint(self.model)
-        self.start = state
+        self.start, self._moved = state, 0.0
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
         self.places = Places(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
@@ -115,6 +116,9 @@ class Course:
             if method not in (start.method, "auto"):
                 expected = f"expected that of the start, {start.method}, got {method}"
                 raise InputError(self.scene.source, "integration.method", expected)
+        elif (begun := from_state(self.model, self.scene.vehicle, start, self.scene.source)) is not self.model:
+            self.model, self.mark = begun, model_fingerprint(begun)
+            self._moved = start.frame - begun.speed * start.t
         if places is not None:
             if [place.shape for place in places] != [place.shape for place in self.places]:
                 raise InputError(self.scene.source, "start", "expected as many places as wheelsets and bodies")
@@ -166,8 +170,18 @@ class Course:
         self._began = time.perf_counter()
         return Run(
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,
-            end, trajectory.end_t, trajectory.end_state,
+            end, trajectory.end_t, self._end_state(trajectory),
         )  # fmt: skip
+
+    def _end_state(self, trajectory: Trajectory) -> State | None:
+        """Where the stretch ended, with what belongs to it."""
+        scene, t = self.scene, trajectory.end_t
+        names = scene.vehicle.name, *scene.vehicle.body_names
+        return (
+            None
+            if trajectory.end_state is None
+            else State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
+        )
 
     def _channels(self, trajectory: Trajectory):
         """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs."""
@@ -257,7 +271,7 @@ class Course:
         return work
 
     def _poses(self, states):
-        """Arc length, y, z, roll, yaw and pitch of all bodies relative to the track, (n, bodies, 6), and its axes there."""
+        """Arc length, y, z, roll, yaw and pitch of all bodies in the track's axes, (n, bodies, 6), and these axes."""
         count = len(self.model.bodies.mass)
         poses, axes = np.empty((len(states), count, 6)), np.broadcast_to(np.eye(3), (len(states), count, 3, 3))
         if not self.model.track.tangent:

@@ -91,10 +91,10 @@ def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Call
         found |= {name: partial(_force, contact, side, at) for at, name in enumerate(("Q_N", "Y_N"))}
     if {"Q_N", "Y_N"} <= contact.keys() | found.keys():
         forces = dict(found)  # a copy: what refers to itself keeps its arrays alive
-        found["Y_over_Q"] = lambda: quotient(*(_known(contact, forces, name) for name in ("Q_N", "Y_N")))
+        found["Y_over_Q"] = partial(_quotient, contact, forces)
     if {"Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"} <= contact.keys():
         found |= {name: partial(_work, contact, at) for at, name in enumerate(("T_gamma_N", "T_gamma_spin_N"))}
-        found["creep_power_W"] = lambda: _work(contact, 2) * rolling_speed(groups[wheelset], speed)
+        found["creep_power_W"] = partial(_power, contact, groups[wheelset], speed)
     if {"N_N", "a_m", "b_m"} <= contact.keys():
         found["p_max_Pa"] = partial(_pressure, contact)
     return {name: compute for name, compute in found.items() if name not in contact}
@@ -107,11 +107,23 @@ def _of_wheelset(groups, group, speed):
     known = {side: (groups[wheel], derived_channels(groups, wheel, speed)) for side, wheel in wheels.items()}
     if not all("Y_N" in stored or "Y_N" in derived for stored, derived in known.values()):
         return {}
-    return {"sum_Y_N": lambda: sum(SIDES[side] * _known(*known[side], "Y_N") for side in SIDES)}
+    return {"sum_Y_N": partial(_sum, known)}
 
 
 def _known(stored, derived, name):
     return stored[name] if name in stored else derived[name]()
+
+
+def _sum(known):  # here and below: functions of the file, which other processes find
+    return sum(SIDES[side] * _known(*known[side], "Y_N") for side in SIDES)
+
+
+def _quotient(contact, forces):
+    return quotient(*(_known(contact, forces, name) for name in ("Q_N", "Y_N")))
+
+
+def _power(contact, body, speed):
+    return _work(contact, 2) * rolling_speed(body, speed)
 
 
 def _force(contact, side, at):

@@ -17,6 +17,7 @@ from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.run.run import Run
+from wrcore.run.state import State
 
 FORMAT = "wrcore run"
 FORMAT_VERSION = 2
@@ -116,6 +117,8 @@ def _write_end(group, run):
     ):
         dataset = group.create_dataset(name, data=value)
         dataset.attrs["units"], dataset.attrs["description"] = unit, text
+    if isinstance(run.end_state, State):
+        group.attrs["frame_m"], group.attrs["vehicle"] = run.end_state.frame, _record(run.end_state.vehicle)
 
 
 def write_going_on(file: h5py.File, run: Run, mark: str, places: tuple[np.ndarray, ...]) -> None:
@@ -286,7 +289,10 @@ def _read_frame(file):
     records = {name: json.loads(file.attrs[name]) for name in ("scene", "settings", "counters")}
     run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
     if END in file:
-        run.end_t, run.end_state = float(file[END]["t"][()]), file[END]["state"][()]
+        end, t = file[END], float(file[END]["t"][()])
+        frame = float(end.attrs.get("frame_m", t * run.scene.get("speed", np.nan)))  # files of before: runs from time 0
+        names = tuple(json.loads(end.attrs.get("vehicle", "[]")))
+        run.end_t, run.end_state = t, State(end["state"][()], t, frame, names)
         if "checkpoint" in file[END]:
             run.end = read_checkpoint(file[END]["checkpoint"])
     return run

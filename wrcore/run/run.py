@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import wrcore
-from wrcore.errors import similar
+from wrcore.errors import UnknownNameError, similar
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.derived import derived_channels
 
@@ -50,7 +50,8 @@ class Channels(Mapping[str, np.ndarray]):
             return self._derived[name]()
         has, known = ", ".join(self._channels), [*self._channels, *self._derived]
         follow = f", and what follows from these, {', '.join(self._derived)}" if self._derived else ""
-        raise KeyError(f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}")
+        text = f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}"
+        raise UnknownNameError("run", "", text)
 
     def __contains__(self, name: object) -> bool:
         return name in self._channels
@@ -64,8 +65,8 @@ class Channels(Mapping[str, np.ndarray]):
             raise AttributeError(name)
         try:
             return self[name]
-        except KeyError as error:
-            raise AttributeError(error.args[0]) from None
+        except UnknownNameError as error:
+            raise AttributeError(error.expected) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._channels)
@@ -116,9 +117,10 @@ class Run:
     end_t : float
         Time of the last valid state, s: the end of a completed run, else the last accepted step before whatever
         happened.
-    end_state : ndarray, shape (size,), or None
+    end_state : State, shape (size,), or None
         That state: 13 numbers per body (position, Euler parameters, velocity, angular velocity), then the force
-        elements' own; :func:`wrcore.run.simulate` takes it as a start.
+        elements' own. An array that knows its time, where the moving frame is and whose it is
+        (:mod:`wrcore.run.state`): :func:`wrcore.run.simulate` takes it as a start.
 
     Examples
     --------
@@ -150,9 +152,8 @@ class Run:
     def __getitem__(self, group: str) -> Channels:
         """Channels of one group as attributes; KeyError names the groups that exist."""
         if group not in self.groups:
-            raise KeyError(
-                f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}{similar(group, self)}"
-            )
+            has = f"no group {group!r} in this run; it has {', '.join(sorted(self.groups))}"
+            raise UnknownNameError("run", "", f"{has}{similar(group, self)}")
         derived = derived_channels(self.groups, group, self.scene.get("speed", np.nan))
         return Channels(group, self.groups[group], derived)
 

@@ -22,6 +22,7 @@ from wrcore.run.course import Course
 from wrcore.run.course import evaluated as evaluated
 from wrcore.run.progress import counted, simulated_time
 from wrcore.run.run import Run
+from wrcore.run.state import State
 from wrcore.scene.description import Scene, Source, load_scene
 
 
@@ -45,8 +46,10 @@ def simulate(
         and somebody watches (a terminal or a notebook, not a log); False: none.
     start : Checkpoint, ndarray of shape (size,), or "initial"
         Where the run begins instead of at the scene's initial state: the ``end`` of an earlier run, which goes on at
-        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit), or a
-        state at time 0. The scene's ``initial`` does not count then.
+        its time bit by bit as if it had not stopped (by the same method; its model must be this one to the bit, which
+        on another processor it is not), its ``end_state``, which knows its time and where the moving frame is (the
+        same vehicle; all else may differ), or an array as a state at time 0. The scene's ``initial`` does not count
+        then.
     **changes
         Further values by key, as :func:`wrcore.load_scene` takes them.
 
@@ -78,7 +81,7 @@ def simulate(
     if overrides or changes or not isinstance(scene, Scene):
         scene = load_scene(scene, overrides, **changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
-    begin = start.t if isinstance(start, Checkpoint) else 0.0
+    begin = start.t if isinstance(start, Checkpoint | State) else 0.0
     check_memory(scene)
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
         course = Course(scene, begin_at, show_progress if progress is None else None)

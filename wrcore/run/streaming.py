@@ -18,7 +18,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from typing import Any
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
-from wrcore.errors.new_files import locked, remove_folder, remove_remains
+from wrcore.errors.new_files import hold, remove_folder, remove_remains
 from wrcore.integrate.integrator import REFERENCES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
@@ -252,21 +252,8 @@ class Parts:
             os.close(self.lock)
 
     def _open(self):
-        """One process at a time writes; the lock goes with it, however it ends."""
-        while self.lock is None:
-            try:
-                self.folder.mkdir(exist_ok=True)
-                lock = os.open(self.folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-            except (FileExistsError, NotADirectoryError):  # a file or a link
-                raise InputError("--out", self.path, f"expected a folder or nothing as {self.folder.name}") from None
-            if not locked(lock):
-                os.close(lock)
-                raise InputError("--out", self.path, "expected a file that no other process is writing")
-            with suppress(FileNotFoundError):  # whoever held it before may just have removed it
-                if os.path.samestat(os.fstat(lock), os.stat(self.folder)):
-                    self.lock = lock
-                    return
-            os.close(lock)
+        if self.lock is None:
+            self.lock = hold(self.folder, self.path)
 
     def _part(self, number):
         return self.folder / f"{number:06d}.h5"

@@ -7,7 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
-from wrcore.scene.pairs import Pair, find_file, own_pairs, pair_geometries, wheel_and_rail
+from wrcore.scene.pairs import Pair, digests_of_files, find_file, own_pairs, pair_geometries, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
@@ -55,6 +55,8 @@ class Scene:
     track : Track
     pairs : tuple of Pair
         Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
+    files : dict
+        SHA-256 of all files that were read for it, by path.
 
     Examples
     --------
@@ -73,6 +75,7 @@ class Scene:
     rail: ProfileCurve
     track: Track
     pairs: tuple[Pair, ...] = ()
+    files: dict[str, str] = field(default_factory=dict)
 
     @property
     def detection(self) -> str:
@@ -145,6 +148,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
 def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     """The scene of a file's content, with whatever other files it names."""
     data = validate(data, "scene", source)
+    digests = digests_of_files(data, folder)  # before they are read: what changes meanwhile does not go unseen
     parameters = find_file(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
@@ -159,7 +163,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     check_bodies(data["initial"]["bodies"], vehicle, source)
     read_friction(data["contact"]["friction"], source)
     read_drive(data.get("drive"), vehicle, source)
-    return Scene(data, source, vehicle, wheel, rail, track, pairs)
+    return Scene(data, source, vehicle, wheel, rail, track, pairs, digests)
 
 
 def _blamed(error, source, asked):

@@ -369,9 +369,9 @@ def _improved(standing, stands, steps):
 
 
 def _on_path(path, s, speed, part):
-    """State of one body from that on a tangent track along x, with what is at s there (m) now at arc length s of a path.
+    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here.
 
-    ``speed`` is that of the path's axes along it, m/s.
+    The path's axes at the body move along it with a speed, m/s.
     """
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from wrcore.contact.geometry import contact_geometry
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.errors.input_files import digest_of_file
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 
@@ -29,12 +30,32 @@ class Pair(NamedTuple):
     """At the tape circle, m."""
 
 
+NAMED_BY = ("parameters", "profile", "points", "table")
+"""Keys of a scene whose values name files."""
+
+
 def find_file(path, folder, source, field):
     """A file named in a scene: relative to its folder, to the folder above it, or to the working directory."""
+    found = _found(path, folder)
+    if found is None:
+        raise InputError(source, field, f"expected an existing file, got {path!r}")
+    return found
+
+
+def _found(path, folder):
     for base in (folder, folder.parent, Path()):
         if os.path.isfile(base / path):  # Path.is_file raises where a name is too long or a folder is closed
             return base / path
-    raise InputError(source, field, f"expected an existing file, got {path!r}")
+    return None
+
+
+def digests_of_files(value, folder, key=""):
+    """SHA-256 of all files that a scene's content, or a part of it, names, by their paths."""
+    if isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else ((key, item) for item in value)
+        return {path: digest for name, item in items for path, digest in digests_of_files(item, folder, name).items()}
+    found = _found(value, folder) if key in NAMED_BY and isinstance(value, str) else None
+    return {} if found is None else {str(found): digest_of_file(found)}
 
 
 def wheel_and_rail(data, folder, source):

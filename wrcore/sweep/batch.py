@@ -7,25 +7,27 @@ equilibrium. A run then costs its integration and two to four milliseconds (repo
 from __future__ import annotations
 
 import dataclasses
+import glob
 import hashlib
 import io
 import json
-import os
-import shutil
 import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 import pandas as pd
 
 from wrcore.dynamics.series import equations_of
 from wrcore.errors import InputError
+from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
+from wrcore.errors.input_files import check_regular, check_unchanged
+from wrcore.errors.new_files import appearing, held, remove_folder, remove_remains
 from wrcore.integrate.integrator import integrate
 from wrcore.run.channels import unit_of
 from wrcore.run.progress import counted
@@ -43,6 +45,7 @@ from wrcore.sweep.measures import (
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 
 _SEALED = "# seal of this part: "
+_KIND = "a sweep's table (CSV or HDF5)"
 
 CHUNK = 200
 """Runs whose motions are held at a time."""
@@ -238,15 +241,29 @@ def sweep_to_file(
         Table, CSV or ``.h5``. Finished batches wait beside it in a folder whose name tells what they depend on.
     threads, progress
         As for :func:`run_sweep`.
+
+    Raises
+    ------
+    InputError
+        If another process writes the same table, if batches wait that were made of something else, or if a file that
+        the sweep reads changes meanwhile.
     """
     path = Path(path)
+    remove_remains(path)
     folder = path.with_name(f".{path.name}.{sweep.digest()}")
     parts = [folder / f"{batch:04d}.csv" for batch in range(sweep.batches)]
-    for batch, part in enumerate(parts):
-        if not _whole(sweep, part):
-            write_table(part, run_rows(sweep, sweep.rows(batch), threads, progress), sweep)
-    gather(sweep, parts, path)
-    shutil.rmtree(folder)
+    with held(folder, path):
+        for other in path.parent.glob(f".{glob.escape(path.name)}.{16 * '[0-9a-f]'}"):
+            if other != folder:
+                with suppress(OSError):  # it may hold batches, too
+                    folder.rmdir()
+                expected = f"expected the sweep, scene and files that the batches in {other.name} were made of"
+                raise InputError("--out", path, f"{expected}, but some were changed; remove that folder to begin anew")
+        for batch, part in enumerate(parts):
+            if not _whole(sweep, part):
+                write_table(part, run_rows(sweep, sweep.rows(batch), threads, progress), sweep)
+        gather(sweep, parts, path)
+        remove_folder(folder)
 
 
 def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
@@ -274,11 +291,7 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
 
 def load_part(sweep: Sweep, path: str | PathLike[str]) -> pd.DataFrame:
     """Read a part of a sweep's table whose seal says that it is whole and of this sweep; else InputError."""
-    table, text, seal = _read(Path(path))
-    if seal != _seal(sweep, text):
-        expected = "expected a whole part of this sweep, as 'wrcore sweep --batch' writes it with the same sources"
-        raise InputError(path, "", expected)
-    return table
+    return _read(Path(path), sweep)
 
 
 def _whole(sweep: Sweep, part: Path) -> bool:
@@ -300,33 +313,31 @@ def _text(table: pd.DataFrame) -> str:
 def write_table(path: str | PathLike[str], table: pd.DataFrame, part_of: Sweep | None = None) -> None:
     """Write a sweep's table: CSV, or HDF5 with a dataset and its unit per column where the name ends in ``.h5``.
 
-    The file appears under its name only when it is complete. A part ends with its seal: a comment, or an attribute.
+    The file appears under its name only when it is complete. A part ends with its seal, a comment or an attribute, if
+    the files that its runs were made of are still what they were.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     if path.suffix == ".h5":
         table = table.astype({name: str for name, column in table.items() if column.dtype.kind not in "biuf"})
-    text = _text(table)
-    seal = "" if part_of is None else _seal(part_of, text)
-    try:
-        if path.suffix == ".h5":
-            _write_hdf5(part, table, seal)
-        else:
-            part.write_text(text + (seal and f"{_SEALED}{seal}\n"), encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    text, seal = _text(table), ""
+    if part_of is not None:
+        check_unchanged(part_of.files)
+        seal = _seal(part_of, text)
+    if path.suffix == ".h5":
+        _write_hdf5(path, table, seal)
+    else:
+        with appearing(path) as file:
+            file.write((text + (seal and f"{_SEALED}{seal}\n")).encode())
 
 
 def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
-    with h5py.File(path, "w", track_order=True) as file:
+    with new_hdf5(path, track_order=True) as file:
         file.attrs["format"] = "wrcore sweep"
         file.attrs["seal"] = seal
         for name in table.columns:
             values = table[name].to_numpy()
             if values.dtype.kind not in "biuf":
-                values = values.astype(h5py.string_dtype())
+                values = values.astype(object)
             dataset = file.create_dataset(name, data=values)
             dataset.attrs["units"] = UNITS.get(name) or unit_of(name)
 
@@ -339,22 +350,36 @@ def load_table(path: str | PathLike[str]) -> pd.DataFrame:
     InputError
         If there is no such file or it is of another kind.
     """
-    return _read(Path(path))[0]
+    return _read(Path(path))
 
 
-def _read(path: Path) -> tuple[pd.DataFrame, str, str]:
-    """A table, its text and its seal, which is empty where it has none."""
+def _read(path: Path, part_of: Sweep | None = None) -> pd.DataFrame:
+    """A table, which is a part of a sweep if one is given."""
     try:
-        if path.suffix != ".h5":
-            text, _, seal = path.read_text(encoding="utf-8-sig").partition(_SEALED)
-            return pd.read_csv(io.StringIO(text)), text, seal.strip()
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != "wrcore sweep":
-                raise InputError(path, "attribute format", "expected 'wrcore sweep'")
-            columns = {name: item.asstr()[()] if item.dtype.kind == "O" else item[()] for name, item in file.items()}
-            table = pd.DataFrame(columns)
-            return table, _text(table), str(file.attrs.get("seal", ""))
+        if path.suffix == ".h5":
+            table, seal = _read_hdf5(path)
+            _check_seal(path, part_of, _text(table), seal)
+            return table
+        check_regular(path)
+        text, _, seal = path.read_text(encoding="utf-8-sig").partition(_SEALED)
+        _check_seal(path, part_of, text, seal.strip())
+        return pd.read_csv(io.StringIO(text))
     except InputError:
         raise
-    except Exception as error:  # a damaged file fails in as many ways as h5py and pandas have
-        raise InputError(path, "", f"expected a sweep's table (CSV or HDF5), got: {error}") from None
+    except Exception as error:  # a damaged file fails in as many ways as pandas has
+        raise InputError(path, "", f"expected {_KIND}, got: {getattr(error, 'strerror', None) or error}") from None
+
+
+def _check_seal(path: Path, part_of: Sweep | None, text: str, seal: str) -> None:
+    if part_of is not None and seal != _seal(part_of, text):
+        expected = "expected a whole part of this sweep, as 'wrcore sweep --batch' writes it of the same files"
+        raise InputError(path, "", expected)
+
+
+def _read_hdf5(path: Path) -> tuple[pd.DataFrame, str]:
+    """A table and its seal, empty where it has none."""
+    with checked_hdf5(path, _KIND) as (file, signed):
+        if file.attrs.get("format") != "wrcore sweep" or not signed:
+            raise InputError(path, "attribute format", "expected 'wrcore sweep', and the digest that it begins with")
+        columns = {name: item.asstr()[()] if item.dtype.kind == "O" else item[()] for name, item in file.items()}
+        return pd.DataFrame(columns), str(file.attrs.get("seal", ""))

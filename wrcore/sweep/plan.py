@@ -48,12 +48,15 @@ class Sweep:
         With the changes that hold for all runs.
     runs : pandas.DataFrame
         A row per run, numbered from 0 (index ``run``), and a column per key.
+    files : dict
+        SHA-256 of all files that are read for any of the runs, by path.
     """
 
     data: dict[str, Any]
     source: str
     scene: Scene
     runs: pd.DataFrame
+    files: dict[str, str]
 
     @property
     def batches(self) -> int:
@@ -67,12 +70,18 @@ class Sweep:
 
     def digest(self) -> str:
         """Digest (16 hex digits) of all that the results depend on, but for the machine."""
-        described = [self.data, self.scene.data, self.scene.vehicle.data, __version__, source_digest()]
-        return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:16]
+        return digest_of_plan([self.data, self.scene.data], self.files)[:16]
 
     def __repr__(self) -> str:
         keys = ", ".join(self.runs.columns)
         return f"Sweep {self.data['name']!r}: {len(self.runs)} runs over {keys}; {self.batches} batches"
+
+
+def digest_of_plan(described: Any, files: Mapping[str, str]) -> str:
+    """Digest of a plan of many runs: what its files say, what was read for them, and the sources of the program."""
+    read = sorted((Path(path).name, digest) for path, digest in files.items())
+    text = json.dumps([described, read, __version__, source_digest()], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def load_sweep(
@@ -115,7 +124,7 @@ def load_sweep(
             raise InputError(name, "measures", one_of(MEASURES, measure))
     scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
-    _check_values(scene, data["keys"], values, name)
+    read = scene.files | _check_values(scene, data["keys"], name)
     grid = data["sampling"]["kind"] == "grid"
     if grid and (count := math.prod(map(len, values.values()))) > MOST_RUNS:
         raise InputError(name, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
@@ -124,7 +133,7 @@ def load_sweep(
     shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
     if data["begin"] >= shortest:
         raise InputError(name, "begin", f"expected less than the shortest run's {shortest:g} s, got {data['begin']:g}")
-    sweep = Sweep(data, name, scene, runs)
+    sweep = Sweep(data, name, scene, runs, read)
     if sweep.batches > MOST_BATCHES:
         least = math.ceil(len(runs) / MOST_BATCHES)
         raise InputError(name, "batch", f"expected at least {least} runs per batch: a batch is a process of its own")
@@ -157,8 +166,9 @@ def _values(entry, sampling, field, source):
     return spaced.tolist()
 
 
-def _check_values(scene, entries, values, source):
-    """Try each key by itself: at its bounds, or at each of its values."""
+def _check_values(scene, entries, source):
+    """Try each key by itself: at its bounds, or at each of its values. Returns the digests of the files read."""
+    files = {}
     for key, entry in entries.items():
         tried = entry.get("values") or [
             entry["from"],
@@ -172,6 +182,8 @@ def _check_values(scene, entries, values, source):
                 raise InputError(source, f"keys.{key}", str(error)) from None
             if changed.data["integration"]["method"] not in ("auto", *METHODS):
                 raise InputError(source, f"keys.{key}", one_of(("auto", *METHODS), value))
+            files |= changed.files
+    return files
 
 
 def _grid(values):
