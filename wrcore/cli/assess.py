@@ -5,8 +5,8 @@ from wrcore.cli.options import columns
 
 ABOUT = """
 Assess a stored run by EN 14363 (running safety and track loading: needs the forces of wheels at 1000 1/s or more) or EN
-12299 (comfort: poses and accelerations of bodies at 200 1/s or more). reports/assessment.md says what of the standards is
-done.
+12299 (comfort: poses and accelerations of bodies at 200 1/s or more). reports/assessment.md says what of the
+standards is done.
 """
 
 FILES = columns(
