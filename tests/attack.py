@@ -31,6 +31,7 @@ from wrcore.creep.build import Resolution
 from wrcore.creep.cases import creep_force
 from wrcore.creep.kalker import kalker_data
 from wrcore.creep.table import CreepTable, load_table, write_table
+from wrcore.errors import InputError
 from wrcore.run.results import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.streaming import simulate_to
@@ -127,6 +128,32 @@ def runs(count, seed):
             return content(run), run.scene, run.settings
 
         return file_attack("runs", count, seed, originals, read, same_numbers)
+
+
+@attack(700)
+def run_over(count, seed):
+    """``wrcore simulate --out`` over a damaged run: the run, or one line and the file as it was."""
+    with tempfile.TemporaryDirectory() as folder:
+        originals = [Path(folder) / name for name in ("whole.h5", "interrupted.h5")]
+        simulate_to(scene_of("tsit5"), originals[0])
+        interrupted(originals[1], "tsit5", 10_000)
+        whole("tsit5")
+        written(originals[0])  # loads what the command needs once for all cases
+        return file_attack("run_over", count, seed, originals, written, lambda *_: True)
+
+
+def written(path):
+    """Run a scene by its command over a file; RuntimeError where that neither gives the run nor is refused."""
+    out, before, said = path.with_name("run.h5"), path.read_bytes(), io.StringIO()
+    out.write_bytes(before)
+    sets = [f"--set={key}={value}" for key, value in (SHORT | {"integration.method": "tsit5"}).items()]
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
+        status = command(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)])
+    if status == 2 and said.getvalue().count("\n") == 1 and out.read_bytes() == before:
+        raise InputError("run_over", "", said.getvalue())
+    if status or said.getvalue():
+        raise RuntimeError(f"status {status}, said {said.getvalue()!r}")
+    load_run(out)
 
 
 def finished(method, folder):

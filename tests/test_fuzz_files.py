@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -230,17 +231,19 @@ FILES = {
 
 
 @pytest.mark.parametrize("arguments", FILES.values(), ids=FILES)
-@pytest.mark.parametrize("kind", ["absent", "folder", "below_a_file", "too_long", "closed", "empty", "binary"])
+@pytest.mark.parametrize("kind", ["absent", "folder", "below_a_file", "too_long", "closed", "empty", "binary", "pipe"])
 def test_files_that_cannot_be_read(tmp_path, arguments, kind):
     (tmp_path / "out").mkdir()
     (tmp_path / "cases.csv").write_text(CASES)
     (tmp_path / "file.csv").write_bytes(bytes(range(256)) if kind == "binary" else b"")
+    os.mkfifo(tmp_path / "pipe.csv")
     closed = tmp_path / "closed.csv"
     closed.write_text("x")
     closed.chmod(0)
     path = {
         "absent": tmp_path / "absent.csv", "folder": tmp_path, "below_a_file": tmp_path / "cases.csv" / "x.csv",
         "too_long": tmp_path / f"{'x' * 300}.csv", "closed": closed,
+        "pipe": tmp_path / "pipe.csv",
     }.get(kind, tmp_path / "file.csv")  # fmt: skip
     out = tmp_path / "out" / "result.csv"
     names = {"FILE": path, "OUT": out, "CASES": tmp_path / "cases.csv"}

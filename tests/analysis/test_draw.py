@@ -77,6 +77,11 @@ def drawn_of(folder, key, item):
     return {part.get("id") for part in ElementTree.parse(folder / "vehicle.svg").getroot().iter()}
 
 
+def test_no_name_breaks_a_drawing(tmp_path):
+    item = {"name": "$\\frac$", "kind": "bushing", "bodies": ["wheelset", "frame"], "at": [0.0, 0.3, 0.5]}
+    assert "element:$\\frac$:side" in drawn_of(tmp_path, "elements", item | ELEMENTS["bushing"])
+
+
 def test_a_box_has_the_moments_of_its_body():
     body = yaml.safe_load((ROOT / "config/vehicles/trailer_vehicle.yaml").read_text())["bodies"]["bogie_1"]
     length, width, height = box_of(body)

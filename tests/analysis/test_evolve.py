@@ -156,11 +156,10 @@ def test_a_damaged_folder_is_refused(request, tmp_path, name, damage, of):
             read()
 
 
-def test_a_plan_of_other_files_does_not_go_on(tmp_path):
+def test_a_plan_of_other_files_does_not_go_on(tmp_path, uic60):
     """A rail that was edited between two steps made two wear rates in one table."""
     rail = tmp_path / "rail.csv"
-    u = np.linspace(-0.034, 0.034, 137)
-    rows = [f"{a:.6f},{b:.9f}" for a, b in zip(u, -u * u / 0.6, strict=True)]
+    rows = [f"{a:.9f},{b:.9f}" for a, b in zip(uic60.u[::10], uic60.f[::10], strict=True)]
     rail.write_text("\n".join(["u_m,f_m", *rows]))
     scene = load_scene(PLAN["scene"]).data
     scene["rail"], scene["vehicle"] = {"profile": "rail.csv"}, scene["vehicle"] | {"parameters": str(VEHICLE)}

@@ -7,6 +7,7 @@ SVG every part is a group named ``body:NAME``, ``element:NAME`` or ``joint:NAME`
 import math
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
@@ -72,6 +73,7 @@ def box_of(body):
 
 
 @styled
+@rc_context({"text.parse_math": False})  # names are the user's
 def plot_vehicle(scene):
     """Draw the vehicle of a scene in its nominal position.
 

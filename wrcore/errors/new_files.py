@@ -117,7 +117,7 @@ def remove_remains(path: Path) -> None:
     """Remove what killed processes left of `appearing` and `remove_folder`: hidden, ours, and held by nobody."""
     if fcntl is None:
         return
-    left = re.compile(rf"\.{re.escape(path.name)}\.(parts\.)?[0-9a-f]{{1,8}}\.part")
+    left = re.compile(rf"\.{re.escape(path.name)}\.((parts|[0-9a-f]{{16}})\.)?[0-9a-f]{{1,8}}\.part")
     with suppress(OSError), os.scandir(path.parent) as entries:
         for entry in entries:
             if left.fullmatch(entry.name):

@@ -168,7 +168,7 @@ def _values(entry, sampling, field, source):
 
 def _check_values(scene, entries, source):
     """Try each key by itself: at its bounds, or at each of its values. Returns the digests of the files read."""
-    files = {}
+    files: dict[str, str] = {}
     for key, entry in entries.items():
         tried = entry.get("values") or [
             entry["from"],
