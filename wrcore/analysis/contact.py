@@ -1,5 +1,7 @@
 """Contact of a wheelset over its lateral position and yaw, without load: points, angles, radii, conicity."""
 
+from typing import Annotated
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
@@ -7,6 +9,8 @@ from numpy.typing import ArrayLike
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.poses import solve_poses
+from wrcore.contact.reduction import REDUCTIONS
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import Track
 
 
@@ -26,13 +30,14 @@ def pair_geometry(pair):
     return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 
 
+@checked
 def contact_table(
     pair: WheelsetOnTrack,
-    shifts: ArrayLike,
-    yaws: ArrayLike = 0.0,
-    wheel_load: float = 1e-3,
-    detection: str = "spatial",
-    patch: str = "moment",
+    shifts: Annotated[ArrayLike, Within(-0.1, 0.1, "m")],
+    yaws: Annotated[ArrayLike, Within(-0.5, 0.5, "rad")] = 0.0,
+    wheel_load: Annotated[float, Within(1e-9, 1e6, "N")] = 1e-3,
+    detection: Annotated[str, OneOf(("planar", "spatial"))] = "spatial",
+    patch: Annotated[str, OneOf(REDUCTIONS)] = "moment",
 ) -> pd.DataFrame:
     """Contact of a wheelset over its lateral position and yaw: all patches of both wheels at a load per wheel.
 

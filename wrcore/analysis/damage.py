@@ -9,19 +9,17 @@ the shakedown limit of the surface, p_max/k = N/|T|, is exceeded (Johnson, Wear 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.style import styled
-from wrcore.analysis.wheels import greatest_pressure, wear_number, wheelsets_of
-from wrcore.errors import InputError
+from wrcore.analysis.wheels import after, greatest_pressure, wear_number, wheelsets_of
+from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.surface import SIDES
-
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
+from wrcore.run.run import Run
 
 YIELD_IN_SHEAR = 300e6
 """Of a wheel or rail steel that has hardened, Pa (chosen)."""
@@ -74,7 +72,10 @@ def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
     return utilised_friction(run, wheelset, side) - less
 
 
-def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> pd.DataFrame:
+@checked
+def damage_table(
+    run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR
+) -> pd.DataFrame:
     """Rolling contact fatigue of each wheel and the rail under it over a run.
 
     Parameters
@@ -103,9 +104,7 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     >>> wr.damage_table(run)[["wheelset", "side"]].values.tolist()
     [['wheelset', 'left'], ['wheelset', 'right']]
     """
-    if not wheelsets_of(run) or not np.any(run.t >= begin):
-        raise InputError("damage_table", "run", f"expected the channels of wheels after {begin:g} s")
-    late, rows = run.t >= begin, []
+    late, rows = after(run, begin, "damage_table"), []
     for wheelset in wheelsets_of(run):
         for side in SIDES:
             number = wear_number(run, wheelset, side)[late]
@@ -119,8 +118,9 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     return pd.DataFrame(rows)
 
 
+@checked
 @styled
-def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> Figure:
+def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR) -> Figure:
     """Shakedown map: greatest pressure over k against utilised friction, all wheels and times.
 
     Parameters
@@ -140,7 +140,7 @@ def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_S
     'utilised friction |T|/N'
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
-    axes, late, top = figure.subplots(), run.t >= begin, 0.0
+    axes, late, top = figure.subplots(), after(run, begin, "plot_shakedown"), 0.0
     for wheelset in wheelsets_of(run):
         for side, mark in zip(SIDES, ("o", "^"), strict=True):
             pressure = greatest_pressure(run, wheelset, side)[late] / shear_yield

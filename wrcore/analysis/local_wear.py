@@ -15,7 +15,7 @@ and leaves it spread over the width of the strip. Depths are those of the profil
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -23,12 +23,11 @@ from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
 from wrcore.analysis.wheels import wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import rolling_speed
+from wrcore.run.run import Run
 from wrcore.scene.friction import read_friction
-
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
 
 BIN = 2.5e-4
 """Width of the bins of depth over a profile, m."""
@@ -65,8 +64,9 @@ class WheelWear:
     """Friction's work in the patches, J/m."""
 
 
+@checked
 def local_wear(
-    run: Run, begin: float = 0.0, law: str = "sheffield", width: float = BIN
+    run: Run, begin: float = 0.0, law: str | dict[str, Any] = "sheffield", width: Annotated[float, ABOVE_ZERO] = BIN
 ) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 

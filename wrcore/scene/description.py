@@ -26,6 +26,7 @@ from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import Track, build_track
@@ -96,6 +97,7 @@ def as_scene(scene: Source) -> Scene:
     return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
+@checked
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
     """Read and check a scene.
 

@@ -18,6 +18,7 @@ import pandas as pd
 
 from wrcore import __version__
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
@@ -75,6 +76,7 @@ class Sweep:
         return f"Sweep {self.data['name']!r}: {len(self.runs)} runs over {keys}; {self.batches} batches"
 
 
+@checked
 def load_sweep(
     source: str | PathLike[str] | Mapping[str, Any], overrides: Iterable[str] | Mapping[str, Any] = ()
 ) -> Sweep:
