@@ -10,7 +10,20 @@ from wrcore.run.channels import UNIT_SUFFIXES
 from wrcore.sweep.batch import column_unit, write_table
 
 SCHEMAS = ("scene", "track", "vehicle", "sweep", "wear", "wear_law")
-COMPOUND = {"s/m", "N/m", "N s/m", "N/m^3", "N m/rad", "N m/rad^3", "N m s/rad", "kg", "kg m^2", "kg/m", "N, m^3/m"}
+COMPOUND = {
+    "1/s",
+    "s/m",
+    "N/m",
+    "N s/m",
+    "N/m^3",
+    "N m/rad",
+    "N m/rad^3",
+    "N m s/rad",
+    "kg",
+    "kg m^2",
+    "kg/m",
+    "N, m^3/m",
+}
 KNOWN = {"1", "that of the key", *UNIT_SUFFIXES.values(), *COMPOUND}
 
 

@@ -4,6 +4,7 @@ An annotation is a type, a union or a list of types, or ``Annotated`` with the m
 passes reaches the function as it was given. Wrong call shapes (missing or unknown arguments) stay Python's own.
 """
 
+import errno
 import reprlib
 import sys
 import types
@@ -47,6 +48,9 @@ ARRAY = {*typing.get_args(ArrayLike)}
 ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
+
+UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
+"""What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
 
 Thing = typing.TypeVar("Thing", bound=Callable[..., Any])
 
@@ -114,7 +118,13 @@ def checked(thing: Thing) -> Thing:
         for name, value in options.items():
             if name in by_name and not by_name[name][0](value):
                 refuse(name, by_name[name], value)
-        return thing(*args, **options)
+        try:
+            return thing(*args, **options)
+        except OSError as error:
+            if error.errno not in UNFIT:
+                raise
+            expected = f"expected a path for this, but: {error.strerror}"
+            raise InputError(thing.__qualname__, short(error.filename), expected) from error
 
     return typing.cast(Thing, front)
 
@@ -173,13 +183,14 @@ def _kind(annotation, origin, inner, marks):
 
 def _plain_kind(kind, bounds):
     low, high = bounds[:2]
-    if kind is float:
-        numbers = (float, int, np.floating, np.integer)
-        return Kind(lambda v: isinstance(v, numbers) and v is not True and v is not False and low <= v <= high,
-                    f"a number, {bounds}")  # fmt: skip
-    if kind is int:
-        return Kind(lambda v: isinstance(v, int | np.integer) and v is not True and v is not False and low <= v <= high,
-                    f"a whole number, {bounds}")  # fmt: skip
+    if kind in (float, int):
+        numbers = (int, np.integer) if kind is int else (float, int, np.floating, np.integer)
+
+        def fits(v):  # numbers of fewer bits would compare with bounds of their own size
+            v = float(v) if isinstance(v, np.floating) else v
+            return isinstance(v, numbers) and v is not True and v is not False and low <= v <= high
+
+        return Kind(fits, f"a {'whole ' * (kind is int)}number, {bounds}")
     if kind in (None, type(None)):
         return Kind(lambda value: value is None, "None")
     if kind is Callable:
@@ -220,4 +231,5 @@ def _are_numbers(value, bounds):
         return False
     if array.dtype.kind not in "iuf" or array.size < bounds.size or array.ndim > bounds.dimensions:
         return False
+    array = array.astype(float, copy=False)  # numbers of fewer bits would compare with bounds of their own size
     return bool(((array >= bounds.low) & (array <= bounds.high)).all())
