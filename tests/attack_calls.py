@@ -186,7 +186,8 @@ def wrong(seed):
         last = error.__traceback__
         while last.tb_next:
             last = last.tb_next
-        if last.tb_frame.f_code.co_name not in ("front", "wrong", "inner"):  # else Python's own
+        own = last.tb_frame.f_code.co_name in ("front", "wrong", "inner") or "no_such" in str(error)
+        if not own:
             raise
         return ""
     except BaseException as error:

@@ -17,7 +17,8 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked, kind_of
 
 GOOD_AND_BAD = [
-    (float, [0, 1.5, np.float32(2.0), np.int64(1)], [True, np.float32(np.inf), "1", None, np.nan, np.inf, 10**400, 1j, [1.0]]),
+    (float, [0, 1.5, np.float32(2.0), np.int64(1)],
+     [True, np.float32(np.inf), "1", None, np.nan, np.inf, 10**400, 1j, [1.0]]),
     (Annotated[float | None, ABOVE_ZERO], [None, 1e-3], [0.0, -1.0, np.nan]),
     (Annotated[int, Within(1, 8)], [1, np.int64(8)], [0, 9, 1.0, True, 2**70]),
     (Annotated[float, Within(high=np.inf)], [np.inf], [np.nan]),
@@ -28,6 +29,7 @@ GOOD_AND_BAD = [
     (ArrayLike, [np.ones(2, np.float32)], [np.float32(np.inf), np.array([np.inf], np.float32)]),
     (ArrayLike | None, [None, [[1.0]]], ["x", object()]),
     (Iterable[float], [[1.0], np.ones(2), range(3), iter([1.0])], [1.0, "12", ["1"], [np.nan], np.array(3.0), {1: 1}]),
+    (Annotated[Sequence[float], ABOVE_ZERO], [[1.0]], [[], [0.0], 1.0]),
     (Sequence[str], [["a"], ()], ["a", [1], iter(["a"])]), (str | PathLike[str], ["a"], [1, None, b"a"]),
     (dict[str, wr.Settling], [{}, {"a": wr.Settling()}], [{"a": 1}, {1: wr.Settling()}, []]),
     (wr.Run | Literal[False], [False], [0, "run.h5", None]), (Any, [None, 3], []),

@@ -176,8 +176,8 @@ def _kind(annotation, origin, inner, marks):
             "a mapping by names",
         )
     if isinstance(origin, type) and issubclass(origin, Iterable):
-        one = kind_of(inner[0], *marks)
-        return Kind(lambda value: _all_fit(value, one.fits, origin is Iterable), f"a list, each {one.text}")
+        one, least = kind_of(inner[0], *marks), bounds.size if bounds in marks else 0
+        return Kind(lambda value: _all_fit(value, one.fits, origin is Iterable, least), f"a list, each {one.text}")
     return _plain_kind(origin or annotation, bounds)
 
 
@@ -210,14 +210,14 @@ def _is_text(value):
     return isinstance(text, str) and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
 
 
-def _all_fit(value, fits, one_shot):
+def _all_fit(value, fits, one_shot, least):
     """Whether all items of a list fit; what can be read only once is left to the function."""
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         return False
     if hasattr(value, "__next__"):
         return one_shot
     try:
-        return all(fits(item) for item in value)
+        return len(value) >= least and all(fits(item) for item in value)
     except TypeError:  # an array without dimensions
         return False
 
