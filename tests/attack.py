@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests import attack_calls as attack_calls
 from tests.attacking import ATTACKS, attack, edited, isolated, mutated, same_numbers, tally, tried
 from tests.conftest import SCENES
 from wrcore.cli import main as command

@@ -56,6 +56,11 @@ def assessed():
     return wr.assess(run)
 
 
+def animated():
+    scene = wr.load_scene(SCENES / "wheelset.yaml", integration__duration=0.05)
+    return wr.draw(wr.simulate(scene), scene)
+
+
 MADE = {
     "Assessment": assessed, "CreepTable": wr.ensure_table, "InputError": lambda: InputError("a", "b", "c"),
     "Patch": lambda: wr.patch(pair(), load=5e4)[0], "RollingContact": lambda: wr.RollingContact(1.0, level=6),
@@ -63,7 +68,7 @@ MADE = {
     "WheelWear": lambda: wr.WheelWear(*np.ones((4, 3)), 1.0, 2.0), "WheelsetOnTrack": pair,
     "Channels": lambda: hunting_run()["wheelset"], "Channels of a wheel": lambda: hunting_run()["wheelset/left"],
     "Sweep": lambda: wr.load_sweep(SCENES.parent / "sweeps" / "smoke.yaml"),
-    "Animation": lambda: wr.draw(wr.simulate(SCENES / "wheelset.yaml", integration__duration=0.05)),
+    "Animation": animated,
 }  # fmt: skip
 """One of each public class, and of what public functions hand out."""
 

@@ -14,16 +14,18 @@ the standard adds, statistics over many sections, is not done: the worst section
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 
 from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
 from wrcore.analysis.wheels import late_in, wheel_forces, wheelsets_of
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import quotient
+from wrcore.run.run import Run
 
 PERCENTILES = (0.15, 50.0, 99.85)
 WINDOW = 2.0
@@ -67,7 +69,10 @@ class Assessment:
         return f"{self.standard}\n{table}"
 
 
-def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bool = False) -> Assessment:
+@checked
+def assess(
+    run: Run, standard: Annotated[str, OneOf(STANDARDS)] = "EN 14363", begin: float = 0.0, freight: bool = False
+) -> Assessment:
     """Assess a run.
 
     Parameters
@@ -99,8 +104,6 @@ def assess(run: Any, standard: str = "EN 14363", begin: float = 0.0, freight: bo
     >>> bool(worst.loc["Y_over_Q", "value"] < worst.loc["Y_over_Q", "limit"])
     True
     """
-    if standard not in STANDARDS:
-        raise InputError("assess", "standard", one_of(STANDARDS, standard))
     if standard != "EN 14363":
         table = (ride_table if standard == "EN 12299" else whole_body_table)(run, begin)
         return Assessment(standard, table, pd.DataFrame())

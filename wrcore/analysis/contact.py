@@ -1,13 +1,16 @@
 """Contact of a wheelset over its lateral position and yaw, without load: points, angles, radii, conicity."""
 
+from typing import Annotated
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
-from wrcore.contact.poses import POSE_LIMITS, solve_poses
-from wrcore.errors import check_number
+from wrcore.contact.poses import solve_poses
+from wrcore.contact.reduction import REDUCTIONS
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import Track
 
 
@@ -27,13 +30,14 @@ def pair_geometry(pair):
     return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 
 
+@checked
 def contact_table(
     pair: WheelsetOnTrack,
-    shifts: ArrayLike,
-    yaws: ArrayLike = 0.0,
-    wheel_load: float = 1e-3,
-    detection: str = "spatial",
-    patch: str = "moment",
+    shifts: Annotated[ArrayLike, Within(-0.1, 0.1, "m")],
+    yaws: Annotated[ArrayLike, Within(-0.5, 0.5, "rad")] = 0.0,
+    wheel_load: Annotated[float, Within(1e-9, 1e6, "N")] = 1e-3,
+    detection: Annotated[str, OneOf(("planar", "spatial"))] = "spatial",
+    patch: Annotated[str, OneOf(REDUCTIONS)] = "moment",
 ) -> pd.DataFrame:
     """Contact of a wheelset over its lateral position and yaw: all patches of both wheels at a load per wheel.
 
@@ -66,9 +70,6 @@ def contact_table(
     [[0.0, 'left', 1], [0.0, 'right', 1], [0.002, 'left', 1], [0.002, 'right', 1]]
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
-    for name, values in (("y_m", y), ("yaw_rad", yaw)):
-        for value in values:
-            check_number(value, -POSE_LIMITS[name], POSE_LIMITS[name], "contact_table", name)
     poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
     patches = solve_poses(poses, pair_geometry(pair), wheel_load, detection, patch)
     placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))

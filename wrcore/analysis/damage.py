@@ -10,7 +10,7 @@ a wheel has those of its worst one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -19,10 +19,9 @@ from matplotlib.figure import Figure
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import greatest_pressure, late_in, wear_number, wheelsets_of
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.surface import SIDES
-
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
+from wrcore.run.run import Run
 
 YIELD_IN_SHEAR = 300e6
 """Of a wheel or rail steel that has hardened, Pa (chosen)."""
@@ -79,7 +78,10 @@ def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
     return np.max(np.where(np.isnan(index), -np.inf, index), axis=1)
 
 
-def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> pd.DataFrame:
+@checked
+def damage_table(
+    run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR
+) -> pd.DataFrame:
     """Rolling contact fatigue of each wheel and the rail under it over a run.
 
     Parameters
@@ -123,8 +125,9 @@ def damage_table(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHE
     return pd.DataFrame(rows)
 
 
+@checked
 @styled
-def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: float = YIELD_IN_SHEAR) -> Figure:
+def plot_shakedown(run: Run, begin: float = 0.0, shear_yield: Annotated[float, ABOVE_ZERO] = YIELD_IN_SHEAR) -> Figure:
     """Shakedown map: greatest pressure over k against utilised friction, all patches and times.
 
     Parameters

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -17,17 +17,19 @@ from wrcore.analysis.plot_vehicle import plot_vehicle
 from wrcore.analysis.plot_wear import plot_evolution
 from wrcore.analysis.wear_folder import TABLE, rows_of
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Within, checked
 from wrcore.run.results import load_run
 from wrcore.run.run import Run
 from wrcore.scene.description import Scene, Source, as_scene, load_scene
 
 
+@checked
 def draw(
     source: Source | Run,
     scene: Source | None = None,
-    factor: float | None = None,
+    factor: Annotated[float | None, Within(1.0, 1e6)] = None,
     begin: float = 0.0,
-    end: float = math.inf,
+    end: Annotated[float, Within(high=math.inf)] = math.inf,
 ) -> Figure | Animation:
     """Draw a scene's vehicle, put a run in motion, or show how a profile wears.
 

@@ -44,6 +44,7 @@ from wrcore.analysis.worn_rails import LaidRails, falls_of, keep_rails, laid_rai
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
@@ -109,12 +110,13 @@ def load_wear_plan(
     return data, scenes
 
 
+@checked
 def evolve(
     plan: str | PathLike[str] | dict[str, Any],
     folder: str | PathLike[str],
     say: Callable[[str], object] | None = None,
     changes: dict[str, Any] | None = None,
-    threads: int = 1,
+    threads: Threads = 1,
     spent: MutableMapping[str, float] | None = None,
 ) -> pd.DataFrame:
     """Wear a wheel profile over the distance of a plan, or go on with it.

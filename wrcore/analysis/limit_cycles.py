@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 
 from wrcore.analysis.stability import at_speed, rising, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.errors import InputError, check_number
-from wrcore.integrate.integrator import integrate
+from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
+from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulate import DERAILED_Y
 from wrcore.scene.description import Source, as_scene
@@ -26,6 +27,7 @@ CYCLES = ("limit cycle", "irregular")
 """Status of motions that do not die away."""
 
 
+@checked
 @dataclass(frozen=True)
 class Settling:
     """How a motion is followed until it has settled.
@@ -56,18 +58,14 @@ class Settling:
     2.0
     """
 
-    window: float = 2.0
-    longest: float = 30.0
-    change: float = 0.002
-    rest: float = 5e-5
-    disturbance: float = 1e-4
-    rate: float = 500.0
-    method: str = "auto"
-    rtol: float = 1e-5
-
-    def __post_init__(self) -> None:
-        for name in ("window", "longest", "change", "rest", "disturbance", "rate", "rtol"):
-            check_number(getattr(self, name), 1e-12, 1e6, "Settling", name)
+    window: Annotated[float, ABOVE_ZERO] = 2.0
+    longest: Annotated[float, ABOVE_ZERO] = 30.0
+    change: Annotated[float, ABOVE_ZERO] = 0.002
+    rest: Annotated[float, ABOVE_ZERO] = 5e-5
+    disturbance: Annotated[float, ABOVE_ZERO] = 1e-4
+    rate: Annotated[float, ABOVE_ZERO] = 500.0
+    method: Annotated[str, OneOf(("auto", *METHODS))] = "auto"
+    rtol: Annotated[float, Within(1e-13, 0.1)] = 1e-5
 
 
 def _run(model, state, settling):
@@ -196,12 +194,19 @@ def rising_branch(model, state, speeds, settling):
     return pd.DataFrame(rows)
 
 
+@checked
 def limit_cycles(
     scene: Source,
     speeds: Iterable[float],
     settling: Settling | None = None,
-    disturbances: Sequence[float] = (0.006, 0.0065, 0.007, 0.008, 0.009),
-    resolution: float = 0.25,
+    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = (
+        0.006,
+        0.0065,
+        0.007,
+        0.008,
+        0.009,
+    ),
+    resolution: Annotated[float, Within(1e-3, 150.0, "m/s")] = 0.25,
 ) -> pd.DataFrame:
     """Both branches of a scene's vehicle.
 
@@ -241,10 +246,6 @@ def limit_cycles(
     3   rising           60.0  limit cycle
     """
     speeds, settling = rising(speeds), settling or Settling()
-    check_number(resolution, 1e-3, 150.0, "limit_cycles", "resolution", "m/s")
-    disturbances = [check_number(y, -DERAILED_Y, DERAILED_Y, "limit_cycles", "disturbances", "m") for y in disturbances]
-    if not disturbances:
-        raise InputError("limit_cycles", "disturbances", "expected one or more, got none")
     model, state = straight_ahead(as_scene(scene))
     tables = {
         "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),

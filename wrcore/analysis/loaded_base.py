@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact import reduction as columns
-from wrcore.contact.detection import axle_direction
+from wrcore.contact.detection import axle_direction, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.patch.normal import height_of_zero
 from wrcore.contact.patch.result import Patch
@@ -28,6 +28,13 @@ _LEVEL = 1e-10
 """Step in roll that ends the search for it, rad."""
 
 _MOST_ROLLS = 25
+
+
+DEEPEST = 1e-3
+"""Overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread."""
+
+LOWEST = 0.1
+"""A wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot."""
 
 
 class Rolling(NamedTuple):
@@ -103,6 +110,13 @@ class LoadedWheels:
             From the flange to the field side.
         """
         raise NotImplementedError
+
+    def check_depth(self, side, y, z, roll, yaw, source, field):
+        """Refuse a height at which a wheel lies deeper in its rail than `DEEPEST`."""
+        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+        lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
+        if find_patches(self.geometry, *lifted, MOMENT, self._rows) or z < self.geometry.rolling_radius - LOWEST:
+            raise InputError(source, field, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """Height of the wheelset at which one wheel carries a load.

@@ -15,20 +15,19 @@ and leaves it spread over the width of the strip. Depths are those of the profil
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Annotated, Any
 
 import numpy as np
 
 from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
 from wrcore.analysis.wheels import late_in, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError, check_number
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import rolling_speed
+from wrcore.run.run import Run
 from wrcore.scene.friction import read_friction
-
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
 
 BIN = 2.5e-4
 """Width of the bins of depth over a profile, m."""
@@ -65,8 +64,12 @@ class WheelWear:
     """Friction's work in the patches, J/m."""
 
 
+@checked
 def local_wear(
-    run: Run, begin: float = 0.0, law: str = "sheffield", width: float = BIN
+    run: Run,
+    begin: float = 0.0,
+    law: str | dict[str, Any] = "sheffield",
+    width: Annotated[float, Within(1e-6, 0.1, "m")] = BIN,
 ) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
@@ -104,7 +107,7 @@ def local_wear(
         raise InputError("local_wear", "run", "expected the channels of wheels, such as wheelset/left")
     if any("z_m" not in run[name] for name in wheelsets_of(run)):
         raise InputError("local_wear", "output.channels", "expected the channels of poses, for the rolling radius")
-    width, late = check_number(width, 1e-6, 0.1, "local_wear", "width", "m"), late_in(run, begin, "local_wear")
+    late = late_in(run, begin, "local_wear")
     wheels = [(name, side) for name in wheelsets_of(run) for side in SIDES]
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")

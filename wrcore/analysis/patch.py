@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Strips
 from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
-from wrcore.errors import InputError, check_number, one_of
+from wrcore.errors import InputError, check_number
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import Source, as_scene
@@ -21,12 +23,25 @@ from wrcore.scene.pairs import Pair
 METHODS = ("exact", "grid")
 
 
+@checked
 def patch(
-    source: Source | WheelsetOnTrack, y: float = 0.0, yaw: float = 0.0, roll: float | None = None,
-    z: float | None = None, load: float | None = None, side: str = "left", speed: float | None = None,
-    omega: float | None = None, vy: float = 0.0, yaw_rate: float = 0.0, mu: float | None = None, method: str = "exact",
-    resolution: str = "middle", slip: str = "surfaces", load_by: str = "vertical",
-) -> list[Patch]:  # fmt: skip
+    source: Source | WheelsetOnTrack,
+    y: Annotated[float, Within(-0.1, 0.1, "m")] = 0.0,
+    yaw: Annotated[float, Within(-0.5, 0.5, "rad")] = 0.0,
+    roll: Annotated[float | None, Within(-0.5, 0.5, "rad")] = None,
+    z: Annotated[float | None, Within(-2.0, 2.0, "m")] = None,
+    load: Annotated[float | None, Within(1e-9, 1e6, "N")] = None,
+    side: Annotated[str, OneOf(SIDES)] = "left",
+    speed: Annotated[float | None, Within(1e-6, 200.0, "m/s")] = None,
+    omega: Annotated[float | None, Within(-4e3, 4e3, "rad/s")] = None,
+    vy: Annotated[float, Within(-200.0, 200.0, "m/s")] = 0.0,
+    yaw_rate: Annotated[float, Within(-1e3, 1e3, "rad/s")] = 0.0,
+    mu: Annotated[float | None, Within(0.0, 2.0)] = None,
+    method: Annotated[str, OneOf(METHODS)] = "exact",
+    resolution: Annotated[str, OneOf(GRIDS)] = "middle",
+    slip: Annotated[str, OneOf(SLIPS)] = "surfaces",
+    load_by: Annotated[str, OneOf(("vertical", "normal"))] = "vertical",
+) -> list[Patch]:
     """Contact patches of one wheel, solved on the real surfaces.
 
     Parameters
@@ -77,23 +92,14 @@ def patch(
     >>> [round(1e-3 * force, 1) for force in (tread.normal, tread.fx, tread.fs)], tread.side
     ([49.9, 9.9, 3.3], 'left')
     """
-    for name, value, known in (("method", method, METHODS), ("side", side, SIDES), ("resolution", resolution, GRIDS),
-                               ("load_by", load_by, ("vertical", "normal"))):  # fmt: skip
-        if value not in known:
-            raise InputError("patch", name, one_of(known, value))
     geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source, side)
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
-    numbers = {"y": (y, 0.1), "yaw": (yaw, 0.5), "roll": (roll, 0.5), "z": (z, 2.0), "omega": (omega, 4e3),
-               "vy": (vy, 200.0), "yaw_rate": (yaw_rate, 1e3)}  # fmt: skip
-    for name, (value, limit) in numbers.items():
-        if value is not None:
-            check_number(value, -limit, limit, "patch", name)
-    check_number(speed, 1e-6, 200.0, "patch", "speed", "m/s")
-    check_number(mu, 0.0, 2.0, "patch", "mu")
     wheels = Strips(geometry, method, resolution, slip, **options)
     rolling = Rolling(float(speed), math.nan if omega is None else float(omega), float(vy), float(yaw_rate))
     how, vertical = {"rolling": rolling, "friction": float(mu)}, load_by == "vertical"
-    if z is None:
+    if z is not None:
+        wheels.check_depth(side, y, z, roll or 0.0, yaw, "patch", "z")
+    else:
         check_number(load, 1e-9, 1e6, "patch", "load", "N")
         if roll is None:
             roll, z = wheels.settled(y, load, yaw, vertical=vertical, **how)

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
+from wrcore.errors.checked_calls import checked
 from wrcore.geometry.surface import SIDES
 
 LIFT = 0.020
@@ -70,6 +71,7 @@ def _label_shifts(axes, shifts, across, height):
             written.append(across[k])
 
 
+@checked
 def plot_pair(pair: WheelsetOnTrack, shifts: ArrayLike | None = None) -> Figure:
     """Draw a pair of profiles with its contact points as the wheelset moves sideways.
 

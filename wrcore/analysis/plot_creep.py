@@ -1,22 +1,30 @@
 """Picture of creep laws: force over creepage."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from wrcore.analysis.style import styled
-from wrcore.creep.cases import creep_force
+from wrcore.creep.cases import MODELS, creep_force
+from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, checked
 
 LOOKS = ("-", (0, (4, 2)), (0, (1, 1)), "-.", (0, (6, 1, 1, 1)), (0, (2, 2)))
 """One line per law: told apart in grey too."""
 
 
+@checked
 @styled
 def plot_creep_force(
-    models: str | Sequence[str] = ("linear", "polach", "fastsim", "table"), a: float = 5e-3, b: float = 5e-3,
-    normal_force: float = 5e4, mu: float = 0.3, spin: float = 0.5, largest: float = 8e-3,
-) -> Figure:  # fmt: skip
+    models: Annotated[str | Sequence[str], OneOf(MODELS)] = ("linear", "polach", "fastsim", "table"),
+    a: Annotated[float, ABOVE_ZERO] = 5e-3,
+    b: Annotated[float, ABOVE_ZERO] = 5e-3,
+    normal_force: Annotated[float, ABOVE_ZERO] = 5e4,
+    mu: Annotated[float, ABOVE_ZERO] = 0.3,
+    spin: float = 0.5,
+    largest: Annotated[float, ABOVE_ZERO] = 8e-3,
+) -> Figure:
     """Draw creep laws for one elliptic patch: longitudinal force over xi without spin, lateral force over eta with it.
 
     Parameters

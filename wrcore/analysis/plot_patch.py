@@ -1,6 +1,6 @@
 """Picture of a loaded wheel on its rail: both profiles, the pressure between them, and the patch from above."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,6 +10,7 @@ from wrcore.analysis.patch import pair_of, patch
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.contact.first_touch import WheelsetOnTrack
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.surface import SIDES
 from wrcore.scene.description import Source
 
@@ -23,8 +24,11 @@ SEEN = (-34.0, 30.0)
 """Heights between which wheel and rail are shown, mm."""
 
 
+@checked
 @styled
-def plot_wheel_on_rail(source: Source | WheelsetOnTrack, side: str = "left", **pose: Any) -> Figure:
+def plot_wheel_on_rail(
+    source: Source | WheelsetOnTrack, side: Annotated[str, OneOf(SIDES)] = "left", **pose: Any
+) -> Figure:
     """Draw a wheel on its rail under load, from behind, and its contact patch from above.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,11 +12,10 @@ from matplotlib.figure import Figure
 from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
 from wrcore.errors import InputError, similar
+from wrcore.errors.checked_calls import checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
-
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
+from wrcore.run.run import Run
 
 PRINTED = {
     "m": (1e3, "mm"), "rad": (1e3, "mrad"), "N": (1e-3, "kN"), "N m": (1.0, "N m"), "J": (1e-3, "kJ"),
@@ -38,6 +37,7 @@ MOST_ENTRIES = 8
 """In one column of a legend."""
 
 
+@checked
 @styled
 def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     """Draw channels of a run over time, one panel each.

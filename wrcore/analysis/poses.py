@@ -98,7 +98,10 @@ def _given(pose, name, otherwise):
 def _placed(wheels, y, yaw, roll, z, load, vertical, how):
     """Roll, and height by side, of a wheelset in a pose."""
     if not math.isnan(z):
-        return (0.0 if math.isnan(roll) else roll), dict.fromkeys(SIDES, z)
+        roll = 0.0 if math.isnan(roll) else roll
+        for side in SIDES:
+            wheels.check_depth(side, y, z, roll, yaw, "contact", "z_m")
+        return roll, dict.fromkeys(SIDES, z)
     if math.isnan(roll):
         roll, z = wheels.settled(y, load, yaw, vertical=vertical, **how)
         return roll, dict.fromkeys(SIDES, z)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from os import PathLike
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError, check_number
+from wrcore.errors.checked_calls import checked
 from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
@@ -103,6 +105,7 @@ def steady_motion(model, state, speed):
     return motion
 
 
+@checked
 def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Modes of a scene's vehicle at one speed, with their energies and shapes.
 
@@ -235,7 +238,8 @@ def loci(scenes, speeds):
     return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
 
 
-def critical_speeds(scenes: Source | dict[str, Scene], speeds: Iterable[float]) -> pd.DataFrame:
+@checked
+def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], speeds: Iterable[float]) -> pd.DataFrame:
     """Linear critical speed of a scene's vehicle, or of one in several scenes.
 
     Parameters

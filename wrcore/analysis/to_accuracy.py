@@ -11,6 +11,7 @@ import numpy as np
 
 from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
 from wrcore.errors import InputError, check_number, one_of
+from wrcore.errors.checked_calls import checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.run import Run
 from wrcore.run.simulate import simulate
@@ -73,6 +74,7 @@ class Accuracy:
     reason: str
 
 
+@checked
 def simulate_to_accuracy(
     scene: Source, accuracy: float, of: str = "y", progress: Callable | None = None
 ) -> tuple[Run, Accuracy]:

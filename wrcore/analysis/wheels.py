@@ -5,19 +5,19 @@ Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
 
 from wrcore.errors import InputError, check_number
+from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.surface import SIDES
 from wrcore.run.derived import forces_on_rail, quotient
 from wrcore.run.motion import growth_rate, hunting_frequency
+from wrcore.run.run import Run
 
-if TYPE_CHECKING:
-    from wrcore.run.run import Run
-
+Side = Annotated[str, OneOf(SIDES)]
 
 SMALLEST = 1e-6
 """Motions below this are not asked for a frequency or a damping, m."""
@@ -36,7 +36,8 @@ def late_in(run, begin, what):
     return run.t >= begin
 
 
-def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.ndarray]:
+@checked
+def wheel_forces(run: Run, wheelset: str, side: Side) -> tuple[np.ndarray, np.ndarray]:
     """Forces of a wheel on its rail.
 
     Parameters
@@ -64,7 +65,8 @@ def wheel_forces(run: Run, wheelset: str, side: str) -> tuple[np.ndarray, np.nda
     return forces_on_rail(contact, side)
 
 
-def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.ndarray:
+@checked
+def wear_number(run: Run, wheelset: str, side: Side, spin: bool = False) -> np.ndarray:
     """Wear number T gamma of a wheel over time, without or with the spin's part.
 
     Parameters
@@ -89,7 +91,8 @@ def wear_number(run: Run, wheelset: str, side: str, spin: bool = False) -> np.nd
     return run[f"{wheelset}/{side}"]["T_gamma_spin_N" if spin else "T_gamma_N"]
 
 
-def creep_power(run: Run, wheelset: str, side: str) -> np.ndarray:
+@checked
+def creep_power(run: Run, wheelset: str, side: Side) -> np.ndarray:
     """Power that a wheel's creep dissipates over time.
 
     Where a run does not hold velocities, the wheelset is taken to keep the scene's speed.
@@ -121,6 +124,7 @@ def greatest_pressure(run, wheelset, side):
     return np.max(np.nan_to_num(run[f"{wheelset}/{side}"].p_max_Pa), axis=1)
 
 
+@checked
 def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     """Forces, wear and pressure of a wheelset's wheels over time; see :meth:`wrcore.run.run.Run.wheel_forces`.
 
@@ -156,6 +160,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     return pd.DataFrame(columns | {"sum_Y_N": run[wheelset].sum_Y_N}, index=pd.Index(run.t, name="t_s"))
 
 
+@checked
 def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     """Loads, guiding forces and wear of each wheel.
 
@@ -178,8 +183,9 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     >>> (1e-3 * wr.wheel_table(run).set_index("side")["Q_mean_N"]).round().to_dict()
     {'left': 55.0, 'right': 55.0}
     """
-    late = late_in(run, begin, "wheel_table")
-    rows = []
+    if not wheelsets_of(run):
+        raise InputError("wheel_table", "run", "expected the channels of wheels")
+    late, rows = late_in(run, begin, "wheel_table"), []
     for wheelset in wheelsets_of(run):
         for side in SIDES:
             vertical, lateral = (force[late] for force in wheel_forces(run, wheelset, side))

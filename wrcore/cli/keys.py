@@ -8,8 +8,8 @@ from wrcore.errors.checked_yaml import keys_of
 KINDS = ("scene", "track", "vehicle", "sweep", "wear")
 
 ABOUT = """
-List the keys of a kind of file, each with what is expected there (with unit and range) and its default; 'needed' marks
-those that their mapping must have. '*' stands for any name, '[]' for the items of a list. 'track' is what a scene has
+List the keys of a kind of file, each with its unit, what is expected there and its default; 'needed' marks those that
+their mapping must have. '*' stands for any name, '[]' for the items of a list. 'track' is what a scene has
 below the key track.
 """
 
@@ -30,9 +30,9 @@ def run(options):
         raise InputError(
             "wrcore keys", options.below, f"expected a key of {options.kind}{similar(options.below, known)}"
         )
-    for path, description, needed, default in rows:
+    for path, description, needed, default, unit in rows:
         remark = " (needed)" if needed else f" (default: {_yaml(default)})" if default is not None else ""
-        print(path)
+        print(f"{path} [{unit}]" if unit else path)
         print(textwrap.fill(description + remark, 100, initial_indent="    ", subsequent_indent="    "))
     return 0
 

@@ -12,7 +12,7 @@ conicity is that of the cone with the same wavelength L = 2 x: (pi / L)^2 2 e r0
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 
 from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import LEAST, Within, checked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,8 +158,12 @@ def equivalent_conicity(y, difference, amplitudes):
     return conicity, ends
 
 
+@checked
 def conicity_curve(
-    pair: WheelsetOnTrack, amplitudes: ArrayLike, roll: bool = False, step: float | None = None
+    pair: WheelsetOnTrack,
+    amplitudes: Annotated[ArrayLike, Within(LEAST, 0.05, "m", dimensions=1)],
+    roll: bool = False,
+    step: Annotated[float | None, Within(1e-6, 1e-3, "m")] = None,
 ) -> pd.DataFrame:
     """Equivalent conicity of a wheelset on its track over the amplitude, as in EN 15302.
 
@@ -193,11 +198,7 @@ def conicity_curve(
     import pandas as pd
 
     amplitudes = np.atleast_1d(np.asarray(amplitudes, dtype=float))
-    if not np.all((amplitudes > 0.0) & (amplitudes <= 0.05)):
-        raise InputError("conicity", "amplitudes", "expected lengths above 0 and up to 0.05 m")
     step = STEP[bool(roll)] if step is None else step
-    if not 1e-6 <= step <= 1e-3:
-        raise InputError("conicity", "step", f"expected 1e-6 to 1e-3 m, got {step!r}")
     half = math.ceil((amplitudes.max() + REACH) / step)
     table = first_touch(pair, step * np.arange(-half, half + 1), roll)
     y, difference = _around_centre(table.y_m.to_numpy(), table.rolling_radius_difference_m.to_numpy())

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wrcore.contact.geometry import HALF_DISTANCES, RADII
 from wrcore.errors import InputError, check_number
+from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
 from wrcore.geometry.track import GAUGES
 from wrcore.kernels.jit import FAST, jit
@@ -39,6 +40,7 @@ _ROLL_STEPS = 40
 _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
 
 
+@checked
 @dataclass(frozen=True)
 class WheelOnRail:
     """One side of a pair.
@@ -61,6 +63,7 @@ class WheelOnRail:
         check_number(self.rolling_radius, *RADII, "wheel", "rolling_radius", "m")
 
 
+@checked
 @dataclass(frozen=True)
 class WheelsetOnTrack:
     """A wheelset and the track under it; the sides may differ in profile and in radius.
@@ -99,6 +102,7 @@ class WheelsetOnTrack:
                 raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")
 
     @classmethod
+    @checked
     def alike(
         cls,
         wheel: ProfileCurve,
@@ -257,7 +261,10 @@ def _tabulate(left, right, shifts, solve_roll, rolls, found):
         rolls[i] = _touch_both(left, right, shifts[i], solve_roll, buffers, found[i])
 
 
-def first_touch(pair: WheelsetOnTrack, shifts: ArrayLike, roll: bool = True) -> pd.DataFrame:
+@checked
+def first_touch(
+    pair: WheelsetOnTrack, shifts: Annotated[ArrayLike, Within(-0.1, 0.1, "m", dimensions=1)], roll: bool = True
+) -> pd.DataFrame:
     """Where a rigid wheelset without yaw touches the rails, and the rolling radius difference.
 
     Parameters
@@ -288,8 +295,6 @@ def first_touch(pair: WheelsetOnTrack, shifts: ArrayLike, roll: bool = True) -> 
     import pandas as pd
 
     shifts = np.atleast_1d(np.asarray(shifts, dtype=float))
-    if shifts.ndim != 1 or not np.all(np.abs(shifts) < 0.1):
-        raise InputError("first_touch", "shifts", "expected lateral positions within 0.1 m")
     rolls, found = np.empty(shifts.size), np.empty((shifts.size, 2, 5))
     _tabulate(*pair.kernel_data(), shifts, bool(roll), rolls, found)
     table = {"y_m": shifts, "roll_rad": rolls}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked, same_shape
 from wrcore.errors.checked_csv import read_csv_table
 
 MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
@@ -193,17 +194,18 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
 
 
+@checked
 def creep_force(
-    model: str,
-    a: ArrayLike,
-    b: ArrayLike,
-    normal_force: ArrayLike,
+    model: Annotated[str, OneOf(MODELS)],
+    a: Annotated[ArrayLike, ABOVE_ZERO],
+    b: Annotated[ArrayLike, ABOVE_ZERO],
+    normal_force: Annotated[ArrayLike, ABOVE_ZERO],
     xi: ArrayLike,
     eta: ArrayLike,
     phi: ArrayLike,
-    mu: ArrayLike = 0.3,
-    shear_modulus: ArrayLike = 8.2e10,
-    nu: ArrayLike = 0.28,
+    mu: Annotated[ArrayLike, ABOVE_ZERO] = 0.3,
+    shear_modulus: Annotated[ArrayLike, ABOVE_ZERO] = 8.2e10,
+    nu: Annotated[ArrayLike, Within(0.0, 0.5)] = 0.28,
     table: CreepTable | str | PathLike[str] | None = None,
     psi: ArrayLike = 0.0,
 ) -> tuple[Any, Any, Any]:
@@ -244,9 +246,10 @@ def creep_force(
     """
     import pandas as pd
 
-    left, right = np.multiply(b, np.add(1.0, psi)), np.multiply(b, np.subtract(1.0, psi))
+    given = {"a": a, "b": b, "normal_force": normal_force, "mu": mu, "shear_modulus": shear_modulus, "nu": nu}
+    a, b, *values, psi = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
     names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "xi", "eta", "phi_per_m")
-    values = np.broadcast_arrays(a, right, left, normal_force, mu, shear_modulus, nu, xi, eta, phi)
+    values = a, b * (1.0 - psi), b * (1.0 + psi), *values
     frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))
     forces = solve_cases(frame, model, table, source="creep_force")

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,7 @@ from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases, random_errors
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import table_folder, warn
 
@@ -271,9 +272,10 @@ def kept_tables(nu, planes, tolerance):
     return [place for place in (SHIPPED / path.name, path) if place.exists()]
 
 
+@checked
 def ensure_table(
-    nu: float = 0.28,
-    planes: str = "ellipse",
+    nu: Annotated[float, Within(0.0, 0.5)] = 0.28,
+    planes: Annotated[str, OneOf(RESOLUTIONS)] = "ellipse",
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable | None = None,
 ) -> CreepTable:

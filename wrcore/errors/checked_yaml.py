@@ -192,8 +192,37 @@ def keys_of(schema_name):
         Whether what is above it cannot do without.
     default : object
         None where there is none.
+    unit : str
+        Of a number, ``1`` for a pure one; empty where the key holds none.
     """
     return _keys(_schema(schema_name), "")
+
+
+def unit_of_key(path):
+    """Unit of a scene's key such as ``initial.bodies.car.y``, empty where it holds no number or there is none."""
+    name, inner = ("track", path.removeprefix("track.")) if path.startswith("track.") else ("scene", path)
+    return next((unit for known, unit in _units(name) if known.fullmatch(inner)), "")
+
+
+@cache
+def _units(schema_name):
+    return [(re.compile(re.escape(path).replace(r"\*", r"[^.]+")), unit) for path, *_, unit in keys_of(schema_name)]
+
+
+_UNIT = r"(?:kg|rad|Pa|N|m|s)(?:\^\d)?"
+_IN_UNIT = re.compile(rf"\bin ((?:1/)?{_UNIT}(?:[ /]{_UNIT})*)(?![\w^])")
+
+
+def _unit(part):
+    """What a schema says: ``x-unit``, or the first "in UNIT" of a description."""
+    found = _IN_UNIT.search(part.get("description", ""))
+    return str(part.get("x-unit") or found and found[1] or "") if _holds_numbers(part) else ""
+
+
+def _holds_numbers(part):
+    kinds = part.get("type", ())
+    inner = [one for one in (*part.get("anyOf", ()), part.get("items")) if one]
+    return any(kind in kinds for kind in ("number", "integer")) or any(map(_holds_numbers, inner))
 
 
 def _keys(part, path):
@@ -203,8 +232,10 @@ def _keys(part, path):
     for name, item in entries.items():
         key = f"{path}.{name}" if path else name
         if "description" in item:
-            yield key, item["description"], name in part.get("required", ()), item.get("default")
+            yield key, item["description"], name in part.get("required", ()), item.get("default"), _unit(item)
         yield from _keys(item, key)
+    for one in part.get("anyOf", ()):
+        yield from _keys(one, path)
     if isinstance(part.get("items"), dict):
         yield from _keys(part["items"], f"{path}[]")
 

@@ -41,6 +41,8 @@ def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
         That names the path, where the disk or a quota is full.
     """
     path = Path(path)
+    if not path.name:
+        raise InputError(path, "", "expected the name of a file")
     path.parent.mkdir(parents=True, exist_ok=True)
     remove_remains(path)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")

@@ -3,11 +3,12 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from wrcore.errors import InputError, similar
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry import profile_files
 from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
@@ -155,12 +156,13 @@ def cone_sections(slope):
     return (Line(low, slope * low, high, slope * high),)
 
 
+@checked
 def named_profile(
     spec: str | Path | dict[str, Any],
-    kind: str,
-    inclination: float | None = None,
-    window: float = WINDOW,
-    spacing: float = SPACING,
+    kind: Annotated[str, OneOf(("wheel", "rail"))],
+    inclination: Annotated[float | None, Within(-0.2, 0.2)] = None,
+    window: Annotated[float, Within(1e-6, 0.1, "m")] = WINDOW,
+    spacing: Annotated[float, Within(1e-6, 1e-3, "m")] = SPACING,
 ) -> ProfileCurve:
     """Profile by name, analytic form or file.
 
@@ -196,10 +198,6 @@ def named_profile(
     >>> round(1e3 * float(wheel(-0.035)), 2), rail.name
     (-6.87, '60E1')
     """
-    if kind not in ("wheel", "rail"):
-        raise ValueError(f"kind must be 'wheel' or 'rail', got {kind!r}")
-    if inclination is not None and not (isinstance(inclination, (int, float)) and abs(inclination) <= 0.2):
-        raise InputError(kind, "inclination", f"expected a ratio like 1/40 (at most 0.2), got {inclination!r}")
     upright = isinstance(spec, dict) and spec.get("inclined") is False
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
         name = spec["points"] if upright and "points" in spec else spec

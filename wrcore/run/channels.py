@@ -14,6 +14,7 @@ UNIT_SUFFIXES = {
     "_per_m": "1/m",
     "_Nm": "N m",
     "_rad": "rad",
+    "_Hz": "Hz",
     "_Pa": "Pa",
     "_J": "J",
     "_W": "W",

@@ -1,7 +1,14 @@
 """What a sampled motion shows by itself: zero crossings, frequency, amplitude, growth."""
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import ArrayLike
+
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Within, checked
+
+Samples = Annotated[ArrayLike, Within(dimensions=1, size=0)]
 
 
 def zero_crossings(t, y):
@@ -27,7 +34,8 @@ def _sign_changes(y):
     return np.flatnonzero((y[:-1] < 0) != (y[1:] < 0))
 
 
-def hunting_frequency(t: ArrayLike, y: ArrayLike) -> float:
+@checked
+def hunting_frequency(t: Samples, y: Samples) -> float:
     """Frequency of a lateral motion about the track's centre, from its zero crossings.
 
     Parameters
@@ -48,6 +56,8 @@ def hunting_frequency(t: ArrayLike, y: ArrayLike) -> float:
     >>> round(wr.hunting_frequency(t, 1e-3 * np.cos(2 * np.pi * 3.0 * t)), 3)
     3.0
     """
+    if np.shape(t) != np.shape(y):
+        raise InputError("hunting_frequency", "y", f"expected as many as times, {np.size(t)}, got {np.size(y)}")
     when = zero_crossings(t, y)
     return float(0.5 * (when.size - 1) / (when[-1] - when[0])) if when.size > 2 else np.nan
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from wrcore import __version__
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
@@ -34,6 +35,7 @@ ROWS = 8192
 COMPRESSION = {"compression": "gzip", "shuffle": True}
 
 
+@checked
 def write_run(
     path: str | PathLike[str], run: Run, also: Callable[[h5py.File, Run], object] | None = None, **options: Any
 ) -> None:
@@ -183,6 +185,7 @@ def _items(file):
     return [(name, item) for name, item in found if name.split("/")[0] != END]
 
 
+@checked
 def load_run(path: str | PathLike[str]) -> Run:
     """Read a run that `write_run` wrote.
 
@@ -220,6 +223,7 @@ def load_run(path: str | PathLike[str]) -> Run:
     return run
 
 
+@checked
 def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]:
     """Read several runs that lie as ``<case>/<name>.h5``.
 

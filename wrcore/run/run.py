@@ -11,6 +11,7 @@ import numpy as np
 
 import wrcore
 from wrcore.errors import UnknownNameError, similar
+from wrcore.errors.checked_calls import checked
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.derived import derived_channels
 
@@ -149,6 +150,7 @@ class Run:
     end_t: float = float("nan")
     end_state: np.ndarray | None = None
 
+    @checked
     def __getitem__(self, group: str) -> Channels:
         """Channels of one group as attributes; KeyError names the groups that exist."""
         if group not in self.groups:
@@ -179,6 +181,7 @@ class Run:
         ended = f"{self.status} ({self.reason})" if self.reason else self.status
         return f"Run {self.scene.get('name', '')!r}: {ended}, {reached}{cost}; groups: {', '.join(self.groups)}"
 
+    @checked
     def to_pandas(self, tidy: bool = False) -> pd.DataFrame:
         """All channels as one table.
 
@@ -220,6 +223,7 @@ class Run:
                         if patch == 0 or not np.isnan(column).all():
                             yield (group, name, patch), column
 
+    @checked
     def wheel_forces(self, wheelset: str = "wheelset") -> pd.DataFrame:
         """Forces, wear and pressure of a wheelset's wheels over time.
 
@@ -243,6 +247,7 @@ class Run:
         """
         return wrcore.wheelset_channels(self, wheelset)
 
+    @checked
     def plot(self, *channels: str) -> Figure:
         """Draw the run over time.
 
@@ -264,6 +269,7 @@ class Run:
         """
         return wrcore.plot_run(self, channels)
 
+    @checked
     def save(self, path: str | PathLike[str]) -> None:
         """Write the run to a file (HDF5), for :func:`wrcore.load_run`."""
         wrcore.write_run(path, self)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import partial
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from wrcore.contact import reduction
 from wrcore.creep.table import show_progress
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Threads, checked
 from wrcore.integrate.trajectory import Checkpoint
 from wrcore.run.course import DERAILED_Y as DERAILED_Y
 from wrcore.run.course import Course
@@ -25,12 +26,15 @@ from wrcore.run.run import Run
 from wrcore.run.state import State
 from wrcore.scene.description import Scene, Source, load_scene
 
+STARTS = "a checkpoint, a state or 'initial' (where a run has no end to go on from, it may have an end_state)"
 
+
+@checked
 def simulate(
     scene: Source,
     overrides: Iterable[str] | Mapping[str, Any] = (),
     progress: Callable[[float], object] | Literal[False] | None = None,
-    start: Checkpoint | np.ndarray | Literal["initial"] = "initial",
+    start: Annotated[Checkpoint | np.ndarray | Literal["initial"], STARTS] = "initial",
     **changes: Any,
 ) -> Run:
     """Run a scene.
@@ -71,9 +75,6 @@ def simulate(
     >>> float(run["wheelset"].y_m[0])  # m
     0.002
     """
-    if start is None:
-        expected = "expected a checkpoint, a state or 'initial', got None, as a run has that no run can go on from"
-        raise InputError("simulate", "start", f"{expected}; it may have an end_state")
     begin_at: Any = None if isinstance(start, str) and start == "initial" else start
     overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
     if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", key) for key in (*overrides, *changes)):
@@ -88,10 +89,11 @@ def simulate(
         return course.advance(output_times(begin, settings["duration"], rate), advance)
 
 
+@checked
 def simulate_many(
     scenes: Sequence[Source],
     progress: Callable[[Sequence[Source]], Iterable[Source]] | Literal[False] | None = None,
-    threads: int = 1,
+    threads: Threads = 1,
 ) -> list[Run]:
     """Run several scenes in one process, which imports, loads kernels and reads tables only once.
 

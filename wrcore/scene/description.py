@@ -26,6 +26,7 @@ from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import checked, short
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import Track, build_track
@@ -99,6 +100,7 @@ def as_scene(scene: Source) -> Scene:
     return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
+@checked
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
     """Read and check a scene.
 
@@ -194,7 +196,10 @@ def _flat(changes, prefix=""):
         if isinstance(value, Mapping) and not path.endswith(WHOLE):
             yield from _flat(value, f"{path}.")
         else:
-            yield path, json.loads(json.dumps(value, default=_plain))
+            try:
+                yield path, json.loads(json.dumps(value, default=_plain))
+            except (ValueError, RecursionError):  # what contains itself, and numbers of thousands of digits
+                raise InputError("changes", path, f"expected a value as YAML holds it, got {short(value)}") from None
 
 
 def _plain(value):

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import checked
 
 PACKAGE = Path(__file__).parents[1]
 PARTS = ("scenes", "vehicles", "sweeps", "wear")
@@ -16,6 +17,7 @@ def examples_folder() -> Path:
     return own if own.is_dir() else PACKAGE.parent / "config"
 
 
+@checked
 def example(name: str) -> Path:
     """Path of an example scene.
 

@@ -25,7 +25,9 @@ import pandas as pd
 
 from wrcore.dynamics.series import equations_of
 from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
+from wrcore.errors.checked_yaml import unit_of_key
 from wrcore.errors.input_files import check_regular, check_unchanged
 from wrcore.errors.new_files import appearing, held, remove_folder, remove_remains
 from wrcore.integrate.integrator import integrate
@@ -51,14 +53,9 @@ CHUNK = 200
 """Runs whose motions are held at a time."""
 
 
-UNITS = {
-    "frequency_Hz": "Hz", "speed": "m/s", "initial.y": "m", "initial.yaw": "rad", "track.gauge": "m",
-    "contact.detection_tolerance": "m", "contact.normal.damping.v0": "m/s", "contact.creep.least_speed": "m/s",
-    "contact.material.shear_modulus": "Pa", "integration.duration": "s", "integration.step": "s",
-    "integration.longest_step": "s", "integration.baumgarte.alpha": "1/s", "integration.baumgarte.beta": "1/s",
-    "output.rate": "1/s",
-}  # fmt: skip
-"""Units of columns whose names do not state them."""
+def column_unit(name: str) -> str:
+    """Unit of a column of a sweep's table: that of the scene's key, or what the name of a measure says."""
+    return unit_of_key(name) or unit_of(name)
 
 
 class _Task(NamedTuple):
@@ -77,9 +74,10 @@ class _Outcome(NamedTuple):
     forces: np.ndarray | None
 
 
+@checked
 def run_sweep(
     source: str | PathLike[str] | dict[str, Any] | Sweep,
-    threads: int = 1,
+    threads: Threads = 1,
     progress: Callable[[Iterable], Iterable] | None = None,
 ) -> pd.DataFrame:
     """Run a whole sweep in this process.
@@ -339,7 +337,7 @@ def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
             if values.dtype.kind not in "biuf":
                 values = values.astype(object)
             dataset = file.create_dataset(name, data=values)
-            dataset.attrs["units"] = UNITS.get(name) or unit_of(name)
+            dataset.attrs["units"] = column_unit(name)
 
 
 def load_table(path: str | PathLike[str]) -> pd.DataFrame:

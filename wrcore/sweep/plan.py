@@ -18,6 +18,7 @@ import pandas as pd
 
 from wrcore import __version__
 from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
@@ -84,6 +85,7 @@ def digest_of_plan(described: Any, files: Mapping[str, str]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+@checked
 def load_sweep(
     source: str | PathLike[str] | Mapping[str, Any], overrides: Iterable[str] | Mapping[str, Any] = ()
 ) -> Sweep:

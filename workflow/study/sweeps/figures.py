@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from wrcore.analysis.plot_run import PRINTED
 from wrcore.analysis.style import shared_legend, styled
-from wrcore.run.channels import unit_of
-from wrcore.sweep.batch import UNITS
+from wrcore.sweep.batch import column_unit
 
 ENDS: dict[str, dict[str, Any]] = {
     "completed": {"color": "#0072B2", "marker": "o", "s": 3, "linewidths": 0, "alpha": 0.5},
@@ -84,7 +83,7 @@ def _short(name: str) -> str:
 
 def _printed(column: str, values: pd.Series) -> tuple[np.ndarray, str]:
     """Values in the unit that is printed, and the label."""
-    unit = UNITS.get(column) or unit_of(column)
+    unit = column_unit(column)
     name = column.removeprefix("contact.").removeprefix("integration.").replace(".", " ")
     for end in ("_m", "_rad", "_N"):
         name = name.removesuffix(end)

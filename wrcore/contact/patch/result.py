@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wrcore.errors import InputError
+
 _MM, _MPA = 1e3, 1e-6
 _MOST_ARROWS = 18
 """Along the longer side of a plot; a denser field is thinned out."""
@@ -155,6 +157,8 @@ class Patch:
         """
         import matplotlib.pyplot as plt
 
+        if axes is not None and not hasattr(axes, "add_collection"):
+            raise InputError("Patch.plot", "axes", f"expected axes of matplotlib, got {axes!r:.60}")
         new = axes is None
         figure, axes = plt.subplots(figsize=(6.4, 5.2), layout="constrained") if new else (axes.figure, axes)
         self._draw_cells(figure, axes)

@@ -1,0 +1,119 @@
+"""The checked front of public functions: what annotations exclude is one line, the rest goes through."""
+
+import copy
+import inspect
+import pickle
+import timeit
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+import wrcore as wr
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked, kind_of
+
+GOOD_AND_BAD = [
+    (float, [0, 1.5, np.float32(2.0), np.int64(1)],
+     [True, np.float32(np.inf), "1", None, np.nan, np.inf, 10**400, 1j, [1.0]]),
+    (Annotated[float | None, ABOVE_ZERO], [None, 1e-3], [0.0, -1.0, np.nan]),
+    (Annotated[int, Within(1, 8)], [1, np.int64(8)], [0, 9, 1.0, True, 2**70]),
+    (Annotated[float, Within(high=np.inf)], [np.inf], [np.nan]),
+    (str, ["", "ä"], ["a\0b", "\ud800", b"a", 1]), (bool, [True, np.bool_(False)], [0, 1, "yes", None]),
+    (Annotated[str, OneOf({"left": 1})], ["left"], ["Left", None, ["left"]]),
+    (Annotated[ArrayLike, Within(0.0, 1.0, dimensions=1)], [0.5, [0, 1], np.ones(2, np.float32)],
+     [[], [2.0], [np.nan], ["a"], [[0.5]], [[1], [1, 2]], np.array([1j]), None, [True]]),
+    (ArrayLike, [np.ones(2, np.float32)], [np.float32(np.inf), np.array([np.inf], np.float32)]),
+    (ArrayLike | None, [None, [[1.0]]], ["x", object()]),
+    (Iterable[float], [[1.0], np.ones(2), range(3), iter([1.0])], [1.0, "12", ["1"], [np.nan], np.array(3.0), {1: 1}]),
+    (Annotated[Sequence[float], ABOVE_ZERO], [[1.0]], [[], [0.0], 1.0]),
+    (Sequence[str], [["a"], ()], ["a", [1], iter(["a"])]), (str | PathLike[str], ["a"], [1, None, b"a"]),
+    (dict[str, wr.Settling], [{}, {"a": wr.Settling()}], [{"a": 1}, {1: wr.Settling()}, []]),
+    (wr.Run | Literal[False], [False], [0, "run.h5", None]), (Any, [None, 3], []),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("annotation, good, bad", GOOD_AND_BAD, ids=[str(row[0])[:40] for row in GOOD_AND_BAD])
+def test_kinds(annotation, good, bad):
+    kind = kind_of(annotation)
+    assert all(kind.fits(value) for value in good) and not any(kind.fits(value) for value in bad)
+
+
+@checked
+def drawn(length: Annotated[float, Within(0.0, 2.0, "m")] = 1.0, *names: str, side: str = "left", **more: Any) -> float:
+    """A docstring."""
+    return length, names, side, more
+
+
+def test_what_is_refused_and_how():
+    value = np.float32(1.5)
+    assert drawn(value, "a", "b", side="x", other=None)[0] is value and drawn() == (1.0, (), "left", {})
+    for call, says in ((lambda: drawn("1"), "drawn: length: expected a number, at least 0 and at most 2 m, got '1'"),
+                       (lambda: drawn(1.0, "a", 2), "drawn: names: expected text, got 2"),
+                       (lambda: drawn(side=None), "drawn: side: expected text, got None"),
+                       (lambda: drawn(-(10**5000)), "drawn: length: expected a number, .* got a int")):  # fmt: skip
+        with pytest.raises(InputError, match=says):
+            call()
+
+
+def test_a_wrong_call_stays_pythons_own():
+    for call in (lambda: wr.wear_number(), lambda: wr.example("wheelset", 3), lambda: wr.load_run(paht="a")):
+        with pytest.raises(TypeError):
+            call()
+
+
+def test_introspection_copies_and_doctests_are_as_before():
+    assert str(inspect.signature(wr.wear_number)).startswith("(run: 'Run', wheelset: 'str', side: 'Side'")
+    assert drawn.__doc__ == "A docstring." and pickle.loads(pickle.dumps(wr.patch)) is wr.patch
+    assert copy.deepcopy(wr.Settling(window=1.0)) == wr.Settling(1.0)
+
+
+def test_every_public_function_is_checked_and_every_annotation_is_understood():
+    made = (
+        "InputError",
+        "Assessment",
+        "CreepTable",
+        "Patch",
+        "RollingContact",
+        "Run",
+        "Scene",
+        "WheelWear",
+        "__version__",
+    )
+    for name in set(wr.__all__) - {*made, "list_profiles"}:
+        public = getattr(wr, name)
+        function = public.__init__ if isinstance(public, type) else public
+        assert hasattr(function, "__wrapped__"), name
+        space = inspect.unwrap(function).__globals__
+        for part in inspect.signature(function).parameters.values():
+            text = part.annotation
+            assert kind_of(eval(text, space) if isinstance(text, str) else text).text, (name, part)
+
+
+def test_the_front_costs_microseconds():
+    @checked
+    def plain(a: float, b: Annotated[float, ABOVE_ZERO] = 1.0, c: Annotated[str, OneOf(("x",))] = "x"):
+        return a
+
+    plain.__module__ = __name__
+    assert min(timeit.repeat(lambda: plain(1.0, b=2.0, c="x"), number=1000, repeat=50)) / 1000 < 5e-6
+
+
+def test_paths_that_cannot_be_are_one_line(tmp_path):
+    run = wr.Run({"name": "still"}, "completed", "", np.array([0.0]), {"wheelset": {"y_m": np.zeros(1)}})
+    (tmp_path / "file").write_text("")
+    for path in ("a" * 5000, tmp_path / "file" / "run.h5", tmp_path, ".", "/"):
+        with pytest.raises(InputError):
+            run.save(path)
+
+
+def test_a_pose_deep_in_the_rail_is_refused_at_once():
+    wheel, rail = wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40)
+    pair = wr.WheelsetOnTrack.alike(wheel, rail)
+    for z in (0.0, -1.9, 0.3, 0.4, 0.458):
+        with pytest.raises(InputError, match="patch: z: expected at most 1 mm of overlap"):
+            wr.patch(pair, z=z)
+    assert wr.patch(pair, z=0.5) == [] and wr.patch(pair, z=0.4597)[0].normal > 1e3

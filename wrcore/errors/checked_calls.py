@@ -1,0 +1,235 @@
+"""A checked front to public functions: their annotations say what an argument may be, `checked` refuses the rest.
+
+An annotation is a type, a union or a list of types, or ``Annotated`` with the marks below. Nothing is converted: what
+passes reaches the function as it was given. Wrong call shapes (missing or unknown arguments) stay Python's own.
+"""
+
+import errno
+import reprlib
+import sys
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, wraps
+from inspect import Parameter, signature, unwrap
+from os import PathLike, fspath
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wrcore.errors import InputError, one_of
+
+LARGEST, LEAST = sys.float_info.max, sys.float_info.min
+
+
+class Within(NamedTuple):
+    """Mark: bounds of a number or of those of an array, both allowed; left out: any finite number."""
+
+    low: float = -LARGEST
+    high: float = LARGEST
+    unit: str = ""
+    dimensions: int = 32
+    """Of an array, at most."""
+    size: int = 1
+    """Of an array, at least."""
+
+    def __str__(self):
+        low = "" if self.low == -LARGEST else "above 0" if self.low == LEAST else f"at least {self.low:g}"
+        high = "" if self.high >= LARGEST else f"at most {self.high:g}"
+        return f"{' and '.join(filter(None, (low, high))) or 'finite' * (self.high == LARGEST)} {self.unit}".rstrip()
+
+
+class OneOf(tuple):
+    """Mark: the words that may be given."""
+
+
+ARRAY = {*typing.get_args(ArrayLike)}
+ABOVE_ZERO = Within(LEAST)
+Threads = Annotated[int, Within(1, 1024)]
+
+
+UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
+"""What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
+
+Thing = typing.TypeVar("Thing", bound=Callable[..., Any])
+
+
+class Kind(NamedTuple):
+    """What an argument may be: a test, and what to say of it, or all words."""
+
+    fits: Callable[[Any], bool]
+    text: str
+    words: tuple[str, ...] = ()
+
+
+def checked(thing: Thing) -> Thing:
+    """Decorate a function, or a class for what it is made of: an argument that its annotation excludes is one line.
+
+    Parameters
+    ----------
+    thing : callable
+        Its annotations are read at the first call.
+
+    Returns
+    -------
+    callable
+        A class is itself.
+
+    Examples
+    --------
+    >>> @checked
+    ... def half(length: Annotated[float, Within(0.0, 2.0, "m")]):
+    ...     return 0.5 * length
+    >>> half(1.0)
+    0.5
+    >>> half(3.0)
+    Traceback (most recent call last):
+    wrcore.errors.InputError: half: length: expected a number, at least 0 and at most 2 m, got 3.0
+    """
+    if isinstance(thing, type):
+        setattr(thing, "__init__", checked(thing.__init__))  # noqa: B010
+        return thing
+
+    @cache
+    def kinds():
+        space, found = sys.modules[thing.__module__].__dict__, {}
+        for name, part in signature(unwrap(thing)).parameters.items():
+            text = part.annotation
+            found[name] = part.kind, kind_of(eval(text, space) if isinstance(text, str) else text)
+        by_name = {name: kind for name, (how, kind) in found.items() if how is not Parameter.VAR_KEYWORD}
+        more = [(name, kind) for name, (how, kind) in found.items() if how is Parameter.VAR_POSITIONAL]
+        return [pair for pair in by_name.items() if pair not in more], by_name, more
+
+    def refuse(name, kind, value):
+        expected = one_of(kind.words, value) if kind.words else f"expected {kind.text}, got {short(value)}"
+        raise InputError(thing.__qualname__.removesuffix(".__init__"), name, expected)
+
+    @wraps(thing)
+    def front(*args, **options):
+        in_order, by_name, more = kinds()
+        for (name, kind), value in zip(in_order, args, strict=False):
+            if not kind[0](value):
+                refuse(name, kind, value)
+        for name, kind in more:
+            for value in args[len(in_order) :]:
+                if not kind[0](value):
+                    refuse(name, kind, value)
+        for name, value in options.items():
+            if name in by_name and not by_name[name][0](value):
+                refuse(name, by_name[name], value)
+        try:
+            return thing(*args, **options)
+        except OSError as error:
+            if error.errno not in UNFIT:
+                raise
+            expected = f"expected a path for this, but: {error.strerror}"
+            raise InputError(thing.__qualname__, short(error.filename), expected) from error
+
+    return typing.cast(Thing, front)
+
+
+def short(value):
+    """A value as an error names it."""
+    try:
+        return reprlib.repr(value)
+    except Exception:  # whole numbers of thousands of digits, objects that cannot say what they are
+        return f"a {type(value).__name__}"
+
+
+def same_shape(source, **arrays):
+    """Refuse arrays, by the names of their arguments, that do not broadcast."""
+    try:
+        return np.broadcast_arrays(*arrays.values())
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(array)}" for name, array in arrays.items() if np.ndim(array))
+        raise InputError(source, " ".join(arrays), f"expected arrays of one shape, got {shapes}") from None
+
+
+def kind_of(annotation, *marks):
+    """The `Kind` of an annotation; a text among the marks of ``Annotated`` says what is expected."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Annotated:
+        return kind_of(inner[0], *inner[1:], *marks)
+    said = next((mark for mark in marks if type(mark) is str), None)
+    kind = _kind(annotation, origin, inner, [mark for mark in marks if mark is not said])
+    return kind if said is None else kind._replace(text=said)
+
+
+def _kind(annotation, origin, inner, marks):
+    words = inner if origin is typing.Literal else next((mark for mark in marks if isinstance(mark, OneOf)), ())
+    bounds = next((mark for mark in marks if isinstance(mark, Within)), Within())
+    if origin in (typing.Union, types.UnionType):
+        arrays = ARRAY <= {*inner}
+        kinds = [kind_of(one, *marks) for one in inner if not (arrays and one in ARRAY)]
+        if arrays:
+            kinds.append(Kind(lambda value: _are_numbers(value, bounds), f"a number or an array of numbers, {bounds}"))
+        tests, texts = [kind.fits for kind in kinds], [kind.text for kind in kinds if kind.text != "None"]
+        return Kind(lambda value: any([fits(value) for fits in tests]), " or ".join(texts))
+    if words and annotation in (str, typing.Any) or origin is typing.Literal:
+        text = f"one of {', '.join(map(str, words))}"
+        return Kind(lambda value: isinstance(value, str | bool) and value in words, text, tuple(map(str, words)))
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        fits = kind_of(inner[1], *marks).fits
+        return Kind(
+            lambda value: isinstance(value, origin) and all(isinstance(k, str) and fits(v) for k, v in value.items()),
+            "a mapping by names",
+        )
+    if isinstance(origin, type) and issubclass(origin, Iterable):
+        one, least = kind_of(inner[0], *marks), bounds.size if bounds in marks else 0
+        return Kind(lambda value: _all_fit(value, one.fits, origin is Iterable, least), f"a list, each {one.text}")
+    return _plain_kind(origin or annotation, bounds)
+
+
+def _plain_kind(kind, bounds):
+    low, high = bounds[:2]
+    if kind in (float, int):
+        numbers = (int, np.integer) if kind is int else (float, int, np.floating, np.integer)
+
+        def fits(v):  # numbers of fewer bits would compare with bounds of their own size
+            v = float(v) if isinstance(v, np.floating) else v
+            return isinstance(v, numbers) and v is not True and v is not False and low <= v <= high
+
+        return Kind(fits, f"a {'whole ' * (kind is int)}number, {bounds}")
+    if kind in (None, type(None)):
+        return Kind(lambda value: value is None, "None")
+    if kind is Callable:
+        return Kind(callable, "a function")
+    if kind in (str, PathLike):
+        return Kind(lambda value: isinstance(value, kind) and _is_text(value), "text" if kind is str else "a path")
+    if kind is bool:
+        return Kind(lambda value: isinstance(value, bool | np.bool_), "True or False")
+    if not isinstance(kind, type) or kind in (object, Any, Parameter.empty):
+        return Kind(lambda value: True, "anything")
+    return Kind(lambda value: isinstance(value, kind), f"{'an' if kind.__name__[0] in 'aA' else 'a'} {kind.__name__}")
+
+
+def _is_text(value):
+    """Whether a file system and a file could hold a text or a path."""
+    text = fspath(value)
+    return isinstance(text, str) and not any(c == "\0" or "\ud800" <= c <= "\udfff" for c in text)
+
+
+def _all_fit(value, fits, one_shot, least):
+    """Whether all items of a list fit; what can be read only once is left to the function."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        return False
+    if hasattr(value, "__next__"):
+        return one_shot
+    try:
+        return len(value) >= least and all(fits(item) for item in value)
+    except TypeError:  # an array without dimensions
+        return False
+
+
+def _are_numbers(value, bounds):
+    if type(value) is float:
+        return bounds.low <= value <= bounds.high
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    if array.dtype.kind not in "iuf" or array.size < bounds.size or array.ndim > bounds.dimensions:
+        return False
+    array = array.astype(float, copy=False)  # numbers of fewer bits would compare with bounds of their own size
+    return bool(((array >= bounds.low) & (array <= bounds.high)).all())
