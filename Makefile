@@ -25,6 +25,8 @@ test: $(STAMP)
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
 check-cpus: $(STAMP)
+	export NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c \
+	    'import numpy._core._multiarray_umath as m; print(*m.__cpu_dispatch__)')"; \
 	for pair in x86-64-v3:Haswell x86-64-v2:Nehalem; do \
 	    NUMBA_CPU_NAME=$${pair%:*} NUMBA_CPU_FEATURES= OPENBLAS_CORETYPE=$${pair#*:} WRCORE_CACHE=$$(mktemp -d) \
 	    $(BIN)/python -m pytest -n $(CORES) --dist loadfile || exit 1; done
