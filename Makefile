@@ -4,6 +4,7 @@
 # make report   the study's report anew: results/report/index.html, results/report.zip
 # make figures  the study's pictures into reports/figures, those that are there by name
 # make docs     the documentation site, without a network: results/docs/index.html
+# make check-cpus   all tests with the code of two other processors, each from an empty kernel cache
 # make lint     ruff, mypy;   make bench   speed measurements;   make clean   remove everything generated
 #
 # PYTHON=python3.12 chooses the interpreter for a new .venv, CORES=4 the cores for the workflow.
@@ -15,13 +16,20 @@ STAMP := .venv/.installed
 DOCS_STAMP := .venv/.docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-.PHONY: study test smoke report figures docs lint bench clean
+.PHONY: study test check-cpus smoke report figures docs lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+
+check-cpus: $(STAMP)
+	export NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c \
+	    'import numpy._core._multiarray_umath as m; print(*m.__cpu_dispatch__)')"; \
+	for pair in x86-64-v3:Haswell x86-64-v2:Nehalem; do \
+	    NUMBA_CPU_NAME=$${pair%:*} NUMBA_CPU_FEATURES= OPENBLAS_CORETYPE=$${pair#*:} WRCORE_CACHE=$$(mktemp -d) \
+	    $(BIN)/python -m pytest -n $(CORES) --dist loadfile || exit 1; done
 
 smoke: $(STAMP)
 	$(SNAKEMAKE) --configfile config/smoke.yaml
