@@ -139,6 +139,7 @@ BAD = [
     ({"approach": 1e-3}, "elements.e1.approach", "either approach or series_stiffness"),
     ({"pendulum": 0.3}, "elements.e1.pendulum", "mu, normal and approach"),
     ({"series_stiffness": None}, "elements.e1.series_stiffness", "or approach"),
+    ({"series_stiffness": 0.0}, "elements.e1.series_stiffness", "above 0"),
 ]
 
 

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from tests.dynamics.test_body import matrix_of
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.suspension import GIVING_WAY
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.vehicle.element_checks import check_element
 from wrcore.vehicle.elements import compile_elements
@@ -318,7 +319,8 @@ def test_friction_that_is_held_does_not_creep(contact):  # noqa: F811
     limit, k = 2000.0, 1e6
     item = {"kind": "friction", "at": [0, 0, 1.5], "direction": "z", "force": limit, "series_stiffness": k}
     model = model_with(contact, [item])
-    for force, own_rate in ((0.97 * limit, 0.0), (-0.97 * limit, 0.0), (limit, 0.0), (1.1 * limit, 0.1 * limit / k / 1e-3)):
+    for part, own_rate in ((0.97, 0.0), (-0.97, 0.0), (1.0, 0.0), (1.1, 0.1 * limit / k / GIVING_WAY)):
+        force = part * limit
         wrenches, rates = evaluate(model, at_rest(upper=(0, 0, 2.0 + force / k), own=[0.0]))
         assert wrenches[0][2] == pytest.approx(-force) and rates == pytest.approx([own_rate], abs=1e-9)
     assert evaluate(model, moving((0.0, 0.0, 0.3), own=[-limit / k]))[1] == pytest.approx([0.3])  # it slides

@@ -146,7 +146,8 @@ def copy_into(target, source):
 def error_size(tolerances, rate, bodies, new, errors):
     """Largest error of any body, the root mean square of its 13 components in units of what they are allowed.
 
-    ``rate`` is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of the state is not finite.
+    ``rate`` is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of
+    the state is not finite.
     """
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):

@@ -2,11 +2,10 @@
 
 A position may err by ``atol + rtol`` times `LENGTH` in a step, in any direction and however far down the track. All
 else follows from that. A velocity may err by `RATE` times as much; under wheels less at low speed, where it is a
-creepage: by what turns a wheelset off its course as the position's error at half the gauge does. That speed is the one
-at which the wheelsets run in this very step. An angle may err by
-what moves a point at the body's radius of gyration as far, an angular velocity by what moves it as fast (so that their
-shares of the energy are alike). A step's error is that of the body that errs most: a train's wheelset is as accurate
-as one that runs alone.
+creepage: by what turns a wheelset off its course as the position's error at half the gauge does. The speed is that of
+the wheelsets in this very step. An angle may err by what moves a point at the body's radius of gyration as far, an
+angular velocity by what moves it as fast (so that their shares of the energy are alike). A step's error is that of the
+body that errs most: a train's wheelset is as accurate as one that runs alone.
 
 No size of any component enters. In a curve the components along resting axes go through zero in turn, and weights by
 their size would bound the step there; and the travelled distance is no measure of what springs and contacts feel.
@@ -18,7 +17,7 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 
 import numpy as np
 
-from wrcore.dynamics.body import EULER, OMEGA, POSITION, STATE_SIZE, VELOCITY
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.support import RAILS, support_places
 from wrcore.dynamics.system import own_states
 from wrcore.kernels.jit import jit

@@ -85,7 +85,7 @@ def restitution(speed, c_e, v0):
 
 
 def depth(setting, speed):
-    """How deep (m) a wheelset that hits the rails without weight goes in: (5/4 m v^2/K)^(2/5), Hertz without damping."""
+    """How deep (m) a wheelset goes in that hits the rails without weight: (5/4 m v^2/K)^(2/5) by Hertz, undamped."""
     patches = contacts(setting.model, np.zeros(1), setting.state[None, :])
     stiffness = np.nansum(patches[..., reduction.NORMAL] / patches[..., reduction.PENETRATION] ** 1.5)
     return float(1.25 * setting.model.bodies.mass[0] * speed**2 / stiffness) ** 0.4
