@@ -299,19 +299,21 @@ def test_the_tolerance_does_not_loosen_along_the_track(contact):  # noqa: F811
 
 def test_a_step_is_as_good_as_its_worst_body():
     """The norm of known errors of two bodies and an own state; no infinity slips through."""
-    tolerances = np.linspace(1.0, 2.0, 27)
+    tolerances, rate = np.linspace(1.0, 2.0, 27), 4.0
+    places = np.arange(27) % 13 < 7
+    split = np.array([tolerances * places, tolerances / rate * ~places])  # what counts at any speed, and per 1/s
     new, errors = np.ones(27), np.zeros(27)
     errors[[0, 4, 20]] = 2e-3, 3e-3, 5e-3
     first, second = (errors[:13] / tolerances[:13]), (errors[13:26] / tolerances[13:26])
     expected = max(math.sqrt(sum(part**2) / 13) for part in (first, second))
-    assert engine.error_size(tolerances, 2, new, errors) == pytest.approx(expected, rel=1e-14)
+    assert engine.error_size(split, rate, 2, new, errors) == pytest.approx(expected, rel=1e-14)
     errors[26] = 0.01
-    assert engine.error_size(tolerances, 2, new, errors) == pytest.approx(0.01 / 2.0, rel=1e-14)
+    assert engine.error_size(split, rate, 2, new, errors) == pytest.approx(0.01 / 2.0, rel=1e-14)
     for place in (3, 17, 26):
         for number in (math.inf, math.nan):
             spoiled = new.copy()
             spoiled[place] = number
-            assert not math.isfinite(engine.error_size(tolerances, 2, spoiled, errors))
+            assert not math.isfinite(engine.error_size(split, rate, 2, spoiled, errors))
 
 
 LEAVES = ["initial.yaw=0.09", "contact.friction=0.9", "speed=10", "integration.duration=0.5"]

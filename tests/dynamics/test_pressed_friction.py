@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from tests.dynamics.test_suspension import at_rest, evaluate, model_with
 from tests.dynamics.test_system import contact  # noqa: F401 (a fixture)
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.suspension import FLOOR
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 
@@ -24,35 +25,60 @@ STOP = {
 PRESSED = {"kind": "friction", "at": [0, 0, 1.5], "mu": MU, "normal": "spring"}
 
 
-def lost_in_a_loop(model, place, axis, pace):
+def lost_in_a_loop(model, place, axis, pace, lead=0.0):
     """Work that friction takes while the upper body moves by ``AMPLITUDE`` sin(pace t) along an axis from ``place``.
 
-    Over the second period; what springs along the axis take cancels over a period.
+    It also lifts by twice as much, ``lead`` (rad) ahead, if that is not 0. Over the second period; what springs take
+    cancels over a period.
     """
-    function, direction = Equations(model, workspace(model)), np.eye(3)[axis]
+    work, direction = workspace(model), np.eye(3)[axis]
+    function = Equations(model, work)
+    up = np.array([0.0, 0.0, 2.0]) * (lead != 0.0)
 
     def slopes(t, x):
-        state = at_rest(np.add(place, [0, 0, 2.0]) + AMPLITUDE * math.sin(pace * t) * direction, own=x[:1])
-        state[7:10] = AMPLITUDE * pace * math.cos(pace * t) * direction
-        force = evaluate(model, state)[0][0, axis]
-        return [*function(0.0, state)[2 * STATE_SIZE :], -force * state[7 + axis]]
+        swing, lift = math.sin(pace * t) * direction, math.sin(pace * t + lead) * up
+        state = at_rest(np.add(place, [0, 0, 2.0]) + AMPLITUDE * (swing + lift), own=x[:1])
+        state[7:10] = AMPLITUDE * pace * (math.cos(pace * t) * direction + math.cos(pace * t + lead) * up)
+        rate = function(0.0, state)
+        return [*rate[2 * STATE_SIZE :], -work.wrenches[0, :3] @ state[7:10]]
 
-    quarter, x, work = 0.5 * math.pi / pace, [0.0, 0.0], []
+    quarter, x, lost = 0.5 * math.pi / pace, [0.0, 0.0], []
     for k in range(-1, 8, 2):  # from one turning point to the next
         ends = max(k, 0) * quarter, (k + 2 if k > 0 else 1) * quarter
         x = solve_ivp(slopes, ends, x, "LSODA", rtol=1e-8, atol=1e-10).y[:, -1]
-        work.append(x[1])
-    return work[4] - work[2]
+        lost.append(x[1])
+    return lost[4] - lost[2]
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.02, 0.06])
-def test_a_slider_loses_its_limit_times_the_way_it_slides(contact, lift):  # noqa: F811
-    c, pace = 2e7, 0.05  # so slow that sliding adds 0.001 s * c * speed = 10 N at most
-    model = model_with(contact, [SPRING, {**PRESSED, "direction": "x", "series_stiffness": c}])
-    limit = MU * max(LOAD - STIFFNESS * lift, 0.0)  # lifted by 60 mm the spring pulls, and nothing rubs
-    lost = lost_in_a_loop(model, (0.0, 0.0, lift), 0, pace)
-    assert lost == pytest.approx(4.0 * limit * (AMPLITUDE - limit / c), abs=4.0 * AMPLITUDE * 10.0)
+@pytest.mark.parametrize("frequency", [0.1, 2.5, 10.0])
+@pytest.mark.parametrize("lift", [0.0, 0.02, 0.06, None])
+def test_a_slider_loses_its_limit_times_the_way_it_slides(contact, lift, frequency):  # noqa: F811
+    c, own = 5e6, {"force": MU * LOAD} if lift is None else {"mu": MU, "normal": "spring"}
+    item = {"kind": "friction", "at": [0, 0, 1.5], "direction": "x", "series_stiffness": c, **own}
+    limit = MU * max(LOAD - STIFFNESS * (lift or 0.0), 0.0)  # lifted by 60 mm the spring pulls, and nothing rubs
+    lost = lost_in_a_loop(model_with(contact, [SPRING, item]), (0.0, 0.0, lift or 0.0), 0, 2.0 * math.pi * frequency)
+    nothing = 4.0 * AMPLITUDE * FLOOR * MU * LOAD
+    assert lost == pytest.approx(4.0 * limit * (AMPLITUDE - limit / c), rel=1e-3, abs=1.01 * nothing)
     assert lost > 0.0
+
+
+@pytest.mark.parametrize("lead", [0.7, 2.5])
+def test_a_slider_under_a_load_that_changes_loses_as_much_at_any_speed(contact, lead):  # noqa: F811
+    """The load swings by half of itself: the lost work of 10 Hz is that of 0.1 Hz, and nearly Coulomb's."""
+    model = model_with(contact, [SPRING, {**PRESSED, "direction": "x", "series_stiffness": 5e6}])
+    slow, fast = (lost_in_a_loop(model, (0.0, 0.0, 0.0), 0, 2.0 * math.pi * f, lead) for f in (0.1, 10.0))
+    assert fast == pytest.approx(slow, rel=3e-3)
+    assert slow == pytest.approx(coulomb_loss(lead, 5e6), rel=0.01)
+
+
+def coulomb_loss(lead, c, points=200_000):
+    """Work that a spring and a slider in series take over a period, the slider returned to its limit point by point."""
+    phase = np.linspace(0.0, 4.0 * math.pi, points + 1)
+    x, limit = AMPLITUDE * np.sin(phase), MU * (LOAD - STIFFNESS * 2.0 * AMPLITUDE * np.sin(phase + lead))
+    force = np.zeros_like(x)
+    for k in range(points):
+        force[k + 1] = min(max(force[k] + c * (x[k + 1] - x[k]), -limit[k + 1]), limit[k + 1])
+    return np.trapezoid(force[points // 2 :], x[points // 2 :])
 
 
 @pytest.mark.parametrize("pace", [0.1, 100.0])
@@ -113,6 +139,7 @@ BAD = [
     ({"approach": 1e-3}, "elements.e1.approach", "either approach or series_stiffness"),
     ({"pendulum": 0.3}, "elements.e1.pendulum", "mu, normal and approach"),
     ({"series_stiffness": None}, "elements.e1.series_stiffness", "or approach"),
+    ({"series_stiffness": 0.0}, "elements.e1.series_stiffness", "above 0"),
 ]
 
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.integrate.integrator import METHODS, integrate
-from wrcore.integrate.tolerances import LENGTH, RATE, SHARE, step_tolerances
+from wrcore.dynamics.body import STATE_SIZE, euler_parameters
+from wrcore.dynamics.drive import GRIP
+from wrcore.integrate.integrator import METHODS, STALL_ATTEMPTS, integrate
+from wrcore.integrate.tolerances import HALF_GAUGE, LENGTH, RATE, SHARE, pace, step_tolerances
 from wrcore.scene.description import compile_scene, load_scene
 
 ROUGH = {"spectrum": {"level": "low", "seed": 1, "length": 300.0, "begin": 20.0}}
@@ -21,18 +22,76 @@ def test_tolerances_by_kind():
     model, _ = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml"))
     lever = np.sqrt(1120.0 / 1813.0)  # roll and yaw moment of inertia, mass
     bound = 1e-4 * LENGTH
-    rate = 20.0 / 0.75  # at 20 m/s; RATE above 22.5 m/s
-    expected = [bound] * 3 + [bound / (2 * lever)] * 4 + [rate * bound] * 3 + [rate * bound / lever] * 3
+    expected = np.zeros((2, STATE_SIZE))  # at any speed, and per 1/s
+    expected[0, :7] = [bound] * 3 + [bound / (2 * lever)] * 4
+    expected[1, 7:] = [bound] * 3 + [bound / lever] * 3
     np.testing.assert_allclose(step_tolerances(model, 1e-4), expected, rtol=1e-12)
-    np.testing.assert_allclose(step_tolerances(model, 1e-4, 2 * bound), 3 * np.array(expected), rtol=1e-12)
-    fast = step_tolerances(model._replace(speed=60.0), 1e-4)
-    np.testing.assert_allclose(fast[7:10], RATE * bound, rtol=1e-12)
+    np.testing.assert_allclose(step_tolerances(model, 1e-4, 2 * bound), 3 * expected, rtol=1e-12)
     for method in METHODS:
         share = SHARE.get(method, 1.0)
-        np.testing.assert_allclose(step_tolerances(model, 1e-4, 0.0, method), share * np.array(expected), rtol=1e-12)
+        np.testing.assert_allclose(step_tolerances(model, 1e-4, 0.0, method), share * expected, rtol=1e-12)
     metro, start = compile_scene(load_scene(SCENES / "metro_car.yaml"))
-    found = step_tolerances(metro, 1e-4)
+    found = step_tolerances(metro, 1e-4)[0]
     assert len(found) == len(start) and np.all(found[STATE_SIZE * len(metro.bodies.mass) :] == bound)
+
+
+def test_velocities_count_by_the_speed_of_the_slowest_wheelset_in_the_step():
+    model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", {"speed": 20.0}))
+    front, rear = (STATE_SIZE * body for body in model.bodies.wheelsets[[0, -1]])
+    assert pace(model, state, state) == pytest.approx(20.0 / HALF_GAUGE, rel=1e-9)
+    for speed, rate in ((60.0, RATE), (2.0, 2.0 / HALF_GAUGE), (0.0, model.contact.least_speed / HALF_GAUGE)):
+        for sign in (1.0, -1.0):
+            new, yaw = state.copy(), 0.8
+            for at in STATE_SIZE * model.bodies.wheelsets:
+                new[at + 7] = 60.0
+            new[rear + 3 : rear + 7] = euler_parameters(0.0, 0.0, yaw)
+            new[rear + 7 : rear + 10] = sign * speed * np.array([np.cos(yaw), np.sin(yaw), 0.0])
+            new[rear + 7 : rear + 10] += [-np.sin(yaw), np.cos(yaw), 5.0]  # across and up it may move
+            assert pace(model, new, new) == pytest.approx(rate, rel=1e-9)
+            assert pace(model, state, new) == pace(model, new, state) == pytest.approx(min(rate, 20.0 / HALF_GAUGE))
+            new[front + 7] = 0.5
+            assert pace(model, new, new) == pytest.approx(min(rate, 0.5 / HALF_GAUGE), rel=1e-9)
+
+
+IDLE = {"suspended_wheelset": ("wheelset", "frame"), "trailer_vehicle": ("wheelset_1", "bogie_1"),
+        "metro_car": ("wheelset_1", "frame_1")}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["rodas4", "ros34pw2", "tsit5", "auto"])
+@pytest.mark.parametrize("name", IDLE)
+def test_a_motor_that_does_nothing_costs_nothing(name, method):
+    """Smooth and rough: as many steps, and the same method, as without it (with the tolerances of 1 mm/s: 13 to 35)."""
+    idle = {"drive.motors": [{"name": "m", "bodies": list(IDLE[name]), "torque": 0.0}]}
+    for track in ({}, {"track.irregularity": ROUGH}):
+        runs = []
+        for more in ({}, idle):
+            scene = load_scene(SCENES / f"{name}.yaml", {"speed": 20.0, "initial.y": 0.001, **track, **more})
+            runs.append(integrate(*compile_scene(scene), [0.0, 0.5], method))
+        assert runs[1].method == runs[0].method and runs[1].steps <= 1.1 * runs[0].steps
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+def test_a_braked_wheelset_comes_to_rest_and_stays(rtol):
+    """Its speed follows the closed solution of a brake whose torque goes through zero, then it stands."""
+    torque, speed, radius, mass, spin = 300.0, 0.1, 0.46, 1813.0, 112.0
+    brake = {"name": "b", "bodies": ["wheelset", "frame"], "torque": torque}
+    scene = load_scene(SCENES / "wheelset.yaml", {"speed": speed, "initial.y": 0.0, "drive.brakes": [brake]})
+    times = np.linspace(0.0, 3.0, 301)
+    run = integrate(*compile_scene(scene), times, "rodas4", rtol)
+    assert run.status == "completed" and run.steps < (2000 if rtol == 1e-4 else 20_000)
+    # omega' = -(M/J) tanh(omega/GRIP), J = m r^2 + I
+    pull = np.exp(-torque / ((mass * radius**2 + spin) * GRIP) * times)
+    rolling = GRIP * np.arcsinh(np.sinh(speed / radius / GRIP) * pull)
+    np.testing.assert_allclose(run.states[:, 11], rolling, atol=0.01 * speed / radius)
+    assert np.abs(run.states[times > 2.0, 7]).max() < 1e-6 < np.abs(run.states[times < 0.5, 7]).min()
+    assert np.ptp(run.states[times > 2.0, :3], axis=0).max() < 1e-6
+
+
+def test_an_explicit_method_gets_on_at_standstill():
+    """Steps of 50 ns, as stability asks for at the least speed of creepages, are no stall."""
+    model, start = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"speed": 1e-3}))
+    run = integrate(model, start, [0.0, 3e-3], "tsit5")
+    assert run.status == "completed" and run.steps > STALL_ATTEMPTS
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -169,10 +169,9 @@ def test_profiles_command_lists_the_named_profiles(capsys):
 
 
 def test_a_collapsed_step_size_is_said_early():
-    # contact damping that saturates within 1 um/s makes a scene so stiff that an explicit method would need half a
-    # minute of work for 0.5 s
-    damping = {"normal": {"damping": {"c_e": 0.01, "v0": 1e-6}}, "creep": {"model": "she"}}
+    # creepages over 10 um/s make a scene so stiff that an explicit method would need half an hour for 0.5 s
+    creep = {"creep": {"model": "she", "least_speed": 1e-5}}
     settings = {"duration": 0.5, "method": "tsit5", "rtol": 1e-6}
-    run = simulate(SCENES / "suspended_wheelset.yaml", contact=damping, integration=settings)
+    run = simulate(SCENES / "suspended_wheelset.yaml", contact=creep, speed=1e-5, integration=settings)
     assert run.status == "stalled" and run.reason.startswith("the step size collapsed: 20000 steps")
     assert run.counters["steps"] + run.counters["rejected"] == 20_000

@@ -68,6 +68,11 @@ def undriven(model):
     return model._replace(drive=no_drive(), torques=0)
 
 
+def may_drive(model):
+    """Whether motors, brakes or a controller can ever exert a torque."""
+    return len(model.drive.control) > 0 or bool(model.drive.tables.points[:, 1].any())
+
+
 def drive_links(model):
     """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration.
 

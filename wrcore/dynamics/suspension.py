@@ -18,7 +18,9 @@ a stiffness of 1 stores: to kx they add 2 hx Tx, for small angles hx roll^2.
 
 Friction whose limit L is its own plus mu times the force N that presses in another element of the same pair sticks
 and slips by one of two laws, both with a displacement as own state. A *slider* at s behind a stiffness c holds
-f = c (x - s); above L it gives way, s' = (|f| - L) sign(f)/(c T), T being a millisecond. *Approach* is Fancher's
+f = c (x - s) and goes along with what pulls it from a width w below L on, s' = x' (g - L + w)/w with g = f sign(x'):
+at L as fast as x, at any speed. Where L falls, (|f| - L) sign(f)/(c T) comes on top, T being a millisecond, so that f
+follows at rest, too. Both parts take energy. *Approach* is Fancher's
 exponential one to the envelope within a distance b, f = L z/b with z' = x' - |x'| z/b: without reversal f - L falls by
 1/e in b, at any speed. At a constant L it stores L z^2/(2 b) and loses L |x'| (z/b)^2. A link of length l that hangs
 under N adds N x/l.
@@ -47,6 +49,12 @@ from wrcore.kernels.jit import FUSED, jit
 LINEAR, DISPLACEMENT, VELOCITY, CUBIC, SERIES, SERIES_VELOCITY, SLIDER, APPROACH = range(8)
 """Laws of an element that acts along one direction; from SERIES on with an own state, from SLIDER on with a limit."""
 
+ROUNDING, FLOOR = 0.02, 1e-3
+"""Width w below a slider's limit: part of the limit, and of that in nominal position (or of 1 N) at least."""
+
+GIVING_WAY = 1e-3
+"""T: time in which a slider at rest gives way where its limit has fallen, s."""
+
 LINE = 3
 """Direction along the line between the markers; 0, 1 and 2 are the axes of the second body."""
 
@@ -70,8 +78,8 @@ class Elements(NamedTuple):
     """(p + 1,) int, as first_spring."""
     directed: np.ndarray
     """(m, 10): along one direction; marker of i, marker of j or rest position (m), length at rest (LINE only, m),
-    stiffness (N/m; of the series spring for series laws and SLIDER; APPROACH: N/(L l), 1/m), damping (N s/m; SLIDER:
-    above its limit; APPROACH: distance b, m), preload (N; positive pushes i along the direction)."""
+    stiffness (N/m; of the series spring for series laws and SLIDER; APPROACH: N/(L l), 1/m), damping (N s/m;
+    APPROACH: distance b, m), preload (N; positive pushes i along the direction)."""
     law: np.ndarray
     """(m, 5) int: direction, law, first and last + 1 point of the characteristic, number of the element's own state.
     From SLIDER on, not the last point but the element that presses: a spring, -1 for none, or -2 - k for the k-th along
@@ -198,11 +206,13 @@ def friction_limit(elements, k, rotation, place, velocity, turn):
 @jit(allocates=False, fastmath=FUSED)
 def friction_force(elements, k, stretch, speed, inner, limit):
     """Force against stretch and speed of the k-th element, one with a limit, and the rate of its state ``inner``."""
-    row = elements.directed[k]
+    row, nominal = elements.directed[k], elements.table[elements.law[k, 2], 1]
     if elements.law[k, 1] == APPROACH:
         return limit * (inner / row[8] + row[7] * stretch), speed - abs(speed) * inner / row[8]
-    force = row[7] * (stretch - inner)
-    return force, math.copysign(max(abs(force) - limit, 0.0), force) / row[8]
+    force, width = row[7] * (stretch - inner), max(ROUNDING * limit, FLOOR * max(nominal, 1.0))
+    pulled = math.copysign(1.0, speed) * force
+    slip = speed * max(pulled - max(limit - width, 0.0), 0.0) / width
+    return force, slip + math.copysign(max(abs(force) - limit, 0.0), force) / (GIVING_WAY * row[7])
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
+from wrcore.dynamics.drive import may_drive
 from wrcore.integrate.jacobian import contacts_alone, plan_sweep
-from wrcore.integrate.tolerances import step_tolerances
+from wrcore.integrate.tolerances import pace, step_tolerances
 
 STABLE = 2.5
 """Length of the steps of Tsit5 where stability bounds them, times the fastest rate as it is found here."""
@@ -45,6 +46,7 @@ def fastest_rate(model, equations, t, state):
         NaN where the rate of the state is not finite.
     """
     work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
+    unit = unit[0] + pace(model, state, state) * unit[1]
     kept = [(own, own.copy()) for own in (work.arc_lengths, work.counters)]
     work.strips.cheap[0] = 1
     base, direction, growths = equations(t, state), np.random.default_rng(0).normal(size=len(state)), []
@@ -73,7 +75,7 @@ def cheaper_method(model, equations, t, state, longest_step):
     str
     """
     bodies = model.bodies
-    if len(model.drive.rows):  # creep gets ever stiffer towards standstill, wherever the run begins
+    if may_drive(model):  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4"
     rough, cost = model.track.irregularity.coefficients.shape[0] > 0, EXPLICIT_PER_STIFF
     excited = rough or len(bodies.wheelsets) == len(bodies.mass)

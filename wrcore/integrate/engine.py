@@ -16,6 +16,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.system import derivatives_at
 from wrcore.geometry.path import arc_length_of, track_frame
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry
+from wrcore.integrate.tolerances import pace
 from wrcore.kernels.jit import jit
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
@@ -55,7 +56,7 @@ class Control(NamedTuple):
     """What a run is asked for."""
 
     tolerances: np.ndarray
-    """(n,): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
+    """(2, n): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
     fixed_step: float
     """s; 0 for steps by the error estimate."""
     longest_step: float
@@ -142,10 +143,11 @@ def copy_into(target, source):
 
 
 @jit(allocates=False)
-def error_size(tolerances, bodies, new, errors):
+def error_size(tolerances, rate, bodies, new, errors):
     """Largest error of any body, the root mean square of its 13 components in units of what they are allowed.
 
-    The force elements' own states make one more body. NaN or infinite if any number of the state is not finite.
+    ``rate`` is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of
+    the state is not finite.
     """
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):
@@ -153,7 +155,7 @@ def error_size(tolerances, bodies, new, errors):
         last = first + STATE_SIZE if b < bodies else size
         total = 0.0
         for i in range(first, last):
-            ratio = errors[i] / tolerances[i]
+            ratio = errors[i] / (tolerances[0, i] + rate * tolerances[1, i])
             total += ratio * ratio + 0.0 * new[i]
         if last > first:
             mean = total / (last - first)
@@ -362,7 +364,8 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
             weight = step * tableau.error[i]
             for k in range(n):
                 errors[k] += weight * stages[i, k]
-        error = error_size(control.tolerances, model.bodies.mass.shape[0], trial, errors)
+        rate = pace(model, state, trial)
+        error = error_size(control.tolerances, rate, model.bodies.mass.shape[0], trial, errors)
         if judge(control, tableau.exponent, 1.0, memory, error):
             accept(control, memory, trial, step)
             copy_into(memory.rate, stages[last])

@@ -24,6 +24,7 @@ import time
 
 import numpy as np
 
+from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.errors import InputError
 from wrcore.integrate import engine
@@ -31,7 +32,7 @@ from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.integrate.tolerances import step_tolerances
+from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory, derailment
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
@@ -42,11 +43,11 @@ REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_
 """Methods of other libraries."""
 
 
-STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-7
+STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-8
 """So many steps (tried ones) in a row that are this short on average, s, are no headway: some 0.1 s of work for a
-wheelset, and at this pace a simulated second takes five million steps. The shortest time scale of a stiff contact is
-10 us, and explicit methods at 0.1 m/s take steps of 5 us. Steps of a stated length, or bounded by ``longest_step``, may
-be as short as they are asked to be.
+wheelset, and at this pace a simulated second takes fifty million steps. The shortest time scale of a stiff contact is
+10 us, and explicit methods take steps of 5 us at 0.1 m/s and of 50 ns at the least speed of creepages, 1 mm/s. Steps of
+a stated length, or bounded by ``longest_step``, may be as short as they are asked to be.
 """
 
 
@@ -108,6 +109,8 @@ def integrate(
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
+        rate = model.contact.least_speed / HALF_GAUGE if may_drive(model) else pace(model, start, start)
+        tolerances = tolerances[0] + rate * tolerances[1]  # theirs stay what they are
         return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]

@@ -34,11 +34,12 @@ from wrcore.integrate.contact_blocks import (
 from wrcore.integrate.engine import copy_into
 from wrcore.integrate.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_rate
+from wrcore.integrate.tolerances import HALF_GAUGE, pace
 from wrcore.kernels.jit import jit
 
-FINE_BELOW = 1e-3
-"""Where creepages are divided by a least speed below this (m/s), differences of velocities shrink in proportion:
-friction saturates at creepages of some 1e-3, and a difference must not come near that."""
+FINE_BELOW = 0.1
+"""Where creepages are divided by a speed below this (m/s), differences of velocities shrink in proportion: friction
+saturates at creepages of some 1e-3, and a difference must not come near that."""
 
 USUAL = 0.3
 """The same below this coefficient of friction."""
@@ -345,7 +346,7 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     axes = turn_of(jacobian)
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
-    fine = min(1.0, model.contact.least_speed / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
+    fine = min(1.0, pace(model, state, state) * HALF_GAUGE / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
     strips, wheels = model.contact.strips.strips > 0, contacts_alone(model)
     copy_into(base, rate)
     if strips:  # a smooth neighbour of the model: ellipses

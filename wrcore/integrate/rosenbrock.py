@@ -45,6 +45,7 @@ from wrcore.integrate.jacobian import (
     turn_of,
 )
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
+from wrcore.integrate.tolerances import pace
 from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import jit
 
@@ -136,7 +137,7 @@ def _touchdown_error(tableau, control, memory, scratch, linear, model):
         for k in range(defect.shape[0]):
             defect[k] -= weight / step * stages[i, k]
     solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), defect)
-    return error_size(control.tolerances, bodies, scratch.trial, defect)
+    return error_size(control.tolerances, pace(model, memory.state, scratch.trial), bodies, scratch.trial, defect)
 
 
 @jit(allocates=False, nogil=True)
@@ -209,7 +210,8 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                 trial[k] += tableau.weights[i] * stages[i, k]
                 slope[k] += tableau.error[i] * stages[i, k]
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
-        error = error_size(control.tolerances, bodies, trial, slope) if regular else np.nan
+        rate = pace(model, state, trial)
+        error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
         looked_ahead, touching = error <= 1.0, 0
         if looked_ahead:  # the next step's first rate
             derivatives_at(equations, clock[T] + step, trial, model, work, slope)

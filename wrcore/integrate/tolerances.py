@@ -2,10 +2,10 @@
 
 A position may err by ``atol + rtol`` times `LENGTH` in a step, in any direction and however far down the track. All
 else follows from that. A velocity may err by `RATE` times as much; under wheels less at low speed, where it is a
-creepage: by what turns a wheelset off its course as the position's error at half the gauge does. An angle may err by
-what moves a point at the body's radius of gyration as far, an angular velocity by what moves it as fast (so that their
-shares of the energy are alike). A step's error is that of the body that errs most: a train's wheelset is as accurate
-as one that runs alone.
+creepage: by what turns a wheelset off its course as the position's error at half the gauge does. The speed is that of
+the wheelsets in this very step. An angle may err by what moves a point at the body's radius of gyration as far, an
+angular velocity by what moves it as fast (so that their shares of the energy are alike). A step's error is that of the
+body that errs most: a train's wheelset is as accurate as one that runs alone.
 
 No size of any component enters. In a curve the components along resting axes go through zero in turn, and weights by
 their size would bound the step there; and the travelled distance is no measure of what springs and contacts feel.
@@ -17,9 +17,10 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 
 import numpy as np
 
-from wrcore.dynamics.body import EULER, OMEGA, POSITION, STATE_SIZE, VELOCITY
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.support import RAILS, support_places
 from wrcore.dynamics.system import own_states
+from wrcore.kernels.jit import jit
 
 LENGTH = 0.01
 """Travel that ``rtol`` refers to, m: about the play of a wheelset between the flanges."""
@@ -37,7 +38,7 @@ estimates the error of its embedded method and errs less itself; errors of ROS34
 
 
 def step_tolerances(model, rtol, atol=0.0, method=""):
-    """Error of a step that each component of the state is allowed.
+    """Error of a step that each component of the state is allowed: what it is at any speed, and per 1/s of `pace`.
 
     Parameters
     ----------
@@ -51,28 +52,45 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
     Returns
     -------
-    numpy.ndarray, shape (size,)
+    numpy.ndarray, shape (2, size)
         m, 1, m/s, rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s
         for the velocities of a track that gives; its sleeper's roll counts at the rails).
     """
-    n, rate = len(model.bodies.mass), RATE
-    if len(model.bodies.wheelsets):  # a driven vehicle does not keep its speed, and may come to a standstill
-        rate = min(RATE, (model.contact.least_speed if len(model.drive.rows) else model.speed) / HALF_GAUGE)
-    weights = np.ones(STATE_SIZE * n + own_states(model))
-    bodies, lever = weights[: STATE_SIZE * n].reshape(n, STATE_SIZE), gyration(model.bodies)[:, None]
-    bodies[:, POSITION:EULER] = 1.0
+    n = len(model.bodies.mass)
+    weights, lever = np.ones(STATE_SIZE * n + own_states(model)), gyration(model.bodies)[:, None]
+    fast, bodies = np.zeros(weights.shape, bool), weights[: STATE_SIZE * n].reshape(n, STATE_SIZE)
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2
-    bodies[:, VELOCITY:OMEGA] = rate
-    bodies[:, OMEGA:] = rate / lever
+    bodies[:, OMEGA:] = 1.0 / lever
+    fast[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, VELOCITY:] = True
     for wheelset, state in model.bodies.independent:
-        weights[STATE_SIZE * n + state] = rate / lever[model.bodies.wheelsets[wheelset], 0]
+        weights[STATE_SIZE * n + state] = 1.0 / lever[model.bodies.wheelsets[wheelset], 0]
+        fast[STATE_SIZE * n + state] = True
     freedoms = len(model.support.mass)
     if freedoms:
         places = support_places(model)
-        weights[places[:, freedoms:]] = rate
+        fast[places[:, freedoms:]] = True
         if freedoms > RAILS:  # roll of the sleeper
             weights[places[:, RAILS + 2 :: freedoms]] /= HALF_GAUGE
-    return (atol + rtol * LENGTH) * SHARE.get(method, 1.0) * weights
+    return (atol + rtol * LENGTH) * SHARE.get(method, 1.0) * weights * np.array([~fast, fast])
+
+
+@jit(allocates=False, inline="always")
+def _ahead(state, at):
+    """Speed (m/s) of the body whose state starts at ``at`` along its own x axis, either way."""
+    e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
+    vx, vy, vz = state[at + 7], state[at + 8], state[at + 9]
+    return abs(vx + 2.0 * ((e1 * e2 + e0 * e3) * vy + (e1 * e3 - e0 * e2) * vz - (e2 * e2 + e3 * e3) * vx))
+
+
+@jit(allocates=False)
+def pace(model, old, new):
+    """Velocities' tolerance over that of positions in a step between two states, by the slowest wheelset, 1/s."""
+    rate = RATE
+    for wheelset in model.bodies.wheelsets:
+        at = STATE_SIZE * wheelset
+        speed = max(min(_ahead(old, at), _ahead(new, at)), model.contact.least_speed)
+        rate = min(rate, speed / HALF_GAUGE)
+    return rate
 
 
 def gyration(bodies):

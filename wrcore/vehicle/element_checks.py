@@ -101,6 +101,8 @@ def _check_friction(item, field, source):
     if "series_stiffness" not in item and "approach" not in item:
         expected = "expected a value, as kind friction needs one, or approach"
         raise InputError(source, f"{field}.series_stiffness", expected)
+    if item.get("series_stiffness") == 0.0:
+        raise InputError(source, f"{field}.series_stiffness", "expected a value above 0")
     if "series_stiffness" in item and "approach" in item:
         raise InputError(source, f"{field}.approach", "expected either approach or series_stiffness")
     if "pendulum" in item and ("approach" not in item or "mu" not in item or "force" in item):

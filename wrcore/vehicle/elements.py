@@ -40,9 +40,6 @@ STEEPEST_INVERSE = 1000.0
 """A damper in series with a spring needs its speed as a function of its force: where its characteristic is flat, the
 speed rises this many times faster than at its steepest part."""
 
-GIVING_WAY = 1e-3
-"""Time in which friction gives way to a force above its own, s: sliding at v, it exceeds it by stiffness * time * v."""
-
 
 def compile_elements(items, layout, joints, gravity):
     """Sort checked elements into what kernels need.
@@ -134,16 +131,12 @@ def _law(item):
     stiffness, damping, points = item.get("stiffness", 0.0), item.get("damping", 0.0), item["points"]
     if item["kind"] == "bushing":
         return suspension.CUBIC, [[item["cubic_stiffness"], 0.0]], 0.0, 0.0
-    if item["kind"] == "friction" and ("mu" in item or "approach" in item):
+    if item["kind"] == "friction":
         own, series = item.get("force", 0.0), item.get("series_stiffness", 0.0)
         if "approach" in item:
             hanging = 1.0 / (item["mu"] * item["pendulum"]) if "pendulum" in item else 0.0
             return suspension.APPROACH, [[own, own], [0.0, 0.0]], hanging, item["approach"]
-        return suspension.SLIDER, [[own, own], [0.0, 0.0]], series, GIVING_WAY * series
-    if item["kind"] == "friction":
-        force, excess = item["force"], GIVING_WAY * item["series_stiffness"]  # at a speed of 1 m/s
-        slider = np.array([[-force - excess, -1.0], [-force, 0.0], [force, 0.0], [force + excess, 1.0]])
-        return suspension.SERIES_VELOCITY, slider, item["series_stiffness"], 0.0
+        return suspension.SLIDER, [[own, own], [0.0, 0.0]], series, 0.0
     if "series_stiffness" in item:
         if points is None:
             return suspension.SERIES, None, item["series_stiffness"], damping

@@ -1,9 +1,13 @@
 """Jumps of the contact point, loss of contact and impacts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from study.hard_cases.contact import crests, drops, impacts, pose_sweeps, restitution, slow_push
+from study.hard_cases.cases import contacts, prepare, run
+from study.hard_cases.contact import GAP, crests, depth, drops, impacts, pose_sweeps, restitution, slow_push
+from wrcore.contact import reduction
 
 
 def test_fast_impacts_keep_the_root_of_the_damping_factor():
@@ -14,9 +18,21 @@ def test_fast_impacts_keep_the_root_of_the_damping_factor():
 
 
 def test_impacts_follow_the_damping_law(vehicles, assert_passed):
-    found, curve = impacts(vehicles, "free wheelset", [0.01, 0.5], ["spatial"], ["ros34pw2", "tsit5"])
+    found, curve = impacts(vehicles, "free wheelset", [0.001, 0.01, 0.5], ["spatial"], ["ros34pw2", "rodas4", "tsit5"])
     assert_passed(found)
-    assert len(curve) == 4
+    assert len(curve) == 9
+
+
+def test_the_depth_of_an_impact(vehicles):
+    """Hertz's spring against the greatest penetration of a run at a tight tolerance, at speeds without much damping."""
+    setting = prepare(vehicles, "free wheelset", {"initial.y": 0.0, "contact.patch": "maximum"})
+    for speed in (1e-3, 5e-3):
+        state = setting.state.copy()
+        state[[2, 9]] += GAP, -speed
+        falling = replace(setting, state=state, model=setting.model._replace(gravity=0.0))
+        found = run(falling, 2.0 * GAP / speed, 5e3, rtol=1e-8)
+        deepest = np.nanmax(contacts(falling.model, found.t, found.states)[..., reduction.PENETRATION])
+        assert deepest == pytest.approx(depth(setting, speed), rel=0.02)
 
 
 def test_an_impact_between_the_stages_of_a_step_is_not_missed(vehicles, assert_passed):
