@@ -347,3 +347,16 @@ def test_foreign_files_are_refused(tmp_path):
     for path in (tmp_path / "text.h5", tmp_path / "absent.h5"):
         with pytest.raises(InputError, match="expected a creep table in HDF5"):
             load_table(path)
+
+
+@pytest.mark.parametrize("far", [1e-8, 1e-6, 1e-5, 1e-4])
+def test_small_creepage_is_linear_theory(far):
+    """The package's own table within 0.5 % of Kalker's force, creepages in parts of saturation, also mixed."""
+    table = ensure_table()
+    directions = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0.2, 0.3], [-0.1, 1, 0.5]])
+    for g in (0.1, 0.3, 1.0, 3.0, 10.0):
+        c11, c22, c23, _ = kalker_coefficients(g, table.data.kalker)
+        w = far * directions / [c11, c22, c23]
+        expected = np.stack([-c11 * w[:, 0], -c22 * w[:, 1] - c23 * w[:, 2]], axis=1)
+        error = look(table, g, 0.0, w)[0][:, :2] - expected
+        assert np.all(np.hypot(*error.T) < 0.005 * np.hypot(*expected.T)), g

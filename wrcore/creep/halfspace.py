@@ -11,7 +11,9 @@ disks and the resolvent of A, factorised once per patch:
 
     F = P(z),   y = M (2 F - z - (w + delta)/h),   z <- z + rho (y - F),   M = (H + A)^-1 H,
 
-which converges for every rho in (0, 2) because the symmetric part of A is positive definite. A panel's slip holds half
+which converges for every rho in (0, 2) because the symmetric part of A is positive definite. It starts where all panels
+stick, A F = -w, which is the solution but for the trailing edge where creepages are small; panels beyond their bound
+slide there, by their share of the rigid slip. It ends on a change relative to the traction. A panel's slip holds half
 a panel ahead of its load. That is second-order accurate where the panel sticks, but in sliding panels the direction of
 the traction must follow the slip at the load: delta carries the slip there (rigid part exactly, elastic part by
 differences along the strip) and lags one iteration behind.
@@ -27,7 +29,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.creep.operator import make_operator, panel_counts
+from wrcore.creep.operator import make_operator, panel_counts, resultants
 from wrcore.errors import InputError, check_number
 from wrcore.kernels.jit import jit
 
@@ -41,6 +43,7 @@ FAST = 100.0
 _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _RHO = np.float32(1.8)
 _RAMP = np.float32(10)
+_TINY = np.float32(1e-30)
 
 
 @jit
@@ -57,14 +60,20 @@ def _project(z, bound, force, ramp):
 
 @jit
 def _start(op, creepage, slip, z):
-    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z = -w/h, the solution where all slides fast."""
+    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck.
+
+    Where that is beyond the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution.
+    """
     xi, eta, phi = np.float32(creepage[0]), np.float32(creepage[1]), np.float32(creepage[2])
-    size = op.bound.size
+    stuck, size = op.stuck, op.bound.size
     for i in range(size):
-        slip[i] = xi - phi * op.y[i]
-        slip[i + size] = eta + phi * op.x_slip[i]
-        z[i] = -slip[i] * op.inverse_step[i]
-        z[i + size] = -slip[i + size] * op.inverse_step[i]
+        k = i + size
+        slip[i], slip[k] = xi - phi * op.y[i], eta + phi * op.x_slip[i]
+        fx = xi * stuck[0, i] + eta * stuck[1, i] + phi * stuck[2, i]
+        fy = xi * stuck[0, k] + eta * stuck[1, k] + phi * stuck[2, k]
+        share = _ONE / max(_ONE, np.sqrt(fx * fx + fy * fy) / op.bound[i])
+        beyond = (_ONE - share) * op.inverse_step[i]
+        z[i], z[k] = share * fx - beyond * slip[i], share * fy - beyond * slip[k]
 
 
 @jit
@@ -135,13 +144,14 @@ def _before_resolvent(op, phi, count, z, slip, delta, force, rhs, ramp, elastic)
 
 @jit
 def _update(y, force, z):
-    """z += rho (y - F); returns the sum of abs(y - F)."""
-    change = _ZERO
+    """z += rho (y - F); returns the sum of abs(y - F) over that of abs(F)."""
+    change, total = _ZERO, _TINY
     for j in range(z.size):
         move = y[j] - force[j]
         z[j] += _RHO * move
         change += abs(move)
-    return change
+        total += abs(force[j])
+    return change / total
 
 
 @jit
@@ -202,7 +212,7 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
     op : Operator
     creepages : (K, 3) xi', eta', phi'.
     tolerance : float
-        Stop when the sum over panels of abs(y - F), in units of mu N, is below.
+        Stop when the sum over panels of abs(y - F), over that of abs(F), is below.
     max_iterations, batch : int
     results : (K, 3), written: fx, fy, mz.
     iterations : (K,) int, written; negative where the tolerance was not met.
@@ -339,7 +349,7 @@ class RollingContact:
         xi, eta, phi : float or (K,) array_like
             Nondimensional creepages.
         tolerance : float
-            Remaining change of the traction, in units of mu N.
+            Remaining change of the traction, relative to it.
 
         Returns
         -------
@@ -362,10 +372,7 @@ class RollingContact:
 
         Row i belongs to output i. For the ellipse this is Kalker's matrix at this refinement.
         """
-        unbound = self.operator._replace(bound=self.operator.bound * np.float32(1e6))
-        results, iterations, empty = np.empty((3, 3)), np.empty(3, np.int64), _no_rows()
-        solve_rows(unbound, np.eye(3), 1e-5, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
-        return results.T
+        return resultants(self.operator, self.operator.stuck).T.astype(float)
 
     def field(self, xi, eta, phi, tolerance=TOLERANCE / 10):
         """Traction and slip over the patch for one case.
@@ -397,7 +404,8 @@ def _field(contact, force, slip, result):
     op, n, ny = contact.operator, contact.n, contact.ny
     size = n * ny
     y_edges = np.linspace(-1, 1, ny + 1) / np.sqrt(contact.g)
-    half_length = op.x_slip.astype(float).reshape(ny, n)[:, :1]  # the first slip point lies on the leading edge
+    second = np.cos(np.pi / n) * np.cos(np.pi / (2 * n))  # slip point of a panel, over the half length
+    half_length = op.x_slip.astype(float).reshape(ny, n)[:, 1:2] / second
     x_edges = half_length * np.cos(np.pi * np.arange(n + 1) / n)
     area = (-np.diff(x_edges, axis=1) * np.diff(y_edges)[:, None]).ravel()
     bound = op.bound.astype(float)

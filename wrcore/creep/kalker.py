@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.creep.operator import _mirrored, make_panels, panel_counts, slip_matrix
+from wrcore.creep.operator import make_panels, panel_counts, resultants, stuck_forces
 from wrcore.geometry.spline import spline_cubics
 from wrcore.kernels.jit import FUSED, jit
 
@@ -59,20 +59,9 @@ def adhesion_coefficients(g, nu, level):
     ndarray (4,)
         C23 is the mean of the two numbers (-dfy/dphi', dmz/duy') that agree in the limit.
     """
-    n, ny = panel_counts(g, level)
-    panels = make_panels(g, 0.0, n, ny)
-    (xx, xx_m), (yy, yy_m), (xy, xy_m) = (_mirrored(block, n) for block in slip_matrix(panels, nu, ny // 2))
-    half = n * ny // 2
-    zero, one = np.zeros(half), np.ones(half)
-    y, x_slip, x_force = panels.y[:half], panels.x_slip[:half], panels.x_force[:half]
-    even = np.block([[xx + xx_m, xy - xy_m], [xy + xy_m, yy - yy_m]])
-    odd = np.block([[xx - xx_m, xy + xy_m], [xy - xy_m, yy + yy_m]])
-    pull = np.linalg.solve(even, -np.concatenate([one, zero]))
-    side, spin = np.linalg.solve(odd, -np.stack([np.concatenate([zero, one]), np.concatenate([-y, x_slip])], axis=1)).T
-    c22, c23 = -2 * side[half:].sum(), -2 * spin[half:].sum()
-    c32 = 2 * (x_force @ side[half:] - y @ side[:half])
-    c33 = -2 * (x_force @ spin[half:] - y @ spin[:half])
-    return np.array([-2 * pull[:half].sum(), c22, (c23 + c32) / 2, c33])
+    panels = make_panels(g, 0.0, *panel_counts(g, level))
+    (c11, _, _), (_, c22, c32), (_, c23, c33) = -resultants(panels, stuck_forces(panels, nu, True)[1])
+    return np.array([c11, c22, (c23 - c32) / 2, c33])
 
 
 def extrapolated_coefficients(g, nu, levels=LEVELS):

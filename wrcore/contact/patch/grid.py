@@ -245,7 +245,7 @@ def grid_rolling(patch, wx, ws, friction, shear_modulus, poisson, tolerance):
     shear_modulus, poisson : float
         Pa and -.
     tolerance : float
-        Remaining change of the tractions over the friction bound.
+        Remaining change of the tractions, relative to them.
 
     Returns
     -------

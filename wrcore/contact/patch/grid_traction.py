@@ -122,7 +122,7 @@ def solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px,
     shear_modulus, poisson : float
         Of both bodies, Pa and -.
     tolerance : float
-        Remaining change of the traction, summed up, over the sum of the bound.
+        Remaining change of the traction, summed up, over the sum of the traction.
     px, ps, sx, ss : numpy.ndarray, shape (nx, ns)
         Written: traction on the wheel (Pa) and slip.
 
@@ -139,26 +139,26 @@ def solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px,
     limit, rx, rs = np.zeros((wide, long)), np.zeros((wide, long)), np.zeros((wide, long))
     zx, zs, fx, fs = np.zeros((wide, long)), np.zeros((wide, long)), np.zeros((wide, long)), np.zeros((wide, long))
     re, im = np.empty((wide, long)), np.empty((wide, long))
-    goal, iterations = 0.0, -MOST_ITERATIONS
+    iterations = -MOST_ITERATIONS
     for i in range(nx):
         for j in range(ns):
             limit[i, j], rx[i, j], rs[i, j] = bound[i, j], wx[i, j] / step, ws[i, j] / step
             zx[i, j], zs[i, j] = -rx[i, j], -rs[i, j]
-            goal += tolerance * bound[i, j]
     for count in range(1, MOST_ITERATIONS + 1):
         _project(zx, zs, limit, fx, fs)
         for i in range(wide):
             for j in range(long):
                 re[i, j], im[i, j] = 2.0 * fx[i, j] - zx[i, j] - rx[i, j], 2.0 * fs[i, j] - zs[i, j] - rs[i, j]
         yx, ys = _apply(even, odd, re, im)
-        change = 0.0
+        change = total = 0.0
         for i in range(wide):
             for j in range(long):
                 move_x, move_s = yx[i, j] - fx[i, j], ys[i, j] - fs[i, j]
                 zx[i, j] += RELAXATION * move_x
                 zs[i, j] += RELAXATION * move_s
                 change += math.sqrt(move_x * move_x + move_s * move_s)
-        if change <= goal:
+                total += math.sqrt(fx[i, j] * fx[i, j] + fs[i, j] * fs[i, j])
+        if change <= tolerance * total:
             iterations = count
             break
     _project(zx, zs, limit, fx, fs)

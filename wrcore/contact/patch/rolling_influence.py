@@ -31,7 +31,7 @@ from numba.extending import intrinsic
 from wrcore.kernels.jit import FUSED, jit
 
 UPWIND = 0.6
-_STEP_SCALE, _UNIT, _ZERO = np.float32(2.5), np.float32(1), np.float32(0)
+_STEP_SCALE, _UNIT, _ZERO = np.float32(2), np.float32(1), np.float32(0)
 _ROOT_HALF = 0x3F3504F3
 """Bits of sqrt(1/2)."""
 
@@ -299,7 +299,7 @@ def _block(panels, i, j, work, matrix):
 
 @jit(allocates=False, fastmath=FUSED)
 def assemble(panels, count, nu, work):
-    """B = H^-1 A of ``count`` strips in the workspace; h = 2.5 sqrt(Axx Ayy) from the diagonals."""
+    """B = H^-1 A of ``count`` strips in the workspace; h = 2 sqrt(Axx Ayy) from the diagonals."""
     n = panels.n
     size = 2 * n * count
     matrix = work.matrix[: size * size].reshape((size, size))
