@@ -228,13 +228,11 @@ def alone(patch, window, velocity, place, mu):
     turn = math.atan(np.average(patch.tilt[at], weights=load))
     angle, s0 = patch.contact_angle + turn, np.average(patch.centre[at], weights=load)
     n0 = np.average(patch.height[at], weights=load)
-    origin = np.array(patch.origin) + [0.0, s0 * math.cos(patch.contact_angle) - n0 * math.sin(patch.contact_angle),
-                                       s0 * math.sin(patch.contact_angle) + n0 * math.cos(patch.contact_angle)]  # fmt: skip
+    c, q = math.cos(patch.contact_angle), math.sin(patch.contact_angle)
+    origin = np.array(patch.origin) + [0.0, s0 * c - n0 * q, s0 * q + n0 * c]
     v, w, speed = np.array(velocity[:3]), np.array(velocity[3:6]), velocity[6]
-    across, normal = (
-        np.array([0.0, math.cos(angle), math.sin(angle)]),
-        np.array([0.0, -math.sin(angle), math.cos(angle)]),
-    )
+    across = np.array([0.0, math.cos(angle), math.sin(angle)])
+    normal = np.array([0.0, -math.sin(angle), math.cos(angle)])
     at_origin = (v + np.cross(w, origin - place)) / speed
     s = (patch.centre[at] - s0) / math.cos(turn)
     heights = patch.height[at] - n0 - math.tan(turn) * (patch.centre[at] - s0)  # over the lobe's own plane

@@ -140,9 +140,10 @@ class StripPatch:
             low = self.centre[at[0]] - (0.5 - tip(own, 0, 1)) * w
             high = self.centre[at[-1]] + (0.5 - tip(own, len(at) - 1, -1)) * w
             half, edges = 0.5 * (high - low), np.append(self.centre[at] - 0.5 * w, self.centre[at[-1]] + 0.5 * w)
-            t = np.clip((edges - low) / half - 1.0, -1.0, 1.0)
+            t = (edges - low) / half - 1.0  # beyond the tips the squares count as negative, as in the tips' condition
+            square, t = np.diff(t - t**3 / 3.0), np.clip(t, -1.0, 1.0)
             t[0], t[-1] = -1.0, 1.0
-            square, root = np.diff(t - t**3 / 3.0), np.diff(0.5 * (t * np.sqrt(1.0 - t * t) + np.arcsin(t)))
+            root = np.diff(0.5 * (t * np.sqrt(1.0 - t * t) + np.arcsin(t)))
             even[at] = self.half_length[at] * root * np.sqrt(half / (w * square))
         return even
 
