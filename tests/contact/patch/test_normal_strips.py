@@ -54,7 +54,9 @@ def test_a_cone_on_a_round_rail_head_is_hertz(radius, share, resolution):
     assert found.p_max == pytest.approx(1.5 * force / (math.pi * a * b * d), rel=0.01)
     assert 0.5 * (found.x_max - found.x_min) == pytest.approx(a * math.sqrt(d), rel=0.01)
     assert 0.5 * (found.s_max - found.s_min) == pytest.approx(b * math.sqrt(d), rel=0.04)
-    assert 2.0 * found.even_length @ found.width == pytest.approx(math.pi * a * b * d, rel=0.005)
+    assert 2.0 * found.even_length @ found.width == pytest.approx(
+        math.pi * a * b * d, rel=0.16 / RESOLUTIONS[resolution]
+    )
     assert found.mean_xx == pytest.approx(0.2 * a * a * d, rel=0.01)
     assert found.mean_ss == pytest.approx(0.2 * b * b * d, rel=0.02)
 
