@@ -12,10 +12,21 @@ from wrcore.contact.detection import axle_direction, detect, find_patches, plana
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.poses import solve_poses
-from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, MOMENT, PATCH_COLUMNS, PENETRATION
+from wrcore.contact.reduction import (
+    MAX_PATCHES,
+    MAXIMUM,
+    MOMENT,
+    NORMAL,
+    PATCH_COLUMNS,
+    PENETRATION,
+    SEMI_A,
+    SEMI_B,
+    U_WHEEL,
+)
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.surface import rail_surface, wheel_surface, wheelset_transform
 from wrcore.geometry.track import Track
@@ -237,6 +248,34 @@ def test_random_poses_never_fail(benchmark_pair, reduction):
             count = find_patches(benchmark_pair, side, y, z, *(side * c for c in axle), True, reduction, rows)
             assert np.all(np.isfinite(rows[:count, : PENETRATION + 3]))
             assert np.all(rows[:count, PENETRATION] > 0)
+
+
+def measured(name, kind, inclination=None):
+    """A standard profile as if measured: points 0.2 mm apart along it, 4 um of noise, unsmoothed."""
+    curve = named_profile(name, kind, inclination)
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(curve.u), np.diff(curve.f)))])
+    u = np.interp(np.linspace(0.0, arc[-1], int(arc[-1] / 2e-4) + 1), arc, curve.u)
+    noise = 4e-6 * np.random.default_rng(1 if kind == "wheel" else 2).standard_normal(u.size)
+    slope = curve(u, 1)
+    secant = np.hypot(1.0, slope)
+    return ProfileCurve.from_points(u - noise * slope / secant, curve(u) + noise / secant, kind)
+
+
+@pytest.mark.parametrize("reduction", [MAXIMUM, MOMENT])
+def test_no_overlap_of_measured_profiles_counts_twice(reduction):
+    # a search for the deepest point that left its overlap found the neighbour's again (4 and 2 of these poses), and the
+    # moments of what it then took for the overlap gave 4e19 Pa
+    wheel, rail = measured("S1002", "wheel"), measured("60E1", "rail", 1 / 40)
+    pair, hertz = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75), hertz_table()
+    rows, modulus = np.empty((MAX_PATCHES, PATCH_COLUMNS)), contact_modulus(8.2e10, 0.28)
+    several = 0
+    for y in np.linspace(-8e-3, 8e-3, 401):
+        z = height_at_load(pair, hertz, modulus, 1.0, y, 0.0, 0.0, True, reduction, 54e3, 0.46, rows)
+        count, _ = wheel_at_rest(pair, hertz, modulus, 1.0, y, z, 0.0, 0.0, True, reduction, rows)
+        several += count > 1
+        assert count > 0 and np.all(np.diff(rows[:count, U_WHEEL]) > 1e-5)
+        assert np.all(1.5 * rows[:count, NORMAL] < 1e10 * math.pi * rows[:count, SEMI_A] * rows[:count, SEMI_B])
+    assert several > 100
 
 
 def test_compiled_search_equals_its_python_source(benchmark_pair):

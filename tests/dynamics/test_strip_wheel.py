@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore.analysis.wheels import creep_power
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.library import solve_patch
 from wrcore.contact.patch.normal import NormalContact
@@ -43,28 +44,28 @@ def test_a_wheel_feels_what_the_patch_alone_gives(exact):
     roll, yaw = math.asin(axle[2]), -math.asin(axle[0] / math.sqrt(1.0 - axle[2] ** 2))
     contact = NormalContact(model.contact.geometry, 8.2e10 / 0.72, "coarse")
     (patch,) = contact.at_height("left", y, z, roll, yaw, (*velocity, velocity[0]))
-    assert row[columns.NORMAL] == pytest.approx(patch.normal_force, rel=1e-9)
     assert row[columns.P_MAX] == pytest.approx(patch.p_max, rel=1e-9)
     strips = (patch.centre, patch.width, patch.half_length, patch.middle, patch.peak)
     slip = (patch.slip_x, patch.slip_x_dx, patch.slip_s, patch.slip_s_dx)
     rolling = solve_patch(strips, slip, 8.2e10, model.contact.friction, "coarse")
     limit = model.contact.friction * patch.normal_force
-    np.testing.assert_allclose(row[[columns.FX, columns.FY]], [rolling.Fx, rolling.Fs], atol=1e-6 * limit)
-    # the wrench is that of the panels' own forces, each where it acts
-    area = 0.0
+    angle, normal, fx, fy, mz = patch.resultant(rolling.force)
+    np.testing.assert_allclose(row[[columns.ANGLE, columns.NORMAL]], [angle, normal], rtol=1e-7)
+    np.testing.assert_allclose(row[[columns.FX, columns.FY]], [fx, fy], atol=1e-6 * limit)
+    assert row[columns.MZ] == pytest.approx(mz, abs=1e-6 * limit)
+    # the wrench is that of pressure and friction on the strips, each where it acts and in its own plane
+    loads, total = math.pi / 2 * patch.peak * patch.half_length * patch.width, np.zeros(6)
     cosine, sine = math.cos(patch.contact_angle), math.sin(patch.contact_angle)
-    load = math.pi / 2 * patch.peak * patch.half_length * patch.width
-    force = np.array([rolling.Fx, rolling.Fs * cosine - patch.normal_force * sine,
-                      rolling.Fs * sine + patch.normal_force * cosine])  # fmt: skip
-    np.testing.assert_allclose(wrench[:3], force, rtol=1e-6, atol=1e-2)
-    origin = np.array(patch.origin) - [0.0, y, z]
-    normal, lateral = np.array([0.0, -sine, cosine]), np.array([0.0, cosine, sine])
-    moment = np.cross(origin, np.array([rolling.Fx, *(rolling.Fs * lateral)[1:]])) + rolling.Mn * normal
-    for s, x, one in zip(patch.centre, patch.middle, load, strict=True):
-        moment += np.cross(origin + x * np.array([1.0, 0.0, 0.0]) + s * lateral, one * normal)
-        area += one
-    assert area == pytest.approx(patch.normal_force)
-    np.testing.assert_allclose(wrench[3:], moment, rtol=1e-6, atol=1e-2)
+    for i, load in enumerate(loads):
+        own = patch.contact_angle + math.atan(patch.tilt[i])
+        across, out = np.array([0.0, math.cos(own), math.sin(own)]), np.array([0.0, -math.sin(own), math.cos(own)])
+        s, n = patch.centre[i], patch.height[i]
+        point = np.array(patch.origin) - [0.0, y, z]
+        point += [patch.middle[i], s * cosine - n * sine, s * sine + n * cosine]
+        along, aside, turn = rolling.force[:, i]
+        force = np.array([along, 0.0, 0.0]) + aside * across + load / math.cos(math.atan(patch.tilt[i])) * out
+        total += np.concatenate([force, np.cross(point, force) + turn * out])
+    np.testing.assert_allclose(wrench, total, rtol=1e-6, atol=1e-2)
 
 
 def test_forces_do_not_step_where_the_number_of_strips_changes(exact):
@@ -78,7 +79,6 @@ def test_forces_do_not_step_where_the_number_of_strips_changes(exact):
         equations(0.0, moved)
         row = equations.work.patches[0, 0, 0].copy()
         (patch,) = contact.at_height("left", y, moved[2])
-        assert row[columns.NORMAL] == pytest.approx(patch.normal_force, rel=1e-9)
         left.append(row[columns.NORMAL])
         counts.append(patch.centre.size)
     increments = np.diff(left)
@@ -87,15 +87,36 @@ def test_forces_do_not_step_where_the_number_of_strips_changes(exact):
 
 
 def test_left_and_right_are_mirror_images(exact):
+    """To the last bit, at the tread, in two lobes and on the flange, ahead and back."""
     equations, _, state = exact
-    rates = equations(0.0, state)
-    mirrored = state.copy()
-    mirrored[[1, 3 + 1, 3 + 3, 8, 10, 12]] *= -1.0  # y, roll and yaw in the Euler parameters, vy, wx, wz
-    other = equations(0.0, mirrored)
-    sign = np.ones(6)
-    sign[[1, 3, 5]] = -1.0
-    # panel forces are float32: 1e-7 of the friction force, over the wheelset's inertia
-    np.testing.assert_allclose(other[7:13], sign * rates[7:13], rtol=1e-6, atol=1e-5)
+    sign = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    for y, yaw, ahead in ((0.003, 1e-3, 1.0), (0.0007, -2e-3, 1.0), (0.0051, 3e-3, 1.0), (0.006, 0.0, -1.0)):
+        moved = state.copy()
+        moved[1], moved[2], moved[3:7] = y, state[2] - 2e-5, (math.cos(yaw / 2), 2e-6, 0.0, math.sin(yaw / 2))
+        moved[7:13] *= ahead
+        moved[8], moved[10], moved[12] = 0.02, 0.01, 0.05
+        mirrored = moved.copy()
+        mirrored[[1, 3 + 1, 3 + 3, 8, 10, 12]] *= -1.0  # y, roll and yaw in the Euler parameters, vy, wx, wz
+        found = []
+        for one in (moved, mirrored):
+            equations(0.0, one)
+            found.append((equations.work.rail_wrenches[0].copy(), equations.work.counts.sum()))
+        (wrenches, count), (others, other) = found
+        assert count == other >= 1
+        np.testing.assert_array_equal(others[::-1], sign * wrenches)
+
+
+@pytest.mark.parametrize(("patch", "slip"), [("exact", "surfaces"), ("exact", "creepages"), ("strips", "surfaces")])
+def test_creep_power_is_what_friction_takes_from_the_wheelset(patch, slip):
+    """Integral of traction times slip, power of the wrench, and forces times creepages are one number."""
+    run = simulate(
+        SCENES / "suspended_wheelset.yaml", progress=False, contact__patch=patch, contact__resolution="coarse",
+        contact__slip=slip, initial__y=0.0051, integration__duration=0.02,
+        output__channels=["pose", "velocity", "contact", "energy"],
+    )  # fmt: skip
+    power = creep_power(run, "wheelset", "left") + creep_power(run, "wheelset", "right")
+    assert power.max() > 100.0
+    np.testing.assert_allclose(power, run["energy"].dissipated_by_creep_W, rtol=1e-4, atol=1e-4 * power.max())
 
 
 def test_the_grid_gives_the_same_forces(exact):

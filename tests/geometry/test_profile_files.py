@@ -1,6 +1,7 @@
 """Readers of profile files: conventions, every fault, random text."""
 
 import os
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from wrcore.cli import parser
+from wrcore.cli.options import profile_of
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile
@@ -320,3 +323,19 @@ def test_random_text_gives_a_profile_or_an_input_error(tmp_path, lines, kind, su
     else:
         assert isinstance(curve, ProfileCurve)
         assert np.all(np.isfinite([curve.f, curve.df, curve.d2f]))
+
+
+def test_commands_smooth_profiles_of_files(tmp_path):
+    u = np.arange(-0.03, 0.0301, 2e-4)
+    noise = 4e-6 * np.random.default_rng(0).standard_normal(u.size)
+    points = np.column_stack([u, 0.05 * u + noise])
+    np.savetxt(tmp_path / "wheel.csv", points, delimiter=",", header="u_m,f_m", comments="")
+    bends = []
+    for smoothing in (None, 1e-5):
+        options = Namespace(unit=None, smoothing=smoothing, inclination=None)
+        bends.append(np.abs(np.diff(profile_of(options, str(tmp_path / "wheel.csv"), "wheel").df)).max())
+    assert bends[1] < 0.05 * bends[0]
+    pair = ["--wheel", "a", "--rail", "b", "--out", "c", "--smoothing", "1"]
+    for command in (["contact", "--poses", "d", "--wheel-load", "1"], ["conicity"]):
+        with pytest.raises(InputError, match="smoothing"):
+            profile_of(parser().parse_args([*command, *pair]), str(tmp_path / "wheel.csv"), "wheel")

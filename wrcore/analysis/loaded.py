@@ -162,20 +162,26 @@ class Strips(LoadedWheels):
         mean_x, mean_s, creep = shape.mean_x, shape.mean_s, _mean_creepages(shape, slip)
         a, b = (math.sqrt(5.0 * max(square - mean * mean, 1e-14))
                 for square, mean in ((shape.mean_xx, mean_x), (shape.mean_ss, mean_s)))  # fmt: skip
-        field, force = None, (0.0, 0.0, 0.0)
+        field, forces = None, np.zeros((3, len(shape.centre)))
         level = "slender" if a > SLENDER * b else self.resolution
         if self.exact and (rolls or fields):
             field = solve_patch(
                 (shape.centre, shape.width, shape.half_length, shape.middle, shape.peak), slip, self.shear_modulus,
                 friction, level, self.poisson_ratio,
             )  # fmt: skip
-            force = field.Fx, field.Fs, field.Mn + mean_s * field.Fx - mean_x * field.Fs
+            forces = field.force
         elif rolls:
-            force = creep_by_table(a, b, shape.normal_force, *creep, friction, self.shear_modulus, self.poisson_ratio)
-        angle = shape.contact_angle
-        point = shape.origin[0] + mean_x, shape.origin[1] + mean_s * math.cos(angle)
-        point = *point, shape.origin[2] + mean_s * math.sin(angle)
-        _fill(row, point, angle, (a, b), shape.normal_force, force, creep if rolls else (math.nan,) * 3, shape.p_max)
+            fx, fs, mz = creep_by_table(a, b, shape.normal_force, *creep, friction, self.shear_modulus,
+                                        self.poisson_ratio)  # fmt: skip
+            share = _loads(shape) / shape.normal_force
+            forces = share * np.stack([0.0 * share + fx, 0.0 * share + fs, mz + (mean_x - shape.middle) * fs])
+        if not self.surfaces:  # creepages are the slip of one plane
+            tilt = 0.0 * shape.tilt + _loads(shape) @ shape.tilt / shape.normal_force
+            shape = replace(shape, tilt=tilt, height=tilt * (shape.centre - mean_s) - row[PENETRATION])
+        angle, normal, *force = shape.resultant(forces)
+        plane, (x, y, z) = shape.contact_angle, shape.origin
+        point = x + mean_x, y + mean_s * math.cos(plane), z + mean_s * math.sin(plane)
+        _fill(row, point, angle, (a, b), normal, force, creep if rolls else (math.nan,) * 3, shape.p_max)
         extent = shape.origin[0] + shape.x_min, shape.origin[0] + shape.x_max, shape.s_max - shape.s_min
         patch = None
         if fields and field is not None:
@@ -203,7 +209,7 @@ class Strips(LoadedWheels):
         cosine, sine = math.cos(shape.contact_angle), math.sin(shape.contact_angle)
         point = shape.origin[0] + mean_x, shape.origin[1] + mean_s * cosine, shape.origin[2] + mean_s * sine
         force = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
-        _fill(row, point, shape.contact_angle, tuple(axes), patch.normal, force,
+        _fill(row, point, patch.contact_angle, tuple(axes), patch.normal, force,
               (math.nan,) * 3 if motion is None else _mean_creepages(shape, slip), patch.p_max)  # fmt: skip
         x_min, x_max, s_min, s_max = patch.extent
         return Found(row, (shape.origin[0] + x_min, shape.origin[0] + x_max, s_max - s_min), patch, True)
@@ -276,18 +282,19 @@ def _fill(row, point, angle, axes, normal, force, creep, p_max):
 
 def _patch_of_strips(shape, field, panels, row, friction, pose):
     """`Patch` of strips, their panels as cells, about the pressure's centroid."""
-    edges = shape.middle[:, None] + shape.half_length[:, None] * panels.edges
+    shorter = shape.even_length / shape.half_length  # strips as rectangles with the areas that they have
+    edges = shape.middle[:, None] + shape.even_length[:, None] * panels.edges
     like = np.ones(edges[:, 1:].shape)
     mean_x, mean_s = shape.mean_x, shape.mean_s
     cells = (
         0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, like * (shape.centre - mean_s)[:, None],
         edges[:, :-1] - edges[:, 1:], like * shape.width[:, None],
-        field.pressure, field.traction_x, field.traction_s,
+        *(one / shorter[:, None] for one in (field.pressure, field.traction_x, field.traction_s)),
         np.where(field.slides, field.slip_x, 0.0), np.where(field.slides, field.slip_s, 0.0), ~field.slides,
     )  # fmt: skip
     ends = shape.x_min - mean_x, shape.x_max - mean_x, shape.s_min - mean_s, shape.s_max - mean_s
     return Patch(
         *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
-        *map(float, row[columns.XI : columns.PHI + 1]), shape.contact_angle,
+        *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
         tuple(map(float, row[[columns.X, columns.Y, columns.Z]])), friction, pose[0], shape.p_max, ends, pose[1:],
     )  # fmt: skip

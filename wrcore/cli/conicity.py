@@ -1,11 +1,9 @@
 """``wrcore conicity``: equivalent conicity of a wheelset on its track."""
 
 import argparse
-import os
-from pathlib import Path
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, ratio
+from wrcore.cli.options import add_pair, columns, profile_of
 from wrcore.errors import InputError
 from wrcore.run.channels import DESCRIPTIONS
 
@@ -44,7 +42,6 @@ def add(commands):
     add_pair(command)
     command.add_argument("--right-wheel", metavar="NAME|FILE", help="where it differs from --wheel")
     command.add_argument("--right-rolling-radius", type=float, metavar="m", help="where it differs, m")
-    command.add_argument("--unit", choices=("m", "mm"), help="of profile files without a header")
     command.add_argument(
         "--roll", action=argparse.BooleanOptionalAction, default=False,
         help="let the wheelset roll so that both wheels touch; the standard does not (default: no)",
@@ -84,19 +81,10 @@ def run(options):
 def _wheelset_on_track(options):
     from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack
 
-    wheel = _profile(options, options.wheel, "wheel")
-    right_wheel = _profile(options, options.right_wheel, "wheel") if options.right_wheel else wheel
-    rail = _profile(options, options.rail, "rail")
+    wheel = profile_of(options, options.wheel, "wheel")
+    right_wheel = profile_of(options, options.right_wheel, "wheel") if options.right_wheel else wheel
+    rail = profile_of(options, options.rail, "rail")
     radius = options.rolling_radius
     right = radius if options.right_rolling_radius is None else options.right_rolling_radius
     sides = WheelOnRail(wheel, rail, radius), WheelOnRail(right_wheel, rail, right)
     return WheelsetOnTrack(*sides, options.tape_circle_half_distance, options.gauge)
-
-
-def _profile(options, spec, kind):
-    """A named profile or one of a file; ``--unit`` applies to files, not to names."""
-    from wrcore.geometry.standards import named_profile
-
-    if options.unit and os.path.isfile(spec) and Path(spec).suffix.lower() not in (".prw", ".prr"):
-        spec = {"points": spec, "unit": options.unit}
-    return named_profile(spec, kind, ratio(options.inclination))

@@ -1,7 +1,7 @@
 """``wrcore contact``: the patches of a wheelset in given poses."""
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, ratio
+from wrcore.cli.options import add_pair, columns, profile_of
 from wrcore.errors import InputError
 
 ABOUT = """
@@ -94,13 +94,11 @@ def run(options):
     from wrcore.analysis.poses import loaded_poses
     from wrcore.contact.geometry import contact_geometry
     from wrcore.contact.poses import read_poses
-    from wrcore.geometry.standards import named_profile
     from wrcore.geometry.track import Track
 
     out = output(options.out)
     poses = read_poses(options.poses)
-    wheel = named_profile(options.wheel, "wheel")
-    rail = named_profile(options.rail, "rail", ratio(options.inclination))
+    wheel, rail = profile_of(options, options.wheel, "wheel"), profile_of(options, options.rail, "rail")
     geometry = contact_geometry(
         wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
     )

@@ -1,7 +1,9 @@
 """Options that several commands have, and how all of them explain themselves and refuse."""
 
 import argparse
+import os
 import textwrap
+from pathlib import Path
 
 from wrcore.errors import InputError, one_of, similar
 from wrcore.run.channels import DESCRIPTIONS, unit_of
@@ -67,12 +69,28 @@ def add_pair(command):
     """Options of a wheel on a rail."""
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
     command.add_argument("--rail", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
+    command.add_argument("--unit", choices=("m", "mm"), help="of profile files without a header")
+    command.add_argument("--smoothing", type=float, metavar="m", help="by which the curve may leave a file's points, m")
     command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
     command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="m, 14 mm below the rails' tops")
     command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m", help="at the tape circle, m")
     command.add_argument(
         "--tape-circle-half-distance", type=float, default=0.75, metavar="m", help="from the wheelset's centre, m"
     )
+
+
+def profile_of(options, spec, kind):
+    """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply."""
+    from wrcore.geometry.standards import named_profile
+
+    if os.path.isfile(spec):
+        own = {"points": spec}
+        if options.unit and Path(spec).suffix.lower() not in (".prw", ".prr"):
+            own["unit"] = options.unit
+        if options.smoothing is not None:
+            own["smoothing"] = options.smoothing
+        spec = own if len(own) > 1 else spec
+    return named_profile(spec, kind, ratio(options.inclination))
 
 
 def ratio(text):

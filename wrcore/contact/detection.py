@@ -110,7 +110,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
                 m0, m1, m2 = overlap_moments(geometry, pose, start, end)
         found = patch_from_moments(geometry, pose, middle, m0, m1, m2, patches[row])
     else:
-        found = patch_at_maximum(geometry, pose, deepest, patches[row])
+        found = patch_at_maximum(geometry, pose, deepest, outside, beyond, patches[row])
     return count + found if row == count else count
 
 
@@ -132,7 +132,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
     inside = False
     outside = first = last = deepest = begin
     depth = m0 = m1 = m2 = 0.0
-    two_back, one_back, one_back_at, before = 1.0, 1.0, begin, 1.0
+    two_back, one_back, two_back_at, one_back_at, before = 1.0, 1.0, begin, begin, 1.0
     least, most = 0, cells
     if exact:
         least, most = cells - grid.node, wheel.shape[1] - cells - grid.node
@@ -180,13 +180,13 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
                                      nodes, patches, count)  # fmt: skip
                 inside = False
             elif 0.0 <= one_back < reserve and one_back <= two_back and one_back <= gap < 0.5:
-                lowest = deepest_point(geometry, pose, one_back_at, SLOPE_TOLERANCE)
+                lowest = deepest_point(geometry, pose, one_back_at, SLOPE_TOLERANCE, two_back_at, u)
                 overlap = -gap_at(geometry, pose, lowest)[0]
                 if overlap > 0.0:
                     none = np.int64(0)
-                    count = _add_overlap(geometry, pose, reduction, one_back_at - SCAN_STEP / parts, lowest, lowest, u,
+                    count = _add_overlap(geometry, pose, reduction, two_back_at, lowest, lowest, u,
                                          lowest, overlap * cosine, 0.0, 0.0, 0.0, none, patches, count)  # fmt: skip
-            two_back, one_back, one_back_at = one_back, gap, u
+            two_back, one_back, two_back_at, one_back_at = one_back, gap, one_back_at, u
         before = coarse
         k += 1
         if k == end and inside:
@@ -236,16 +236,17 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
     ``overlap`` and the sums m0, m1, m2: see `scan`.
     """
     wheel, start = geometry.scan_wheel, geometry.scan_wheel_start + (grid.node + begin) * SCAN_STEP
+    outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
     if reduction == MAXIMUM:
         strip = deepest_strip(grid, wheel, geometry.scan_rail, begin + overlap.first, begin + overlap.last)
-        return int(patch_at_maximum(geometry, pose, start + (strip - begin) * SCAN_STEP, patch))
+        deepest = start + (strip - begin) * SCAN_STEP
+        return int(patch_at_maximum(geometry, pose, deepest, outside, beyond, patch))
     if overlap.count >= _WIDE:
         m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3
     else:
         middle = (overlap.first + overlap.last) // 2
         ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_place(grid, wheel, begin + middle)[0]
         ahead = cells_ahead(geometry, start + middle * SCAN_STEP, ur)
-        outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
         m0, m1, m2, start, nodes = fine_sums(geometry, pose, ahead, outside, beyond)
         if nodes < _WIDE:
             return -1

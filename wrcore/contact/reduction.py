@@ -61,13 +61,13 @@ GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 @jit(allocates=False)
-def deepest_point(geometry, pose, u, tolerance):
-    """Lateral wheel coordinate near ``u`` where the slopes agree: Newton's steps inside a shrinking bracket.
+def deepest_point(geometry, pose, u, tolerance, outside, beyond):
+    """Lateral wheel coordinate between ``outside`` and ``beyond`` where the slopes agree, from ``u``: Newton's steps
+    inside a shrinking bracket. What lies beyond belongs to other overlaps.
 
-    Returns ``u`` itself where the overlap ends (edge of a profile) before the slopes agree.
+    Returns ``u`` itself where there is none (edge of a profile).
     """
-    low, high = u - 3.0 * SCAN_STEP, u + 3.0 * SCAN_STEP
-    new = u
+    low, high, new = outside, beyond, u
     for _ in range(60):
         value, rate = slope_difference(geometry, pose, new)
         if abs(value) < tolerance:
@@ -82,7 +82,8 @@ def deepest_point(geometry, pose, u, tolerance):
             new = 0.5 * (low + high)
         if high - low < 1e-13:
             break
-    return new if abs(new - u) < 2.9 * SCAN_STEP else u
+    near = 1e-3 * (beyond - outside)
+    return new if outside + near < new < beyond - near else u
 
 
 @jit(allocates=False)
@@ -132,13 +133,13 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
 
     ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside; ``deepest`` is a strip near the deepest one.
     """
-    u = deepest_point(geometry, pose, deepest, _LOOSE_TOLERANCE)
+    u = deepest_point(geometry, pose, deepest, _LOOSE_TOLERANCE, outside, beyond)
     gap, rate = gap_at(geometry, pose, u)[0], slope_difference(geometry, pose, u)[1]
     start = end = np.nan
     if gap < 0.0 < rate:
         half = math.sqrt(-2.0 * gap / rate)
-        start = _edge_by_newton(geometry, pose, u - half, outside - SCAN_STEP, u)
-        end = _edge_by_newton(geometry, pose, u + half, u, beyond + SCAN_STEP)
+        start = _edge_by_newton(geometry, pose, u - half, outside, u)
+        end = _edge_by_newton(geometry, pose, u + half, u, beyond)
     if not start == start:
         start = _edge_by_bracket(geometry, pose, outside, first)
     if not end == end:
@@ -207,9 +208,10 @@ def _arc_sine(x):
 
 
 @jit(allocates=False)
-def patch_at_maximum(geometry, pose, u, patch):
-    """Reduction ``maximum`` from a strip near the deepest one; returns whether there is penetration."""
-    u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE)
+def patch_at_maximum(geometry, pose, u, outside, beyond, patch):
+    """Reduction ``maximum`` from the deepest strip, with points without overlap next to its overlap; returns whether
+    there is penetration."""
+    u = deepest_point(geometry, pose, u, SLOPE_TOLERANCE, outside, beyond)
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     if not on_rail(geometry, ur):
         return False

@@ -270,7 +270,7 @@ def cells_ahead(geometry, u, ur):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_sums(geometry, pose, ahead, first, last):
-    """Moments of g^2 over the strips at the wheel profile's own nodes from ``first`` to ``last``.
+    """Moments of g^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``.
 
     ``ahead``: see `cells_ahead`, for the middle of the overlap.
 
@@ -285,8 +285,8 @@ def fine_sums(geometry, pose, ahead, first, last):
     """
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
     density = 1.0 / step
-    begin = max(max(int((first - geometry.wheel_start) * density), 0), -ahead)
-    end = min(int((last - geometry.wheel_start) * density) + 2, wheel.shape[1] - LANES)
+    begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -ahead)
+    end = min(int((last - geometry.wheel_start) * density) + 1, wheel.shape[1] - LANES)
     end = min(end, rail.shape[1] - LANES - ahead)
     origin, cell = geometry.wheel_start + begin * step, begin + ahead
     offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step

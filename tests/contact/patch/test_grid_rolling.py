@@ -14,7 +14,7 @@ from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.grid_pressure import solve_pressure
 from wrcore.contact.patch.grid_traction import MOST_ITERATIONS, solve_traction
 from wrcore.contact.patch.reference import FINE, solve_on_grids
-from wrcore.contact.patch.surfaces import plane_slip, surface_slip
+from wrcore.contact.patch.surfaces import plane_slip, strip_planes, surface_slip
 from wrcore.contact.strip import make_pose
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
@@ -165,7 +165,8 @@ def force_in_a_kernel(geometry, side, y, z, ex, ey, ez, plane, motion, modulus, 
     pose = make_pose(side, y, z, ex, ey, ez, True)
     patch = grid_normal(geometry, pose, plane, modulus, 16, 16)
     wx, ws = np.empty(patch.gap.shape), np.empty(patch.gap.shape)
-    surface_slip(pose, plane, motion, patch.x, patch.s, patch.height, wx, ws)
+    low, tilt = strip_planes(patch.s, patch.gap, patch.height)
+    surface_slip(pose, plane, motion, patch.x, patch.s, low, tilt, wx, ws)
     traction = grid_rolling(patch, wx, ws, 0.3, shear_modulus, poisson, 1e-4)
     return patch.pressure.sum() * patch.dx * patch.ds, traction.fx, traction.fs, traction.mn, traction.iterations
 

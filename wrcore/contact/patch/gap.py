@@ -37,8 +37,8 @@ S, NODE_GAP, NODE_SHAPE, NODE_SQUARE, NODE_SHARE = range(5)
 NODE_ROWS = 5
 
 # Rows of the strip gap: what `strip_gap` fills.
-GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, U, UR = range(9)
-GAP_ROWS = 9
+GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, TILT, U, UR = range(10)
+GAP_ROWS = 10
 
 _ANGLE_NODES = 32
 """Nodes over half of each overlap for the mean contact angle, over its half width; as many again where it goes on."""
@@ -151,6 +151,8 @@ def strip_gap(geometry, pose, frame, s, u, ur):
         Their slopes over s (1/m^2 and -).
     height : float
         Height of the wheel's extreme point along n, m.
+    tilt : float
+        Slope over s of the loaded surface, midway between wheel and rail: the strip's own contact plane.
     u, ur : float
         Wheel and rail coordinates, m: guesses for the next strip.
     """
@@ -188,7 +190,7 @@ def strip_gap(geometry, pose, frame, s, u, ur):
             break
         ur += (s - here) / (frame.cosine + m * frame.sine)
     gap = top - normal - (s - here) * fall
-    return gap, rise - fall, shape, crest, shape_rate, crest_rate, top, u, ur
+    return gap, rise - fall, shape, crest, shape_rate, crest_rate, top, 0.5 * (rise + fall), u, ur
 
 
 @jit(allocates=False)
@@ -250,40 +252,69 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
     nodes[2, k] = 0.5 * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _material_point(geometry, pose, frame, s, x, height, tilt):
+    """Point of a left wheel's undeformed surface on a strip, from the wheelset's centre, and its own plane's angle."""
+    cosine = 1.0 / math.sqrt(1.0 + tilt * tilt)
+    across = frame.ur + geometry.rail_distance + s * frame.cosine - height * frame.sine
+    z = frame.z + s * frame.sine + height * frame.cosine
+    cosine, sine = cosine * (frame.cosine - frame.sine * tilt), cosine * (frame.sine + frame.cosine * tilt)
+    return frame.x + x, across - pose.y, z - pose.z, cosine, sine
+
+
 @jit(allocates=False, fastmath=FUSED)
-def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, slip):
-    """Rigid slip of the wheel's over the rail's surface, strip by strip, from the wheelset's motion.
+def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, slip):
+    """Rigid slip of a left wheel's over its rail's surface, strip by strip, from the wheelset's motion.
 
     Parameters
     ----------
     velocity : tuple of float
         vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), and the rolling speed V (m/s, > 0).
-    centre, middle, height : numpy.ndarray, shape (n,)
-        s and X of the strips (s to the left), and the height of the wheel's extreme point along the normal, m.
+    centre, middle, height, tilt : numpy.ndarray, shape (n,)
+        s and X of the strips, the height of the wheel's extreme point along the normal, m, and the slope of the strips'
+        own planes over s.
     slip : numpy.ndarray, shape (4, n)
         Filled at the strips' middles: velocity of the wheel's material point relative to the rail's over V along x and
-        along s, each followed by its slope over x (1/m): slip_x, slip_x_dx, slip_s, slip_s_dx.
+        across in the strip's own plane, each followed by its slope over x (1/m): slip_x, slip_x_dx, slip_s, slip_s_dx.
 
     Notes
     -----
     The material point lies on the wheel's undeformed surface, as in CONTACT: equal bodies shorten alike under pressure.
     """
     vx, vy, vz, wx, wy, wz, speed = velocity
-    slowness, sine = 1.0 / speed, pose.side * frame.sine
+    slowness = 1.0 / speed
     for i in range(len(centre)):
-        s, n = pose.side * centre[i], height[i]
-        across = frame.ur + geometry.rail_distance + s * frame.cosine - n * frame.sine
-        px, py = frame.x + middle[i], pose.side * across - pose.y
-        pz = frame.z + s * frame.sine + n * frame.cosine - pose.z
+        px, py, pz, cosine, sine = _material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         slip[0, i] = (vx + wy * pz - wz * py) * slowness
         slip[1, i] = 0.0
-        slip[2, i] = ((vy + wz * px - wx * pz) * frame.cosine + (vz + wx * py - wy * px) * sine) * slowness
-        slip[3, i] = (wz * frame.cosine - wy * sine) * slowness
+        slip[2, i] = ((vy + wz * px - wx * pz) * cosine + (vz + wx * py - wy * px) * sine) * slowness
+        slip[3, i] = (wz * cosine - wy * sine) * slowness
 
 
-@jit(allocates=False)
-def creepage_slip(xi, eta, phi, centre, middle, slip):
-    """As `rigid_slip`, from one set of creepages at the origin of the contact frame (wheel relative to rail)."""
+@jit(allocates=False, fastmath=FUSED)
+def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, force, share, pressure, friction):
+    """Add ``share`` of the wrenches of pressure and friction on the strips, about the wheelset's centre.
+
+    The load (along n, N) acts along the normal of each strip's own plane, as the gap along n has it: n - tilt s. For
+    friction this is `rigid_slip`, transposed: it takes from the wheelset what it does on the slip. ``force``, (3, n):
+    along x and across, N, and the moment of the latter about the strip's middle, N m.
+    """
     for i in range(len(centre)):
-        slip[0, i], slip[1, i] = xi - phi * centre[i], 0.0
-        slip[2, i], slip[3, i] = eta + phi * middle[i], phi
+        px, py, pz, cosine, sine = _material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
+        fx, fs, turn = share * force[0, i], share * force[1, i], share * force[2, i]
+        _add_force(px, py, pz, fx, fs * cosine, fs * sine, friction)
+        friction[4] -= turn * sine
+        friction[5] += turn * cosine
+        along = share * load[i] * math.sqrt(1.0 + tilt[i] * tilt[i])
+        _add_force(px, py, pz, 0.0, -along * sine, along * cosine, pressure)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _add_force(px, py, pz, fx, fy, fz, wrench):
+    """Add a force at a point to a wrench."""
+    wrench[0] += fx
+    wrench[1] += fy
+    wrench[2] += fz
+    wrench[3] += py * fz - pz * fy
+    wrench[4] += pz * fx - px * fz
+    wrench[5] += px * fy - py * fx

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.patch.resolvent import SLENDER, factorise, substitute
-from wrcore.contact.patch.rolling import AUTO, LEVELS, Level, make_workspace, read_field, rolling_force
+from wrcore.contact.patch.rolling import AUTO, LEVELS, Level, make_workspace, read_field, read_forces, rolling_force
 from wrcore.contact.patch.rolling_influence import Panels, assemble, lay_out, make_panels
 from wrcore.errors import InputError
 from wrcore.kernels.jit import FUSED, jit
@@ -124,6 +124,8 @@ class RollingField(NamedTuple):
     slides : ndarray of bool
     power : ndarray
         Dissipated power over area and V, Pa.
+    force : ndarray, shape (3, strips)
+        Of each strip along x and s, N, and the moment of the latter about the strip's middle, N m.
     """
 
     Fx: float
@@ -140,6 +142,7 @@ class RollingField(NamedTuple):
     slip_s: np.ndarray
     slides: np.ndarray
     power: np.ndarray
+    force: np.ndarray
 
 
 def solve_patch(strips, slip, shear_modulus, mu, level="middle", nu=0.28, method=AUTO):
@@ -167,5 +170,6 @@ def solve_patch(strips, slip, shear_modulus, mu, level="middle", nu=0.28, method
     result = rolling_force(*arrays, float(shear_modulus), float(mu), library, work, method)
     field = np.empty((9, count * n))
     read_field(library.panels, count, work, field)
-    rows = field.reshape(9, count, n)
-    return RollingField(*result, *rows[:7], rows[7] > 0, rows[8])
+    rows, force = field.reshape(9, count, n), np.empty((3, count))
+    read_forces(count, work, force)
+    return RollingField(*result, *rows[:7], rows[7] > 0, rows[8], force)

@@ -20,7 +20,7 @@ PATCHES = ("maximum", "moment", "strips", "exact")
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
-FORCE_ROWS = 21
+FORCE_ROWS, MOTION = 24, 15
 
 PATCHES_HELD, WRENCHES_HELD = 1, 2
 """What `StripWork.held` says."""
@@ -65,8 +65,14 @@ class StripWork(NamedTuple):
     """(MEMORY,): a memory of nothing."""
     rows: np.ndarray
     out: np.ndarray
+    motion: np.ndarray
+    """Of the wheel, as a left one."""
     strips: np.ndarray
     slip: np.ndarray
+    friction: np.ndarray
+    """(3, MAX_STRIPS): forces on the strips, see `gap.strip_wrenches`."""
+    wrench: np.ndarray
+    """(2, 6): of pressure and of friction."""
     sums: np.ndarray
     force: np.ndarray
     normal: normal_strips.Workspace
@@ -141,7 +147,8 @@ def strip_work(model, wheelsets):
     return StripWork(
         *(np.zeros(1, np.int64) for _ in range(3)), np.zeros((*wheels, normal_strips.MEMORY)),
         np.zeros(normal_strips.MEMORY), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
-        np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
+        np.zeros(MOTION), np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
         normal,
         *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip

@@ -15,27 +15,30 @@ Johnson, Contact Mechanics (1985), chapters 3 and 4. Kalker, Three-Dimensional E
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wrcore.contact.detection import axle_direction
 from wrcore.contact.normal import hertz_table
-from wrcore.contact.patch.gap import creepage_slip, group_end, rigid_slip
+from wrcore.contact.patch.gap import group_end, rigid_slip
 from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.solve import (
     CENTRE,
     EXACT,
+    HALF_LENGTH,
     LOAD,
     MIDDLE,
     PEAK,
     STRIP_ROWS,
+    STRIP_TILT,
     STRIPS,
     SUMS,
     WHEEL_HEIGHT,
     WINDOW,
     publish,
     solve_patch,
+    tip,
     wheel_overlaps,
 )
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
@@ -73,6 +76,10 @@ class StripPatch:
     peak: np.ndarray
     """Pressure in the middle of a strip, Pa: p = peak sqrt(1 - ((x - middle)/half_length)^2)."""
     window: np.ndarray
+    height: np.ndarray
+    """Of the wheel's extreme point in a strip along n, m."""
+    tilt: np.ndarray
+    """Slope over s of a strip's own contact plane, in which it slips."""
     normal_force: float
     p_max: float
     mean_x: float
@@ -88,7 +95,57 @@ class StripPatch:
     slip_x_dx: np.ndarray = None
     slip_s: np.ndarray = None
     slip_s_dx: np.ndarray = None
-    """Rigid slip over V at the middle of the strips, and its slope along x; None unless a velocity was given."""
+    """Rigid slip over V at the middle of the strips, across in their own planes, and its slope along x; None unless a
+    velocity was given."""
+
+    def resultant(self, force):
+        """What pressure and friction on the strips are together, as in runs.
+
+        Parameters
+        ----------
+        force : numpy.ndarray, shape (3, strips)
+            Along x and across in the strips' own planes, N, and the moment of the latter about the middle, N m.
+
+        Returns
+        -------
+        angle : float
+            Of the pressure's resultant, the patch's normal, rad.
+        normal, fx, fy, mz : float
+            Forces along and across that normal, N, and friction's moment about it at the pressure's centroid, N m.
+        """
+        load = 0.5 * math.pi * self.peak * self.half_length * self.width
+        turn, cosine = math.atan2(load @ self.tilt, load.sum()), 1.0 / np.sqrt(1.0 + self.tilt**2)
+        fx, fs, fn = force[0], cosine * force[1], cosine * self.tilt * force[1]
+        x, s = self.middle - self.mean_x, self.centre - self.mean_s
+        about_s, about_n = (
+            self.height @ fx - x @ fn - (cosine * self.tilt) @ force[2],
+            x @ fs - s @ fx + cosine @ force[2],
+        )
+        c, q = math.cos(turn), math.sin(turn)
+        normal = load.sum() / c + fn.sum() * c - fs.sum() * q
+        return self.contact_angle + turn, normal, fx.sum(), fs.sum() * c + fn.sum() * q, about_n * c - about_s * q
+
+    @property
+    def even_length(self):
+        """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
+
+        ``half_length`` squared is the mean of the squares over a strip; between the tips of a window it is taken to be
+        that of an ellipse times a number for each strip.
+        """
+        even, rows = np.empty_like(self.half_length), np.zeros((STRIP_ROWS, len(self.centre)))
+        rows[HALF_LENGTH] = self.half_length
+        for k in np.unique(self.window):
+            at = np.flatnonzero(self.window == k)
+            own, w = rows[:, at], self.width[at[0]]
+            low = self.centre[at[0]] - (0.5 - tip(own, 0, 1)) * w
+            high = self.centre[at[-1]] + (0.5 - tip(own, len(at) - 1, -1)) * w
+            half, edges = 0.5 * (high - low), np.append(self.centre[at] - 0.5 * w, self.centre[at[-1]] + 0.5 * w)
+            t = (edges - low) / half - 1.0  # beyond the tips the squares count as negative, as in the tips' condition
+            square, t = np.diff(t - t**3 / 3.0), np.clip(t, -1.0, 1.0)
+            t[0], t[-1] = -1.0, 1.0
+            root = np.diff(0.5 * (t * np.sqrt(1.0 - t * t) + np.arcsin(t)))
+            even[at] = self.half_length[at] * root * np.sqrt(half / (w * square))
+        return even
 
     def slip_of_creepages(self, xi, eta, phi):
         """Rigid slip of one set of creepages at the frame's origin: xi - phi s along x, eta + phi x along s.
@@ -103,9 +160,8 @@ class StripPatch:
         numpy.ndarray, shape (4, strips)
             slip_x, slip_x_dx, slip_s, slip_s_dx.
         """
-        slip = np.zeros((4, len(self.centre)))
-        creepage_slip(xi, eta, phi, self.centre, self.middle, slip)
-        return slip
+        none = np.zeros(len(self.centre))
+        return np.stack([xi - phi * self.centre, none, eta + phi * self.middle, none + phi])
 
 
 class NormalContact:
@@ -166,9 +222,11 @@ class NormalContact:
             raise InputError("NormalContact", "pose", f"expected finite numbers, got {(y, z, roll, yaw)!r}")
         if velocity is not None and not (len(velocity) == 7 and velocity[6] > 0.0):
             raise InputError("NormalContact", "velocity", f"expected vx, vy, vz, wx, wy, wz, V > 0, got {velocity!r}")
-        sign = SIDES[side]
-        axle = (sign * c for c in axle_direction(roll, yaw))
-        count, pose = wheel_overlaps(self.geometry, sign, y, z, *axle, self.spatial, self._patches)
+        sign = SIDES[side]  # a right wheel is the mirror image of a left one
+        if velocity is not None:
+            velocity = tuple(float(v) * (sign if k in (1, 3, 5) else 1.0) for k, v in enumerate(velocity))
+        axle = axle_direction(sign * roll, sign * yaw)
+        count, pose = wheel_overlaps(self.geometry, 1.0, sign * y, z, *axle, self.spatial, self._patches)
         found, first = [], 0
         while first < count:
             last = group_end(self._patches, count, first)
@@ -194,13 +252,14 @@ class NormalContact:
         slips = (None,) * 4
         if velocity is not None:
             slips = np.zeros((4, count))
-            rigid_slip(self.geometry, pose, frame, tuple(map(float, velocity)), strips[CENTRE], strips[MIDDLE],
-                       strips[WHEEL_HEIGHT], slips)  # fmt: skip
-        origin = (frame.x, pose.side * (frame.ur + self.geometry.rail_distance), frame.z)
-        return StripPatch(
-            side, windows > 0, pose.side * math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
-            strips[WINDOW].astype(int), *map(float, sums), *slips,
+            rigid_slip(self.geometry, pose, frame, velocity, strips[CENTRE], strips[MIDDLE], strips[WHEEL_HEIGHT],
+                       strips[STRIP_TILT], slips)  # fmt: skip
+        origin = (frame.x, frame.ur + self.geometry.rail_distance, frame.z)
+        found = StripPatch(
+            side, windows > 0, math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
+            strips[WINDOW].astype(int), strips[WHEEL_HEIGHT], strips[STRIP_TILT], *map(float, sums), *slips,
         )  # fmt: skip
+        return found if side == "left" else _mirrored(found)
 
     def _once(self, pose, first, last, memory):
         """One solution of the overlaps: number of windows, frame, strips and sums."""
@@ -208,7 +267,7 @@ class NormalContact:
                                      self.resolution, self.model, memory, self._work)  # fmt: skip
         if not windows:
             return 0, frame, self._strips[:, :0], np.full(SUMS, np.nan)
-        count = publish(self.geometry, pose, frame, self.modulus, self._work, windows, self._strips, self._sums)
+        count = publish(self.modulus, self._work, windows, self._strips, self._sums)
         return windows, frame, self._strips[:, :count].copy(), self._sums.copy()
 
     def at_load(self, side, y, load, roll=0.0, yaw=0.0, guess=None, vertical=True, velocity=None):
@@ -239,6 +298,17 @@ class NormalContact:
 
         z = height_of_zero(excess, self.geometry.rolling_radius if guess is None else guess)
         return ([] if math.isnan(z) else self.at_height(side, y, z, roll, yaw, velocity)), z
+
+
+def _mirrored(patch):
+    """A patch of a left wheel as that of a right one, or the other way round."""
+    arrays = {name: part[::-1] for name, part in vars(patch).items() if isinstance(part, np.ndarray)}
+    for name in {"centre", "tilt", "slip_s", "slip_s_dx"} & arrays.keys():
+        arrays[name] = -arrays[name]
+    arrays["window"] = arrays["window"].max(initial=0) - arrays["window"]
+    x, y, z = patch.origin
+    return replace(patch, origin=(x, -y, z), contact_angle=-patch.contact_angle, mean_s=-patch.mean_s,
+                   s_min=-patch.s_max, s_max=-patch.s_min, **arrays)  # fmt: skip
 
 
 def height_of_zero(excess, z, step=2e-5, most=60):

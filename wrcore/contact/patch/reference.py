@@ -8,7 +8,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch.grid import grid_normal, grid_rolling
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.patch.surfaces import Motion, plane_slip, surface_slip
+from wrcore.contact.patch.surfaces import Motion, plane_slip, strip_planes, surface_slip
 from wrcore.errors import InputError
 
 FINE = ((40, 32), (48, 40), (56, 48), (64, 48))
@@ -56,7 +56,7 @@ def solve_on_grids(
         grid = grid_normal(geometry, pose, plane, modulus, nx, ns)
         wx, ws = np.empty(grid.gap.shape), np.empty(grid.gap.shape)
         if isinstance(slip, Motion):
-            surface_slip(pose, plane, slip, grid.x, grid.s, grid.height, wx, ws)
+            surface_slip(pose, plane, slip, grid.x, grid.s, *strip_planes(grid.s, grid.gap, grid.height), wx, ws)
         else:
             plane_slip(*slip, grid.x, grid.s, wx, ws)
         traction = grid_rolling(grid, wx, ws, friction, shear_modulus, poisson_ratio, tolerance)
@@ -76,8 +76,10 @@ def _patch(pose, plane, slip, friction, grid, traction, forces):
         at = plane.x, plane.y - n * plane.sine - pose.y, plane.z + n * plane.cosine - pose.z
         slip = creepages(*slip[:6], *at, plane.cosine, plane.sine, slip.speed)[:3]
     normal = float(grid.pressure.sum() * grid.dx * grid.ds)
+    across = grid.pressure.sum(axis=0)
+    turn = math.atan(across @ strip_planes(grid.s, grid.gap, grid.height)[1] / max(across.sum(), 1e-30))
     return Patch(
         x, s, np.full(x.shape, grid.dx), np.full(x.shape, grid.ds), *fields, stick, normal, *map(float, forces),
-        *map(float, slip), math.atan2(plane.sine, plane.cosine), (plane.x, plane.y, plane.z), friction,
+        *map(float, slip), math.atan2(plane.sine, plane.cosine) + turn, (plane.x, plane.y, plane.z), friction,
         "left" if pose.side > 0.0 else "right",
     )  # fmt: skip

@@ -86,8 +86,9 @@ class Workspace(NamedTuple):
         Distances of points and edges, and the three integrals there.
     slip : (3, n (n + 1)) float32
         Slip of one strip by another, components xx, ss, xs.
-    strip : (7, M)
-        Half length, middle, line, centre and width over c, share in the load, peak times half length.
+    strip : (10, M)
+        Half length, middle, line, centre and width over c, share in the load, peak times half length; of a solution the
+        forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c.
     scale : (5,)
         c (m), normal force N (N), friction bound mu N (N), G c^2/(mu N), and what the slip was divided by.
     bound, step, z, force, y, r, product, rigid, shift, delta, ramp : (m,) float32
@@ -131,7 +132,7 @@ def make_workspace(strips, n):
     single = [np.zeros(m, np.float32) for _ in range(11)]
     return Workspace(
         np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
-        np.zeros((3, n * (n + 1)), np.float32), np.zeros((7, strips)), np.zeros(5),
+        np.zeros((3, n * (n + 1)), np.float32), np.zeros((10, strips)), np.zeros(5),
         *single, np.zeros(n + 2, np.float32),
     )  # fmt: skip
 
@@ -231,7 +232,7 @@ def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work):
 
 @jit(allocates=False, fastmath=FUSED)
 def _resultant(panels, count, work):
-    """(fx, fs, mn) of the panel forces over mu N and mu N c.
+    """(fx, fs, mn) of the panel forces over mu N and mu N c; those of the strips into ``work.strip``.
 
     At a slip that had to be divided by ``slow`` the force differs from that of the rigid slip alone by 1/slow of what
     it does at the reduced slip.
@@ -239,6 +240,7 @@ def _resultant(panels, count, work):
     n, strip, slow = panels.n, work.strip, work.scale[4]
     fx = fs = mn = 0.0
     for j in range(count):
+        strip[7, j] = strip[8, j] = strip[9, j] = 0.0
         for k in range(n):
             i = 2 * n * j + k
             if slow > 1:
@@ -246,10 +248,11 @@ def _resultant(panels, count, work):
                 traction = work.bound[i] / np.sqrt(sx * sx + ss * ss + _TINY)
                 work.force[i] = -traction * sx + (work.force[i] + traction * sx) / slow
                 work.force[i + n] = -traction * ss + (work.force[i + n] + traction * ss) / slow
-            x = strip[1, j] + strip[0, j] * panels.load[k]
-            fx += work.force[i]
-            fs += work.force[i + n]
-            mn += x * work.force[i + n] - strip[2, j] * work.force[i]
+            strip[7, j] += work.force[i]
+            strip[8, j] += work.force[i + n]
+            strip[9, j] += strip[0, j] * panels.load[k] * work.force[i + n]
+        fx, fs = fx + strip[7, j], fs + strip[8, j]
+        mn += strip[9, j] + strip[1, j] * strip[8, j] - strip[2, j] * strip[7, j]
     return fx, fs, mn
 
 
@@ -298,6 +301,7 @@ def rolling_force(
     windows = 1 if split == count else 2
     c, load = lay_out(centre, width, half_length, middle, peak, split, work.strip)
     bound = mu * load
+    work.scale[2] = bound
     if not bound > 0:
         return 0.0 * bound, 0.0 * bound, 0.0 * bound, 0.0 * bound, DIRECT
     assemble(panels, count, library.nu, work)
@@ -325,6 +329,15 @@ def _solve_factorised(panels, size, reach, iterations, work):
     factorise(matrix, 2 * panels.n, reach, factors)
     whole = 2 * panels.n * (reach + 1) >= size
     return _iterate(panels, size, DIRECT if whole else BAND, reach, 1, iterations, work)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def read_forces(count, work, force):
+    """Forces of the strips of the last solution into (3, M): along x and s, N, moment about the middle, N m."""
+    for j in range(count):
+        for k in range(3):
+            force[k, j] = work.scale[2] * work.strip[7 + k, j] if work.scale[2] > 0.0 else 0.0
+        force[2, j] *= work.scale[0]
 
 
 @jit(allocates=False, fastmath=FUSED)

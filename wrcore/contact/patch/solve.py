@@ -4,7 +4,7 @@ import math
 
 from wrcore.contact.detection import find_patches
 from wrcore.contact.patch.fixed import windows_from_fixed
-from wrcore.contact.patch.gap import HEIGHT, UR, U, frame_of_overlaps, look_over_overlaps
+from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
 from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
 from wrcore.contact.patch.windows import (
@@ -39,8 +39,8 @@ _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
 
 # Rows of the strip array, and of the sums over a patch.
-CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WHEEL_HEIGHT, WINDOW = range(7)
-STRIP_ROWS = 7
+CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WINDOW, WHEEL_HEIGHT, STRIP_TILT, STRIP_LOAD = range(9)
+STRIP_ROWS = 9
 LOAD, LARGEST, MEAN_X, MEAN_S, MEAN_XX, MEAN_SS, X_MIN, X_MAX, S_MIN, S_MAX = range(10)
 SUMS = 10
 
@@ -180,7 +180,7 @@ def _resume(frame, memory, work, windows):
 
 
 @jit(allocates=False)
-def _tip(strips, end, step):
+def tip(strips, end, step):
     """Zero of the parabola through a^2 of a window's last three strips, in strips inwards from the window's end."""
     length = strips[HALF_LENGTH]
     c1, c2, c3 = length[end] ** 2, length[end + step] ** 2, length[end + 2 * step] ** 2
@@ -194,15 +194,15 @@ def _tip(strips, end, step):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def publish(geometry, pose, frame, modulus, work, windows, strips, sums):
-    """Strips of a solution in the contact frame (s to the left on both sides), and sums over them.
+def publish(modulus, work, windows, strips, sums):
+    """Strips of a solution in the contact frame, and sums over them.
 
     Parameters
     ----------
     modulus : float
         E*, Pa.
     strips : numpy.ndarray, shape (STRIP_ROWS, MAX_STRIPS)
-        Filled: rows CENTRE to WINDOW, by increasing s.
+        Filled: rows CENTRE to STRIP_LOAD, by increasing s.
     sums : numpy.ndarray, shape (SUMS,)
         Filled: normal force, largest pressure, means over the pressure of x, s, x^2, s^2, and extents.
 
@@ -217,13 +217,12 @@ def publish(geometry, pose, frame, modulus, work, windows, strips, sums):
     sums[X_MIN], sums[X_MAX] = 1e9, -1e9
     best = 0
     for i in range(count):
-        k = i if pose.side > 0.0 else count - 1 - i
-        a, x, w = math.sqrt(work.square[k]), work.middle[k], work.width[k]
-        s, peak = pose.side * work.centre[k], stiffness * work.share[k] * a
-        window = work.window[k] if pose.side > 0.0 else windows - 1 - work.window[k]
+        a, x, w, s = math.sqrt(work.square[i]), work.middle[i], work.width[i], work.centre[i]
+        peak = stiffness * work.share[i] * a
         strips[CENTRE, i], strips[WIDTH, i], strips[HALF_LENGTH, i], strips[MIDDLE, i] = s, w, a, x
-        strips[PEAK, i], strips[WHEEL_HEIGHT, i], strips[WINDOW, i] = peak, work.gap[k, HEIGHT], window
-        load = 0.5 * math.pi * peak * a * w
+        strips[PEAK, i], strips[WINDOW, i] = peak, work.window[i]
+        strips[WHEEL_HEIGHT, i], strips[STRIP_TILT, i] = work.gap[i, HEIGHT], work.gap[i, TILT]
+        strips[STRIP_LOAD, i] = load = 0.5 * math.pi * peak * a * w
         sums[LOAD] += load
         sums[MEAN_X] += load * x
         sums[MEAN_S] += load * s
@@ -234,7 +233,7 @@ def publish(geometry, pose, frame, modulus, work, windows, strips, sums):
             best = i
     for q in range(MEAN_X, MEAN_SS + 1):
         sums[q] /= sums[LOAD]
-    low, high = _tip(strips, 0, 1), _tip(strips, count - 1, -1)
+    low, high = tip(strips, 0, 1), tip(strips, count - 1, -1)
     sums[S_MIN] = strips[CENTRE, 0] - (0.5 - low) * strips[WIDTH, 0]
     sums[S_MAX] = strips[CENTRE, count - 1] + (0.5 - high) * strips[WIDTH, count - 1]
     square = strips[PEAK, best] ** 2

@@ -135,9 +135,49 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
                 gap[i, j], height[i, j] = NO_RAIL, 0.0
 
 
+@jit
+def strip_planes(s, gap, height):
+    """Of each strip along x the wheel's least height (m), and the slope over s midway between wheel and rail there.
+
+    Parameters
+    ----------
+    s : numpy.ndarray, shape (ns,)
+    gap, height : numpy.ndarray, shape (nx, ns)
+        Of `surface_gap`.
+
+    Returns
+    -------
+    low, tilt : numpy.ndarray, shape (ns,)
+        0 where a profile has ended.
+    """
+    low, tilt = np.zeros(s.size), np.zeros(s.size)
+    for j in range(s.size):
+        here, middle = _lowest(gap, height, j)
+        if here != here:
+            continue
+        before, after = max(j - 1, 0), min(j + 1, s.size - 1)
+        left, right = _lowest(gap, height, before)[1], _lowest(gap, height, after)[1]
+        if left != left:
+            before, left = j, middle
+        if right != right:
+            after, right = j, middle
+        low[j], tilt[j] = here, (right - left) / (s[after] - s[before]) if after > before else 0.0
+    return low, tilt
+
+
 @jit(allocates=False)
-def surface_slip(pose, plane, motion, x, s, height, wx, ws):
-    """Rigid slip of the wheel's own surface over the rail at rest, in the contact plane's directions.
+def _lowest(gap, height, j):
+    """The wheel's least height in a strip, and that midway between wheel and rail there; NaN where a profile ended."""
+    low = mid = np.nan
+    for i in range(gap.shape[0]):
+        if gap[i, j] < NO_RAIL and not low <= height[i, j]:
+            low, mid = height[i, j], height[i, j] - 0.5 * gap[i, j]
+    return low, mid
+
+
+@jit(allocates=False)
+def surface_slip(pose, plane, motion, x, s, low, tilt, wx, ws):
+    """Rigid slip of the wheel's own surface over the rail at rest, across in the plane of each strip along x.
 
     A strip of the wheel counts with its radius at its point nearest to the rail: away from it the undeformed wheel
     moves more slowly along x, but the flattened one does not, as its surface passes over the same length.
@@ -150,24 +190,23 @@ def surface_slip(pose, plane, motion, x, s, height, wx, ws):
         Of the wheelset.
     x, s : numpy.ndarray, shapes (nx,), (ns,)
         m.
-    height : numpy.ndarray, shape (nx, ns)
-        Of the wheel over the plane, m.
+    low, tilt : numpy.ndarray, shape (ns,)
+        Of `strip_planes`.
     wx, ws : numpy.ndarray, shape (nx, ns)
         Written: velocity of wheel relative to rail over the speed, forward and to the left.
     """
     slowness = 1.0 / motion.speed
     for j in range(s.size):
-        low = height[0, j]
-        for i in range(1, x.size):
-            low = min(low, height[i, j])
-        py = plane.y + s[j] * plane.cosine - low * plane.sine - pose.y
-        pz = plane.z + s[j] * plane.sine + low * plane.cosine - pose.z
+        secant = 1.0 / math.sqrt(1.0 + tilt[j] * tilt[j])
+        cosine, sine = secant * (plane.cosine - plane.sine * tilt[j]), secant * (plane.sine + plane.cosine * tilt[j])
+        py = plane.y + s[j] * plane.cosine - low[j] * plane.sine - pose.y
+        pz = plane.z + s[j] * plane.sine + low[j] * plane.cosine - pose.z
         for i in range(x.size):
             px = plane.x + x[i]
             vy = motion.vy + motion.wz * px - motion.wx * pz
             vz = motion.vz + motion.wx * py - motion.wy * px
             wx[i, j] = (motion.vx + motion.wy * pz - motion.wz * py) * slowness
-            ws[i, j] = (vy * plane.cosine + vz * plane.sine) * slowness
+            ws[i, j] = (vy * cosine + vz * sine) * slowness
 
 
 @jit(allocates=False)
