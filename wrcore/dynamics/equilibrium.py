@@ -23,7 +23,8 @@ STEP = 1e-7
 """Of the difference quotients: m and rad."""
 
 RESIDUAL = 1e-9
-"""Accelerations below this count as none, m/s^2 and rad/s^2."""
+"""Accelerations below this count as none, m/s^2 and rad/s^2; Newton's method ends there once a step leaves more than a
+tenth of what was left before it: what is soft still moves far, in y and roll, while they are all but zero."""
 
 FRICTIONLESS = 1e-9
 """Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
@@ -124,13 +125,14 @@ def solve_equilibrium(model, state, iterations=50):
     equations = Equations(model)
     unknown = _unknowns(model)
     size = int(unknown.sum())
-    residual = np.inf
+    residual = before = np.inf
     for _ in range(iterations):
         rows = [displaced(state, model, h * row) for h in (STEP, -STEP) for row in np.eye(len(unknown))[unknown]]
         values = _accelerations(equations.at(0.0, np.array([*rows, state])), model)[:, unknown]
         residual = float(np.max(np.abs(values[-1])))
-        if residual < RESIDUAL:
+        if residual < RESIDUAL and not residual < 0.1 * before:
             break
+        before = residual
         slopes = ((values[:size] - values[size:-1]) / (2.0 * STEP)).T
         largest = np.max(np.abs(slopes), axis=1)
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros

@@ -119,9 +119,12 @@ def steady_running(model, state, iterations=10):
     places, size = best.places, len(best.matrix)
     own = size - own_states(model)
     columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
+    last = np.inf
     for _ in range(iterations):
-        if np.max(np.abs(best.residual)) < RESIDUAL:
+        left = np.max(np.abs(best.residual))
+        if left < RESIDUAL and not left < 0.1 * last:
             break
+        last = left
         slopes = best.matrix[places:, columns]
         largest = np.max(np.abs(slopes), axis=1)
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros

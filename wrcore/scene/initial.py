@@ -14,7 +14,7 @@ import numpy as np
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle, settle_apart
-from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, matrix_of
+from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, euler_parameters, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
 from wrcore.dynamics.linear import steady_running
@@ -274,16 +274,17 @@ def _parts(vehicle, state):
 
 
 def _with_axle_boxes(vehicle, state):
-    """The state with axle boxes on their axles."""
+    """The state with axle boxes on their axles, pitched against these as they were."""
     state = state.copy()
     parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
     places = dict(zip(parts, vehicle.positions, strict=True))
     for name, part in parts.items():
         described = vehicle.data["bodies"][name]
         if described["kind"] == "axle_box":
-            axle = parts[described["wheelset"]]
-            part[:3] = axle[:3] + matrix_of(axle[3:7]) @ (places[name] - places[described["wheelset"]])
-            part[3:7] = axle[3:7]
+            axle, (_, pitch, _) = parts[described["wheelset"]], angles(part[3:7])
+            axes = matrix_of(axle[3:7])
+            part[:3] = axle[:3] + axes @ (places[name] - places[described["wheelset"]])
+            part[3:7] = euler_of(axes @ matrix_of(euler_parameters(0.0, float(pitch), 0.0)))
     return state
 
 
