@@ -7,8 +7,8 @@ from synthetic import hunting_run
 
 from wrcore import __version__
 from wrcore.errors import InputError
-from wrcore.errors.checked_hdf5 import BLOCK, sign
-from wrcore.run.results import load_run, load_runs, read_part, unit_of, write_run
+from wrcore.errors.checked_hdf5 import BLOCK, new_hdf5, sign
+from wrcore.run.results import load_run, load_runs, unit_of, write_run
 from wrcore.run.simulate import Run
 
 
@@ -91,29 +91,32 @@ def test_foreign_files_are_input_errors(tmp_path, written):
         load_run(tmp_path / "notes.h5")
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["t"] = [1.0]
-    with pytest.raises(InputError, match="expected 'wrcore run', got 'none'"):
+    with pytest.raises(InputError, match="other.h5: expected .* without the digest"):
         load_run(tmp_path / "other.h5")
+    with new_hdf5(tmp_path / "sealed.h5") as file:
+        file["t"] = [1.0]
+    with pytest.raises(InputError, match="expected 'wrcore run', got 'none'"):
+        load_run(tmp_path / "sealed.h5")
     with h5py.File(written[1], "a") as file:
         file.attrs["format_version"] = 99
     with pytest.raises(InputError, match="run.h5.*SHA-256 does not belong"):
         load_run(written[1])
     sign(written[1])
-    with pytest.raises(InputError, match="expected at most 2, got 99"):
+    with pytest.raises(InputError, match="expected 3, got 99"):
         load_run(written[1])
     with pytest.raises(InputError, match="no such file"):
         load_run(tmp_path / "absent.h5")
 
 
-def test_a_file_of_version_1_is_read_but_no_run_goes_on_from_it(written):
-    run, path = written
-    with h5py.File(path, "a") as file:
-        file.attrs["format_version"] = 1
-    path.write_bytes(path.read_bytes()[BLOCK:])  # they had no digest
-    assert np.array_equal(load_run(path)["wheelset"].y_m, run["wheelset"].y_m)
-    assert read_part(path)[0] == ""
+def test_a_file_of_an_older_version_is_one_clear_line(written):
+    _, path = written
     with h5py.File(path, "a") as file:
         file.attrs["format_version"] = 2
-    with pytest.raises(InputError, match="expected the digest that a run file begins with"):
+    sign(path)
+    with pytest.raises(InputError, match="format_version: expected 3, got 2: 'wrcore simulate' runs its scene again"):
+        load_run(path)
+    path.write_bytes(path.read_bytes()[BLOCK:])
+    with pytest.raises(InputError, match="without the digest that ours begins with"):
         load_run(path)
 
 

@@ -32,7 +32,7 @@ def refuse_others(path, attribute, wanted):
     found = "something else"
     if not foreign(path):
         try:
-            with checked_hdf5(path, f"one of {wanted!r}") as (file, _):
+            with checked_hdf5(path, f"one of {wanted!r}") as file:
                 value = str(file.attrs.get(attribute, found))
                 found = json.loads(value)["name"] if attribute == "scene" and value != found else value
         except InputError:  # damaged, or what no program can read: it may go

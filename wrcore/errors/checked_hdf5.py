@@ -98,8 +98,8 @@ def sign(path: str | os.PathLike[str]) -> None:
 
 
 @contextmanager
-def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[tuple[h5py.File, bool]]:
-    """Open an HDF5 file for reading; whatever is wrong with it or comes up while it is read is one line.
+def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[h5py.File]:
+    """Open an HDF5 file of ours for reading; whatever is wrong with it or comes up while it is read is one line.
 
     Parameters
     ----------
@@ -110,19 +110,18 @@ def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[tuple[h5py
     Yields
     ------
     file : h5py.File
-        All its links lead to itself; its datasets hold numbers or text, all of them stored in the file.
-    signed : bool
-        Whether it has a digest, with which its content agrees.
+        Its content agrees with the digest at its head, all its links lead to itself, and its datasets hold numbers or
+        text, all of them stored in the file.
 
     Raises
     ------
     InputError
     """
     try:
-        signed = _check_bytes(path)
+        _check_bytes(path)
         with h5py.File(path, "r") as file, np.errstate(over="ignore"):
             _check_content(file, os.path.getsize(path))
-            yield file, signed
+            yield file
     except InputError:
         raise
     except FileNotFoundError:
@@ -142,17 +141,16 @@ def foreign(path: str | os.PathLike[str]) -> bool:
 
 
 def _check_bytes(path):
-    """Whether a file has a digest; ValueError if that, or the file, is wrong."""
+    """ValueError where a file does not agree with the digest at its head."""
     check_regular(path)
     with open(path, "rb") as file:
         head = file.read(BLOCK)
         if head.startswith(SIGNATURE):
-            return False
+            raise ValueError("HDF5 without the digest that ours begins with (of another program, or version)")
         if not head.startswith(HEAD):
             raise ValueError("another kind of file")
         if head.rstrip(b"\0") != _digest(file):
             raise ValueError("a content that its SHA-256 does not belong to (damaged, or edited)")
-    return True
 
 
 def _check_content(file, size):

@@ -21,8 +21,8 @@ from wrcore.run.run import Run
 from wrcore.run.state import State
 
 FORMAT = "wrcore run"
-FORMAT_VERSION = 2
-"""Files of version 1 have no digest: their channels are read, but no run goes on from them."""
+FORMAT_VERSION = 3
+"""Up to version 2 velocities and accelerations stood in the ground's axes."""
 
 KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
@@ -146,7 +146,7 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
     lengths = [_length(part) for part in parts]
     rows = min(max(lengths), ROWS)
     with new_hdf5(path) as file:
-        with checked_hdf5(parts[0], KIND) as (first, _):
+        with checked_hdf5(parts[0], KIND) as first:
             shapes = {name: item.shape[1:] for name, item in _items(first) if isinstance(item, h5py.Dataset)}
         for name, shape in sorted(shapes.items(), key=lambda item: item[0] != "t"):
             group, _, channel = name.rpartition("/")
@@ -160,13 +160,13 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
                 dataset.dims[0].attach_scale(file["t"])
         begin = 0
         for part, length in zip(parts, lengths, strict=True):
-            with checked_hdf5(part, KIND) as (content, _):
+            with checked_hdf5(part, KIND) as content:
                 for at in range(0, length, ROWS):
                     end = min(at + ROWS, length)
                     for name in shapes:
                         file[name][begin + at : begin + end] = content[name][at:end]
             begin += length
-        with checked_hdf5(parts[-1], KIND) as (last, _):
+        with checked_hdf5(parts[-1], KIND) as last:
             for name, value in last.attrs.items():
                 file.attrs[name] = value
             last.copy(END, file)
@@ -174,7 +174,7 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
 
 
 def _length(part):
-    with checked_hdf5(part, KIND) as (file, _):
+    with checked_hdf5(part, KIND) as file:
         return len(file["t"])
 
 
@@ -212,8 +212,8 @@ def load_run(path: str | PathLike[str]) -> Run:
     ...     load_run(f"{folder}/run.h5")["wheelset"].y_m
     array([0., 0.])
     """
-    with checked_hdf5(path, KIND) as (file, signed):
-        _check_format(path, file, signed)
+    with checked_hdf5(path, KIND) as file:
+        _check_format(path, file)
         run = _read_frame(file)
         for name, item in _items(file):
             if isinstance(item, h5py.Dataset) and "/" in name:
@@ -257,15 +257,14 @@ def load_runs(paths: Iterable[str | PathLike[str]]) -> dict[str, dict[str, Run]]
     return cases
 
 
-def _check_format(path, file, signed):
+def _check_format(path, file):
     found = file.attrs.get("format", "none")
     if found != FORMAT:
         raise InputError(path, "attribute format", f"expected {FORMAT!r}, got {found!r}")
     version = int(file.attrs["format_version"])
-    if not 1 <= version <= FORMAT_VERSION:
-        raise InputError(path, "attribute format_version", f"expected at most {FORMAT_VERSION}, got {version}")
-    if version > 1 and not signed:
-        raise InputError(path, "", "expected the digest that a run file begins with (another program wrote this one)")
+    if version != FORMAT_VERSION:
+        expected = f"expected {FORMAT_VERSION}, got {version}: 'wrcore simulate' runs its scene again"
+        raise InputError(path, "attribute format_version", expected)
 
 
 def _check_run(path, run):
@@ -294,9 +293,9 @@ def _read_frame(file):
     run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
     if END in file:
         end, t = file[END], float(file[END]["t"][()])
-        frame = float(end.attrs.get("frame_m", t * run.scene.get("speed", np.nan)))  # files of before: runs from time 0
-        names = tuple(json.loads(end.attrs.get("vehicle", "[]")))
-        run.end_t, run.end_state = t, State(end["state"][()], t, frame, names)
+        run.end_t, run.end_state = t, end["state"][()]
+        if "frame_m" in end.attrs:
+            run.end_state = State(run.end_state, t, float(end.attrs["frame_m"]), tuple(json.loads(end.attrs["vehicle"])))
         if "checkpoint" in file[END]:
             run.end = read_checkpoint(file[END]["checkpoint"])
     return run
@@ -312,9 +311,9 @@ def read_part(path: str | PathLike[str]) -> tuple[str, Run, list[np.ndarray]]:
     run : Run
     places : list of ndarray
     """
-    with checked_hdf5(path, KIND) as (file, signed):
-        _check_format(path, file, signed)
+    with checked_hdf5(path, KIND) as file:
+        _check_format(path, file)
         run = _read_frame(file)
         _check_run(path, run)
         places = [file[END][name][()] for name in sorted(file.get(END, ())) if name.startswith("place_")]
-        return str(file.attrs.get("fingerprint", "")) if signed and run.end else "", run, places
+        return str(file.attrs.get("fingerprint", "")) if run.end else "", run, places

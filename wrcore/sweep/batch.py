@@ -376,8 +376,8 @@ def _check_seal(path: Path, part_of: Sweep | None, text: str, seal: str) -> None
 
 def _read_hdf5(path: Path) -> tuple[pd.DataFrame, str]:
     """A table and its seal, empty where it has none."""
-    with checked_hdf5(path, _KIND) as (file, signed):
-        if file.attrs.get("format") != "wrcore sweep" or not signed:
-            raise InputError(path, "attribute format", "expected 'wrcore sweep', and the digest that it begins with")
+    with checked_hdf5(path, _KIND) as file:
+        if file.attrs.get("format") != "wrcore sweep":
+            raise InputError(path, "attribute format", "expected 'wrcore sweep'")
         columns = {name: item.asstr()[()] if item.dtype.kind == "O" else item[()] for name, item in file.items()}
         return pd.DataFrame(columns), str(file.attrs.get("seal", ""))
