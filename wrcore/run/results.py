@@ -295,7 +295,8 @@ def _read_frame(file):
         end, t = file[END], float(file[END]["t"][()])
         run.end_t, run.end_state = t, end["state"][()]
         if "frame_m" in end.attrs:
-            run.end_state = State(run.end_state, t, float(end.attrs["frame_m"]), tuple(json.loads(end.attrs["vehicle"])))
+            names = tuple(json.loads(end.attrs["vehicle"]))
+            run.end_state = State(run.end_state, t, float(end.attrs["frame_m"]), names)
         if "checkpoint" in file[END]:
             run.end = read_checkpoint(file[END]["checkpoint"])
     return run
