@@ -35,15 +35,9 @@ PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
 
 @dataclass(frozen=True)
 class Animation:
-    """A page with a run in motion; a notebook shows it.
-
-    Attributes
-    ----------
-    html : str
-        The whole page.
-    data : dict
-        What it draws: per body nominal place and size (m), ``y`` (m) and ``yaw`` (rad) over the frames, both times
-        ``factor``; per wheelset its pose, true to scale, and per wheel profiles, patches and forces.
+    """A page (``html``) with a run in motion; a notebook shows it. ``data`` is what it draws: per body nominal place
+    and size (m), ``y`` (m) and ``yaw`` (rad) over the frames, both times ``factor``; per wheelset its pose, true to
+    scale, and per wheel profiles, patches and forces.
     """
 
     html: str = field(repr=False)
@@ -59,28 +53,8 @@ class Animation:
 
 
 def animate(run, scene, factor=None, begin=0.0, end=math.inf):
-    """Put a run in motion.
-
-    Parameters
-    ----------
-    run : Run
-        With the output channels pose and contact.
-    scene : Scene
-        Of the run: lends the vehicle's nominal position and the profiles.
-    factor : float, optional
-        By which displacements are drawn larger from above; left out: a round one with which the largest is some
-        `SHOWN` m.
-    begin, end : float
-        Part of the run, s; of a longer one than `MOST_FRAMES` at `FRAME_RATE` the beginning is shown.
-
-    Returns
-    -------
-    Animation
-
-    Raises
-    ------
-    InputError
-        For a run without these channels, or of another vehicle, or a time beyond its end.
+    """Put a run with the channels pose and contact in motion over ``begin``..``end`` (s; the first `MOST_FRAMES`
+    frames), displacements drawn larger by ``factor`` (left out: a round one with which the largest is some `SHOWN` m).
     """
     frames = _frames(run, begin, end)
     vehicle = scene.vehicle

@@ -112,18 +112,7 @@ def assess(
 
 
 def low_pass(values, rate, cut=CUT):
-    """Signal after a Butterworth low-pass of fourth order, as if it had always been at its first value.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-    rate, cut : float
-        Hz.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-    """
+    """Signal (n,) after a Butterworth low-pass of fourth order, as if always at its first value; rates in Hz."""
     from scipy import signal
 
     values = np.asarray(values, float)
@@ -132,21 +121,8 @@ def low_pass(values, rate, cut=CUT):
 
 
 def sliding_mean(s, values, window=WINDOW):
-    """Mean over the way gone, a window centred at each place.
-
-    Parameters
-    ----------
-    s : array_like, shape (n,)
-        Way gone, m, never falling.
-    values : array_like, shape (n,)
-        NaN does not count.
-    window : float
-        m.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        NaN where the window reaches beyond an end, or all of it is NaN.
+    """Mean of values (n,), NaN left out, over a window (m) centred at each place of the way gone s (m, never falling);
+    NaN where the window reaches beyond an end or holds no value.
     """
     s, values = np.asarray(s, float), np.asarray(values, float)
     known = np.isfinite(values)
@@ -161,20 +137,9 @@ def sliding_mean(s, values, window=WINDOW):
 
 
 def track_sections(path, end, begin=0.0):
-    """Straight stretches and full curves of a scene's path, cut into sections of the standard's length.
-
-    Parameters
-    ----------
-    path : str or list
-        ``track.path`` of a resolved scene.
-    end, begin : float
-        Arc lengths, m: how far what follows the path's last segment, and the straight track before its first, count.
-
-    Returns
-    -------
-    list of tuple
-        Begin and end (m) and radius (m, signed; infinite where it is straight). Stretches shorter than a section are
-        one; transitions belong to none.
+    """Straight stretches and full curves, without transitions, of ``track.path`` from ``begin`` to ``end`` (m), cut
+    into sections of the standard's length: begin, end (m) and radius (m, signed, infinite where straight) of each.
+    Stretches shorter than a section are one.
     """
     path = [{"tangent": max(end, 0.0)}] if isinstance(path, str) else path
     s = min(begin, 0.0)
@@ -197,25 +162,8 @@ def track_sections(path, end, begin=0.0):
 
 
 def section_table(run, begin=0.0):
-    """Percentiles of the filtered quantities in each section that a wheelset runs through.
-
-    Parameters
-    ----------
-    run : Run
-    begin : float
-        Start of the evaluation, s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns section, begin_m, end_m, radius_m, quantity, wheelset, side, p0_15, p50, p99_85 (N; Y/Q a number).
-    wheel_loads : dict of str to float
-        Q0 of each wheelset: mean of Q over its wheels and the whole run, N.
-
-    Raises
-    ------
-    InputError
-        For a run without wheels, with too low a rate, shorter than a window, or nothing after ``begin``.
+    """Percentiles of the filtered quantities (columns p0_15, p50, p99_85, in N; Y/Q a number) per section, wheelset and
+    side from ``begin`` (s) on, and Q0 (N) by wheelset: its mean Q over the whole run.
     """
     rate, late = rate_of(run, LEAST_RATE, "EN 14363"), late_in(run, begin, "EN 14363")
     wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]

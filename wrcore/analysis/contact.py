@@ -15,17 +15,7 @@ from wrcore.geometry.track import Track
 
 
 def pair_geometry(pair):
-    """The same pair, compiled for the contact search.
-
-    Parameters
-    ----------
-    pair : WheelsetOnTrack
-        With equal sides.
-
-    Returns
-    -------
-    ContactGeometry
-    """
+    """The `ContactGeometry` of a `WheelsetOnTrack` with equal sides, compiled for the contact search."""
     one = pair.left
     return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 

@@ -31,23 +31,7 @@ BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)
 
 
 def rcf_damage(wear_number):
-    """Damage that a passage with a wear number does, 1e-5 at most.
-
-    Parameters
-    ----------
-    wear_number : array_like
-        T gamma, N.
-
-    Returns
-    -------
-    numpy.ndarray
-        Share of the life to the first cracks; 0 also where wear prevails.
-
-    Examples
-    --------
-    >>> rcf_damage([10.0, 40.0, 65.0, 120.0, 300.0]).tolist()
-    [0.0, 5e-06, 1e-05, 5e-06, 0.0]
-    """
+    """Share (1e-5 at most) of the life to first cracks that a passage with T gamma (N) takes; 0 where wear prevails."""
     return np.interp(wear_number, BREAKS, DAMAGE)
 
 
@@ -64,16 +48,7 @@ def passage_damage(run, wheelset, side):
 
 
 def fatigue_index(run, wheelset, side, shear_yield=YIELD_IN_SHEAR):
-    """Index of surface fatigue FI of a wheel's worst patch over time, shape (n,); -inf without contact.
-
-    Parameters
-    ----------
-    run : Run
-    wheelset : str
-    side : {"left", "right"}
-    shear_yield : float
-        k, Pa.
-    """
+    """FI (n,), index of surface fatigue, of a wheel's worst patch, k = ``shear_yield`` (Pa); -inf without contact."""
     index = utilised_friction(run, wheelset, side) - shear_yield / run[f"{wheelset}/{side}"].p_max_Pa
     return np.max(np.where(np.isnan(index), -np.inf, index), axis=1)
 

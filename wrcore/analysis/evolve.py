@@ -67,26 +67,8 @@ MOST_STEPS = 10_000
 def load_wear_plan(
     source: str | PathLike[str] | dict[str, Any], changes: dict[str, Any] | None = None
 ) -> tuple[dict[str, Any], list[Scene]]:
-    """Read and check a plan, with all its scenes.
-
-    Parameters
-    ----------
-    source : path-like or dict
-        File (schema ``wrcore/scene/schemas/wear.yaml``) or its content; then paths count from the working directory.
-    changes : dict, optional
-        Values of the plan's keys that replace those of the file; ``set`` changes all scenes.
-
-    Returns
-    -------
-    data : dict
-        With defaults.
-    scenes : list of Scene
-        In the plan's order.
-
-    Raises
-    ------
-    InputError
-        One line that names file, field and expectation.
+    """Read and check a plan (a file by the schema ``wear.yaml``, or its content, with paths from the working
+    directory), ``changes`` replacing its keys: its data with defaults, and its scenes in order.
     """
     if isinstance(source, dict):
         name, folder, data = "plan", Path(), source
@@ -236,13 +218,8 @@ def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
 
 
 def profile_row(scene, folder, step, gone):
-    """What the table says of the profile at the start of a step.
-
-    Returns
-    -------
-    dict
-        step, distance_m, worn_m (deepest loss of the ordinate since new or turned), Sh_m, Sd_m, qR_m (flange height,
-        thickness, slope as in EN 15313, recalled), hollow_m, equivalent_conicity (3 mm).
+    """What the table says of the profile at the start of a step: worn_m (deepest loss of the ordinate since new or
+    turned), flange measures Sh_m, Sd_m, qR_m (EN 15313, recalled), hollow_m and equivalent_conicity (3 mm).
     """
     u, now = read_points(file_of(folder, "profile", step))
     curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")

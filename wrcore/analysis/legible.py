@@ -9,22 +9,9 @@ BORDER = 1.0
 
 
 def findings(figure):
-    """Texts of a figure that cannot be read, or say the same twice.
-
-    Looked at are all titles, labels, numbers on axes, legends and texts that are seen, but for those in three
-    dimensions.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        As it will be saved; it is laid out here if it has not been.
-
-    Returns
-    -------
-    list of str
-        One line each: a text beyond the page, two that overlap, a legend or a text at a fixed place of its panel that
-        covers a line or mark, an entry that stands twice in one legend, an axis without numbers. Empty for a good
-        figure.
+    """Texts of a figure that cannot be read, one line each: a text beyond the page, two that overlap, one or a legend
+    that covers a line or mark, an entry twice in a legend, an axis without numbers; those in three dimensions are left
+    out.
     """
     figure.draw_without_rendering()
     border = BORDER * figure.dpi / 72.0

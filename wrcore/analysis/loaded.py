@@ -216,27 +216,9 @@ class Strips(LoadedWheels):
 
 
 def loaded_wheels(geometry, model="exact", resolution="middle", slip="surfaces", **options):
-    """Wheels of a wheelset by a patch model.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    model : {"maximum", "moment", "strips", "exact", "grid"}
-    resolution : {"coarse", "middle", "fine"}
-        Of strips and grids.
-    slip : {"surfaces", "creepages"}
-        Rigid slip of strips and grids: of the real surfaces, or of one set of creepages per patch.
-    **options
-        shear_modulus (Pa), poisson_ratio, detection.
-
-    Returns
-    -------
-    LoadedWheels
-
-    Raises
-    ------
-    InputError
-        For an unknown choice, or a number in another unit.
+    """`LoadedWheels` of a geometry by a patch model (maximum, moment, strips, exact or grid); of strips and grids
+    ``resolution`` (coarse, middle, fine) and rigid ``slip`` (of the real surfaces, or one set of creepages); options
+    are shear_modulus (Pa), poisson_ratio and detection.
     """
     if model not in MODELS:
         raise InputError("patch", "", one_of(MODELS, model))

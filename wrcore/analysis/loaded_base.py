@@ -91,23 +91,8 @@ class LoadedWheels:
         self._rows = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
-        """Patches of one wheel in a pose.
-
-        Parameters
-        ----------
-        side : {"left", "right"}
-        y, z, roll, yaw : float
-            Of the wheelset, m and rad; roll first, then yaw about the vertical.
-        rolling : Rolling, optional
-            Without, the wheel stands and there are no creep forces.
-        friction : float
-        fields : bool
-            Give a `Patch` with its fields, too.
-
-        Returns
-        -------
-        list of Found
-            From the flange to the field side.
+        """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),
+        roll, then yaw about the vertical (rad); without ``rolling`` it stands and there are no creep forces.
         """
         raise NotImplementedError
 
@@ -119,20 +104,8 @@ class LoadedWheels:
             raise InputError(source, field, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
-        """Height of the wheelset at which one wheel carries a load.
-
-        Parameters
-        ----------
-        load : float
-            N: of all forces vertically, or of the normal forces.
-        vertical : bool
-        guess : float
-            m.
-
-        Returns
-        -------
-        float
-            m; NaN where there is none.
+        """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal
+        forces), sought near ``guess`` (m); NaN where there is none.
         """
         goal = load ** (2.0 / 3.0)
 

@@ -152,26 +152,9 @@ def _material(scene):
 
 
 def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, steps=STEPS):
-    """Friction's work over patches per metre rolled and area, distributed by FASTSIM.
-
-    Parameters
-    ----------
-    rows : mapping of str to numpy.ndarray, shape (m,)
-        Channels a_m, b_m, N_N, Fx_N, Fy_N, Mz_Nm, xi, eta and phi_per_m of m patches.
-    friction : float
-    shear_modulus : float
-        Pa.
-    poisson_ratio : float
-    strips, steps : int
-
-    Returns
-    -------
-    y : numpy.ndarray, shape (m, strips)
-        Middles of the strips, m.
-    dy, dx : numpy.ndarray, shapes (m, 1) and (m, strips)
-        Width of the strips and of the steps along them, m.
-    work : numpy.ndarray, shape (m, strips, steps)
-        N/m^2; from the leading edge on.
+    """Friction's work over m patches (``rows``: channels a_m to phi_per_m, shapes (m,); modulus in Pa) by FASTSIM:
+    middles of the strips y (m, strips), their width dy (m, 1), length of the steps dx (m, strips), all m, and work
+    (m, strips, steps) per metre rolled and area, N/m^2, from the leading edge on.
     """
     a, b, load, xi, eta, phi = (rows[name][:, None] for name in ("a_m", "b_m", "N_N", "xi", "eta", "phi_per_m"))
     data = kalker_data(poisson_ratio)

@@ -122,17 +122,7 @@ class Placed(NamedTuple):
 
 
 def pair_of(source, side="left"):
-    """Wheel and rail of a source of `patch`: of a scene those of its first wheelset.
-
-    Parameters
-    ----------
-    source, side
-        As for `patch`.
-
-    Returns
-    -------
-    Placed
-    """
+    """Wheel and rail of one side (`Placed`) of a source of `patch`: of a scene those of its first wheelset."""
     if isinstance(source, WheelsetOnTrack):
         one = getattr(source, side)
         return Placed(one.wheel, one.rail, one.rolling_radius, source.half_distance, source.rail_distance(one))

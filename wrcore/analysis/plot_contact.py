@@ -18,19 +18,9 @@ _LABEL_WIDTH = 3.5  # mm
 
 @styled
 def fig_contact_location(pair, table):
-    """Contact points on wheel and rail, joined by a line for each lateral shift of the wheelset.
-
-    Seen from behind: the left side stands on the left. The wheels are drawn at y = 0, lifted by `LIFT`.
-
-    Parameters
-    ----------
-    pair : WheelsetOnTrack
-    table : pandas.DataFrame
-        From `first_touch`, one row per line; whole millimetres of shift are labelled where there is room.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Contact points of `first_touch` (``table``) on wheel and rail, joined by a line for each lateral shift; whole
+    millimetres are labelled where there is room. Seen from behind: the left side stands on the left. The wheels are
+    drawn at y = 0, lifted by `LIFT`.
     """
     figure = Figure(figsize=(7.2, 3.2), layout="constrained")
     for axes, side in zip(figure.subplots(1, 2), SIDES, strict=True):

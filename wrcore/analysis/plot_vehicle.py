@@ -55,17 +55,8 @@ MARK = 4.0
 
 
 def box_of(body):
-    """Length, width and height (m) of the homogeneous box of a body's mass and moments of inertia.
-
-    Parameters
-    ----------
-    body : dict
-        Of a vehicle file.
-
-    Returns
-    -------
-    numpy.ndarray, shape (3,)
-        0 in directions in which no box has such moments.
+    """Length, width and height (m) of the homogeneous box of a body's mass and moments of inertia (dict of a vehicle
+    file); 0 in directions in which no box has such moments.
     """
     roll, pitch, yaw = (body["inertia"][name] for name in ("roll", "pitch", "yaw"))
     squares = np.array([pitch + yaw - roll, roll + yaw - pitch, roll + pitch - yaw])
@@ -75,17 +66,8 @@ def box_of(body):
 @styled
 @rc_context({"text.parse_math": False})  # names are the user's
 def plot_vehicle(scene):
-    """Draw the vehicle of a scene in its nominal position.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of a train its first vehicle is drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Side view and plan view in m; numbers in the plan view name the force elements and joints in the list below.
+    """Side view and plan view (m) of a scene's (first) vehicle in its nominal position; numbers in the plan view name
+    the force elements and joints in the list below.
     """
     vehicle = scene.vehicle.unit or scene.vehicle
     bodies = vehicle.data["bodies"]
@@ -186,9 +168,8 @@ def _draw_body(axes, name, body, view, upright):
 
 
 def _draw_parts(axes, parts, view, upright):
-    """A mark for each part, the line between its ends, and a stroke along the direction in which it acts.
-
-    Returns the marks' places (m) with the size of the largest one (points).
+    """A mark for each part, the line between its ends, and a stroke along the direction in which it acts; the marks'
+    places (m) with the size of the largest one (points).
     """
     places = {}
     for part in parts:

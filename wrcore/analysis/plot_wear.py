@@ -19,19 +19,8 @@ FLANGE = (
 
 @styled
 def plot_evolution(profiles, table):
-    """Worn profiles, and flange, conicity and wear rate over the distance.
-
-    Parameters
-    ----------
-    profiles : sequence of tuple
-        Distance (m), u and f (m) at the start of each step, as from
-        :func:`wrcore.analysis.evolve.profiles_over_distance`.
-    table : pandas.DataFrame
-        From `wrcore.analysis.evolve.evolve`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Worn ``profiles`` (distance, u and f (m) of each step, of `wrcore.analysis.evolve.profiles_over_distance`), and
+    flange, conicity and wear rate of the ``table`` of `evolve` over the distance.
     """
     new = profiles[0][1:]
     figure = Figure(figsize=(7.2, 7.6), layout="constrained")

@@ -64,18 +64,8 @@ def styled(function):
 
 @styled
 def save_figure(figure, *paths):
-    """Write a figure, in the format of each path's ending; equal figures give equal bytes.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    paths : path-like
-        ``.png`` and ``.svg`` files; folders are created.
-
-    Warns
-    -----
-    UserWarning
-        For texts that cannot be read: one line that begins with "figure" and the first file's name.
+    """Write a figure as ``.png`` and ``.svg`` by the paths' endings, folders created; equal figures give equal bytes.
+    Texts that cannot be read are a UserWarning that begins with "figure" and the first file's name.
     """
     for path in map(Path, paths):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -39,10 +39,8 @@ def _write_plan(folder, plan):
 
 
 def rows_of(folder):
-    """Rows of the steps that count.
-
-    InputError where a file is no longer what was written; a folder without a plan, as versions before digests or others
-    have made it, is believed.
+    """Rows of the steps that count; InputError where a file is no longer what was written. A folder without a plan, as
+    versions before digests or others have made it, is believed.
     """
     path = folder / TABLE
     files = _read_plan(folder)["files"] if (folder / PLAN).exists() else None

@@ -38,18 +38,8 @@ _MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Friction's work over m patches, and what else laws ask for.
-
-    Attributes
-    ----------
-    rows : mapping of str to ndarray, shape (m,)
-        Channels of contacts.
-    y, dy, dx, work : ndarray
-        As :func:`wrcore.analysis.local_wear.friction_work` gives them.
-    friction : float
-        Coefficient.
-    speed : ndarray, shape (m,)
-        Rolling speed, m/s.
+    """Friction's work over m patches: ``rows`` channels (m,) of contacts, ``y``, ``dy``, ``dx``, ``work`` of
+    :func:`wrcore.analysis.local_wear.friction_work`, friction coefficient, and rolling ``speed`` (m,), m/s.
     """
 
     rows: Mapping[str, np.ndarray]
@@ -90,22 +80,8 @@ LAWS = {"sheffield": sheffield, "energy": energy}
 
 
 def archard(sliding, hardness, coefficients, speeds, pressures):
-    """Depth by Archard with a map.
-
-    Parameters
-    ----------
-    sliding : Sliding
-    hardness : float
-        Pa.
-    coefficients : array_like, shape (len(pressures) + 1, len(speeds) + 1)
-        Wear coefficients between the bounds, a row from each pressure on.
-    speeds, pressures : array_like
-        Bounds, rising, m/s and Pa.
-
-    Returns
-    -------
-    numpy.ndarray
-        m^3 per metre rolled and m^2, shape of the work.
+    """Loss (m^3 per metre rolled and m^2, shape of the work) by Archard at a hardness (Pa) with a map: ``coefficients``
+    (pressures + 1, speeds + 1) between the rising bounds of speed (m/s) and pressure (Pa).
     """
     pressed = sliding.work / sliding.friction  # p s
     inside, mean = sliding.inside(), sliding.mean_pressure()
@@ -116,18 +92,8 @@ def archard(sliding, hardness, coefficients, speeds, pressures):
 
 
 def over_t_gamma(sliding, points):
-    """Volume over T gamma of whole patches, spread as friction's work is.
-
-    Parameters
-    ----------
-    sliding : Sliding
-    points : array_like, shape (k, 2)
-        T gamma (N), rising, and volume per metre rolled (m^3/m); constant beyond the ends.
-
-    Returns
-    -------
-    numpy.ndarray
-        m^3 per metre rolled and m^2, shape of the work.
+    """Loss (m^3 per metre rolled and m^2, shape of the work) of whole patches, spread as friction's work is; points
+    (k, 2) are T gamma (N, rising) and volume per metre rolled (m^3/m), constant beyond the ends.
     """
     rows = sliding.rows
     number = np.abs(rows["Fx_N"] * rows["xi"] + rows["Fy_N"] * rows["eta"])
@@ -138,24 +104,8 @@ def over_t_gamma(sliding, points):
 
 
 def wear_law(law: str | Mapping[str, object], source: str = "local_wear") -> Law:
-    """A wear law by name, or with its coefficients.
-
-    Parameters
-    ----------
-    law : str or mapping
-        ``"sheffield"``, ``"energy"``, ``{"archard": {...}}`` or ``{"t_gamma": [...]}`` (schema ``wear_law.yaml``).
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    callable
-        From :class:`Sliding` to m^3 per metre rolled and m^2.
-
-    Raises
-    ------
-    InputError
-        For an unknown law, or coefficients that do not go together.
+    """The law of ``"sheffield"``, ``"energy"``, ``{"archard": {...}}`` or ``{"t_gamma": [...]}`` (schema
+    ``wear_law.yaml``), from :class:`Sliding` to m^3 per metre rolled and m^2; ``source`` is named in errors.
     """
     if isinstance(law, str) and law in LAWS:
         return partial(_by_mass, LAWS[law])

@@ -208,17 +208,8 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
 
 
 def hunting(t, y):
-    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion.
-
-    Parameters
-    ----------
-    t, y : numpy.ndarray, shape (n,)
-        Times (s) and lateral positions (m) from release on.
-
-    Returns
-    -------
-    frequency, growth, damping_ratio : float
-        NaN once the motion has died before it has swung.
+    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion y (m) over t (s)
+    from release on; NaN once the motion has died before it has swung.
     """
     swinging = np.flatnonzero(np.abs(y) > SMALLEST)
     end = swinging[-1] + 1 if swinging.size else 0

@@ -13,19 +13,11 @@ POINTS = 2.5e-4
 
 
 def flange(curve):
-    """Flange height, thickness and slope of a wheel profile whose inner face is 70 mm from the tape circle.
+    """Sh_m, Sd_m and qR_m of a wheel profile whose inner face is 70 mm from the tape circle (EN 15313, recalled); NaN
+    where it does not reach as far.
 
     Height Sh: tip below the tape circle. Thickness Sd: from the inner face to the flank 10 mm below the tape circle.
-    Slope qR: along u from there to where the flange is 2 mm short of its tip. EN 15313, recalled.
-
-    Parameters
-    ----------
-    curve : ProfileCurve
-
-    Returns
-    -------
-    dict
-        Sh_m, Sd_m, qR_m; NaN where the profile does not reach as far.
+    Slope qR: along u from there to where the flange is 2 mm short of its tip.
     """
     below = curve.u < 0.0
     u, f = curve.u[below], curve.f[below] - curve(0.0)
@@ -40,27 +32,15 @@ def flange(curve):
 
 
 def hollow(f):
-    """Depth of a tread's hollow, m: by how much the wheel's radius grows again towards the field side (false flange).
-
-    Parameters
-    ----------
-    f : numpy.ndarray
-        Ordinates of a wheel profile, field side last.
+    """Depth of a tread's hollow, m: by how much the wheel's radius grows again towards the field side (false flange);
+    ``f`` are ordinates, field side last.
     """
     outwards = f[int(np.argmin(f)) :]
     return float(np.max(np.maximum.accumulate(outwards) - outwards))
 
 
 def limits_reached(limits, row):
-    """Names of the limits of a wear plan that a row of its table has reached.
-
-    Parameters
-    ----------
-    limits : mapping
-        ``Sh`` and ``hollow`` (at most), ``Sd``, ``qR`` (at least), m.
-    row : mapping
-        With Sh_m, Sd_m, qR_m and hollow_m.
-    """
+    """Names of a wear plan's limits (``Sh``, ``hollow`` at most, ``Sd``, ``qR`` at least, m) that a row has reached."""
     signs = {"Sh": 1.0, "hollow": 1.0, "Sd": -1.0, "qR": -1.0}
     return [name for name, limit in limits.items() if signs[name] * (row[f"{name}_m"] - limit) >= 0.0]
 
@@ -103,19 +83,8 @@ def edges_of(u):
 
 
 def onto_points(u, edges, depth):
-    """Depths over the bins around stored points from those over bins of a run; what is beyond the ends stays at them.
-
-    Parameters
-    ----------
-    u : numpy.ndarray, shape (n,)
-        Stored points, m.
-    edges, depth : numpy.ndarray, shapes (m + 1,) and (m,)
-        Bins of a run, m, and what is lost in them.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        Of the same sum times width.
+    """Depths over the bins around stored points u (n,) from ``depth`` (m,) over bins between ``edges`` (m + 1,), all m,
+    with the same sum times width; what is beyond the ends stays at them.
     """
     area = np.concatenate([[0.0], np.cumsum(depth * np.diff(edges))])
     inner = np.interp(edges_of(u)[1:-1], edges, area)

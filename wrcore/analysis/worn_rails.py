@@ -49,20 +49,7 @@ def rail_file(folder, step, place, side):
 
 
 def laid_rails(folder, step, place, scene):
-    """The rails of a scene as they lie at the start of a step.
-
-    Parameters
-    ----------
-    folder : path-like
-    step, place : int
-        Of the step, and of the scene in the plan.
-    scene : Scene
-        As the plan has it.
-
-    Returns
-    -------
-    LaidRails
-    """
+    """`LaidRails` of a scene as they lie at the start of a step; ``place`` is the scene's in the plan."""
     changes, points, shifts, gauge = {}, {}, {}, 0.0
     for side, new in _new_rails(scene).items():
         path = rail_file(folder, step, place, side)
@@ -76,19 +63,8 @@ def laid_rails(folder, step, place, scene):
 
 
 def falls_of(laid, wheels, passages):
-    """By what the rails' ordinates fall at the stored points, m per metre that the vehicle runs.
-
-    Parameters
-    ----------
-    laid : LaidRails
-    wheels : mapping of (str, str) to WheelWear
-        From :func:`wrcore.analysis.local_wear.local_wear`.
-    passages : float
-        Of vehicles per metre that one of them runs, 1/m.
-
-    Returns
-    -------
-    dict of str to numpy.ndarray
+    """By what the rails' ordinates fall at the stored points, m per metre that the vehicle runs, by side, from the
+    `WheelWear` of all wheels and the passages per metre that one vehicle runs (1/m).
     """
     return {
         side: passages

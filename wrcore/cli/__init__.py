@@ -19,13 +19,7 @@ COMMANDS = (init, simulate, sweep, assess, draw, evolve, contact, conicity, cree
 
 
 def parser():
-    """The parser of the whole command line.
-
-    Returns
-    -------
-    argparse.ArgumentParser
-        ``parser().parse_args(words).run(options)`` does what the words ask for.
-    """
+    """The parser of the whole command line; ``parser().parse_args(words).run(options)`` does what the words ask for."""
     whole = Parser(
         prog="wrcore", description="Wheel-rail contact in railway dynamics.",
         epilog="'wrcore COMMAND --help' lists its options with units and defaults, and the columns of its files. "
@@ -40,18 +34,8 @@ def parser():
 
 
 def main(arguments=None):
-    """Entry point.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Defaults to the process's arguments.
-
-    Returns
-    -------
-    int
-        Exit status: 0 done, 2 bad input, 1 a run that stalled or failed, 4 an accuracy that was not reached or is that
-        of a derailment, 128 and its number for a signal.
+    """Entry point, with the process's arguments by default: exit status 0 done, 2 bad input, 1 a run that stalled or
+    failed, 4 an accuracy not reached or of a derailment, 128 and its number for a signal.
     """
     whole = parser()
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next: eval "$(register-python-argcomplete wrcore)"

@@ -45,17 +45,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def columns(title, **texts):
-    """What a table holds, as text for a help page.
-
-    Parameters
-    ----------
-    title : str
-    **texts : str
-        Meaning by column; an empty one is that of the run's channel of this name. Units are those that the names state.
-
-    Returns
-    -------
-    str
+    """What a table holds, as text for a help page: meaning by column; an empty one is that of the run's channel of this
+    name. Units are those that the names state.
     """
     lines = [f"{title}:"]
     for name, text in texts.items():

@@ -42,21 +42,8 @@ class UnknownNameError(InputError, KeyError):
 
 
 def check_number(value, low, high, source, field, unit=""):
-    """Refuse what is no number from ``low`` to ``high``: NaN, text, another unit.
-
-    Parameters
-    ----------
-    value : object
-    low, high : float
-        Bounds, both allowed.
-    source, field : str
-        As for :class:`InputError`.
-    unit : str
-        Of the bounds.
-
-    Returns
-    -------
-    float
+    """The number, refused if it is none from ``low`` to ``high`` (both allowed, in ``unit``): NaN, text, another unit;
+    ``source`` and ``field`` as for :class:`InputError`.
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
         raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {value!r}")
@@ -64,17 +51,7 @@ def check_number(value, low, high, source, field, unit=""):
 
 
 def similar(word, known):
-    """``; did you mean 'speed'?`` where one of the known words is close to a word, else nothing.
-
-    Parameters
-    ----------
-    word : object
-    known : iterable of str
-
-    Returns
-    -------
-    str
-    """
+    """``; did you mean 'speed'?`` where one of the known words is close to a word, else nothing."""
     from difflib import get_close_matches
 
     words = {name.lower(): name for name in map(str, known)}
@@ -83,21 +60,6 @@ def similar(word, known):
 
 
 def one_of(known, word):
-    """What to say of a word that is none of the known ones: these, and the closest.
-
-    Parameters
-    ----------
-    known : iterable of str
-    word : object
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> one_of(("planar", "spatial"), "spacial")
-    "expected one of planar, spatial, got 'spacial'; did you mean 'spatial'?"
-    """
+    """What to say of a word that is none of the known ones: these, and the closest."""
     known = [str(name) for name in known]
     return f"expected one of {', '.join(known)}, got {word!r}{similar(word, known)}"

@@ -64,28 +64,8 @@ class Kind(NamedTuple):
 
 
 def checked(thing: Thing) -> Thing:
-    """Decorate a function, or a class for what it is made of: an argument that its annotation excludes is one line.
-
-    Parameters
-    ----------
-    thing : callable
-        Its annotations are read at the first call.
-
-    Returns
-    -------
-    callable
-        A class is itself.
-
-    Examples
-    --------
-    >>> @checked
-    ... def half(length: Annotated[float, Within(0.0, 2.0, "m")]):
-    ...     return 0.5 * length
-    >>> half(1.0)
-    0.5
-    >>> half(3.0)
-    Traceback (most recent call last):
-    wrcore.errors.InputError: half: length: expected a number, at least 0 and at most 2 m, got 3.0
+    """Decorate a function, or a class for what it is made of: an argument that its annotation excludes is an
+    `InputError` of one line. Annotations are read at the first call; a class stays itself.
     """
     if isinstance(thing, type):
         setattr(thing, "__init__", checked(thing.__init__))  # noqa: B010

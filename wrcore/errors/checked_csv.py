@@ -9,25 +9,10 @@ from wrcore.errors.input_files import check_regular
 
 
 def read_csv_table(path, text):
-    """Read a CSV file with a header line; lines that begin with # are comments.
+    """Read a CSV file with a header line; lines that begin with # are comments, and the column ``text`` stays text.
 
     Columns are separated by commas, semicolons or tabs, as the header is; beside the latter two, numbers may have
     decimal commas, all of them. Line ends and a byte order mark are those of any editor.
-
-    Parameters
-    ----------
-    path : path-like
-    text : str
-        Column that stays text (a name).
-
-    Returns
-    -------
-    pandas.DataFrame
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as a table, or a row has more cells than the header.
     """
     import pandas as pd
 

@@ -31,18 +31,7 @@ LARGEST_CHUNK = 2**26
 
 @contextmanager
 def new_hdf5(path: str | os.PathLike[str], **options: bool) -> Iterator[h5py.File]:
-    """A new HDF5 file with its digest, which appears under its name when it is complete.
-
-    Parameters
-    ----------
-    path : path-like
-    **options
-        Of :class:`h5py.File`.
-
-    Yields
-    ------
-    h5py.File
-    """
+    """A new HDF5 file (:class:`h5py.File` with options) with its digest, which appears when it is complete."""
     with appearing(path) as whole:
         patient = _Patient(whole.raw)
         try:
@@ -99,23 +88,9 @@ def sign(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def checked_hdf5(path: str | os.PathLike[str], kind: str) -> Iterator[h5py.File]:
-    """Open an HDF5 file of ours for reading; whatever is wrong with it or comes up while it is read is one line.
-
-    Parameters
-    ----------
-    path : path-like
-    kind : str
-        What it should be, for errors.
-
-    Yields
-    ------
-    file : h5py.File
-        Its content agrees with the digest at its head, all its links lead to itself, and its datasets hold numbers or
-        text, all of them stored in the file.
-
-    Raises
-    ------
-    InputError
+    """Open an HDF5 file of ours for reading; whatever is wrong with it or comes up while it is read is an `InputError`
+    of one line that names the ``kind`` it should be. Its content agrees with the digest at its head, all its links lead
+    to itself, and its datasets hold numbers or text, all of them stored in the file.
     """
     try:
         _check_bytes(path)

@@ -100,21 +100,7 @@ _LIMITS = f"expected at most {MOST_VALUES} values, {DEEPEST} levels deep and non
 
 
 def read_yaml(path):
-    """Read one YAML mapping.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        If the file is missing, not UTF-8, not YAML, repeats a key or holds no mapping.
-    """
+    """Read one YAML mapping; InputError if it is missing, not UTF-8, not YAML, repeats a key or is no mapping."""
     text = ""
     try:
         check_regular(path)
@@ -149,17 +135,7 @@ def parse_value(text):
 
 
 def parse_ratio(value):
-    """A number, or a ratio of two such as '1/40'.
-
-    Parameters
-    ----------
-    value : str, int or float
-
-    Returns
-    -------
-    float
-        NaN where the value is no such thing.
-    """
+    """A number, or a ratio of two such as '1/40', as float; NaN where the value is no such thing."""
     numerator, slash, denominator = str(value).partition("/")
     try:
         return float(numerator) / (float(denominator) if slash else 1.0)
@@ -175,25 +151,8 @@ def _schema(name):
 
 
 def keys_of(schema_name):
-    """What a kind of file may hold: for help pages.
-
-    Parameters
-    ----------
-    schema_name : str
-        File in ``wrcore/scene/schemas`` without its ending.
-
-    Yields
-    ------
-    path : str
-        ``contact.friction``; ``*`` stands for any name, ``[]`` for the items of a list.
-    description : str
-        What is expected there, with unit and range.
-    needed : bool
-        Whether what is above it cannot do without.
-    default : object
-        None where there is none.
-    unit : str
-        Of a number, ``1`` for a pure one; empty where the key holds none.
+    """Keys of a schema, for help pages: path (``*`` stands for any name, ``[]`` for the items of a list), description,
+    whether what is above cannot do without, default (None: none) and unit of a number (``1``: pure; empty: no number).
     """
     return _keys(_schema(schema_name), "")
 
@@ -241,26 +200,8 @@ def _keys(part, path):
 
 
 def validate(data, schema_name, source):
-    """Check data against a schema of the package and fill in its defaults.
-
-    Parameters
-    ----------
-    data : dict
-        Left as it is.
-    schema_name : str
-        File in ``wrcore/scene/schemas`` without its ending.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    dict
-        A copy with all defaults; whole numbers are integers where the schema asks for them.
-
-    Raises
-    ------
-    InputError
-        One line that names the field and what was expected.
+    """A copy of the data with all defaults, checked against a schema of the package; InputError in one line names the
+    source, the field and what was expected. Whole numbers are integers where the schema asks for them.
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
@@ -274,24 +215,9 @@ def validate(data, schema_name, source):
 
 
 def plain_tree(data, source):
-    """A copy of nested data that holds nothing but what JSON knows; paths become text.
-
-    Parameters
-    ----------
-    data : dict
-        As YAML or a caller gives it.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        For keys that are no text, dates, bytes, sets, numbers that are not finite or too large, text that is no
-        Unicode, data that contain themselves, and data that aliases blow up beyond `MOST_VALUES`.
+    """A copy of nested data that holds nothing but what JSON knows, paths as text; InputError for keys that are no
+    text, dates, bytes, sets, numbers not finite or too large, text that is no Unicode, data that contain themselves or
+    that aliases blow up beyond `MOST_VALUES`.
     """
     left = MOST_VALUES
 

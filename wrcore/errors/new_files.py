@@ -20,25 +20,11 @@ except ImportError:  # a system without such locks
 
 @contextmanager
 def appearing(path: str | os.PathLike[str]) -> Iterator[BufferedRandom]:
-    """A new file that replaces one of its name when it is complete.
+    """A new file, to be written and read, that replaces one of its name when it is complete; OSError names the path
+    where the disk or a quota is full.
 
     Until then it has a hidden name of its own and is locked. Hidden files of that kind whose writer is gone are removed
     by whoever writes the name next.
-
-    Parameters
-    ----------
-    path : path-like
-        Its folder is created if needed.
-
-    Yields
-    ------
-    io.BufferedRandom
-        To be written, and read.
-
-    Raises
-    ------
-    OSError
-        That names the path, where the disk or a quota is full.
     """
     path = Path(path)
     if not path.name:

@@ -60,32 +60,11 @@ class Places(NamedTuple):
 
 
 class Course:
-    """A compiled scene and where it has got to.
+    """A compiled scene and where it has got to: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or state
+    (size,)) of the next stretch and the ``places`` for its channels.
 
-    Parameters
-    ----------
-    scene : Scene
-    start : Checkpoint or ndarray, shape (size,), optional
-        Where it begins instead of at the scene's initial state.
-    progress : callable, optional
-        Wraps the list of patches if a creep table has to be built.
-    shared : dict, optional
-        As for :func:`wrcore.scene.description.compile_scene`.
-
-    Attributes
-    ----------
-    model : Model
-    mark : str
-        Its fingerprint.
-    start : Checkpoint or ndarray
-        Where the next stretch begins.
-    places : Places
-        For the channels of the next stretch.
-
-    Raises
-    ------
-    InputError
-        If it cannot begin there.
+    InputError if it cannot begin there. ``progress`` wraps the patches of a creep table that has to be built,
+    ``shared`` is that of :func:`wrcore.scene.description.compile_scene`.
     """
 
     def __init__(
@@ -131,21 +110,8 @@ class Course:
         progress: Callable[[float], object] | None = None,
         stop: Callable[[], str] | None = None,
     ) -> Run:
-        """Integrate one stretch.
-
-        Parameters
-        ----------
-        times : ndarray, shape (n,)
-            Output times, s; after a first stretch, those that follow.
-        progress : callable, optional
-            Called now and then with the time reached, s.
-        stop : callable, optional
-            A reason to stop, or an empty string: :func:`wrcore.integrate.integrator.integrate`.
-
-        Returns
-        -------
-        Run
-            Of this stretch alone.
+        """Integrate one stretch over output times (n,), s; its run alone. ``progress`` is called with the time reached
+        (s), ``stop`` gives a reason to stop or an empty string.
         """
         scene, settings = self.scene, self.scene.data["integration"]
         begin = self.start.t if isinstance(self.start, Checkpoint) else float(times[0])
@@ -289,23 +255,9 @@ class Course:
 def evaluated(
     model: Model, trajectory: Trajectory, work: Workspace | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the equations of motion again at a run's output times.
-
-    Parameters
-    ----------
-    model : Model
-    trajectory : Trajectory
-    work : Workspace, optional
-        Its arc lengths are those near which the first ones are sought.
-
-    Returns
-    -------
-    patches : ndarray, shape (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS)
-        NaN where a patch is absent; left and right.
-    bounds : ndarray, shape (n, wheelsets, 2)
-        Bound of planar detection's error (detection ``auto`` only), m.
-    rates : ndarray, shape (n, size)
-        Derivatives of the states.
+    """Evaluate the equations of motion again at a run's output times, arc lengths sought near those of ``work``:
+    patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left first, NaN where absent; bounds (n, wheelsets, 2) of
+    planar detection's error (``auto`` only), m; rates (n, size), derivatives of the states.
     """
     shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)

@@ -31,18 +31,8 @@ Groups = Mapping[str, Mapping[str, np.ndarray]]
 
 
 def forces_on_rail(contact: Mapping[str, np.ndarray], side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Forces of a wheel on its rail.
-
-    Parameters
-    ----------
-    contact : mapping of str to ndarray, shape (n, patches)
-        Channels N_N, Fy_N and contact_angle_rad of its contacts.
-    side : {"left", "right"}
-
-    Returns
-    -------
-    Q, Y : ndarray, shape (n,)
-        Vertical (downwards) and lateral (to the field side) force, N.
+    """Vertical (Q, downwards) and lateral (Y, to the field side) force (n,) of a wheel on its rail, N, from the
+    channels N_N, Fy_N and contact_angle_rad (n, patches) of its contacts.
     """
     loads = contact["N_N"]
     vertical, lateral = np.zeros(len(loads)), np.zeros(len(loads))
@@ -66,21 +56,8 @@ def rolling_speed(body: Mapping[str, np.ndarray], speed: float) -> np.ndarray | 
 
 
 def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Callable[[], np.ndarray]]:
-    """Channels that a group does not hold, but that follow from those that it and its wheels hold.
-
-    Parameters
-    ----------
-    groups : mapping of str to mapping of str to ndarray
-        Of a run.
-    group : str
-        Of a wheel (``wheelset/left``) or of a wheelset.
-    speed : float
-        Of the scene, m/s.
-
-    Returns
-    -------
-    dict of str to callable
-        What computes each of them, by name.
+    """Channels that a group (of a wheel, ``wheelset/left``, or of a wheelset) does not hold but that follow from those
+    that it and its wheels hold: what computes each, by name; the scene's speed in m/s.
     """
     wheelset, _, side = group.rpartition("/")
     if side not in SIDES or not wheelset:
@@ -140,21 +117,8 @@ def _pressure(contact):
 
 
 def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, dict[str, np.ndarray]]:
-    """Derived channels that a scene asks for by name.
-
-    Parameters
-    ----------
-    wanted : iterable of str
-        ``output.channels`` of the scene.
-    groups : mapping of str to mapping of str to ndarray
-        Of a wheelset and its wheels, with all channels of contacts.
-    speed : float
-        Of the scene, m/s.
-
-    Returns
-    -------
-    dict of str to dict of str to ndarray
-        By group; groups without any are left out.
+    """Derived channels by group that a scene asks for (``output.channels``), from groups of a wheelset and its wheels
+    with all channels of contacts; groups without any are left out.
     """
     found = {}
     for group, stored in groups.items():

@@ -12,18 +12,7 @@ Samples = Annotated[ArrayLike, Within(dimensions=1, size=0)]
 
 
 def zero_crossings(t, y):
-    """Times at which a sampled motion passes through zero, by linear interpolation.
-
-    Parameters
-    ----------
-    t, y : array_like, shape (n,)
-        Times (s) and motion (any unit).
-
-    Returns
-    -------
-    ndarray
-        Times in order, s.
-    """
+    """Times (s) in order at which a sampled motion y passes through zero, by linear interpolation."""
     t, y = np.asarray(t), np.asarray(y)
     before = _sign_changes(y)
     return t[before] - y[before] * (t[before + 1] - t[before]) / (y[before + 1] - y[before])
@@ -68,18 +57,7 @@ def amplitude(y):
 
 
 def growth_rate(t, y):
-    """Exponential growth of an oscillation: slope of the logarithm of its extrema over time.
-
-    Parameters
-    ----------
-    t, y : array_like, shape (n,)
-        Times (s) and motion.
-
-    Returns
-    -------
-    float
-        Rate, 1/s, positive if the motion grows; NaN with fewer than two extrema between zero crossings.
-    """
+    """Growth of an oscillation, 1/s: slope of the logarithm of its extrema over t (s); NaN with fewer than two."""
     t, y = np.asarray(t), np.asarray(y)
     edges = _sign_changes(y) + 1
     tops = [start + int(np.argmax(np.abs(y[start:end]))) for start, end in zip(edges[:-1], edges[1:], strict=True)]

@@ -29,22 +29,9 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[float], None] | None]:
-    """A bar over simulated time.
+    """A bar over a duration (s) of simulated time from ``begin`` (s): what is to be called with the time reached (s),
+    or None where nobody watches.
 
-    Parameters
-    ----------
-    duration : float
-        s.
-    begin : float
-        Time at which the run begins, s.
-
-    Yields
-    ------
-    callable or None
-        To be called with the time reached, s; None where nobody watches.
-
-    Examples
-    --------
     >>> with simulated_time(10.0) as advance:
     ...     if advance:
     ...         advance(5.0)

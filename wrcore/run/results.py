@@ -133,15 +133,8 @@ def write_going_on(file: h5py.File, run: Run, mark: str, places: tuple[np.ndarra
 
 
 def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], counters: dict[str, Any]) -> None:
-    """Write one run file from files of its stretches, a dataset of one stretch in memory at a time.
-
-    Parameters
-    ----------
-    path : path-like
-    parts : sequence of path-like
-        In their order; status, reason and end are those of the last one.
-    counters : dict
-        Of the whole.
+    """Write one run file, with the counters of the whole, from files of its stretches in order, a dataset of one
+    stretch in memory at a time; status, reason and end are those of the last one.
     """
     lengths = [_length(part) for part in parts]
     rows = min(max(lengths), ROWS)
@@ -303,14 +296,8 @@ def _read_frame(file):
 
 
 def read_part(path: str | PathLike[str]) -> tuple[str, Run, list[np.ndarray]]:
-    """What :func:`write_going_on` added to a stretch of a run, which is read without its channels.
-
-    Returns
-    -------
-    mark : str
-        Empty if nothing can go on from there.
-    run : Run
-    places : list of ndarray
+    """What :func:`write_going_on` added to a stretch of a run, which is read without its channels: the mark (empty if
+    nothing can go on from there), the run, and its places.
     """
     with checked_hdf5(path, KIND) as file:
         _check_format(path, file)

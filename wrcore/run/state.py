@@ -18,22 +18,8 @@ REACH = 1.0
 
 
 class State(np.ndarray):
-    """A state vector that knows its time; what is computed from it does, too.
-
-    Attributes
-    ----------
-    t : float
-        s.
-    frame : float
-        Arc length that the moving frame has gone, m.
-    vehicle : tuple of str
-        Names of the vehicle and of its bodies; empty: not known.
-
-    Examples
-    --------
-    >>> state = State(np.zeros(13), t=2.0, frame=40.0)
-    >>> (state + 0.1).t, len(state)
-    (2.0, 13)
+    """A state vector that knows its time ``t`` (s), the arc length ``frame`` (m) that the moving frame has gone, and
+    the names of the ``vehicle`` and its bodies (empty: not known); what is computed from it does, too.
     """
 
     t: float = 0.0
@@ -54,11 +40,7 @@ class State(np.ndarray):
 
 def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -> Model:
     """The model with its moving frame where a state has it; a plain array is one at time 0, the frame at its beginning.
-
-    Raises
-    ------
-    InputError
-        For a state of another vehicle, or an array of bodies that are elsewhere.
+    InputError for a state of another vehicle, or an array of bodies that are elsewhere.
     """
     if not isinstance(state, State):
         _check_place(model, vehicle, state, source)

@@ -53,13 +53,7 @@ CHECKPOINT_S = 60.0
 
 
 class Interrupts:
-    """SIGINT and SIGTERM as a question that can be asked; a second one does what it always does.
-
-    Attributes
-    ----------
-    caught : int
-        Number of the signal, 0 for none.
-    """
+    """SIGINT and SIGTERM as a question: ``caught`` is the signal's number or 0; a second one does as ever."""
 
     caught = 0
 
@@ -88,40 +82,13 @@ def simulate_to(
     block: int | None = None,
     record: dict[str, Any] | None = None,
 ) -> tuple[Run, int]:
-    """Run a scene with bounded memory, its channels going to a file.
+    """Run a scene with bounded memory, its channels going to the run file ``path`` (None: counters only): the run, with
+    the channels of the last block only, and the number of the signal that interrupted it, or 0.
 
-    Parameters
-    ----------
-    scene : Scene
-    path : path-like or None
-        Run file to write; None: nothing is kept but counters.
-    progress : callable, optional
-        Called now and then with the simulated time reached, s.
-    resume : bool
-        Go on with an interrupted run of the same scene if there is one; False: begin anew.
-    say : callable, optional
-        Told, in one line, that a run is taken up again, or what is damaged.
-    checkpoint_s : float
-        Wall time between two checkpoints at most, s.
-    block : int, optional
-        Output times in a block; of no influence on the result.
-    record : dict, optional
-        Further settings to keep with the run.
-
-    Returns
-    -------
-    run : Run
-        How it ended and what it cost, with the channels of the last block only: :func:`wrcore.load_run` reads
-        those of the file.
-    interrupted : int
-        Number of the signal that interrupted it, 0 for none.
-
-    Raises
-    ------
-    InputError
-        If another process writes the same file.
-    OSError
-        That names the file, where the disk is full: the blocks written before are kept.
+    An interrupted run of the same scene goes on unless ``resume`` is False; ``say`` is told of that and of what is
+    damaged. ``progress`` is called with the simulated time reached (s), ``checkpoint_s`` is the longest wall time
+    between checkpoints, ``block`` the output times in a block, ``record`` further settings to keep. InputError if
+    another process writes the same file; OSError names the file where the disk is full, with the blocks kept.
     """
     course, settings = Course(scene), scene.data["integration"]
     if settings["method"] not in REFERENCES:
@@ -179,17 +146,7 @@ def fingerprint(course):
 
 
 class Total:
-    """The blocks of a run so far: how far they reach, what they cost, how they end.
-
-    Attributes
-    ----------
-    t : float
-        Last output time, s.
-    over : bool
-        Whether the run has ended before its duration.
-    last : Run
-        The last block.
-    """
+    """The blocks of a run: reach (``t``, s), cost, the ``last`` one, and whether it is ``over`` before its duration."""
 
     def __init__(self):
         self.first, self.t, self.over, self.last = math.nan, -math.inf, False, None
@@ -221,20 +178,8 @@ class Total:
 
 
 class Parts:
-    """The blocks of a run, numbered from 0 without a gap in a folder beside its file.
-
-    Parameters
-    ----------
-    path : path-like
-    mark : str
-        Fingerprint of the run.
-    say : callable, optional
-        Told of damaged blocks.
-
-    Attributes
-    ----------
-    count : int
-        Blocks of this run so far.
+    """The ``count`` blocks of the run with a fingerprint (``mark``), numbered from 0 without a gap in a folder beside
+    its file; ``say`` is told of damaged ones.
     """
 
     def __init__(self, path, mark, say=lambda text: None):
@@ -260,7 +205,6 @@ class Parts:
 
     def take_up(self, course, total, resume):
         """Put a course where an interrupted run of the same scene has got to; False if there is none to go on with.
-
         Everything is read before anything is moved or removed.
         """
         files, gap = sorted(self.folder.glob("[0-9]*.h5")), 1.5 / course.scene.data["output"]["rate"]

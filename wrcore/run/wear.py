@@ -16,25 +16,9 @@ import numpy as np
 
 
 def creep_work(fx, fy, mz, xi, eta, phi):
-    """Creep work per metre run of wheels with several patches.
-
-    Parameters
-    ----------
-    fx, fy : numpy.ndarray, shape (..., patches)
-        Creep forces on the wheel, N; NaN where there is no patch.
-    mz : numpy.ndarray
-        Spin moment, N m.
-    xi, eta, phi : numpy.ndarray
-        Creepages (-) and spin (1/m).
-
-    Returns
-    -------
-    wear_number : numpy.ndarray, shape (...)
-        Sum over patches of |Fx xi + Fy eta|, N.
-    wear_number_with_spin : numpy.ndarray
-        Sum over patches of |Fx xi + Fy eta + Mz phi|, N.
-    work : numpy.ndarray
-        Sum over patches of -(Fx xi + Fy eta + Mz phi), J/m: times the rolling speed it is the dissipated power.
+    """Creep work of wheels, shape (...), from forces (N), spin moment (N m), creepages and spin (1/m) of patches (...,
+    patches), NaN where there is none: sums of abs(Fx xi + Fy eta), N, of abs(Fx xi + Fy eta + Mz phi), N, and of -(Fx
+    xi + Fy eta + Mz phi), J/m, which times the rolling speed is the dissipated power.
     """
     sliding = fx * xi + fy * eta
     whole = sliding + mz * phi

@@ -21,17 +21,8 @@ def _row(what, of, cases, values, unit):
 
 
 def contact_claims(cases):
-    """Errors of the contact search and both reductions against CONTACT.
-
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        From `study.contact.reference.compare_with_contact`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        what, of (the reduction), cases, count, median, q95 and worst of the amount, unit.
+    """Errors of the contact search and both reductions against CONTACT, from
+    `study.contact.reference.compare_with_contact`: what, of (the reduction), cases, count, median, q95, worst, unit.
     """
     rows = []
     for (name, reduction), part in cases.groupby(["set", "reduction"], sort=False):
@@ -43,12 +34,8 @@ def contact_claims(cases):
 
 
 def creep_claims(errors):
-    """Errors of creep laws against CONTACT, file by file and in all cases together, % of mu N; columns as above.
-
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-        From `study.creep.laws.error_table`.
+    """Errors of creep laws against CONTACT (`study.creep.laws.error_table`), file by file and in all cases together, %
+    of mu N; columns as for `contact_claims`.
     """
     known = errors[errors["against"] == "CONTACT"]
     rows = []
@@ -59,13 +46,7 @@ def creep_claims(errors):
 
 
 def patch_claims(summary):
-    """Errors of patch models against exact contact; columns as for `contact_claims`.
-
-    Parameters
-    ----------
-    summary : pandas.DataFrame
-        From `study.patch.tables.summary`.
-    """
+    """Errors of patch models against exact contact (`study.patch.tables.summary`); columns as for `contact_claims`."""
     named = summary.rename(columns={"quantity": "what", "model": "of"})
     return named.assign(cases="poses " + named["zone"])[
         ["what", "of", "cases", "count", "median", "q95", "worst", "unit"]
@@ -73,13 +54,7 @@ def patch_claims(summary):
 
 
 def speed_claims(front):
-    """Real-time factors on the fronts of speed against error: least, median and greatest of each kind and accuracy.
-
-    Parameters
-    ----------
-    front : pandas.DataFrame
-        ``wrcore/run/accuracy_front.csv``.
-    """
+    """Real-time factors on the fronts of speed against error: least, median, greatest of each kind and accuracy."""
     sound = front[front["y_rms_m"] < 1e-5]
     rows = [
         {"what": f"times real time, {kind}", "of": "choices below 10 µm", "cases": f"{speed:g} m/s", "count": len(part),

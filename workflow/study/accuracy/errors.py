@@ -20,37 +20,15 @@ SIDES = ("left", "right")
 
 
 def combinations(grids):
-    """All choices of several grids, each once.
-
-    Parameters
-    ----------
-    grids : sequence of dict
-        Lists of detections, patches, creeps, methods and rtols by the names of :class:`Choice`'s fields.
-
-    Returns
-    -------
-    list of Choice
-    """
+    """All choices of several grids, lists by the names of :class:`Choice`'s fields, each once."""
     found = [Choice(*values) for grid in grids for values in product(*(grid[name] for name in Choice._fields))]
     return list(dict.fromkeys(found))
 
 
 def run_errors(run, reference, until=np.inf):
-    """How far a run is from its reference.
-
-    Parameters
-    ----------
-    run, reference : Run
-        With the same output times, as far as both go.
-    until : float
-        End of the comparison, s.
-
-    Returns
-    -------
-    dict
-        RMS and maximum over all wheelsets of the lateral position's error (m); RMS over all wheels of the error of Q
-        and Y (N), and of Y alone; of the normal force over its mean; relative errors of mean wear number and creep
-        power, and of amplitude and frequency over the second half.
+    """How far a run is from its reference with the same output times, up to ``until`` (s): RMS and maximum of the
+    lateral position (m) over all wheelsets; RMS over all wheels of Q and Y (N), of Y alone, and of the normal force
+    over its mean; relative errors of mean wear number, creep power, and amplitude and frequency over the second half.
     """
     if run.t[-1] < min(until, reference.t[-1]) - 1e-9:
         return dict.fromkeys(ERRORS, np.nan)  # did not get there
@@ -115,20 +93,7 @@ COSTS = ("wall_s", "rhs_evaluations", "steps", "rejected", "jacobians")
 
 
 def reference_runs(source, overrides, reference):
-    """The reference run and its independent twin.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    reference : dict
-        creep, as in :class:`Choice`, methods and rtols (two each).
-
-    Returns
-    -------
-    scene : Scene
-    run, twin : Run
-    """
+    """Scene, its reference run and independent twin: creep as in :class:`Choice`, two methods and rtols."""
     scenes = [
         load_scene(source, [*overrides, *Choice("spatial", "moment", reference["creep"], method, rtol).overrides()])
         for method, rtol in zip(reference["methods"], reference["rtols"], strict=True)
@@ -146,29 +111,12 @@ def reference_row(scene, run, twin, until=np.inf):
 
 
 def study(source, overrides, choices, reference, until=np.inf, repetitions=1, progress=None, twins=None):
-    """Run every choice on a scene.
+    """Run every choice on a scene, in turn in each of some timed passes, so that a slow moment of the machine does not
+    hit one alone: a row per choice with its fields, status, errors against the reference up to ``until`` (s), median
+    wall time (s), its spread (largest less least over the median), real-time factor and counters.
 
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    choices : sequence of Choice
-    reference : Run
-    until : float
-        End of the comparison, s.
-    repetitions : int
-        Timed runs of each choice; all choices run in turn in each pass, so that a slow moment of the machine does not
-        hit one alone.
-    progress : callable, optional
-        Wraps the list of choices in each pass, e.g. ``tqdm.tqdm``.
-    twins : dict of tuple to Run, optional
-        Tight runs by model (`study.accuracy.models.twins`): errors of the integration against them are added.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per choice: its fields, status, errors, median wall time (s), its spread (largest less least over the
-        median), real-time factor and counters.
+    With ``twins``, tight runs by model (`study.accuracy.models.twins`), errors of the integration against them are
+    added; ``progress`` wraps the choices of each pass.
     """
     scenes = {choice: load_scene(source, [*overrides, *choice.overrides()]) for choice in choices}
     rows, times = {}, {choice: [] for choice in choices}
@@ -191,30 +139,14 @@ def study(source, overrides, choices, reference, until=np.inf, repetitions=1, pr
 
 
 def pareto_front(table, error="y_rms_m", cost="wall_s"):
-    """Rows that no other row beats in both error and cost, from cheap and rough to dear and accurate.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Rows that no other row beats in both error and cost, from cheap and rough to dear and accurate."""
     usable = table[(table["status"] == "completed") & table[error].notna()].sort_values([cost, error])
     return usable[usable[error] < usable[error].cummin().shift(fill_value=np.inf)]
 
 
 def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
-    """The cheapest choice for each wanted accuracy.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From :func:`study`.
-    accuracies : sequence of float
-        Largest error that is accepted, in the error's unit, each a row.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Accuracies that nothing reaches are left out.
+    """The cheapest choice of a table of :func:`study` for each wanted accuracy (largest error accepted, in its unit), a
+    row each; those that nothing reaches are left out.
     """
     front = pareto_front(table, error, cost)
     rows = []
@@ -226,15 +158,7 @@ def recommendations(table, accuracies, error="y_rms_m", cost="wall_s"):
 
 
 def recommendation_table(tables, accuracies):
-    """:func:`recommendations` of several scenes, the title of the scene in front.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        By title.
-    accuracies : sequence of float
-        m.
-    """
+    """:func:`recommendations` of several scenes for accuracies in m, the title of the scene in front."""
     found = {title: recommendations(table, accuracies) for title, table in tables.items()}
     table = pd.concat([rows.assign(scene=title) for title, rows in found.items()])
     apart = [f"{of}_{name}" for of in ("integration", "model") for name in SHOWN if f"{of}_{name}" in table]
@@ -242,17 +166,8 @@ def recommendation_table(tables, accuracies):
 
 
 def front_table(tables, references):
-    """Fronts of several scenes: the choices that no other beats.
-
-    Parameters
-    ----------
-    tables, references : dict of str to pandas.DataFrame
-        By title: from :func:`study` and :func:`reference_row`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
+    """Fronts of several scenes, the choices that no other beats, from :func:`study` and :func:`reference_row` by title:
+    kind, speed_m_per_s, the fields of a choice, y_rms_m, N_rms_relative and real_time_factor.
     """
     columns = [*Choice._fields, "y_rms_m", "N_rms_relative", "real_time_factor"]
     parts = [

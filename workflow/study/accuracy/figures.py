@@ -40,25 +40,13 @@ def model_kind(row, finest):
 
 @styled
 def speed_against_error(tables, finest, doubts=None, resolved=None):
-    """Real-time factor over error, one panel per scene: every choice, its errors of integration and of model apart.
+    """Real-time factor over error, a panel per scene (tables of :func:`study.accuracy.errors.study` by title): every
+    choice, its errors of integration and of model apart.
 
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        By title, from :func:`study.accuracy.errors.study`. With the columns of `study.accuracy.models` the marker says
-        which kind of model it is, and each choice has a full mark at the error of its integration and an open one at
-        that of its model. Without, marks are at the difference from the reference, coloured by kind.
-    finest : str
-        Creep of the reference, as in the column ``creep``.
-    doubts : dict of str to float, optional
-        Difference between the two reference runs (RMS, m), drawn as a line: errors below it mean nothing.
-    resolved : dict of str to float, optional
-        Difference between the two runs with exact contact (RMS, m), drawn as a line: errors of models below it mean
-        nothing.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    With the columns of `study.accuracy.models` markers tell kinds of models, full at the error of a choice's
+    integration, open at that of its model; without, marks are at the difference from the reference (creep ``finest``),
+    coloured by kind. Below the lines, differences between the two reference runs (``doubts``) and the two with exact
+    contact (``resolved``; RMS, m), errors, and errors of models, mean nothing.
     """
     rows = -(-len(tables) // 2)
     figure = Figure(figsize=(7.4, 1.1 + 2.5 * rows), layout="constrained")

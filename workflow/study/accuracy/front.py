@@ -4,19 +4,9 @@ from wrcore.run.accuracy import measured_front
 
 
 def front_markdown(front=None, accuracies=(1e-4, 1e-5, 1e-6, 1e-7)):
-    """The fastest measured choice for each accuracy as a table in Markdown, as reports/accuracy.md quotes it.
-
-    Parameters
-    ----------
-    front : pandas.DataFrame, optional
-        Measurements; by default those that the package carries.
-    accuracies : sequence of float
-        RMS errors of the lateral position, m; left out are those that nothing reaches and those for which the choice
-        is that of the next smaller one.
-
-    Returns
-    -------
-    str
+    """The fastest measured choice (by default of the package's front) for each accuracy (RMS of the lateral position,
+    m) as a table in Markdown, as reports/accuracy.md quotes it; left out are accuracies that nothing reaches and those
+    for which the choice is that of the next smaller one.
     """
     front = measured_front() if front is None else front
     head = ("scene", "error below", "detection, creep, method, rtol", "error", "of N", "times real time")

@@ -21,23 +21,7 @@ def model_of(choice):
 
 
 def twins(source, overrides, choices, reference, method, rtol):
-    """A tight run of every model.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    choices : sequence of Choice
-    reference : tuple of (Choice, Run)
-        A tight run that is there already.
-    method : str
-    rtol : float
-
-    Returns
-    -------
-    dict of tuple to Run
-        By `model_of`.
-    """
+    """A tight run of every model of the choices, by `model_of`; ``reference`` is one that is there, (Choice, Run)."""
     found = {model_of(reference[0]): reference[1]}
     for choice in choices:
         if model_of(choice) not in found:
@@ -47,20 +31,8 @@ def twins(source, overrides, choices, reference, method, rtol):
 
 
 def exact_runs(source, overrides, exact, duration):
-    """Runs with exact contact at two resolutions.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    exact : dict
-        finer and coarser: changes to the scene; method and rtol.
-    duration : float
-        s.
-
-    Returns
-    -------
-    finer, coarser : Run
+    """Runs with exact contact over a duration (s) at two resolutions, finer and coarser: the changes to the scene of
+    these names in ``exact``, beside its method and rtol.
     """
     rtol = exact["rtol"]
     common = [*overrides, f"integration.duration={duration}", f"integration.method={exact['method']}"]
@@ -76,16 +48,8 @@ def exact_row(finer, coarser):
 
 
 def with_model_errors(table, tight, exact=None):
-    """Columns of the model's errors, the same for all choices of a model; NaN without a run with exact contact.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `study.accuracy.errors.study`.
-    tight : dict of tuple to Run
-        From `twins`.
-    exact : Run, optional
-        Compared up to its end.
+    """Table of `study.accuracy.errors.study` with columns of the model's errors, the same for all choices of a model,
+    from the tight runs of `twins`; NaN without a run with exact contact, compared up to its end.
     """
     until = float("inf") if exact is None else float(exact.t[-1])
     found = {
@@ -97,19 +61,8 @@ def with_model_errors(table, tight, exact=None):
 
 
 def model_table(tables, exacts):
-    """Errors of all models of all scenes, with what exact contact's own resolution does in front.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        By the scene's title, with the columns of `with_model_errors`.
-    exacts : dict of str to pandas.DataFrame
-        From `exact_row`, for scenes that have it; others are left out.
-
-    Returns
-    -------
-    pandas.DataFrame
-        scene, detection, patch, creep, and the errors of the model.
+    """Errors of all models of all scenes (tables of `with_model_errors` by title), with what exact contact's own
+    resolution does (`exact_row`) in front; scenes without the latter are left out.
     """
     columns = [f"model_{name}" for name in SHOWN]
     parts = []

@@ -32,21 +32,8 @@ DOUBT = 0.2
 
 
 def random_scene(seed, seconds=1.0):
-    """A scene of random kind, speed, friction, profiles, track and duration.
-
-    Parameters
-    ----------
-    seed : int
-        Its remainder says which kind.
-    seconds : float
-        Factor of its duration.
-
-    Returns
-    -------
-    kind : str
-        Name of a scene file.
-    changes : dict
-        To that scene, by key path.
+    """A scene of random kind (by the seed's remainder), speed, friction, profiles, track and duration (times
+    ``seconds``): name of a scene file, and changes to it by key path.
     """
     rng = np.random.default_rng(seed)
     kind = list(KINDS)[seed % len(KINDS)]
@@ -80,22 +67,11 @@ def _curve(rng, speed, duration):
 
 
 def judged(source, changes, requests, tight):
-    """Ask for accuracies of one scene and compare what was handed out with a tight run.
+    """Ask for accuracies of one scene, by the quantity of `wrcore.analysis.to_accuracy.QUANTITIES`, and compare what
+    was handed out with the first of two ``tight`` runs (method, rtol, longest_step).
 
-    Parameters
-    ----------
-    source, changes
-        Scene, as for :func:`wrcore.load_scene`.
-    requests : dict of str to sequence of float
-        Accuracies by the quantity they are asked of (`wrcore.analysis.to_accuracy.QUANTITIES`).
-    tight : sequence of dict
-        method, rtol and longest_step of two runs; the first one judges.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per request: of, asked, stated, whether it counts as reached, rtol, cost, status, reason, error (against
-        the first tight run), doubt (difference of the tight runs), trusted, ratio (error over asked).
+    A row per request: of, asked, stated, whether it counts as reached, rtol, cost, status, reason, error, doubt
+    (difference of the tight runs), trusted, ratio (error over asked).
     """
     scene = load_scene(source, changes)
     sure, twin = (
@@ -124,18 +100,9 @@ def _apart(one, other, of):
 
 
 def summary(table):
-    """How many requests were kept, by quantity and accuracy.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `judged`, of several scenes.
-
-    Returns
-    -------
-    pandas.DataFrame
-        of, asked, requests, trusted; of the trusted ones: reached, missed (said to be reached, but erred by more),
-        worst ratio of those said to be reached; median and largest cost of all.
+    """How many requests of `judged` were kept, by quantity and accuracy: of, asked, requests, trusted; of the trusted
+    ones reached, missed (said to be reached, but erred by more) and worst ratio of those said to be reached; median and
+    largest cost of all.
     """
     rows = []
     for (of, asked), part in table.groupby(["of", "asked"], sort=False):

@@ -29,17 +29,7 @@ THIN = {"linewidth": 0.7, "marker": "o", "markersize": 2.5, "markevery": 4}
 
 @styled
 def fig_rolling_radius_difference(tables):
-    """Rolling radius difference over the lateral shift.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        From `first_touch`, by label.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Rolling radius difference over the lateral shift, from tables of `first_touch` by label."""
     figure, axes = _single()
     for style, (label, table) in zip(STYLES, tables.items(), strict=False):
         axes.plot(MM * table.y_m, MM * table.rolling_radius_difference_m, label=label, **style)
@@ -50,16 +40,8 @@ def fig_rolling_radius_difference(tables):
 
 @styled
 def fig_contact_angle(tables):
-    """Contact angles of both sides over the lateral shift.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        From `first_touch`, by label. Angles are rotations about x: positive on a left wheel, negative on a right one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Contact angles of both sides over the lateral shift, from tables of `first_touch` by label; they are rotations
+    about x: positive on a left wheel, negative on a right one.
     """
     figure, axes = _single()
     for style, (label, table) in zip(STYLES, tables.items(), strict=False):
@@ -73,18 +55,8 @@ def fig_contact_angle(tables):
 
 @styled
 def fig_conicity(curves, reference=None):
-    """Equivalent conicity over the amplitude, with the tolerance band of EN 15302 around a reference.
-
-    Parameters
-    ----------
-    curves : dict of str to pandas.DataFrame
-        From `conicity_curve`, by label.
-    reference : tuple of array_like, optional
-        Amplitudes (m) and reference values.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Equivalent conicity over the amplitude, from `conicity_curve` by label, with the tolerance band of EN 15302
+    around a reference (amplitudes (m) and values).
     """
     figure, axes = _single()
     if reference is not None:
@@ -102,17 +74,7 @@ def fig_conicity(curves, reference=None):
 
 @styled
 def fig_conicity_of_pairs(table):
-    """Equivalent conicity of several pairs over the amplitude, with and without roll.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `wrcore.analysis.contact.conicity_table`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Equivalent conicity of several pairs (`conicity_table`) over the amplitude, with and without roll."""
     figure, axes = _single()
     for style, (label, rows) in zip(STYLES, table.groupby("pair", sort=False), strict=False):
         amplitude = MM * rows.amplitude_m
@@ -126,17 +88,7 @@ def fig_conicity_of_pairs(table):
 
 @styled
 def fig_location_with_yaw(table):
-    """Left wheel's contact point over the lateral shift for several yaw angles: across the wheel and along the rail.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `wrcore.analysis.contact.location_with_yaw`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Left contact point across the wheel and along the rail over the shift for several yaws (`location_with_yaw`)."""
     figure = Figure(figsize=(7.2, 3.0), layout="constrained")
     across, along = figure.subplots(1, 2)
     left = table[table.side == "left"]
@@ -161,19 +113,11 @@ _CELLS = 16
 
 @styled
 def fig_planar_error(table):
-    """What planar detection misses, over yaw and contact angle, with the first-order law as contours.
+    """What planar detection misses (`planar_error_map`), over yaw and contact angle, with the first-order law as
+    contours, in `BANDS`, flange on top: normal penetration, longitudinal position, penetration over the law, and bound
+    of ``detection: auto`` over missed penetration.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `study.contact.tables.planar_error_map`. Cells stay empty where no pose has such a contact angle, or
-        where planar detection has no patch there.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Panels: missed normal penetration, missed longitudinal position, missed penetration over the law, and bound of
-        ``detection: auto`` over missed penetration; each in `BANDS`, flange on top.
+    Cells stay empty where no pose has such a contact angle, or where planar detection has no patch there.
     """
     table = table[table.yaw_rad > 0]
     table = table.assign(ratio=table.missed_m / table.law_m, excess=table.bound_m / table.missed_m)
@@ -238,17 +182,7 @@ REDUCTION_LINES = {
 
 @styled
 def fig_lateral_sweep(sweep):
-    """Vertical force while the loaded pair is swept sideways at fixed height, and its steps per micrometre.
-
-    Parameters
-    ----------
-    sweep : pandas.DataFrame
-        From `study.contact.tables.lateral_sweep`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Vertical force of a loaded pair swept sideways at fixed height (`lateral_sweep`), its steps per micrometre."""
     figure = Figure(figsize=(6.6, 4.6), layout="constrained")
     force, steps = figure.subplots(2, 1, sharex=True)
     y = MM * sweep.y_m.to_numpy()
@@ -267,17 +201,7 @@ def fig_lateral_sweep(sweep):
 
 @styled
 def fig_patch_forces(tables):
-    """Normal force of each patch of the left wheel over its lowering: coexisting patches, and where they merge.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        From `study.contact.tables.force_over_height`, by title of the panel.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Normal force of each left patch over the lowering (`force_over_height`): patches that coexist, and merge."""
     figure = Figure(figsize=(7.6, 3.0), layout="constrained")
     panels = figure.subplots(1, len(tables), squeeze=False)[0]
     for axes, (title, table) in zip(panels, tables.items(), strict=True):

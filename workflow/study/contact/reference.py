@@ -37,30 +37,15 @@ ERRORS = {
 
 
 def compare_with_contact(geometry, reference, reductions=tuple(REDUCTIONS), detection="spatial"):
-    """Each case of CONTACT beside our patches, with either reduction.
+    """Each case of CONTACT beside our patches, with either reduction: patches, the columns of `ERRORS`, ``inside`` (all
+    our points lie laterally within CONTACT's patch) and ``combined`` (CONTACT's one patch covers several of ours, with
+    a gap between them).
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    reference : pandas.DataFrame
-        Cases in CONTACT's axes (y right, z down): set, side, y_ws_mm, yaw_rad, roll_rad, Fz_wheel_N, z_ws_mm, and of
-        the patch y_tr_mm, delta_rad, x_tr_pc_mm, y_tr_pc_mm (pressure centroid), s_min_mm, s_max_mm, Fn_N, pmax_MPa,
-        approach_mm.
-    reductions : sequence of str
-    detection : {"planar", "spatial"}
+    Cases are in CONTACT's axes (y right, z down). Where we report several patches the position is that of their
+    resultant, angle and approach those of the most loaded one, and p_max the greatest.
 
-    Returns
-    -------
-    pandas.DataFrame
-        Case and, per reduction: patches, the columns of `ERRORS`, ``inside`` (all our points lie laterally within
-        CONTACT's patch) and ``combined`` (CONTACT's one patch covers several of ours, with a gap between them). Where
-        we report several patches the position is that of their resultant, angle and approach those of the most loaded
-        one, and p_max the greatest.
-
-    Notes
-    -----
-    CONTACT's vertical force includes that of friction (mu = 0.3, the wheel rolls with creepage), ours at rest does
-    not: on the flange the normal forces at equal vertical load differ by up to a half for that reason. Everything but
+    CONTACT's vertical force includes that of friction (mu = 0.3, the wheel rolls with creepage), ours at rest does not:
+    on the flange the normal forces at equal vertical load differ by up to a half for that reason. Everything but
     ``height_equal_load_m`` and ``normal_relative`` is therefore taken at equal normal force.
     """
     rows = [
@@ -111,18 +96,8 @@ def _forces(wheel, pose, z, patches):
 
 
 def summarise(comparison):
-    """Mean and greatest absolute error per set and reduction.
-
-    Parameters
-    ----------
-    comparison : pandas.DataFrame
-        From `compare_with_contact`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        set, reduction, cases, quantity, mean, q90 and max of the absolute error, and how many cases lie inside
-        CONTACT's patch and are combined.
+    """Mean, q90 and max of the absolute errors of `compare_with_contact` per set and reduction, and how many cases lie
+    inside CONTACT's patch and are combined.
     """
     rows = []
     for (name, reduction), part in comparison.groupby(["set", "reduction"], sort=False):

@@ -73,20 +73,8 @@ def _note(overlaps, count, low, high, depth):
 
 @jit
 def dense_overlaps(geometry, pose, overlaps):
-    """All overlaps of one wheel by a dense search.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    pose : Pose
-    overlaps : numpy.ndarray, shape (n, 4)
-        Filled: first and last strip in overlap (m), greatest depth along the rail's normal (m); the fourth column is
-        left alone.
-
-    Returns
-    -------
-    int
-        Number of overlaps, from the flange to the field side.
+    """All overlaps of one wheel by a dense search: their number; fills ``overlaps`` (n, 4) from the flange to the field
+    side with first and last strip (m) and greatest depth along the rail's normal (m), the fourth column left alone.
     """
     strips = int((geometry.wheel.shape[0] - 1) * geometry.wheel_step / DENSE_STEP) + 1
     count = 0
@@ -147,27 +135,13 @@ def _sound(rows, count):
 
 @jit
 def judge(geometry, side, y, z, axle, spatial, reduction, rows, overlaps):
-    """Compare the search with the dense one for one wheel.
+    """Compare the search with the dense one for one wheel: outcome, strip and depth (m) of the overlap or patch that it
+    is about, and the number of overlaps deeper than `DEPTH`; arguments as for
+    :func:`wrcore.contact.detection.find_patches`, ``axle`` pointing outwards, ``overlaps`` (n, 4) is scratch.
 
-    Parameters
-    ----------
-    geometry, side, y, z, spatial, reduction, rows
-        As for :func:`wrcore.contact.detection.find_patches`.
-    axle : tuple of float
-        The wheel's outward axle direction.
-    overlaps : numpy.ndarray, shape (n, 4)
-        Scratch: overlaps of the dense search and the groups that may count as one.
-
-    Returns
-    -------
-    outcome : int
-        FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the deepest count if there
-        are more than MAX_PATCHES), INVENTED (a patch outside all groups), SPLIT (more patches in a group than
-        overlaps) or BAD (a number that is not finite, no penetration, or an upright contact plane).
-    where, depth : float
-        Strip and depth of the overlap or patch that it is about, m.
-    expected : int
-        Number of overlaps deeper than `DEPTH`.
+    The outcome is FOUND, MISSED (an overlap deeper than `DEPTH` without a patch in its group; only the deepest count if
+    there are more than MAX_PATCHES), INVENTED (a patch outside all groups), SPLIT (more patches in a group than
+    overlaps) or BAD (a number that is not finite, no penetration, or an upright contact plane).
     """
     count = find_patches(geometry, side, y, z, axle[0], axle[1], axle[2], spatial, reduction, rows)
     bad = _sound(rows, count)
@@ -243,40 +217,16 @@ def _search_all(geometry, poses, spatial, reduction, counts):
 
 
 def random_poses(count, seed=0, nominal=0.46, ranges=None):
-    """Random wheelset poses, uniform in `POSE_RANGES`.
-
-    Parameters
-    ----------
-    count, seed : int
-    nominal : float
-        Height about which the lift is counted, m.
-    ranges : dict of str to float, optional
-        Other ranges than `POSE_RANGES`.
-
-    Returns
-    -------
-    numpy.ndarray, shape (count, 4)
-        y, z (m), roll, yaw (rad).
+    """Random wheelset poses y, z (m), roll, yaw (rad), shape (count, 4), uniform in `POSE_RANGES` or other ranges; the
+    lift counts from a nominal height (m).
     """
     half = [(POSE_RANGES | (ranges or {}))[name] for name in ("y", "lift", "roll", "yaw")]
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 4)) * half + [0.0, nominal, 0.0, 0.0]
 
 
 def count_patches(geometry, poses, detection="spatial", reduction="moment"):
-    """Number of patches per wheel at many poses.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    poses : numpy.ndarray, shape (n, 4)
-        y, z (m), roll, yaw (rad).
-    detection : {"planar", "spatial"}
-    reduction : {"maximum", "moment"}
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, 2)
-        -1 where a result is not finite, has no penetration or stands upright.
+    """Number of patches per wheel, shape (n, 2), at poses (n, 4): y, z (m), roll, yaw (rad); -1 where a result is not
+    finite, has no penetration or stands upright.
     """
     counts = np.empty((len(poses), 2), np.int64)
     _search_all(geometry, poses, detection == "spatial", REDUCTIONS[reduction], counts)
@@ -284,23 +234,9 @@ def count_patches(geometry, poses, detection="spatial", reduction="moment"):
 
 
 def compare_with_dense(geometry, poses, detection="spatial", reduction="moment", depths=None):
-    """The search against the dense one, wheel by wheel.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    poses : numpy.ndarray, shape (n, 4)
-        y, z (m), roll, yaw (rad).
-    detection : {"planar", "spatial"}
-    reduction : {"maximum", "moment"}
-    depths : array_like, shape (n,), optional
-        Penetration (m) to which each wheel is lowered by itself; the heights of ``poses`` then do not count.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per wheel: y_m, z_m, roll_rad, yaw_rad, side, outcome (found, missed, invented, split, bad number),
-        u_wheel_m and depth_m of what is wrong, overlaps (deeper than `DEPTH`).
+    """The search against the dense one at poses (n, 4), y, z (m), roll, yaw (rad), or with each wheel lowered by itself
+    to a penetration of ``depths`` (n,), m: a row per wheel with its pose, side, outcome (found, missed, invented,
+    split, bad number), u_wheel_m and depth_m of what is wrong, and overlaps (deeper than `DEPTH`).
     """
     import pandas as pd
 
@@ -317,23 +253,9 @@ def compare_with_dense(geometry, poses, detection="spatial", reduction="moment",
 
 
 def search_table(geometry, poses, dense, seed=0):
-    """The bar of the contact search: how often it fails, misses or invents, per detection and reduction.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    poses : int
-        Random poses that must give finite patches.
-    dense : int
-        Random poses that are compared with the dense search, and as many wheels lowered to a depth between `DEPTH` and
-        0.5 mm, where patches are small.
-    seed : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        detection, reduction, wheels_searched, bad; wheels_compared, overlaps (deeper than `DEPTH`), wheels with
-        several, missed, invented, split.
+    """The bar of the contact search: how often it fails at random poses, and how often it misses, invents or splits at
+    ``dense`` ones and as many wheels lowered to between `DEPTH` and 0.5 mm, where patches are small; a row per
+    detection and reduction.
     """
     import pandas as pd
 

@@ -41,16 +41,8 @@ TOUCH = 1e-3
 
 
 def study_pair(settings):
-    """A wheelset on its track from one entry of the study's pairs.
-
-    Parameters
-    ----------
-    settings : dict
-        wheel, rail: names of profiles; inclination (ratio), gauge, rolling_radius, half_distance (m).
-
-    Returns
-    -------
-    WheelsetOnTrack
+    """A wheelset on its track from one entry of the study's pairs: names of wheel and rail, inclination (ratio), gauge,
+    rolling_radius, half_distance (m).
     """
     wheel = named_profile(settings["wheel"], "wheel")
     rail = named_profile(settings["rail"], "rail", settings["inclination"])
@@ -59,37 +51,15 @@ def study_pair(settings):
 
 
 def touch_table(pairs, shifts):
-    """Rigid first touch of several pairs: contact points, contact angles, rolling radius difference; no yaw.
-
-    Parameters
-    ----------
-    pairs : dict of str to WheelsetOnTrack
-    shifts : array_like, shape (n,)
-        Lateral positions, m.
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``pair`` and the columns of :func:`wrcore.contact.first_touch.first_touch` (with roll).
+    """Rigid first touch of several pairs at lateral shifts (n,), m, without yaw: ``pair`` and the columns of
+    :func:`wrcore.contact.first_touch.first_touch` (with roll).
     """
     tables = {label: first_touch(pair, shifts) for label, pair in pairs.items()}
     return pd.concat(tables, names=["pair"]).reset_index(level="pair").reset_index(drop=True)
 
 
 def conicity_table(pairs, amplitudes):
-    """Equivalent conicity over the amplitude with roll and, as EN 15302 has it, without.
-
-    Parameters
-    ----------
-    pairs : dict of str to WheelsetOnTrack
-    amplitudes : array_like, shape (n,)
-        m.
-
-    Returns
-    -------
-    pandas.DataFrame
-        pair, amplitude_m, conicity_with_roll, conicity_without_roll.
-    """
+    """Equivalent conicity of several pairs over amplitudes (n,), m, with roll and, as EN 15302 has it, without."""
     rows = []
     for label, pair in pairs.items():
         curves = [conicity_curve(pair, amplitudes, roll).equivalent_conicity for roll in (True, False)]
@@ -99,19 +69,8 @@ def conicity_table(pairs, amplitudes):
 
 
 def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
-    """Where a yawed wheelset touches without load: the most loaded patch of each wheel, with roll.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    shifts, yaws : array_like
-        Lateral positions (m) and yaw angles (rad); all combinations.
-    detection : {"planar", "spatial"}
-
-    Returns
-    -------
-    pandas.DataFrame
-        yaw_rad, y_m, side, roll_rad, the patch's position and contact angle, and the wheel's rolling radius.
+    """Where a wheelset touches without load, with roll, at all combinations of lateral shifts (m) and yaw angles (rad):
+    roll, and of each wheel's most loaded patch position, contact angle and rolling radius.
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(yaws, shifts, indexing="ij"))
     poses = pd.DataFrame({"pose_id": np.arange(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
@@ -128,16 +87,8 @@ def _radius(geometry, u):
 
 
 def first_order_law(yaw, angle, radius=0.46):
-    """Normal penetration that planar detection misses, to first order: r psi^2 tan^2(delta) cos(delta)/2, m.
-
-    Parameters
-    ----------
-    yaw, angle, radius : array_like
-        Yaw and contact angle (rad), rolling radius (m).
-
-    Returns
-    -------
-    ndarray
+    """Normal penetration that planar detection misses, to first order: r psi^2 tan^2(delta) cos(delta)/2, m, from yaw
+    psi and contact angle delta (rad) and rolling radius r (m).
     """
     return 0.5 * radius * np.square(yaw) * np.square(np.tan(angle)) * np.cos(angle)
 
@@ -199,27 +150,15 @@ def _planar_errors(geometry, hertz, modulus, load, shifts, yaws, out):
 
 
 def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
-    """What planar detection misses at the most loaded spatial patch of a wheel, over lateral shift and yaw.
+    """What planar detection misses at the most loaded spatial patch of a left wheel, over lateral shifts to the left
+    (m) and yaw (rad), without roll, at the height at which it carries a vertical load (N) with spatial detection and
+    the reduction ``maximum``.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    shifts, yaws : array_like
-        Lateral positions to the left (m) and yaw angles (rad). The left wheel is taken, without roll, at the height
-        at which it carries ``load`` with spatial detection and the reduction ``maximum``.
-    load : float
-        Vertical load, N.
-    same_patch : float
-        Planar detection's lowest strip further than this from the spatial one belongs to another patch, m: its row
-        then has no error (NaN).
-
-    Returns
-    -------
-    pandas.DataFrame
-        yaw_rad, y_m, contact_angle_rad, radius_m (rolling radius), u_spatial_m, u_planar_m (deepest strips),
-        spatial_m and planar_m (penetration along the normal at the same pose, negative where planar detection sees
-        no contact), missed_m (lower overlap along the common normal), shift_m (missed longitudinal position), bound_m
-        (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law).
+    Columns: u_spatial_m, u_planar_m (deepest strips), spatial_m, planar_m (penetration along the normal, negative where
+    planar detection sees no contact), missed_m (lower overlap along the common normal), shift_m (missed longitudinal
+    position), bound_m (`planar_error_bound`), a_m (semi-axis along rolling), law_m (first-order law). Errors are NaN
+    where planar detection's lowest strip is further than ``same_patch`` (m) from the spatial one: it belongs to another
+    patch.
     """
     modulus = contact_modulus(**MATERIAL)
     out = np.empty((len(shifts) * len(yaws), 12))
@@ -235,19 +174,8 @@ def planar_error_map(geometry, shifts, yaws, load, same_patch=2e-3):
 
 
 def over_contact_angle(table, edges, column):
-    """Median of a column of `planar_error_map` per contact angle and yaw.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-    edges : array_like, shape (n + 1,)
-        Limits of the classes of contact angle, rad.
-    column : str
-
-    Returns
-    -------
-    pandas.DataFrame, shape (n, yaws)
-        NaN where no pose has such an angle: this pair's contact jumps over it.
+    """Median of a column of `planar_error_map` per class of contact angle (``edges`` (n + 1,), rad) and yaw, shape
+    (n, yaws); NaN where no pose has such an angle: this pair's contact jumps over it.
     """
     classes = pd.cut(table.contact_angle_rad, edges, labels=range(len(edges) - 1))
     median = table.groupby([classes, "yaw_rad"], observed=False)[column].median()
@@ -265,21 +193,8 @@ def _sweep(geometry, hertz, modulus, y, z, spatial, reduction, force):
 
 
 def lateral_sweep(geometry, reach, step, load, detection="spatial"):
-    """Vertical force of the centred, loaded pair while it is swept sideways at fixed height, without roll and yaw.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    reach, step : float
-        Sweep from -reach to reach in steps, m.
-    load : float
-        Vertical load per wheel at y = 0, which gives the height, N.
-    detection : {"planar", "spatial"}
-
-    Returns
-    -------
-    pandas.DataFrame
-        y_m and, per reduction, the force of both wheels: ``maximum_N``, ``moment_N``.
+    """Vertical force (N) of both wheels of the centred pair per reduction (``maximum_N``, ``moment_N``) over y_m from
+    -reach to reach (m), without roll and yaw, at the height at which each wheel carries a vertical load (N) at y = 0.
     """
     hertz, modulus, spatial = hertz_table(), contact_modulus(**MATERIAL), detection == "spatial"
     count = round(reach / step)
@@ -293,19 +208,9 @@ def lateral_sweep(geometry, reach, step, load, detection="spatial"):
 
 
 def sweep_jumps(sweep, reaches):
-    """How continuous the force of `lateral_sweep` is.
-
-    Parameters
-    ----------
-    sweep : pandas.DataFrame
-    reaches : sequence of float
-        Parts -reach..reach that are looked at, m.
-
-    Returns
-    -------
-    pandas.DataFrame
-        reach_m, reduction, largest_step_N (between neighbouring positions), smooth_step_N (99th percentile of the
-        steps: the smooth slope), ratio of both, at_m (where).
+    """How continuous the force of `lateral_sweep` is in each part -reach..reach (m): largest_step_N between
+    neighbouring positions and where (at_m), smooth_step_N (99th percentile of the steps: the smooth slope), their
+    ratio.
     """
     rows = []
     for reach in reaches:
@@ -330,22 +235,9 @@ def _force_over_depth(geometry, hertz, modulus, y, yaw, heights, reduction, out)
 
 
 def force_over_height(geometry, y, yaw, lowering, reduction="moment"):
-    """Patches of the left wheel while it is lowered: where they appear, how they share the force, where they merge.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    y, yaw : float
-        Lateral position (m) and yaw (rad); no roll.
-    lowering : array_like, shape (n,)
-        Lowering below the height at which the wheel just touches, m.
-    reduction : {"maximum", "moment"}
-
-    Returns
-    -------
-    pandas.DataFrame
-        lowering_m, patches, vertical_N and, per patch from the flange to the field side, u_wheel_m and N_N (NaN where
-        there is none).
+    """Patches of the left wheel, without roll, while it is lowered from where it just touches (``lowering`` (n,), m):
+    where they appear, how they share the force, where they merge; lowering_m, patches, vertical_N and, per patch from
+    the flange to the field side, u_wheel_m and N_N (NaN where there is none).
     """
     hertz, modulus = hertz_table(), contact_modulus(**MATERIAL)
     rows, nominal = np.empty((MAX_PATCHES, PATCH_COLUMNS)), geometry.rolling_radius

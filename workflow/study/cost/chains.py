@@ -15,21 +15,8 @@ STATES = 16
 
 
 def chain(base, n, kind):
-    """Bars that hang one below the other from the moving frame.
-
-    Parameters
-    ----------
-    base : Model
-        Any model; bodies, elements and joints are replaced.
-    n : int
-        Bars.
-    kind : {"spherical", "revolute"}
-        Of the joints.
-
-    Returns
-    -------
-    Recorded
-        With states near the hanging position, rotations and velocities at random.
+    """Bars, joined by spherical or revolute joints, that hang one below the other from the moving frame of a base
+    model: `Recorded` states near the hanging position, rotations and velocities at random.
     """
     spins = np.zeros(n, np.int64)
     bodies = Bodies(np.ones(n), np.full((n, 3), 0.1), spins, np.zeros(0, np.int64))
@@ -50,20 +37,7 @@ def chain(base, n, kind):
 
 
 def over_chains(base, lengths, passes):
-    """Time of a right-hand side over the length of a chain.
-
-    Parameters
-    ----------
-    base : Model
-    lengths : sequence of int
-        Bars.
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        Joint, bars, nanoseconds per evaluation (median and quartiles) and per bar.
-    """
+    """Time of a right-hand side (ns, median and quartiles, and per bar) over the bars of a chain, by joint."""
     kinds = [(kind, n) for kind in ("spherical", "revolute") for n in lengths]
     found = [chain(base, n, kind) for kind, n in kinds]
     seconds = take_turns([evaluation("", each) for each in found], passes)

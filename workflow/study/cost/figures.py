@@ -18,17 +18,7 @@ SERIES = (
 
 @styled
 def fig_growth(wheelsets, runs, scenes):
-    """Cost over the number of wheelsets, duration, tolerance and simultaneous scenes.
-
-    Parameters
-    ----------
-    wheelsets, runs, scenes : pandas.DataFrame
-        From `study.cost.growth`: ``over_wheelsets``, ``over_runs`` and ``over_scenes``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Cost over the number of wheelsets, duration, tolerance and simultaneous scenes (`study.cost.growth`)."""
     figure = Figure(figsize=(7.2, 6.0), layout="constrained")
     (a, b), (c, d) = figure.subplots(2, 2)
     for (scene, part), style in zip(wheelsets.groupby("scene", sort=False), SERIES, strict=False):
@@ -77,17 +67,7 @@ STAGE_COLOURS = {
 
 @styled
 def fig_breakdown(table):
-    """Time of one right-hand side by stage, beside the least that the machine could take for what the stage does.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From :func:`study.cost.stages.with_limits`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Time of one right-hand side by stage (`with_limits`), beside the least that the machine could take for it."""
     scenes = list(dict.fromkeys(table["scene"]))
     figure = Figure(figsize=(7.2, 0.7 + 2.1 * len(scenes)), layout="constrained")
     for axes, scene in zip(figure.subplots(len(scenes), 1, squeeze=False)[:, 0], scenes, strict=True):

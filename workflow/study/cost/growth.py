@@ -44,29 +44,12 @@ def cache_sizes():
 
 
 def over_wheelsets(title, source, overrides, *, spacing, counts, duration, states, passes):
-    """Time of a right-hand side and of a run over the length of a train.
+    """Time of a right-hand side, at states of a run, and of runs of a duration (s) over the length of a train:
+    ``counts`` vehicles, ``spacing`` (m) apart, of a scene of one vehicle on tangent, perfect track.
 
-    Parameters
-    ----------
-    title : str
-    source, overrides
-        Scene of one vehicle on tangent, perfect track, as for :func:`wrcore.load_scene`.
-    spacing : float
-        Between vehicles, m.
-    counts : sequence of int
-        Vehicles.
-    duration : float
-        Of the runs, s.
-    states : int
-        States of a run at which the right-hand side is evaluated.
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per train: bodies, wheelsets; microseconds per evaluation of the right-hand side and, in a run, per
-        evaluation with all that the integration adds, each with quartiles and per wheelset; real-time factor; bytes of
-        what belongs to each wheelset or body (``own_bytes``) and of what all share (``shared_bytes``).
+    A row per train: bodies, wheelsets; microseconds per evaluation of the right-hand side and, in a run, per evaluation
+    with all that the integration adds, each with quartiles and per wheelset; real-time factor; bytes of what belongs to
+    each wheelset or body (``own_bytes``) and of what all share (``shared_bytes``).
     """
     recorded, runs, rows = [], [], []
     for count in counts:
@@ -103,23 +86,8 @@ def _bytes(model, trajectory):
 
 
 def over_runs(title, source, overrides, *, durations, tolerances, passes):
-    """Time of runs over their duration, and over their tolerance.
-
-    Parameters
-    ----------
-    title, source, overrides
-        As for :func:`over_wheelsets`.
-    durations : sequence of float
-        s.
-    tolerances : sequence of float
-        Relative; absolute ones are a thousandth of them.
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per run: what is varied and its value, evaluations, steps, rejected steps, milliseconds, microseconds per
-        evaluation, real-time factor.
+    """Time of runs over their duration (s), and over their relative tolerance (absolute: a thousandth): what is varied
+    and its value, evaluations, steps, rejected steps, milliseconds, microseconds per evaluation, real-time factor.
     """
     scene = load_scene(source, overrides)
     model, start = compile_scene(scene)
@@ -143,22 +111,12 @@ def over_runs(title, source, overrides, *, durations, tolerances, passes):
 
 
 def over_scenes(title, source, overrides, *, counts, threads, passes):
-    """Time of several scenes in one process, one after the other and at the same time.
+    """Time of several scenes, which differ in speed, in one process, one after the other and at the same time, a row
+    per number of scenes and threads.
 
-    Parameters
-    ----------
-    title, source, overrides
-        As for :func:`over_wheelsets`; the scenes differ in speed.
-    counts, threads : sequence of int
-        Scenes, and how many run at a time.
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per number of scenes and threads: milliseconds by the wall per scene with quartiles, how many times faster
-        than one at a time, how many processors the runs got on average (with other work on the machine less than there
-        are), and whether all results were those of single runs to the bit.
+    Columns: milliseconds by the wall per scene with quartiles, how many times faster than one at a time, how many
+    processors the runs got on average (with other work on the machine less than there are), and whether all results
+    were those of single runs to the bit.
     """
     scenes = [load_scene(source, [*overrides, f"speed={speed:g}"]) for speed in np.linspace(30.0, 55.0, max(counts))]
     alone = [simulate_many([scene], progress=False)[0] for scene in scenes]
@@ -193,20 +151,10 @@ def identical(run, other):
 
 
 def findings(wheelsets, caches):
-    """From which train on time per evaluation is more than arithmetic, in words, a row per scene.
-
-    Parameters
-    ----------
-    wheelsets : pandas.DataFrame
-        From :func:`over_wheelsets`, several scenes.
-    caches : dict of str to int
-        From :func:`cache_sizes`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        scene, range of time per evaluation and wheelset (us), the smallest train above ``BEYOND_ARITHMETIC`` times the
-        least, bytes of the longest train with what it shares, and the smallest cache that holds them.
+    """From which train on time per evaluation is more than arithmetic, in words, a row per scene of
+    :func:`over_wheelsets`: range of time per evaluation and wheelset (us), the smallest train above
+    ``BEYOND_ARITHMETIC`` times the least, bytes of the longest train with what it shares, and the smallest of the
+    caches (:func:`cache_sizes`) that holds them.
     """
     rows = []
     for scene, part in wheelsets.groupby("scene", sort=False):

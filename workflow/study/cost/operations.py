@@ -230,8 +230,7 @@ def _registers(tally):
 
 
 def _call(_, *arguments):
-    """Stands in for calls of kernels by their addresses: that of the joints has four arguments, of wheels on ellipses
-    eight."""
+    """Stands for calls of kernels by address: that of the joints has four arguments, of wheels on ellipses eight."""
     kernel = constraints.add_reactions if len(arguments) == 4 else wheel.wheel_wrenches
     kernel(*arguments)
 
@@ -271,19 +270,9 @@ def interpreted(tally):
 
 
 def count_operations(recorded, states=20):
-    """Operations and bytes of one right-hand side, on average over some states.
-
-    Parameters
-    ----------
-    recorded : Recorded
-    states : int
-        Spread over those of the run.
-
-    Returns
-    -------
-    dict of str to dict
-        By stage, and for the ``whole``: floating-point sums and products (a fused one counts two), divisions, square
-        roots, other functions, and bytes of floating-point numbers read from and written to arrays.
+    """Operations and bytes of one right-hand side by stage and as a ``whole``, on average over some states of the run:
+    floating-point sums and products (a fused one counts two), divisions, square roots, other functions, and bytes of
+    floating-point numbers read from and written to arrays.
     """
     chosen = recorded.states[:: max(1, len(recorded.states) // states)]
     tally = Tally()

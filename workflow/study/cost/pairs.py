@@ -62,18 +62,11 @@ def repeated(label, call, units=1.0):
 
 
 def engine_against_scipy(title, scene, accuracy, ladder, passes):
-    """Dormand and Prince's pair, compiled and by scipy, over the same compiled right-hand side, at equal error.
+    """Dormand and Prince's pair, compiled and by scipy, over the same compiled right-hand side, at equal ``accuracy``:
+    rms error of the lateral position (m) against a run at a tolerance of 1e-11 by another method.
 
-    Parameters
-    ----------
-    title : str
-    scene : Scene
-    accuracy : float
-        Error of the lateral position, rms, against a run at a tolerance of 1e-11 by another method, m.
-    ladder : sequence of float
-        Relative tolerances of the runs between whose errors the time at ``accuracy`` is interpolated (both logarithmic;
-        the loosest run where even that is more accurate).
-    passes : int
+    Its time is interpolated between runs at a ladder of relative tolerances (error and time logarithmic; the loosest
+    run where even that is more accurate).
     """
     model, start = compile_scene(scene)
     times = output_times(0.0, scene.data["integration"]["duration"], 200.0)
@@ -102,17 +95,8 @@ def time_at_error(accuracy, errors, seconds):
 
 
 def compiled_against_plain(scene, states, duration, passes):
-    """The compiled right-hand side against the plain NumPy one: per evaluation, and in runs by the same pair.
-
-    Parameters
-    ----------
-    scene : Scene
-        One wheelset on tangent track.
-    states : int
-        Of the scene's run, at which both are evaluated.
-    duration : float
-        Of the runs, s.
-    passes : int
+    """The compiled right-hand side against the plain NumPy one, for one wheelset on tangent track: per evaluation at
+    states of the scene's run, and in runs of a duration (s) by the same pair.
     """
     recorded = record(scene, scene.data["integration"]["duration"], states)
     model, start = recorded.model, compile_scene(scene)[1]
@@ -148,18 +132,7 @@ def planar_against_spatial(title, scene, passes):
 
 
 def right_hand_sides(group, scenes, count, passes, bar=None):
-    """Right-hand sides of several scenes, each at the states of its own run.
-
-    Parameters
-    ----------
-    group : str
-    scenes : dict of str to Scene
-        By contender.
-    count : int
-        States of each run.
-    passes : int
-    bar : Bar, optional
-    """
+    """Right-hand sides of several scenes, by contender, each at ``count`` states of its own run."""
     contenders = []
     for label, scene in scenes.items():
         recorded = record(scene, scene.data["integration"]["duration"], count)
@@ -191,19 +164,7 @@ def process(scene, passes):
 
 
 def benchmark_table(scenes, settings):
-    """All groups as one table.
-
-    Parameters
-    ----------
-    scenes : dict of str to (str, str, list of str)
-        Title, scene file and changes by name.
-    settings : dict
-        Key ``cost.pairs`` of the configuration.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """All groups as one table: scenes (title, file, changes) by name, settings ``cost.pairs`` of the configuration."""
     passes, count, rows = settings["passes"], settings["states"], []
 
     def scene(name, *further):

@@ -26,24 +26,8 @@ class Recorded(NamedTuple):
 
 
 def record(scene, duration, count):
-    """States at equal intervals of a run.
-
-    Parameters
-    ----------
-    scene : Scene
-        On tangent, perfect track, which looks the same at every place and time.
-    duration : float
-        s.
-    count : int
-
-    Returns
-    -------
-    Recorded
-
-    Raises
-    ------
-    InputError
-        For another track.
+    """States at equal intervals of a run of a duration (s) on tangent, perfect track, which looks the same at every
+    place and time; InputError for another track.
     """
     if not scene.track.tangent:
         raise InputError(scene.source, "track", "expected a tangent, perfect track where evaluations are timed")
@@ -56,21 +40,8 @@ def record(scene, duration, count):
 
 
 def lasting(label, call, arrays, units):
-    """Contender that goes through so many copies of arrays that it can be timed.
-
-    Parameters
-    ----------
-    label : str
-    call : callable
-        Takes the arrays.
-    arrays : sequence of numpy.ndarray
-        Repeated along their first axis.
-    units : int
-        Units in one pass over the arrays.
-
-    Returns
-    -------
-    Contender
+    """Contender that calls with so many copies of arrays, repeated along their first axis, that it can be timed;
+    ``units`` are those of one pass over the arrays.
     """
     call(*arrays)
     started = time.process_time()
@@ -81,18 +52,7 @@ def lasting(label, call, arrays, units):
 
 
 def evaluation(label, recorded):
-    """Contender that evaluates the right-hand side at all states, over and over.
-
-    Parameters
-    ----------
-    label : str
-    recorded : Recorded
-
-    Returns
-    -------
-    Contender
-        Its units are evaluations.
-    """
+    """Contender that evaluates the right-hand side at all recorded states, over and over; its units are evaluations."""
     equations, model, work = Equations(recorded.model).arguments
 
     def evaluate(states, rates):

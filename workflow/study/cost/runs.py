@@ -20,24 +20,9 @@ SMOOTH = 0.1
 
 
 def batch_table(source, overrides, speeds, passes, functions=8):
-    """Where the time of a batch of runs in one process goes: as a sweep, and as runs with all their channels.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    speeds : sequence of float
-        One run each, m/s.
-    passes : int
-        Batches; one more before them warms up and another one afterwards is profiled.
-    functions : int
-        Rows for the functions that take most of a profiled batch.
-
-    Returns
-    -------
-    pandas.DataFrame
-        batch (``sweep`` or ``runs``), part, seconds (median over the passes) and share of the whole: the whole,
-        integration, and what is not integration. Then the functions with their own times, profiled.
+    """Where the time of a batch of runs, one per speed (m/s), in one process goes, as a sweep and as runs with all
+    their channels: seconds (median over the passes) and share of the whole, of integration and of what is not, then of
+    the ``functions`` that take most, with their own times, in a profiled batch.
     """
     changes = dict(change.partition("=")[::2] for change in overrides)
     sweep = load_sweep({
@@ -84,20 +69,8 @@ def _functions(profile, count):
 
 
 def rejection_table(scenes, methods, tolerances):
-    """Rejected steps of every method on scenes.
-
-    Parameters
-    ----------
-    scenes : dict of str to Scene
-        By title.
-    methods : sequence of str
-    tolerances : sequence of float
-        Relative; absolute ones are a thousandth of them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        scene, method, rtol, status, steps, rejected, their share of all attempts, and whether it keeps ``SMOOTH``.
+    """Rejected steps of every method and relative tolerance (absolute ones a thousandth) on scenes by title, their
+    share of all attempts, and whether it keeps ``SMOOTH``.
     """
     rows = []
     for title, scene in scenes.items():

@@ -22,19 +22,8 @@ LOAD = 5e4
 
 
 def loaded_wheels(contact, place, count):
-    """Left wheels that carry `LOAD` at a place, in random order.
-
-    Parameters
-    ----------
-    contact : ContactModel
-    place : str
-        Key of `PLACES`.
-    count : int
-
-    Returns
-    -------
-    numpy.ndarray, shape (count, MOTION_COLUMNS)
-        Motions at rest, as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
+    """Left wheels at rest, in random order, that carry `LOAD` at a place (key of `PLACES`): motions
+    (count, MOTION_COLUMNS), as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
     """
     rng, rows, motions = np.random.default_rng(0), np.empty((MAX_PATCHES, PATCH_COLUMNS)), []
     (low, high), (least, most) = PLACES[place]
@@ -52,20 +41,7 @@ def loaded_wheels(contact, place, count):
 
 
 def search_costs(contact, count, passes):
-    """Time of the search per wheel.
-
-    Parameters
-    ----------
-    contact : ContactModel
-    count : int
-        Wheels at random.
-    passes : int
-
-    Returns
-    -------
-    list of dict
-        Rows of :func:`study.cost.timing.compare`: a group for each place and reduction.
-    """
+    """Time of the search per wheel, of ``count`` random ones: a group of `compare` for each place and reduction."""
     rows, patches = [], np.zeros((count, MAX_PATCHES, PATCH_COLUMNS))
     for place in PLACES:
         motions = loaded_wheels(contact, place, count)

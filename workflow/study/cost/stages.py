@@ -132,17 +132,9 @@ def _root(numbers, turns):
 
 
 def limits(passes):
-    """What one core can do at best, measured.
-
-    Parameters
-    ----------
-    passes : int
-
-    Returns
-    -------
-    dict
-        flop_per_ns: fused products (two each) of eight numbers at a time; byte_per_ns: read from the first cache;
-        ns_per_division, ns_per_root: one by one, none waiting for another. All from the best pass.
+    """What one core can do at best, measured as the best pass: flop_per_ns (fused products, two each, of eight numbers
+    at a time), byte_per_ns (from the first cache), ns_per_division and ns_per_root (one by one, none waiting for
+    another).
     """
     numbers, turns = np.ones(BLOCK + LANES), CHAIN // BLOCK * LANES
     first = -(numbers.ctypes.data // 8) % LANES  # of a cache line
@@ -177,22 +169,9 @@ def _wheels(recorded):
 
 
 def breakdown(title, scene, states, passes):
-    """Time, operations and bytes of the stages of one evaluation.
-
-    Parameters
-    ----------
-    title : str
-    scene : Scene
-        On tangent, perfect track.
-    states : int
-        Of a run, over which everything is averaged.
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per stage and one for the whole: nanoseconds per evaluation (median and quartiles over the passes), share
-        of the whole, and what :func:`study.cost.operations.count_operations` counts.
+    """Time, operations and bytes of the stages of one evaluation on tangent, perfect track, averaged over states of a
+    run: a row per stage and one for the whole with nanoseconds per evaluation (median and quartiles over the passes),
+    share of the whole, and what :func:`study.cost.operations.count_operations` counts.
     """
     recorded = record(scene, scene.data["integration"]["duration"], states)
     model, (motions, patches, counts, creep) = recorded.model, _wheels(recorded)
@@ -223,21 +202,12 @@ def breakdown(title, scene, states, passes):
 
 
 def with_limits(tables, found):
-    """Tables of :func:`breakdown` beside what the machine can do.
+    """Tables of :func:`breakdown` beside what the machine can do (:func:`limits`): operations and bytes per nanosecond,
+    ``least_ns``, what sets it, and how many times longer the stage takes.
 
-    Parameters
-    ----------
-    tables : sequence of pandas.DataFrame
-    found : dict
-        From :func:`limits`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        With operations and bytes per nanosecond; ``least_ns``, the longest of three times: all sums and products at the
-        rate of fused ones, all bytes at the first cache's bandwidth, all divisions and roots one by one; which of them
-        that is; and how many times longer the stage takes. What it takes beyond that is waiting of one operation for
-        another, branches, functions and whole numbers.
+    ``least_ns`` is the longest of three times: all sums and products at the rate of fused ones, all bytes at the first
+    cache's bandwidth, all divisions and roots one by one. What a stage takes beyond that is waiting of one operation
+    for another, branches, functions and whole numbers.
     """
     table = pd.concat(tables, ignore_index=True)
     table["flop_per_ns"], table["byte_per_ns"] = table["flops"] / table["ns"], table["bytes"] / table["ns"]

@@ -33,19 +33,8 @@ class Bar(NamedTuple):
 
 
 def take_turns(contenders, passes, clock=time.process_time):
-    """Seconds per unit of each contender in each pass.
-
-    Parameters
-    ----------
-    contenders : sequence of Contender
-    passes : int
-        One more before them, which compiles and warms up, is not counted.
-    clock : callable
-        Seconds; processor time by default, which leaves out what other processes take.
-
-    Returns
-    -------
-    numpy.ndarray, shape (passes, contenders)
+    """Seconds per unit of each contender in each pass, shape (passes, contenders), after one pass that compiles and
+    warms up; the clock is processor time by default, which leaves out what other processes take.
     """
     seconds = np.empty((passes + 1, len(contenders)))
     for row in seconds:
@@ -57,24 +46,10 @@ def take_turns(contenders, passes, clock=time.process_time):
 
 
 def compare(group, of, contenders, passes, unit="us", bar=None, clock=time.process_time):
-    """Rows of the table of benchmarks: contenders of a group against the first of them.
+    """Rows of the table of benchmarks: contenders of a group against the first of them, ``of`` saying what a unit is.
 
-    Parameters
-    ----------
-    group, of : str
-        What is compared, and what a unit is: an evaluation, a run.
-    contenders : sequence of Contender
-    passes : int
-    unit : {"ns", "us", "ms", "s"}
-        Of the times.
-    bar : Bar, optional
-    clock : callable
-
-    Returns
-    -------
-    list of dict
-        group, contender, of, unit; median and quartiles of the time; median and quartiles of the ratio to the first
-        contender, pass by pass; excess over it; passes; the bar in words and whether it is met.
+    group, contender, of, unit (ns, us, ms or s); median and quartiles of the time; median and quartiles of the ratio to
+    the first contender, pass by pass; excess over it; passes; the bar in words and whether it is met.
     """
     return summary(group, of, [c.label for c in contenders], take_turns(contenders, passes, clock), unit, bar)
 
@@ -101,12 +76,8 @@ def _quartiles(name, values):
 
 
 def machine():
-    """What was measured on, and with how much beside it.
-
-    Returns
-    -------
-    dict
-        processor, cores, load (processes waiting or running in the last minute), python, numpy, numba.
+    """What was measured on: processor, cores, load (processes waiting or running, last minute), python, numpy,
+    numba.
     """
     processor = platform.processor() or platform.machine()
     try:

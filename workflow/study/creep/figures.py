@@ -64,16 +64,8 @@ def _legend_below(figure, handles, columns, **kwargs):
 
 @styled
 def fig_creep_curves(curves):
-    """Forces of every law over pure longitudinal, pure lateral, pure spin and combined creepage.
-
-    Parameters
-    ----------
-    curves : pandas.DataFrame
-        From `study.creep.laws.creep_curves`; one model of each family.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Forces of every law, one model of each family, over pure longitudinal, pure lateral, pure spin and combined
+    creepage (`study.creep.laws.creep_curves`).
     """
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     for axes, (line, along, force, title) in zip(figure.subplots(2, 3).flat, CURVES, strict=True):
@@ -98,17 +90,7 @@ def fig_creep_curves(curves):
 
 @styled
 def fig_creep_traction(fields):
-    """Traction, stick and slip over the patch.
-
-    Parameters
-    ----------
-    fields : dict of str to ContactField
-        By title; one panel each.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Traction, stick and slip over the patch, a panel for each `ContactField` by title."""
     figure = Figure(figsize=(7.4, 3.3), layout="constrained")
     widths = [np.ptp(field.x_edges) for field in fields.values()]
     panels = figure.subplots(1, len(fields), squeeze=False, sharey=True, width_ratios=widths)[0]
@@ -154,16 +136,7 @@ def _traction(axes, field, top):
 
 
 def stick_border(field):
-    """Edges between stick and slip (and of stick with the patch's rim), as a polyline (m, 2) broken by NaN rows.
-
-    Parameters
-    ----------
-    field : ContactField
-
-    Returns
-    -------
-    ndarray
-    """
+    """Edges between stick and slip (and of stick with the patch's rim), as a polyline (m, 2) broken by NaN rows."""
     ny, n = field.x_edges.shape[0], field.x_edges.shape[1] - 1
     stick, gap = field.stick.reshape(ny, n), [np.nan, np.nan]
     rows = []
@@ -202,18 +175,8 @@ def _arrow_places(field, spacing=0.24):
 
 @styled
 def fig_creep_cost(laws, contact):
-    """Cost per case against the error that 95 % of the cases keep, for all laws, tables and levels.
-
-    Parameters
-    ----------
-    laws : pandas.DataFrame
-        From `study.creep.laws.laws_table`; the rows against CONTACT on ellipses are drawn.
-    contact : pandas.DataFrame
-        From `study.creep.laws.contact_points`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Cost per case against the error that 95 % of the cases keep, for all laws, tables and levels: rows of
+    `laws_table` against CONTACT on ellipses, and `contact_points`.
     """
     figure = Figure(figsize=(6.8, 4.6), layout="constrained")
     axes = figure.subplots()
@@ -260,19 +223,7 @@ def _annotate(axes, text, at, offset):
 
 @styled
 def fig_creep_error_map(errors, name):
-    """Where a table errs: over a/b with the size of creepage, with the spin direction and with the patch's shape.
-
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-        From `study.creep.smoothness.error_map`.
-    name : str
-        Name of the table.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Where a table errs (`error_map`): over a/b with the size of creepage, the spin direction, the patch's shape."""
     inputs = [("size", "size of creepage $r$ / 1"), ("beta", r"spin direction $\beta$ / rad")]
     inputs += [("psi", r"shape number $|\psi|$ / 1")] if np.ptp(errors["psi"]) > 0 else []
     figure = Figure(figsize=(0.8 + 2.2 * len(inputs), 4.6), layout="constrained")
@@ -289,19 +240,8 @@ def fig_creep_error_map(errors, name):
 
 
 def binned_errors(errors, column, error, share=0.95):
-    """Quantile of an error in cells of a/b (logarithmic) and another input (logarithmic for "size").
-
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-    column, error : str
-        The other input and the error.
-    share : float
-
-    Returns
-    -------
-    edges_a_over_b (n + 1,), edges (m + 1,), quantile (n, m)
-        NaN in cells without a case.
+    """Quantile (``share``) of an error in cells of a/b (logarithmic) and another input (logarithmic for "size"):
+    edges_a_over_b (n + 1,), edges (m + 1,), quantile (n, m), NaN in cells without a case.
     """
     patches = errors["a_over_b"].nunique()
     counts = (max(1, patches // 20), 5) if column == "psi" else (min(14, patches), 10)  # some patches in each cell
@@ -349,18 +289,8 @@ OUTPUTS = {
 
 @styled
 def fig_creep_smoothness(lines, table):
-    """A creep table's forces and slopes along lines that cross its cells, its pole and zero creepage.
-
-    Parameters
-    ----------
-    lines : pandas.DataFrame
-        From `study.creep.smoothness.smoothness`; dots are the exact solver.
-    table : pandas.DataFrame
-        From `study.creep.smoothness.smoothness_table`; the variation of F_x's slope at the pole is written in.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """A creep table's forces and slopes along lines that cross its cells, its pole and zero creepage (`smoothness`;
+    dots are the exact solver); the variation of F_x's slope at the pole (`smoothness_table`) is written in.
     """
     figure = Figure(figsize=(8.4, 4.6), layout="constrained")
     panels = figure.subplots(2, 4, sharex="col")

@@ -45,21 +45,8 @@ class Model(NamedTuple):
 
 
 def read_reference(folder):
-    """CONTACT's cases.
-
-    Parameters
-    ----------
-    folder : path-like
-        Holds `REFERENCE_FILES`, in the columns of ``wrcore creep`` with Fx_N, Fy_N, Mz_Nm.
-
-    Returns
-    -------
-    dict of str to ReferenceCases
-
-    Raises
-    ------
-    InputError
-        If a file is missing or a column or value is not as `wrcore.creep.cases.check_cases` expects.
+    """CONTACT's cases by file, from a folder with `REFERENCE_FILES` in the columns of ``wrcore creep`` with Fx_N, Fy_N,
+    Mz_Nm; InputError if a file is missing or a column or value is not as `wrcore.creep.cases.check_cases` expects.
     """
     return {name: _read_cases(Path(folder) / file) for name, file in REFERENCE_FILES.items()}
 
@@ -78,20 +65,7 @@ def _read_cases(path):
 
 
 def creep_models(nu, tables, grids):
-    """The laws to compare: linear, SHE, Polach, FASTSIM on each grid, and each table.
-
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio.
-    tables : dict of str to CreepTable
-    grids : sequence of int
-        FASTSIM's steps along x and strips across.
-
-    Returns
-    -------
-    list of Model
-    """
+    """Linear, SHE, Polach, FASTSIM on each grid (steps along x and strips across), and each table, for Poisson's nu."""
     plain = {"linear": "linear", "she": "SHE", "polach": "Polach"}
     models = [Model(name, law, LAWS[law], creep_data(nu)) for law, name in plain.items()]
     models += [Model(f"FASTSIM {n} x {n}", "fastsim", LAWS["fastsim"], creep_data(nu, grid=n)) for n in grids]
@@ -125,21 +99,11 @@ def _sizes(difference):
 
 
 def error_table(reference, models, nu, levels):
-    """Error of every law and of the exact solver in every reference case.
+    """Error of every law and of the exact solver at rising levels, the last of which is the reference "exact", in every
+    reference case.
 
-    Parameters
-    ----------
-    reference : dict of str to ReferenceCases
-    models : list of Model
-    nu : float
-    levels : sequence of int
-        Levels of the exact solver, rising; the last is what "exact" means as the other reference.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Rows: file x model x reference x case. Columns cases, model, family, against ("CONTACT" or "exact"), case_id,
-        force_error, moment_error, out_of_range (patches of this file that the model's data do not cover).
+    Rows: file x model x reference x case. Columns cases, model, family, against ("CONTACT" or "exact"), case_id,
+    force_error, moment_error, out_of_range (patches of this file that the model's data do not cover).
     """
     import pandas as pd
 
@@ -169,24 +133,11 @@ def random_arguments(count, planes, seed=0):
 
 
 def time_models(models, cases, nu, levels, passes):
-    """CPU seconds per case of every law and level; in each pass all of them take their turn.
+    """CPU seconds per case (s_per_case) of every law and level; in each pass all of them take their turn.
 
-    Laws run over random arguments in a compiled loop, the exact solver over the given cases one by one. A pass that
-    is not kept comes first, so that compilation and first loads are outside. A single exact case costs its operator
-    and one solution ("from nothing"); where cases share a patch, one solution ("ready").
-
-    Parameters
-    ----------
-    models : list of Model
-    cases : ReferenceCases
-    nu : float
-    levels : sequence of int
-    passes : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns pass, model, family, work, s_per_case.
+    Laws run over random arguments in a compiled loop, the exact solver over the given cases one by one. A pass that is
+    not kept comes first, so that compilation and first loads are outside. A single exact case costs its operator and
+    one solution ("from nothing"); where cases share a patch, one solution ("ready").
     """
     import pandas as pd
 
@@ -225,23 +176,9 @@ def _time_exact(cases, nu, level, count):
 
 
 def laws_table(errors, costs, tables):
-    """One row per file, reference and model: quantiles of the errors, cost, memory and build time.
-
-    Parameters
-    ----------
-    errors : pandas.DataFrame
-        From `error_table`.
-    costs : pandas.DataFrame
-        From `time_models`.
-    tables : pandas.DataFrame
-        One row per creep table: name, memory_MB, build_s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns cases, against, model, family, force_<quantile>, moment_<quantile> (`QUANTILES`), us_per_case and
-        us_from_nothing (medians over the passes), memory_MB, build_s (NaN where there is nothing to build),
-        out_of_range.
+    """One row per file, reference and model from `error_table`, `time_models` and creep ``tables`` (name, memory_MB,
+    build_s): force_<quantile> and moment_<quantile> (`QUANTILES`), us_per_case and us_from_nothing (medians over the
+    passes), memory_MB, build_s (NaN where there is nothing to build), out_of_range.
     """
     keys = ["cases", "against", "model", "family"]
     grouped = errors.groupby(keys, sort=False)
@@ -261,16 +198,7 @@ def laws_table(errors, costs, tables):
 
 
 def laws_markdown(laws):
-    """The table of `laws_table` for reading: errors in per cent, one section per file and reference.
-
-    Parameters
-    ----------
-    laws : pandas.DataFrame
-
-    Returns
-    -------
-    str
-    """
+    """The table of `laws_table` for reading: errors in per cent, one section per file and reference."""
     names = {f"{error}_{q}": f"{symbol} {q.replace('q', '')}" for error, symbol in ERRORS.items() for q in QUANTILES}
     units = {"us_per_case": "µs", "us_from_nothing": "µs with operator", "memory_MB": "MB", "build_s": "build s"}
     parts = [
@@ -286,20 +214,8 @@ def laws_markdown(laws):
 
 
 def timed_table(name, nu, planes, tolerance, progress=None):
-    """Build a creep table and measure what that costs, compilation apart.
-
-    Parameters
-    ----------
-    name : str
-        Goes into the row.
-    nu, planes, tolerance, progress
-        As for `wrcore.creep.table.build_table`.
-
-    Returns
-    -------
-    table : CreepTable
-    row : dict
-        name, build_s (CPU seconds with the random check), and all of `wrcore.creep.table.table_info`.
+    """Build a creep table (`wrcore.creep.table.build_table`) and measure what that costs, compilation apart: the table,
+    and a row with name, build_s (CPU seconds with the random check) and all of `wrcore.creep.table.table_info`.
     """
     random_errors(build_data(nu, planes, _WARM_UP), _WARM_UP.level, patches=1, per_patch=2)
     start = time.process_time()
@@ -308,18 +224,9 @@ def timed_table(name, nu, planes, tolerance, progress=None):
 
 
 def contact_points(folder):
-    """CONTACT's own errors and times, measured elsewhere on another machine, over the first ellipse cases.
-
-    Parameters
-    ----------
-    folder : path-like
-        Holds `CONTACT_TIMES`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns program ("CONTACT": given Hertz pressure, the faster of its two solvers; "its FASTSIM": parabolic
-        bound), n_across, force_q95, us_per_case.
+    """CONTACT's own errors (force_q95) and times (us_per_case), measured elsewhere on another machine
+    (`CONTACT_TIMES`), over the first ellipse cases: program is "CONTACT" (given Hertz pressure, the faster of its two
+    solvers) or "its FASTSIM" (parabolic bound).
     """
     import pandas as pd
 
@@ -346,21 +253,8 @@ def curve_creepages(points, translation=1.0, spin=4.0, held_spin=0.6):
 
 
 def creep_curves(models, nu, a_over_b, level, points):
-    """Forces of every law and of the exact solver along lines of creepage.
-
-    Parameters
-    ----------
-    models : list of Model
-        The names become those of the curves.
-    nu, a_over_b : float
-    level, points : int
-        Level of the exact solver; points on each line.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns line ("longitudinal", "lateral", "spin", "combined": lateral at a held spin), model, family, xi, eta,
-        phi, fx, fy, mz; the exact solution has the family "exact".
+    """Forces of every law and of the exact solver (family "exact") at a level along lines of creepage ("longitudinal",
+    "lateral", "spin", "combined": lateral at a held spin): line, model, family, xi, eta, phi, fx, fy, mz.
     """
     import pandas as pd
 

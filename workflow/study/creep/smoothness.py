@@ -29,9 +29,8 @@ def _stratified(low, high, count, rng):
 
 
 def sized_creepages(g, size, alpha, beta, kalker):
-    """Creepages (..., 3) of a size r and a direction (alpha, beta) as `wrcore.creep.axes` defines them.
-
-    Without spin the linear force is 3 r mu N, so that full slip comes near r = 1.
+    """Creepages (..., 3) of a size r and a direction (alpha, beta) as `wrcore.creep.axes` defines them; without spin
+    the linear force is 3 r mu N, so that full slip comes near r = 1.
     """
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     rate = scales(g, c11, c22, c23)[-1]
@@ -39,21 +38,8 @@ def sized_creepages(g, size, alpha, beta, kalker):
 
 
 def error_map(model, patches, level, seed=0):
-    """Error of a table against the exact solver all over its range.
-
-    Parameters
-    ----------
-    model : Model
-        The table.
-    patches : (int, int)
-        Parts of the range of ln(a/b) and of abs(psi); one random patch from each pair of them.
-    level, seed : int
-        Level of the exact solver, seed.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns a_over_b, psi, size, alpha, beta, force_error, moment_error.
+    """Error of a table against the exact solver all over its range, at one random patch from each pair of parts of the
+    range of ln(a/b) and of abs(psi): a_over_b, psi, size, alpha, beta, force_error, moment_error.
     """
     import pandas as pd
 
@@ -95,21 +81,9 @@ def smooth_lines(axes):
 
 
 def smoothness(model, level, points, exact_points):
-    """Forces and slopes of a table along `smooth_lines` and, on one of them, where it bends most, a hundredfold.
-
-    Parameters
-    ----------
-    model : Model
-    level : int
-        Level of the exact solver.
-    points, exact_points : int
-        Points on each line for the table (odd) and for the exact solver.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns line ("cells", "border", "axis", "zero"), source ("table", "exact"), x, fx, fy, mz, and slopes
-        dfx, dfy, dmz (central differences along x).
+    """Forces and slopes of a table along `smooth_lines` and, on one of them, where it bends most, a hundredfold
+    ("border"), with the exact solver at fewer points: line, source ("table", "exact"), x, fx, fy, mz, and slopes dfx,
+    dfy, dmz (central differences along x). ``points`` is odd.
     """
     import pandas as pd
 
@@ -150,18 +124,12 @@ def _exact_along(places, nu, level):
 
 
 def smoothness_table(lines):
-    """How much the slopes vary along each line of `smoothness`, and whether they jump.
+    """How much the slopes vary along each line of `smoothness`, and whether they jump, a row per line, source and
+    output.
 
-    Parameters
-    ----------
-    lines : pandas.DataFrame
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per line, source and output: slope (largest size), variation (largest minus smallest slope over the
-        largest size) and, for the table, step (largest change of the slope over `SPAN` points over the same) and
-        step_ratio: that step over the one of twice the span. A slope without jumps gives 0.5, a jump gives 1.
+    Columns: slope (largest size), variation (largest minus smallest slope over the largest size) and, for the table,
+    step (largest change of the slope over `SPAN` points over the same) and step_ratio: that step over the one of twice
+    the span. A slope without jumps gives 0.5, a jump gives 1.
     """
     import pandas as pd
 

@@ -22,18 +22,8 @@ LEAST_ENERGY = 0.05
 
 @styled
 def fig_root_locus(loci, linear):
-    """Damping ratio and frequency of all oscillations over speed; hunting stands out.
-
-    Parameters
-    ----------
-    loci : dict of str to pandas.DataFrame
-        Tables of `loci`, by title of the row of panels.
-    linear : dict of str to pandas.DataFrame
-        Tables of `critical_speeds`; that of the variant ``spatial`` is marked.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Damping ratio and frequency of all oscillations over speed (tables of `loci` by title of the row of panels);
+    hunting stands out, and the variant ``spatial`` of `critical_speeds` (``linear``) is marked.
     """
     figure = Figure(figsize=(7.0, 0.6 + 2.3 * len(loci)), layout="constrained")
     panels = figure.subplots(len(loci), 2, sharex=True, squeeze=False)
@@ -68,18 +58,8 @@ def _critical(table):
 
 @styled
 def fig_modes(table, title):
-    """Modes at one speed: frequency, damping, and where their kinetic energy is.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        First table of `modes`; what does not oscillate is left out, modes of equal name, frequency and damping stand in
-        one row.
-    title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Modes at one speed (first table of `modes`): frequency, damping, and where their kinetic energy is. What does not
+    oscillate is left out; modes of equal name, frequency and damping stand in one row.
     """
     table = table[table["damping_ratio"] < OVERDAMPED]
     labels = pd.Series(
@@ -108,20 +88,10 @@ def fig_modes(table, title):
 
 @styled
 def fig_limit_cycles(tables, linear):
-    """Amplitude of wheelsets over speed: what a large and what a small disturbance leave.
+    """Amplitude of wheelsets over speed (`limit_cycles` with a column detection, by title of the panel): what a large
+    and what a small disturbance leave; the variant ``spatial`` of `critical_speeds` (``linear``) is marked.
 
     Irregular motions are stars that no line joins, motions that end beside the rails are crosses at the top.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        Tables of `limit_cycles` with a column detection, by title of the panel.
-    linear : dict of str to pandas.DataFrame
-        Tables of `critical_speeds`; that of the variant ``spatial`` is marked.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     figure = Figure(figsize=(7.0, 0.6 + 2.4 * len(tables)), layout="constrained")
     panels = figure.subplots(len(tables), 1, squeeze=False)[:, 0]

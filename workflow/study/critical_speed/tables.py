@@ -6,19 +6,8 @@ from wrcore.analysis.limit_cycles import nonlinear_critical_speed
 
 
 def critical_table(linear, cycles):
-    """Linear and nonlinear critical speeds.
-
-    Parameters
-    ----------
-    linear : dict of str to pandas.DataFrame
-        Tables of `wrcore.analysis.stability.critical_speeds` by vehicle; the variants ``planar`` and ``spatial`` count.
-    cycles : dict of str to pandas.DataFrame
-        Tables of :func:`limit_cycles` with a column detection, by the same vehicles.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per vehicle and detection.
+    """Linear (`critical_speeds`; variants ``planar`` and ``spatial``) and nonlinear critical speeds (`limit_cycles`
+    with a column detection), both by vehicle: a row per vehicle and detection.
     """
     rows = []
     for vehicle, table in linear.items():

@@ -36,20 +36,8 @@ rotation is then still exact to a hundredth of it."""
 
 @dataclass(frozen=True)
 class Check:
-    """One invariant of a case.
-
-    Attributes
-    ----------
-    invariant : str
-    value : float
-    limit : float
-        Largest value that passes; the smallest one if ``least``.
-    unit : str
-    source : str
-        Where the limit comes from.
-    least : bool
-    known_limit : str
-        Why the models in use cannot pass, where that is known.
+    """One invariant of a case: ``limit`` is the largest value that passes (the smallest if ``least``), ``source`` where
+    it comes from, ``known_limit`` why the models in use cannot pass, where that is known.
     """
 
     invariant: str
@@ -68,17 +56,8 @@ class Check:
 
 @dataclass(frozen=True)
 class Setting:
-    """A vehicle, ready to run.
-
-    Attributes
-    ----------
-    scene : Scene
-    model : Model
-        Its arrays may be changed between parts of a run.
-    state : numpy.ndarray
-        Start.
-    label : dict
-        Columns vehicle, detection and integrator of the table.
+    """A vehicle, ready to run from ``state``: arrays of the model may be changed between parts of a run, ``label``
+    holds the columns vehicle, detection and integrator of the table.
     """
 
     scene: object
@@ -95,21 +74,8 @@ class Setting:
 
 
 def prepare(vehicles, name, changes=(), **parts):
-    """A vehicle of the study in some scene.
-
-    Parameters
-    ----------
-    vehicles : dict of str to dict
-        ``scene`` and ``set`` (changes to it) by name of the vehicle.
-    name : str
-    changes : dict
-        Further changes to the scene.
-    **parts
-        Attributes of the scene to be replaced, such as ``wheel`` or ``track``.
-
-    Returns
-    -------
-    Setting
+    """A vehicle of the study (``scene`` and ``set``, changes to it, by name) as a `Setting`, with further changes to
+    the scene; ``parts`` are attributes of the scene to be replaced, such as ``wheel`` or ``track``.
     """
     entry = vehicles[name]
     chosen = {**entry.get("set", {}), **dict(changes)}
@@ -121,20 +87,8 @@ def prepare(vehicles, name, changes=(), **parts):
 
 
 def with_forces(setting, body, markers):
-    """The same with constant forces on one body, which are zero until they are set.
-
-    Parameters
-    ----------
-    setting : Setting
-    body : int
-    markers : array_like, shape (n, 3)
-        Where they act, relative to the body's centre, m.
-
-    Returns
-    -------
-    setting : Setting
-    forces : numpy.ndarray, shape (n, 3)
-        View of the model's forces in the axes of the moving frame, N.
+    """The same with constant forces on one body at markers (n, 3), relative to the body's centre (m): the setting, and
+    a view (n, 3) of the forces (N, axes of the moving frame), zero until they are set.
     """
     elements, markers = setting.model.elements, np.atleast_2d(np.asarray(markers, float))
     rows = np.zeros((len(markers), elements.springs.shape[1]))
@@ -157,23 +111,8 @@ def run(setting, duration, rate=200.0, begin=0.0, **control):
 
 
 def run_in_parts(setting, duration, rate, part, change, **control):
-    """Integrate part by part, with something in the model changed before each.
-
-    Parameters
-    ----------
-    setting : Setting
-    duration, rate : float
-        s and 1/s.
-    part : float
-        Length of a part, s.
-    change : callable
-        Takes the time at which a part begins and the state there; may change the model's arrays, and ends the run by
-        returning True.
-
-    Returns
-    -------
-    Trajectory
-        Of all parts together.
+    """Integrate for a duration (s) at an output rate (1/s), part (s) by part: ``change`` takes the time and the state
+    at which each begins, may change the model's arrays, and ends the run by returning True.
     """
     done, at, state = [], 0.0, setting.state
     for index in range(math.ceil(duration / part - 1e-9)):
@@ -218,20 +157,9 @@ def wheel_forces(patches):
 
 
 def impulse_error(setting, trajectory, patches):
-    """Impulse of the rails less that of the load and less the momentum gained by all bodies, of the load's.
-
-    Parameters
-    ----------
-    setting : Setting
-        Whose elements to the moving frame have no vertical stiffness: their preloads and the weight are the load.
-    trajectory : Trajectory
-        Sampled uniformly, closely enough for the forces.
-    patches : numpy.ndarray
-        From :func:`contacts`.
-
-    Returns
-    -------
-    float
+    """Impulse of the rails less that of the load and less the momentum gained by all bodies, of the load's, over a
+    trajectory sampled closely enough for the forces (patches from :func:`contacts`). The load is the weight and the
+    preloads of elements to the moving frame, which have no vertical stiffness.
     """
     bodies, elements = setting.model.bodies, setting.model.elements
     preloads = [
@@ -262,21 +190,7 @@ def sound(setting, trajectory):
 
 
 def rows(family, case, condition, setting, trajectory, checks, expected="completed"):
-    """Rows of the table for one run: one per check.
-
-    Parameters
-    ----------
-    family, case, condition : str
-    setting : Setting
-    trajectory : Trajectory
-    checks : sequence of Check
-    expected : str
-        Status that counts as survived.
-
-    Returns
-    -------
-    list of dict
-    """
+    """Rows of the table for one run: one per check; ``expected`` is the status that counts as survived."""
     used = trajectory.method
     label = setting.label | {"integrator": used if setting.control["step"] == 0.0 else f"{used}, fixed step"}
     outcome = "survived" if trajectory.status in ("completed", expected) else "failed"

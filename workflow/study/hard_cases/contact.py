@@ -60,21 +60,11 @@ CREST_RATE = 2e4
 
 
 def restitution(speed, c_e, v0):
-    """Speed after over speed before an impact by Eq. (7), without weight.
+    """Speed after over speed (m/s) before an impact by Eq. (7), without weight; c_e and v0 (m/s) are those of the
+    damping factor.
 
     With m v v' = -c_d(v') f(d) and any elastic force f that depends on the penetration alone, int v/c_d(v) dv over the
     approach equals int v/c_d(-v) dv over the separation. For speeds far above v0 that is sqrt(c_e).
-
-    Parameters
-    ----------
-    speed : float
-        Of the approach, m/s.
-    c_e, v0 : float
-        Of the damping factor.
-
-    Returns
-    -------
-    float
     """
 
     def stored(end, sign):
@@ -92,24 +82,10 @@ def depth(setting, speed):
 
 
 def impacts(vehicles, name, speeds, detections, methods):
-    """A wheelset that hits the rails without weight: its restitution against that of the damping law.
+    """A free wheelset that hits the rails at vertical speeds (m/s) without weight, its restitution against that of the
+    damping law: rows of the table, and curve of restitution and expected.
 
     Where the study's tolerance is no small part of how deep it goes in, ``rtol`` is made `RESOLVED` of that.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them; a free wheelset.
-    speeds : sequence of float
-        Vertical, m/s.
-    detections, methods : sequence of str
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        detection, integrator, speed_m_per_s, restitution, expected.
     """
     found, curve = [], []
     for detection, method, speed in product(detections, methods, speeds):
@@ -136,24 +112,9 @@ def impacts(vehicles, name, speeds, detections, methods):
 
 
 def drops(vehicles, name, height, duration, detections, methods, tolerances):
-    """A wheelset that falls onto the rails, bounces and comes to rest: it never gets higher than before.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them; a free wheelset.
-    height, duration : float
-        m and s.
-    detections, methods : sequence of str
-    tolerances : sequence of float
-        Relative ones; the absolute one is a thousandth of it.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        detection, integrator, rtol, t_s, lift_m (above the static height).
+    """A free wheelset that falls from a height (m) onto the rails, bounces and comes to rest within a duration (s) at
+    relative tolerances (the absolute one is a thousandth): it never gets higher than before. Rows of the table, and
+    curve of lift_m (above the static height) over t_s.
     """
     found, curve = [], []
     for detection, method, rtol in product(detections, methods, tolerances):
@@ -195,20 +156,8 @@ def crest(length, curvature, begin):
 
 
 def crests(vehicles, speed, length, duration, detections, methods):
-    """Vehicles that run over a hump: wheels take off where V^2 kappa exceeds what presses them down, and come back.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    speed, length, duration : float
-        m/s, m and s.
-    detections, methods : sequence of str
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles that run over a hump of a length (m) at a speed (m/s) for a duration (s): wheels take off where V^2
+    kappa exceeds what presses them down, and come back; rows of the table.
     """
     found = []
     for name, detection, method, kind in product(vehicles, detections, methods, CRESTS):
@@ -249,25 +198,11 @@ def _crest_checks(setting, trajectory, share):
 
 
 def pose_sweeps(pairs, load, step, reach, far_step, far):
-    """Static sweeps of loaded pairs: how far the force steps, and whether the way back is the way there.
+    """Static sweeps of pairs (settings of :func:`study.contact.tables.study_pair`) under a load (N per wheel): how far
+    the force steps at constant height (``step``, ``reach``), and whether the way back is the way there at constant load
+    (``far_step``, ``far``), all m.
 
-    Parameters
-    ----------
-    pairs : dict of str to dict
-        Settings of :func:`study.contact.tables.study_pair` by name.
-    load : float
-        N per wheel.
-    step, reach : float
-        Of the sweep at constant height, m.
-    far_step, far : float
-        Of the sweep at constant load, to and fro, m.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        pair, detection, reduction, y_m, u_wheel_m (left wheel's most loaded patch), force_N (lateral, both wheels).
+    Rows of the table, and curve of u_wheel_m (left, most loaded patch) and force_N (lateral, both wheels) over y_m.
     """
     found, curve = [], []
     for pair, settings in pairs.items():
@@ -310,24 +245,8 @@ def _at_load(geometry, detection, load, y):
 
 
 def slow_push(vehicles, name, largest, durations, detections, methods):
-    """A wheelset pushed over its contact jumps and back at two rates: what is left of the loop at no rate at all.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them.
-    largest : float
-        Force to the left, N.
-    durations : (float, float)
-        Of push and return together, s; the second one slower.
-    detections, methods : sequence of str
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        detection, integrator, duration_s, force_N, y_m.
+    """A wheelset pushed to the left by a force up to ``largest`` (N) over its contact jumps and back in two durations
+    (s, the second longer): what is left of the loop at no rate. Rows of the table, and curve of y_m over force_N.
     """
     found, curve = [], []
     for detection, method in product(detections, methods):

@@ -34,17 +34,7 @@ def _panels(count, width=7.2, height=2.9):
 
 @styled
 def fig_low_speed(curves):
-    """Braking to standstill, and what the smallest speed of creepages changes.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``low_speed``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Braking to standstill, and what the smallest speed of creepages changes (family ``low_speed``)."""
     figure, (braking, influence) = _panels(2, 7.8)
     rows = pd.DataFrame(curves["braking"])
     rows = rows[(rows["detection"] == "spatial") & (rows["least_speed_m_per_s"] == rows["least_speed_m_per_s"].min())]
@@ -71,16 +61,8 @@ def fig_low_speed(curves):
 
 @styled
 def fig_contact_jumps(curves):
-    """Lateral force and contact point of a loaded wheelset over y, and a slow push to the flange and back.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``contact``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Lateral force and contact point over y under load, and a slow push to the flange and back (family
+    ``contact``).
     """
     figure, (force, point, push) = _panels(3, 9.0)
     for (pair, detection), part in _groups(curves["pose_sweeps"], "pair", "detection"):
@@ -103,17 +85,7 @@ def fig_contact_jumps(curves):
 
 @styled
 def fig_lift_off(curves):
-    """Restitution over speed against the damping law's, and a drop that bounces.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``contact``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Restitution over speed against the damping law's, and a drop that bounces (family ``contact``)."""
     figure, (impact, drop) = _panels(2)
     rows = pd.DataFrame(curves["impacts"])
     law = rows.drop_duplicates("speed_m_per_s").sort_values("speed_m_per_s")
@@ -138,17 +110,7 @@ def fig_lift_off(curves):
 
 @styled
 def fig_nadal(curves):
-    """Y/Q at which a wheelset climbs over friction, with Nadal's limit.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``flange``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Y/Q at which a wheelset climbs over friction, with Nadal's limit (family ``flange``)."""
     figure, (axes,) = _panels(1, 4.2, 3.0)
     rows = pd.DataFrame(curves["nadal"])
     limit = rows.drop_duplicates("friction").sort_values("friction")
@@ -163,17 +125,7 @@ def fig_nadal(curves):
 
 @styled
 def fig_stability_map(curves):
-    """Largest stable fixed step over speed: found (markers) and of the linearised motion (lines).
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``integration``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Largest stable step over speed: found (markers), of the linearised motion (lines; family ``integration``)."""
     groups = _groups(curves["stability_map"], "vehicle")
     figure, panels = _panels(groups.ngroups, 3.7 * groups.ngroups, 3.1)
     for axes, ((vehicle,), table) in zip(panels, groups, strict=True):
@@ -191,17 +143,7 @@ def fig_stability_map(curves):
 
 @styled
 def fig_tolerances(curves):
-    """Error over the tolerance for every integrator, and what Baumgarte's feedback does to drift and steps.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``integration``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Error over the tolerance by integrator, drift and steps over Baumgarte's feedback (family ``integration``)."""
     figure, (errors, drift, steps) = _panels(3, 9.0)
     rows = pd.DataFrame(curves["tolerance_ladder"])
     rows = rows[(rows["vehicle"] == rows["vehicle"].iloc[0]) & (rows["detection"] == rows["detection"].iloc[-1])]
@@ -230,16 +172,8 @@ def fig_tolerances(curves):
 
 @styled
 def fig_sharp_curve(curves):
-    """Lateral force of all wheels on the rails through a transition into a sharp curve, and what Newton's law asks for.
-
-    Parameters
-    ----------
-    curves : dict of str to list of dict
-        Of the family ``track``.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Lateral force of all wheels on the rails through a transition into a sharp curve, and what Newton's law asks for
+    (family ``track``).
     """
     figure, (axes,) = _panels(1, 5.2, 3.8)
     rows = pd.DataFrame(curves["curve"])

@@ -48,25 +48,9 @@ def flange_angle(scene):
 
 
 def pushed(setting, body, turn, rate, largest, settle):
-    """A wheelset is turned towards a rail and pushed onto it by a rising force until it derails.
-
-    Parameters
-    ----------
-    setting : Setting
-    body : int
-        A wheelset.
-    turn : float
-        Force ahead on its right and backwards on its left end, which turns it to the left, N; reached at half the time
-        to settle.
-    rate, largest : float
-        Of the force to the left, N/s and N.
-    settle : float
-        Time before that force begins, s.
-
-    Returns
-    -------
-    setting : Setting
-    trajectory : Trajectory
+    """Setting and trajectory of a wheelset that is turned towards a rail and, after ``settle`` (s), pushed onto it by a
+    force to the left that rises at a rate (N/s) to ``largest`` (N), until it derails; ``turn`` (N) acts ahead on its
+    right and backwards on its left end, in full at half the time to settle.
     """
     low = -setting.scene.vehicle.rolling_radius
     setting, force = with_forces(setting, body, [[0.0, AXLE_BOX, low], [0.0, -AXLE_BOX, low]])
@@ -79,13 +63,8 @@ def pushed(setting, body, turn, rate, largest, settle):
 
 
 def flange_history(setting, trajectory, body):
-    """What the left wheel of a pushed wheelset does over time.
-
-    Returns
-    -------
-    dict of str to numpy.ndarray, shape (n,)
-        t_s, y_m, yaw_rad, Y_over_Q (sliding mean over 2 m; NaN where the wheel is as good as unloaded), patches,
-        contact_angle_rad (steepest).
+    """What the left wheel of a pushed wheelset does over time, shapes (n,): t_s, y_m, yaw_rad, Y_over_Q (sliding mean
+    over 2 m; NaN where the wheel is as good as unloaded), patches, contact_angle_rad (steepest).
     """
     k = int(np.flatnonzero(setting.model.bodies.wheelsets == body)[0])
     patches = contacts(setting.model, trajectory.t, trajectory.states)[:, k, 0]
@@ -126,22 +105,8 @@ def _recognised(setting, trajectory):
 
 
 def derailments(vehicles, speeds, detections, methods, pushes):
-    """Vehicles whose first wheelset is pushed over the rail at several speeds.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    speeds : sequence of float
-        m/s.
-    detections, methods : sequence of str
-    pushes : dict of str to dict
-        Largest force and its rate by vehicle: ``largest`` (N), ``rate`` (N/s).
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles whose first wheelset is pushed over the rail at several speeds (m/s), by ``pushes`` of a ``largest``
+    force (N) at a ``rate`` (N/s) by vehicle: rows of the table.
     """
     found = []
     for name, speed, detection, method in product(pushes, speeds, detections, methods):
@@ -162,27 +127,9 @@ def derailments(vehicles, speeds, detections, methods, pushes):
 
 
 def nadal(vehicles, name, speed, frictions, detections, turn, push):
-    """Y/Q at which a wheelset with a large angle of attack climbs under a slowly rising force, over friction.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them.
-    speed : float
-        m/s.
-    frictions : sequence of float
-    detections : sequence of str
-    turn : float
-        As for :func:`pushed`, N.
-    push : dict
-        ``largest`` (N), ``rate`` (N/s).
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        detection, friction, Y_over_Q, nadal, yaw_rad (when it climbs).
+    """Y/Q at which a wheelset with a large angle of attack (``turn``, N, as for :func:`pushed`) climbs at a speed (m/s)
+    under a slowly rising force (``largest``, N, and ``rate``, N/s, of the push), over friction: rows of the table, and
+    curve of Y_over_Q, nadal and yaw_rad when it climbs.
     """
     found, curve = [], []
     for detection, friction in product(detections, frictions):

@@ -30,26 +30,8 @@ def used_friction(patches, friction):
 
 
 def friction_ladder(vehicles, names, values, laws, duration, detections, unstable=()):
-    """Vehicles released off the centre at frictions from none to very high.
-
-    Parameters
-    ----------
-    vehicles, names
-        As :func:`study.hard_cases.cases.prepare` takes them; several names.
-    values : sequence of float
-        Friction coefficients.
-    laws : sequence of str
-        Creep laws.
-    duration : float
-        s.
-    detections : sequence of str
-    unstable : sequence of str
-        Vehicles that may end in a derailment: their motion grows until they climb.
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles released off the centre for a duration (s) at friction coefficients from none to very high, by creep
+    law: rows of the table. The motion of ``unstable`` vehicles grows until they climb: they may end in a derailment.
     """
     entry = vehicles[names[0]]
     label = {"vehicle": names[0], "detection": "any", "integrator": "any"}
@@ -85,23 +67,7 @@ def frictionless(vehicles, name, duration, detections, methods):
 
 
 def friction_step(vehicles, names, values, part, detections, methods):
-    """A track whose friction changes from part to part within `STEP`.
-
-    Parameters
-    ----------
-    vehicles, names
-        As :func:`study.hard_cases.cases.prepare` takes them; several names.
-    values : sequence of float
-        Friction of the parts.
-    part : float
-        Time in which a wheelset passes a part, s.
-    detections, methods : sequence of str
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
-    """
+    """A track whose friction changes within `STEP` after each part, passed in ``part`` (s): rows of the table."""
     found = []
     for name, detection, method in product(names, detections, methods):
         changes = {"contact.detection": detection, "integration.method": method, "initial.y": 0.004}
@@ -127,23 +93,9 @@ def friction_step(vehicles, names, values, part, detections, methods):
 
 
 def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
-    """Creep laws at the ends of their range: flat and slender patches, creepages and spin without bounds.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them; their creep table and material are used.
-    ratios : sequence of float
-        a/b.
-    sizes : sequence of float
-        Nondimensional creepages; each alone and all together.
-    tolerance : float
-        Change of a force, as a fraction of mu N, that a change of a/b by a tenth of it may make.
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Creep laws of a vehicle's table and material at the ends of their range, flat and slender patches (``ratios``
+    a/b), creepages and spin without bounds (nondimensional ``sizes``, each alone and all together): rows of the table.
+    ``tolerance`` is the change of a force (of mu N) that a change of a/b by a tenth of it may make.
     """
     found = []
     directions = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])

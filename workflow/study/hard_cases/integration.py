@@ -46,14 +46,8 @@ VIOLATION = 1e-5
 
 
 def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duration):
-    """Every method from very loose to very tight: it survives, and errors fall with the tolerance.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        vehicle, detection, integrator, rtol, error_m (largest in y), steps, wall_s.
+    """Every method from very loose to very tight at a speed (m/s) for a duration (s): it survives, and errors fall with
+    the tolerance. Rows of the table, and curve of error_m (largest in y), steps and wall_s over rtol.
     """
     found, curve = [], []
     for name, detection in product(names, detections):
@@ -114,24 +108,8 @@ def predicted_step(method, eigenvalues, longest):
 
 
 def stability_map(vehicles, names, speeds, methods, longest):
-    """Largest stable fixed step of every method over speed, against that of the linearised motion.
-
-    Parameters
-    ----------
-    vehicles, names
-        As :func:`study.hard_cases.cases.prepare` takes them; several names.
-    speeds : sequence of float
-        m/s.
-    methods : sequence of str
-    longest : float
-        Steps above this are not tried, s.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        vehicle, integrator, speed_m_per_s, predicted_s, found_s.
+    """Largest stable fixed step of every method over speed (m/s), up to ``longest`` (s), against that of the linearised
+    motion: rows of the table, and curve of predicted_s and found_s.
     """
     found, curve = [], []
     for name, speed in product(names, speeds):
@@ -213,24 +191,9 @@ def violations(model, times, states):
 
 
 def baumgarte(vehicles, name, pairs, duration, methods):
-    """Joints under Baumgarte's feedback from none to very stiff: drift, and what it costs in steps.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them; a vehicle with joints.
-    pairs : sequence of (float, float)
-        alpha and beta, 1/s.
-    duration : float
-        s.
-    methods : sequence of str
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        integrator, alpha_per_s, beta_per_s, violation_m, steps, smallest_step_s, fastest_root_per_s.
+    """Joints under Baumgarte's feedback (``pairs`` of alpha and beta, 1/s) from none to very stiff for a duration (s):
+    drift, and what it costs in steps. Rows of the table, and curve of violation_m, steps, smallest_step_s and
+    fastest_root_per_s.
     """
     found, curve = [], []
     for method, (alpha, beta) in product(methods, pairs):
@@ -252,14 +215,8 @@ def baumgarte(vehicles, name, pairs, duration, methods):
 
 
 def long_run(vehicles, names, duration, changes, rate, methods):
-    """Long hunting: joints, Euler parameters and the amplitude do not drift.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        vehicle, integrator, t_s, violation_m, norm.
+    """Long hunting for a duration (s), outputs at a rate (1/s): joints, Euler parameters and the amplitude do not
+    drift. Rows of the table, and curve of violation_m and norm over t_s.
     """
     found, curve = [], []
     for name, method in product(names, methods):

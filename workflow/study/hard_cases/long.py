@@ -28,24 +28,8 @@ class _BrokenOffError(Exception):
 
 
 def hunting(vehicles, name, changes, duration, rate=200.0):
-    """A limit cycle over a long time: as a whole, and broken off half-way and taken up again.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    name : str
-    changes : dict
-        To the scene: the speed of a stable limit cycle.
-    duration : float
-        s.
-    rate : float
-        Outputs, 1/s.
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """A limit cycle over a long duration (s), outputs at a rate (1/s), as a whole and broken off half-way and taken up
+    again: rows of the table. ``changes`` to the scene give the speed of a stable limit cycle.
     """
     kept = {"integration.duration": duration, "output.rate": rate, "output.channels": "[pose, velocity]"}
     setting = prepare(vehicles, name, {**changes, **kept})
@@ -112,9 +96,8 @@ def _differing_channels(one, other):
 
 
 def _drifts(run, setting):
-    """Relative change of the first wheelset's amplitude and mean lateral kinetic energy, second part to last.
-
-    The amplitude is sqrt(2) times the root mean square over whole periods.
+    """Relative change of the first wheelset's amplitude (sqrt(2) times the root mean square over whole periods) and
+    mean lateral kinetic energy, second part to last.
     """
     body = int(setting.model.bodies.wheelsets[0])
     wheelset = run[setting.scene.vehicle.body_names[body]]

@@ -28,23 +28,8 @@ def fastest_time_scale(setting):
 
 
 def ladder(vehicles, speeds, methods, duration):
-    """Vehicles released off the centre at ever lower speeds: no blow-up, no step collapse.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    speeds : sequence of float
-        m/s.
-    methods : dict of str to float
-        Lowest speed (m/s) at which an integrator is run, by its name.
-    duration : float
-        s.
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles released off the centre for a duration (s) at ever lower speeds (m/s), down to the lowest of each
+    integrator (``methods``, m/s): no blow-up, no step collapse; rows of the table.
     """
     found = []
     for name, detection, speed, method in product(vehicles, DETECTIONS, speeds, methods):
@@ -64,26 +49,11 @@ def ladder(vehicles, speeds, methods, duration):
 
 
 def slow_path(vehicles, name, speeds, distance, critical_speed):
-    """One suspended wheelset over the same distance at several speeds: without inertia its path is that of the slowest.
+    """One suspended wheelset over the same distance (m) at several falling speeds (m/s): without inertia its path is
+    that of the slowest; rows of the table.
 
     Springs and rolling depend on the distance alone. Inertia forces grow like V^2 and reach the size of the others at
-    the critical speed.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them.
-    speeds : sequence of float
-        Falling, m/s.
-    distance : float
-        m.
-    critical_speed : float
-        m/s.
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    the critical speed (m/s).
     """
     found = []
     for detection in DETECTIONS:
@@ -103,25 +73,9 @@ def slow_path(vehicles, name, speeds, distance, critical_speed):
 
 
 def regularisation(vehicles, name, speeds, least_speeds, distance):
-    """Influence of the smallest speed that creepages are divided by, at speeds above and below it.
-
-    Parameters
-    ----------
-    vehicles, name
-        As :func:`study.hard_cases.cases.prepare` takes them.
-    speeds : sequence of float
-        m/s.
-    least_speeds : sequence of float
-        ``contact.creep.least_speed``, m/s; the first one, below all speeds, is compared with.
-    distance : float
-        m.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curve : list of dict
-        vehicle, speed_m_per_s, least_speed_m_per_s, y_off_m (largest departure from the first run).
+    """Influence over a distance (m) of the smallest speed that creepages are divided by (``contact.creep.least_speed``,
+    m/s; the first, below all speeds, is compared with), at speeds (m/s) above and below it: rows of the table, and
+    curve of y_off_m (largest departure from the first run).
     """
     found, curve, reference = [], [], {}
     for speed, least in product(speeds, least_speeds):
@@ -169,28 +123,12 @@ def largest_drag(setting):
 
 
 def braking(vehicles, speed, deceleration, rest, least_speeds):
-    """Vehicles that a constant force slows down to standstill, where it ends; then they must stay.
+    """Vehicles that a constant force slows down from a speed (m/s) at a deceleration (m/s^2) to standstill, where it
+    ends; then they must stay for ``rest`` (s). Rows of the table, and curve of v_m_per_s over t_s, by
+    ``contact.creep.least_speed`` (m/s).
 
     The frame runs at constant speed, so the vehicle is let go from it along the track and drawn back at its heaviest
     body. Wheels that roll lose momentum at the rate of the force, their spin included: m v + J omega/r = P0 - F t.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    speed, deceleration : float
-        m/s and m/s^2.
-    rest : float
-        Time at standstill, s.
-    least_speeds : sequence of float
-        ``contact.creep.least_speed``, m/s.
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    curves : list of dict
-        vehicle, detection, least_speed_m_per_s, t_s, v_m_per_s.
     """
     found, curves = [], []
     for name, detection, least in product(vehicles, DETECTIONS, least_speeds):

@@ -22,22 +22,9 @@ HEAD_RADIUS = 0.3
 
 
 def worn(wheel, rail, offset, share, reach):
-    """Ordinates of a wheel profile that is worn towards the rail around the tape circle.
-
-    Parameters
-    ----------
-    wheel, rail : ProfileCurve
-    offset : float
-        Wheel's minus rail's lateral coordinate of the same place in the track, m.
-    share : float
-        Part of the gap between both that wear has closed at the middle.
-    reach : float
-        Distance from the middle at which it ends, m.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-        At the wheel's nodes, m.
+    """Ordinates (n,), m, at its nodes of a wheel profile that is worn towards the rail around the tape circle: wear has
+    closed a ``share`` of the gap at the middle and ends at ``reach`` (m) from it; ``offset`` (m) is the wheel's minus
+    the rail's lateral coordinate of the same place in the track.
     """
     on_rail = np.clip(wheel.u - offset, rail.u[0], rail.u[-1])
     gap = wheel.f - np.interp(on_rail, rail.u, rail.f)
@@ -52,27 +39,9 @@ def kinked(wheel, height, place, half_width):
 
 
 def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.inf):
-    """A profile from points of a wheel profile.
-
-    Parameters
-    ----------
-    wheel : ProfileCurve
-    ordinates : numpy.ndarray, shape (n,)
-        At its nodes, m.
-    spacing : float
-        Distance of the points, m.
-    noise : float
-        Standard deviation of errors added to the points' ordinates, m.
-    seed : int
-        Of the errors.
-    smoothing : float
-        Root mean square distance that the curve may keep from the points, m.
-    end : float
-        Points beyond are left out, m.
-
-    Returns
-    -------
-    ProfileCurve
+    """A `ProfileCurve` from points of a wheel profile with ordinates (n,) at its nodes, up to ``end``, at a spacing,
+    with a ``noise`` (standard deviation) on ordinates and ``smoothing`` (root mean square distance that the curve may
+    keep from the points), all m.
     """
     u = np.append(-np.arange(0.0, -wheel.u[0], spacing)[:0:-1], np.arange(0.0, wheel.u[-1], spacing))
     u = u[u <= end]
@@ -81,19 +50,8 @@ def sampled(wheel, ordinates, spacing, noise=0.0, seed=0, smoothing=0.0, end=np.
 
 
 def variants(setting, entries):
-    """Wheel profiles of the cases by name.
-
-    Parameters
-    ----------
-    setting : Setting
-        With the profile they come from.
-    entries : dict of str to dict
-        ``kind`` (worn, kinked or plain), its arguments, and those of :func:`sampled`.
-
-    Returns
-    -------
-    dict of str to callable
-        Each makes a ProfileCurve, or raises InputError.
+    """Wheel profiles of the cases by name, each a function that makes a ProfileCurve or raises InputError; entries hold
+    ``kind`` (worn, kinked or plain), its arguments, and those of :func:`sampled`.
     """
     scene = setting.scene
     offset = scene.track.rail_distance(scene.rail) - scene.vehicle.half_distance
@@ -113,22 +71,8 @@ def variants(setting, entries):
 
 
 def profiles(vehicles, names, entries, duration, detections, methods):
-    """Vehicles on unusual profiles: an answer that keeps the laws of mechanics, or a refusal.
-
-    Parameters
-    ----------
-    vehicles, names
-        As :func:`study.hard_cases.cases.prepare` takes them; several names.
-    entries : dict of str to dict
-        As for :func:`variants`.
-    duration : float
-        s.
-    detections, methods : sequence of str
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles on unusual profiles (``entries`` of :func:`variants`) for a duration (s): an answer that keeps the laws
+    of mechanics, or a refusal; rows of the table.
     """
     found = []
     for name in names:

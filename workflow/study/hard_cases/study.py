@@ -32,31 +32,12 @@ FAMILIES = {
 
 
 def run_family(family, vehicles, settings, progress=None):
-    """Run one family of hard cases.
+    """Run one of the `FAMILIES` of hard cases: its table (:data:`study.hard_cases.cases.COLUMNS`), and by function what
+    figures need.
 
-    Parameters
-    ----------
-    family : str
-        One of `FAMILIES`.
-    vehicles : dict of str to dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    settings : dict of str to dict
-        Arguments of each of the family's functions. ``vehicles`` among them picks some vehicles by name for functions
-        that run all they are given.
-    progress : callable, optional
-        Wraps the list of functions' names, e.g. ``tqdm.tqdm``.
-
-    Returns
-    -------
-    found : pandas.DataFrame
-        Columns of :data:`study.hard_cases.cases.COLUMNS`.
-    curves : dict of str to list of dict
-        What figures need, by function.
-
-    Raises
-    ------
-    InputError
-        If settings are missing or unknown.
+    ``settings`` are the arguments of each of the family's functions; ``vehicles`` among them picks some vehicles by
+    name for functions that run all they are given. ``progress`` wraps the functions' names. InputError if settings are
+    missing or unknown.
     """
     if set(settings) != set(FAMILIES[family]):
         expected = f"expected settings for {', '.join(FAMILIES[family])}"
@@ -74,18 +55,11 @@ def run_family(family, vehicles, settings, progress=None):
 
 
 def summary(found):
-    """What came of each case: its runs by outcome, and the check that came closest to its limit or went beyond.
+    """What came of each case of all families: its runs by outcome, and the check that came closest to its limit or went
+    beyond.
 
-    Parameters
-    ----------
-    found : pandas.DataFrame
-        Table of all families.
-
-    Returns
-    -------
-    pandas.DataFrame
-        family, case, runs, survived, refused, failed, checks, passed, known (failed checks with a known limit), steps
-        (largest), smallest_step_s, wall_s (all runs).
+    Columns: family, case, runs, survived, refused, failed, checks, passed, known (failed checks with a known limit),
+    steps (largest), smallest_step_s, wall_s (all runs).
     """
     rows = []
     keys = ["condition", "vehicle", "detection", "integrator"]
@@ -104,17 +78,7 @@ def summary(found):
 
 
 def known_limits(found):
-    """Known limits of the models that cases have met: where, how often, and by how much.
-
-    Parameters
-    ----------
-    found : pandas.DataFrame
-
-    Returns
-    -------
-    pandas.DataFrame
-        family, case, invariant, value (worst), limit, known_limit, times.
-    """
+    """Known limits of the models that cases have met: where, how often (times), and by how much (value, the worst)."""
     met = found[found["known_limit"].fillna("") != ""]
     columns = ["family", "case", "invariant", "known_limit"]
     if met.empty:
@@ -131,17 +95,7 @@ def unexplained(found):
 
 
 def report_text(found):
-    """The study's summary in Markdown: totals, cases, known limits and whatever failed without a known reason.
-
-    Parameters
-    ----------
-    found : pandas.DataFrame
-        Table of all families.
-
-    Returns
-    -------
-    str
-    """
+    """The study's summary in Markdown: totals, cases, known limits and whatever failed without a known reason."""
     cases, limits, open_rows = summary(found), known_limits(found), unexplained(found)
     totals = cases[["runs", "survived", "refused", "failed", "checks", "passed", "known"]].sum()
     lines = [

@@ -24,24 +24,8 @@ def balance_speed(radius, cant):
 
 
 def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
-    """Vehicles on irregular straight track: they stay on it, and the rails carry the load.
-
-    Parameters
-    ----------
-    vehicles : dict
-        As :func:`study.hard_cases.cases.prepare` takes it.
-    speeds : dict of str to sequence of float
-        m/s, by vehicle.
-    spectra : sequence of (str, int)
-        Level of the disturbance and seed.
-    length, duration : float
-        Of the irregularity (m), and of the runs (s).
-    methods, detections : sequence of str
-
-    Returns
-    -------
-    list of dict
-        Rows of the table.
+    """Vehicles at speeds (m/s, by vehicle) for a duration (s) on a length (m) of irregular straight track, ``spectra``
+    being level and seed: they stay on it, and the rails carry the load; rows of the table.
     """
     found = []
     for name, (level, seed), method, detection in product(speeds, spectra, methods, detections):
@@ -63,31 +47,12 @@ def irregular(vehicles, speeds, spectra, length, duration, methods, detections):
 
 
 def curve(vehicles, names, radius, cant, lengths, shares, duration, methods, detections):
-    """A curve with transition at the speed that its cant balances, and faster: forces of all wheels on the rails.
+    """A curve of a radius and cant (m) with tangent and transition (``lengths``, m) for a duration (s, the last quarter
+    is looked at) at the speed that its cant balances, and faster (``shares`` of it): forces of all wheels on the rails.
+    Rows of the table, and history of Y_N (lateral, all wheels) and expected_N over t_s.
 
     In the track's canted axes the rails carry m (g cos + V^2/R sin) and push with m (V^2/R cos - g sin), the angle
     being that of the cant.
-
-    Parameters
-    ----------
-    vehicles, names
-        As :func:`study.hard_cases.cases.prepare` takes them; several names.
-    radius, cant : float
-        m.
-    lengths : (float, float, float)
-        Of tangent, transition and curve, m.
-    shares : sequence of float
-        Speeds over the balanced one.
-    duration : float
-        s; the last quarter is looked at.
-    methods, detections : sequence of str
-
-    Returns
-    -------
-    found : list of dict
-        Rows of the table.
-    history : list of dict
-        vehicle, detection, share, t_s, Y_N (lateral force of all wheels), expected_N.
     """
     found, history = [], []
     tangent, transition, length = lengths

@@ -32,20 +32,8 @@ TREATMENT_STYLES = (
 
 @styled
 def fig_ivp_work_precision(table, effort, bar):
-    """Error of the lateral position at the end against evaluations and against seconds.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `study.ivp.runs.work_precision`; runs that failed are left out.
-    effort : dict
-        Of the reference: ``solver`` and ``evaluations``.
-    bar : float
-        Error that a run must stay below, m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Error of the lateral position at the end against evaluations and against seconds (`work_precision` without failed
+    runs), with the reference's effort (``solver``, ``evaluations``) and the error allowed (``bar``, m).
     """
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -68,17 +56,7 @@ def fig_ivp_work_precision(table, effort, bar):
 
 @styled
 def fig_ivp_constraints(history):
-    """Violation of the constraints over time for Baumgarte's parameters and for projection.
-
-    Parameters
-    ----------
-    history : pandas.DataFrame
-        From `study.ivp.runs.violation_history`.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Violation of the constraints over time (`violation_history`) for Baumgarte's parameters and for projection."""
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
     panels = figure.subplots(1, 2)
     groups = history.groupby(["treatment", "alpha_per_s"])

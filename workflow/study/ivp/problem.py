@@ -134,22 +134,8 @@ def workspace(problem):
 
 
 def read_problem(path):
-    """Read the benchmark's file.
-
-    Parameters
-    ----------
-    path : path-like
-        JSON with the Test Set's parameters by their own names, initial values and reference; see
-        ``config/benchmarks/ivp_wheelset.json``.
-
-    Returns
-    -------
-    Problem
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or a number is missing.
+    """Read the benchmark's JSON file, the Test Set's parameters by their own names, initial values and reference
+    (``config/benchmarks/ivp_wheelset.json``); InputError if it cannot be read or a number is missing.
     """
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))

@@ -45,23 +45,9 @@ class Run(NamedTuple):
 
 
 def solve(problem, method, rtol, alpha=0.0, beta=0.0, times=None):
-    """Integrate the benchmark.
-
-    Parameters
-    ----------
-    problem : Problem
-    method : str
-        A pair of `TABLEAUS`, alone or with the ending `PROJECTED`, or one of `SCIPY`.
-    rtol : float
-        Relative tolerance; the absolute one is `ATOL_OVER_RTOL` times this.
-    alpha, beta : float
-        Baumgarte's parameters, 1/s. Zero: the constraints hold as accelerations only.
-    times : numpy.ndarray, shape (n,), optional
-        Increasing, from 0; the last one ends the run. The reference's time if not given.
-
-    Returns
-    -------
-    Run
+    """Integrate the benchmark up to the last of the times (n,), s (the reference's if not given), by a pair of
+    `TABLEAUS`, alone or with the ending `PROJECTED`, or one of `SCIPY`; the absolute tolerance is `ATOL_OVER_RTOL`
+    times ``rtol``. With Baumgarte's alpha and beta (1/s) of zero the constraints hold as accelerations only.
     """
     wheelset, work = problem.wheelset._replace(alpha=float(alpha), beta=float(beta)), workspace(problem)
     times = np.array([0.0, problem.reference.time]) if times is None else np.asarray(times, float)
@@ -103,19 +89,7 @@ def error_of(problem, run):
 
 
 def value_table(problem, run):
-    """All seventeen unknowns beside the reference.
-
-    Parameters
-    ----------
-    problem : Problem
-    run : Run
-        Up to the reference's time.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns quantity, unit, reference, found, difference.
-    """
+    """All seventeen unknowns beside the reference at its time: quantity, unit, reference, found, difference."""
     import pandas as pd
 
     names = [*STATE, *CONTACT, *(f"lambda_{side}" for side in MULTIPLIERS)]
@@ -127,23 +101,9 @@ def value_table(problem, run):
 
 
 def work_precision(problem, tolerances, repetitions, feedback=0.0):
-    """Error of x against evaluations and seconds.
-
-    Parameters
-    ----------
-    problem : Problem
-    tolerances : dict of str to list of float
-        Relative tolerances of each method.
-    repetitions : int
-        Passes over all runs in turn; the seconds are medians. A short run of each method that compiles comes first.
-    feedback : float
-        Baumgarte's alpha = beta, 1/s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns method, rtol, status, steps, rejected, evaluations, seconds, error_x_m, error_max (relative, over all
-        eleven state variables).
+    """Error of x against evaluations and seconds (medians over passes through all runs in turn, after a short run of
+    each method that compiles) at relative tolerances of each method, with Baumgarte's alpha = beta = ``feedback``
+    (1/s); error_max is relative, over all eleven state variables.
     """
     import pandas as pd
 
@@ -167,20 +127,8 @@ def treatments(parameters):
 
 
 def stabilisation_table(problem, parameters, tolerances):
-    """Effect of Baumgarte's parameters, and of projection, on the error, the drift and the cost.
-
-    Parameters
-    ----------
-    problem : Problem
-    parameters : list of float
-        Values of alpha = beta, 1/s.
-    tolerances : list of float
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns treatment, alpha_per_s, rtol, evaluations, error_x_m, error_max, phi_m, phi_rate_m_per_s (violation of
-        position and velocity constraints at the end).
+    """Effect of Baumgarte's alpha = beta (1/s), and of projection, on the error, the drift (phi_m and phi_rate_m_per_s:
+    violation of position and velocity constraints at the end) and the cost.
     """
     import pandas as pd
 
@@ -194,21 +142,8 @@ def stabilisation_table(problem, parameters, tolerances):
 
 
 def violation_history(problem, parameters, rtol, points):
-    """Violation of the constraints over time, at accepted steps.
-
-    Parameters
-    ----------
-    problem : Problem
-    parameters : list of float
-        Values of alpha = beta, 1/s.
-    rtol : float
-    points : int
-        Times, equally spaced.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns treatment, alpha_per_s, t_s, phi_m, phi_rate_m_per_s (larger of the two wheels).
+    """Violation of the constraints over equally spaced times, at accepted steps, by Baumgarte's alpha = beta (1/s):
+    treatment, alpha_per_s, t_s, phi_m, phi_rate_m_per_s (larger of the two wheels).
     """
     import pandas as pd
 

@@ -312,29 +312,13 @@ def _keep_worst(work, worst):
 
 @jit
 def run_pair(a, b, e, p, work, state, times, history, rtol, atol, projected):
-    """Integrate with an explicit embedded pair whose last stage starts the next step.
+    """Integrate with an explicit embedded pair whose last stage starts the next step, tableau a (s, s), b (s,) and
+    weights e (s + 1,) of the error estimate, of order s - 2: numbers of steps (negative: the step size fell below the
+    resolution of time) and of rejected ones.
 
-    Parameters
-    ----------
-    a, b, e : numpy.ndarray, shapes (s, s), (s,), (s + 1,)
-        Tableau and weights of the error estimate, of order s - 2.
-    p : Wheelset
-    work : Work
-    state : numpy.ndarray, shape (11,)
-        From the initial state, overwritten with the last one.
-    times : numpy.ndarray, shape (n,)
-        Increasing, s; the last one ends the run.
-    history : numpy.ndarray, shape (n, 2)
-        Filled: largest violation |Phi| (m) and |Phi'| (m/s) of the two constraints after the steps up to each time,
-        counted from the time before.
-    rtol, atol : float
-    projected : bool
-        Project the state after each step.
-
-    Returns
-    -------
-    steps, rejected : int
-        Negative ``steps``: the step size fell below the resolution of time.
+    Overwrites the state (11,) with the last one, at the last of the increasing times (n,), s, and fills ``history``
+    (n, 2) with the largest violations abs(Phi) (m) and abs(Phi') (m/s) of the two constraints after the steps up to
+    each time, counted from the time before. ``projected``: the state is projected after each step.
     """
     stages, n = b.shape[0], state.shape[0]
     k, trial, worst = np.zeros((stages + 1, n)), np.zeros(n), np.zeros(2)

@@ -35,18 +35,7 @@ def _inside(curve, count, margin=1e-6):
 
 @styled
 def fig1_parametrisation(scene, point=(0.015, 0.22, -0.012, 0.07)):
-    """Fig. 1: the surfaces of wheels and rails and their coordinates.
-
-    Parameters
-    ----------
-    scene : Scene
-    point : tuple of float
-        u_w (m), s_w (rad), u_r (m) and s_r (m) of the points Q and P that the close-up marks.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Fig. 1: surfaces of wheels and rails, their coordinates, and Q and P at u_w, s_w, u_r, s_r (m, rad, m, rad)."""
     figure = Figure(figsize=(6.8, 3.2))
     overview = figure.add_axes((-0.16, -0.45, 0.8, 1.8), projection="3d", computed_zorder=False)
     for side in ("right", "left"):
@@ -116,18 +105,7 @@ def _axis_arrows(axes, length):
 
 @styled
 def fig2_profiles(wheel, rail, u_wheel=-0.034, u_rail=-0.030):
-    """Fig. 2: an arbitrary point on the rail and on the wheel profile, with tangent, normal and slope angle.
-
-    Parameters
-    ----------
-    wheel, rail : ProfileCurve
-    u_wheel, u_rail : float
-        Lateral coordinates of the marked points Q and P, m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Fig. 2: a point on the rail and one on the wheel profile (at u, m), with tangent, normal and slope angle."""
     figure = Figure(figsize=(6.8, 2.5), layout="constrained")
     rail_axes, wheel_axes = figure.subplots(1, 2)
     _profile_with_point(rail_axes, rail, u_rail, ("P", "u_r", "f_r"), up=1.0)
@@ -159,29 +137,12 @@ def _profile_with_point(axes, curve, u, names, up):
 
 @styled
 def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
-    """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose.
+    """Fig. 3: planar detection in the cross-section and spatial detection over the wheel's strips, at one pose y (m)
+    and yaw (rad).
 
-    Parameters
-    ----------
-    scene : Scene
-    y, yaw : float
-        Pose of the wheelset, m and rad.
-    load : float
-        Vertical load per wheel at which the wheelset rests, N; gives height and roll.
-    lowered : float
-        Further lowering that makes the overlap visible, m.
-    side : {"left", "right"}
-    window : float
-        Half width of the view about the deepest contact points, m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-
-    Raises
-    ------
-    ValueError
-        If there is no contact on this side at this pose.
+    The wheelset rests under a vertical ``load`` per wheel (N), which gives height and roll, ``lowered`` (m) further to
+    make the overlap visible; ``window`` is the half width of the view about the deepest contact points (m). ValueError
+    if there is no contact on this side.
     """
     vehicle = scene.vehicle
     geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
@@ -260,18 +221,8 @@ def _mark(axes, points, detection):
 
 @styled
 def fig4_lateral_position(cases, horizons=None):
-    """Fig. 4: lateral position over time with planar and with spatial detection.
-
-    Parameters
-    ----------
-    cases : dict of str to dict of str to Run
-        Runs by title of the panel and by detection; one panel per entry.
-    horizons : dict of str to float, optional
-        Prediction horizon by title, s; marked where given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Fig. 4: lateral position over time with planar and with spatial detection, runs by title of the panel and by
+    detection; prediction horizons (s, by title) are marked where given.
     """
     figure = Figure(figsize=(6.6, 0.9 + 1.6 * len(cases)), layout="constrained")
     panels = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
@@ -295,22 +246,8 @@ def _mark_horizon(axes, horizon, end):
 
 @styled
 def fig5_contact_points(runs, wheel, rail, horizon=None, body="wheelset"):
-    """Fig. 5: where the contact points lie on rail and wheel profile, per side, over time and on the profile.
-
-    Parameters
-    ----------
-    runs : dict of str to Run
-        Runs by detection.
-    wheel, rail : ProfileCurve
-        Profiles that the points lie on.
-    horizon : float, optional
-        Prediction horizon, s; marked where given.
-    body : str
-        Wheelset.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Fig. 5: where the contact points of runs by detection lie on rail and wheel profile, per side, over time and on
+    the profile; the prediction horizon (s) is marked where given.
     """
     figure = Figure(figsize=(7.4, 5.4), layout="constrained")
     panels = figure.subplots(2, 4, width_ratios=(3, 1, 3, 1), sharey="row")

@@ -20,38 +20,15 @@ from wrcore.run.simulate import simulate
 
 
 def horizons(cases, bound):
-    """Prediction horizons of the spatial runs that have a tighter twin.
-
-    Parameters
-    ----------
-    cases : dict of str to dict of str to Run
-        Runs by case and by ``spatial``, ``spatial_tight`` (where run) and others.
-    bound : float
-        Agreement in lateral position that is asked for, m.
-
-    Returns
-    -------
-    dict of str to float
-        Horizon by case, s.
+    """Prediction horizons (s, by case) of the ``spatial`` runs that have a tighter twin (``spatial_tight``), for a
+    bound (m) of agreement in lateral position.
     """
     paired = {case: runs for case, runs in cases.items() if "spatial_tight" in runs}
     return {case: prediction_horizon(runs["spatial"], runs["spatial_tight"], bound) for case, runs in paired.items()}
 
 
 def motion_row(run, body="wheelset"):
-    """What one run shows, as a row of a table.
-
-    Parameters
-    ----------
-    run : Run
-    body : str
-        Wheelset to look at.
-
-    Returns
-    -------
-    dict
-        Columns carry their unit. Frequency, wavelength and growth are those before the first flange contact.
-    """
+    """What a run shows, a table's row: frequency, wavelength and growth are those before the first flange contact."""
     flange = first_flange_contact(run, body)
     early = run.t <= (np.inf if np.isnan(flange) else flange)
     y = run[body].y_m
@@ -71,19 +48,10 @@ def motion_row(run, body="wheelset"):
 def motion_table(cases, bound):
     """One row per case and detection: how the wheelset moves, and how planar and spatial compare.
 
-    Parameters
-    ----------
-    cases : dict of str to dict of str to Run
-        Runs by case and by ``planar``, ``spatial`` and, where run, ``spatial_tight`` (tighter tolerances) and
-        ``spatial_mirrored`` (started on the other side of the track).
-    bound : float
-        Agreement in lateral position that the prediction horizon asks for, m.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Frequency and growth up to the first flange contact; the difference between planar and spatial and the mirror
-        defect up to the prediction horizon (over the whole run where there is no twin).
+    Runs are ``planar``, ``spatial`` and, where run, ``spatial_tight`` (tighter tolerances) and ``spatial_mirrored``
+    (started on the other side of the track). Frequency and growth count up to the first flange contact, the difference
+    between planar and spatial and the mirror defect up to the prediction horizon for a bound (m), or over the whole run
+    where there is no twin.
     """
     horizon = horizons(cases, bound)
     rows = []
@@ -103,19 +71,8 @@ def motion_table(cases, bound):
 
 
 def time_runs(cases, repetitions):
-    """Time planar and spatial runs of scenes, in turn.
-
-    Parameters
-    ----------
-    cases : dict of str to dict of str to Scene
-        Scenes by case and by ``planar`` and ``spatial``.
-    repetitions : int
-        Timed runs of each scene; one more before them warms up compiled kernels and caches.
-
-    Returns
-    -------
-    pandas.DataFrame
-        What `timing_table` takes.
+    """Time ``planar`` and ``spatial`` runs of scenes by case, in turn, after one of each that warms up compiled kernels
+    and caches: what `timing_table` takes.
     """
     rows = []
     for case, scenes in cases.items():
@@ -134,20 +91,9 @@ RIGID_LOAD = 1e-3
 
 
 def rigid_contact(geometry, shifts, detection="planar"):
-    """Rigid contact geometry of a wheelset without load and yaw, with roll: what a conicity study starts from.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    shifts : array_like, shape (n,)
-        Lateral positions of the wheelset, m (positive to the left).
-    detection : {"planar", "spatial"}
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns y_m, roll_rad, lowering_m (of the wheelset's centre below the nominal radius), radius_difference_m
-        (left less right) and, per side, u_wheel, u_rail (m) and contact angle (rad) of the most loaded patch.
+    """Rigid contact geometry of a wheelset at lateral positions (n,), m, without load and yaw, with roll, what a
+    conicity study starts from: y_m, roll_rad, lowering_m (of its centre below the nominal radius), radius_difference_m
+    (left less right) and, of each side's most loaded patch, u_wheel, u_rail (m) and contact angle (rad).
     """
     poses = pd.DataFrame(
         {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
@@ -175,37 +121,18 @@ def rigid_contact(geometry, shifts, detection="planar"):
 
 
 def geometry_table(scene, y):
-    """Rigid contact geometry of a scene's wheelset, see :func:`rigid_contact`.
-
-    Parameters
-    ----------
-    scene : Scene
-    y : sequence of float
-        Lateral positions of the wheelset, m.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Rigid contact geometry (:func:`rigid_contact`) of a scene's wheelset at lateral positions y (m)."""
     vehicle = scene.vehicle
     geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
     return rigid_contact(geometry, y, scene.detection)
 
 
 def timing_table(samples):
-    """Cost per run and per right-hand-side call, and planar over spatial.
+    """Cost per run and per right-hand-side call, medians over the repetitions of the samples of `time_runs`;
+    ``ratio_per_run`` and ``ratio_per_call`` are the medians of the paired ratios planar / spatial, equal in both rows
+    of a case.
 
-    Parameters
-    ----------
-    samples : pandas.DataFrame
-        One row per timed run: case, detection, repetition, simulated_s, wall_s, rhs_evaluations, steps, rejected.
-        Planar and spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per case and detection with the median over the repetitions; the columns ``ratio_per_run`` and
-        ``ratio_per_call`` hold the median of the paired ratios planar / spatial and are equal in both rows.
+    Planar and spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
     """
     samples = samples.assign(us_per_call=1e6 * samples["wall_s"] / samples["rhs_evaluations"])
     columns = ["simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected", "us_per_call"]
@@ -220,19 +147,8 @@ def timing_table(samples):
 
 
 def comparison_table(reference, ours):
-    """Reference values beside ours.
-
-    Parameters
-    ----------
-    reference : pandas.DataFrame
-        Columns quantity, unit, value, tolerance (absolute, empty where a value is only shown), source.
-    ours : dict of str to float
-        Our value by quantity.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The reference with the columns ours and within (yes, no, or empty without a tolerance or a value of ours).
+    """Reference values (quantity, unit, value, tolerance: absolute, empty where a value is only shown, source) beside
+    ours by quantity, with the columns ours and within (yes, no, or empty without a tolerance or a value of ours).
     """
     table = reference.copy()
     table.insert(3, "ours", [ours.get(quantity, np.nan) for quantity in table["quantity"]])
@@ -243,19 +159,8 @@ def comparison_table(reference, ours):
 
 
 def our_values(geometry, motion, timing, case):
-    """Our side of the comparison with published values.
-
-    Parameters
-    ----------
-    geometry, motion, timing : pandas.DataFrame
-        Contact geometry over the lateral position, `motion_table` and `timing_table`.
-    case : str
-        Case that is compared: the paper's.
-
-    Returns
-    -------
-    dict of str to float
-        By the quantity's name in the reference table.
+    """Our side of the comparison with published values, by the quantity's name in the reference table, for the paper's
+    case: from contact geometry over the lateral position, `motion_table` and `timing_table`.
     """
     run = motion[(motion["case"] == case) & (motion["detection"] == "spatial")].iloc[0]
     cost = timing[timing["case"] == case].iloc[0]

@@ -19,22 +19,9 @@ def patches_per_evaluation(recorded):
 
 
 def patch_costs(source, overrides, models, states, passes):
-    """Time per patch of each model, all in turn.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`, on tangent, perfect track; its own model gives the run.
-    models : dict of str to dict
-        Arguments of `wrcore.analysis.loaded.loaded_wheels` by name.
-    states, passes : int
-        States of the run, and turns that count.
-
-    Returns
-    -------
-    pandas.DataFrame
-        model, patches (per evaluation), us_per_patch (median; all of the evaluation, its patches aside some 0.5 us),
-        us_low and us_high (quartiles).
+    """Time per patch of each model (arguments of `wrcore.analysis.loaded.loaded_wheels` by name), all in turn, at
+    states of a run on tangent, perfect track by the scene's own model: patches per evaluation, us_per_patch (median;
+    all of the evaluation, its patches aside some 0.5 us), us_low and us_high (quartiles).
     """
     scene = load_scene(source, overrides)
     recorded = record(scene, scene.data["integration"]["duration"], states)

@@ -34,18 +34,8 @@ PANELS = 16
 
 @styled
 def fig_patch_errors(places, load):
-    """Errors of normal force and greatest pressure, and the slope of the radius difference, over the lateral position.
-
-    Parameters
-    ----------
-    places : pandas.DataFrame
-        From `study.patch.tables.pose_errors`.
-    load : float
-        N.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Errors of normal force and greatest pressure, slope of the radius difference over y (`pose_errors`; load in
+    N).
     """
     places = places[np.isclose(places["load_N"], load)]
     slopes = radius_differences(places)
@@ -71,23 +61,9 @@ def fig_patch_errors(places, load):
 
 @styled
 def fig_patches(geometry, models, load, shifts, rolling):
-    """Pressure, traction and slip of exact contact beside the ellipse of another model, for the left wheel.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    models : dict of str to dict
-        Title, and arguments of `wrcore.analysis.loaded.loaded_wheels`: exact contact, and the ellipse.
-    load : float
-        N.
-    shifts : sequence of float
-        Lateral positions, a row each, m.
-    rolling : dict
-        speed (m/s), friction, and creepage (longitudinal, lateral) of a wheel that otherwise rolls freely.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Pressure, traction and slip of exact contact beside the ellipse of another model (title and arguments of
+    `wrcore.analysis.loaded.loaded_wheels` of both), for the left wheel under a load (N), a row per lateral shift (m);
+    ``rolling`` is speed (m/s), friction, and creepage (longitudinal, lateral) of a wheel that otherwise rolls freely.
     """
     figure = Figure(figsize=(9.0, 4.6 * len(shifts)), layout="constrained")
     panels = figure.subplots(len(shifts), 2, squeeze=False)
@@ -106,14 +82,8 @@ def fig_patches(geometry, models, load, shifts, rolling):
 
 
 def patches_of_models(geometry, models, load, y, rolling):
-    """Patches of exact contact and of an ellipse under the same load and in the same motion, about the same origin.
-
-    Parameters as for `fig_patches`.
-
-    Returns
-    -------
-    list of list of Patch
-        The most loaded patch in front.
+    """Patches, the most loaded in front, of exact contact and of an ellipse under the same load and in the same motion,
+    about the same origin; arguments as for `fig_patches`.
     """
     exact, ellipse = (loaded_wheels(geometry, **settings) for settings in models)
     speed, (xi, eta) = rolling["speed"], rolling["creepage"]
@@ -131,19 +101,8 @@ def patches_of_models(geometry, models, load, y, rolling):
 
 
 def ellipse_patch(row, origin, friction, shear_modulus=8.2e10, poisson_ratio=0.28):
-    """A Hertz ellipse with the tractions of exact rolling contact on it, as a `Patch`.
-
-    Parameters
-    ----------
-    row : numpy.ndarray
-        Of a patch, with creepages at its centre.
-    origin : tuple of float
-        To which coordinates refer, m; the ellipse is drawn where it lies beside it.
-    friction, shear_modulus, poisson_ratio : float
-
-    Returns
-    -------
-    Patch
+    """A Hertz ellipse (``row`` of a patch, with creepages at its centre) with the tractions of exact rolling contact on
+    it, as a `Patch`; coordinates refer to ``origin`` (m), the ellipse is drawn where it lies beside it.
     """
     a, b, normal = row[columns.SEMI_A], row[columns.SEMI_B], row[columns.NORMAL]
     xi, eta, phi = map(float, row[columns.XI : columns.PHI + 1])

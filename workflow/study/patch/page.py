@@ -8,30 +8,13 @@ CELL = ("median", "q95", "worst")
 
 
 def spread_table(table, rows, columns):
-    """Median / 95 % / worst of a long table as a wide one.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        With the columns of CELL and a unit.
-    rows, columns : str or list of str
-        Columns whose values name the rows and columns.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Median / 95 % / worst (CELL, with a unit) of a long table as a wide one, named by ``rows`` and ``columns``."""
     cells = [" / ".join(f"{value:.2g}" for value in row) for row in table[list(CELL)].itertuples(index=False)]
     return table.assign(cell=cells).pivot_table(index=rows, columns=columns, values="cell", aggfunc="first", sort=False)
 
 
 def error_tables(summary):
-    """One table per zone: quantities down, models across, their cost in the heads.
-
-    Returns
-    -------
-    dict of str to pandas.DataFrame
-    """
+    """One table per zone: quantities down, models across, their cost in the heads."""
     costs = summary.drop_duplicates("model").set_index("model")["us_per_patch"]
     heads = {name: f"{name} ({cost:.2g} µs)" if cost == cost else name for name, cost in costs.items()}
     named = summary.assign(model=summary["model"].map(heads), quantity=summary["quantity"] + ", " + summary["unit"])
@@ -68,21 +51,7 @@ RUNS = {
 
 
 def page(summary, conicity, contact, models):
-    """All of it in Markdown.
-
-    Parameters
-    ----------
-    summary, conicity : pandas.DataFrame
-        From `study.patch.tables.summary` and `conicity_under_load`.
-    contact : pandas.DataFrame
-        From `study.patch.reference.distributions`.
-    models : pandas.DataFrame
-        From `study.patch.runs.compared`.
-
-    Returns
-    -------
-    str
-    """
+    """All in Markdown: `summary`, `conicity_under_load`, CONTACT's cases (`distributions`), runs (`compared`)."""
     parts = []
     for zone, table in error_tables(summary).items():
         parts += [f"Errors {zone}, median / 95 % / worst", table]

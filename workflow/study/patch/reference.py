@@ -12,21 +12,9 @@ LOAD = 1e3
 
 
 def compare_with_contact(geometry, reference, models):
-    """Each loaded case of CONTACT that is one patch beside every model at the same height.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    reference : pandas.DataFrame
-        Cases in CONTACT's axes, as `study.contact.reference.compare_with_contact` takes them.
-    models : dict of str to dict
-        Arguments of `wrcore.analysis.loaded.loaded_wheels` by name.
-
-    Returns
-    -------
-    pandas.DataFrame
-        set, side, y_m, yaw_rad, model; errors of the wheel's normal force (relative), greatest pressure (relative),
-        length along and width across of the nearest patch (m).
+    """Each loaded case of CONTACT (in its axes) that is one patch beside every model (arguments of
+    `wrcore.analysis.loaded.loaded_wheels` by name) at the same height: errors of the wheel's normal force (relative),
+    greatest pressure (relative), length along and width across of the nearest patch (m).
     """
     wheels = {name: loaded_wheels(geometry, **settings) for name, settings in models.items()}
     rows = []

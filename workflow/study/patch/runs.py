@@ -15,20 +15,9 @@ MEASURES = ("linear_critical_speed_m_per_s", "cycle_amplitude_m", "cycle_frequen
 
 
 def limit_cycle(source, overrides, cycle, start=None):
-    """What a large disturbance settles to at one speed, on perfect track.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    cycle : dict
-        speed (m/s), shift (m, of the vehicle, sideways) and settling, as for `wrcore.analysis.limit_cycles.Settling`.
-    start : list of str, optional
-        Further changes of a scene that is cheaper to run: what the disturbance settles to there is what it starts from.
-
-    Returns
-    -------
-    dict
+    """What a large disturbance settles to at one speed, on perfect track; ``cycle`` holds speed (m/s), shift (m, of the
+    vehicle, sideways) and settling, and ``start`` changes to a scene that is cheaper to run: what the disturbance
+    settles to there is what it starts from.
     """
     settling = Settling(**cycle["settling"])
 
@@ -48,21 +37,7 @@ def limit_cycle(source, overrides, cycle, start=None):
 
 
 def irregular_run(source, overrides, changes, begin):
-    """Motion, forces and wear of a run, and its cost.
-
-    Parameters
-    ----------
-    source, overrides
-        Scene, as for :func:`wrcore.load_scene`.
-    changes : dict
-        Further ones, by key path.
-    begin : float
-        Start of the evaluation, s.
-
-    Returns
-    -------
-    dict
-    """
+    """Motion, forces and wear of a run from ``begin`` (s) on, and its cost; ``changes`` are by key path."""
     run = simulate(load_scene(source, [*overrides, *(f"{key}={value}" for key, value in changes.items())]))
     wheels, late = wheel_table(run, begin), run.t >= begin
     y = np.concatenate([run[name].y_m[late] for name in wheelsets_of(run)])
@@ -80,19 +55,8 @@ def model_runs(source, overrides, cycle, track, begin, start=None):
 
 
 def compared(rows, exact):
-    """Models of each vehicle beside exact contact.
-
-    Parameters
-    ----------
-    rows : pandas.DataFrame
-        vehicle, model, and the measures.
-    exact : str
-        Name of the model that others are compared with.
-
-    Returns
-    -------
-    pandas.DataFrame
-        With relative deviations of the measures from exact contact: columns that end in ``_deviation``.
+    """Models of each vehicle (rows: vehicle, model and the measures) with relative deviations of the measures from the
+    model ``exact`` in columns that end in ``_deviation``.
     """
     sure = rows[rows["model"] == exact].set_index("vehicle")
     table = rows.copy()
@@ -102,20 +66,8 @@ def compared(rows, exact):
 
 
 def linear_speeds(variants, titles, names):
-    """Linear critical speeds by vehicle and model, from the study of critical speeds.
-
-    Parameters
-    ----------
-    variants : pandas.DataFrame
-        Its table of variants: vehicle (title), variant, critical_speed_m_per_s.
-    titles : dict of str to str
-        By vehicle.
-    names : dict of str to str
-        Variant by model; models without one are left out.
-
-    Returns
-    -------
-    dict of (str, str) to float
+    """Linear critical speeds by (vehicle, model) from the variants (vehicle's title, variant, critical_speed_m_per_s)
+    of the study of critical speeds; models without a variant's name are left out.
     """
     found = variants.set_index(["vehicle", "variant"])["critical_speed_m_per_s"]
     return {(vehicle, model): float(found[title, variant])

@@ -32,14 +32,7 @@ class Carried(NamedTuple):
 
 
 def carried(found, rolling):
-    """`Carried` of the patches of a wheel.
-
-    Parameters
-    ----------
-    found : sequence of wrcore.analysis.loaded_base.Found
-    rolling : Rolling
-        With which they were found; its rate is given.
-    """
+    """`Carried` of the patches (`Found`) of a wheel, with the `Rolling` with which they were found, its rate given."""
     rows = np.array([one.row for one in found]).reshape(-1, columns.PATCH_COLUMNS)
     normal, angle = rows[:, columns.NORMAL], rows[:, columns.ANGLE]
     total = normal.sum()
@@ -52,29 +45,17 @@ def carried(found, rolling):
 
 
 def pose_errors(geometry, models, loads, shifts, rolling):
-    """Each model beside the reference, pose by pose.
+    """Each model beside the reference, pose by pose: vertical wheel loads (N) and lateral positions (m), without yaw,
+    at the roll and height at which the `REFERENCE` among the models carries the load on both wheels; ``rolling`` is
+    speed (m/s), friction, and pairs of creepages (longitudinal, lateral) of a wheel that otherwise rolls freely.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    models : dict of str to dict
-        Arguments of `wrcore.analysis.loaded.loaded_wheels` by name; one of them is `REFERENCE`.
-    loads, shifts : sequence of float
-        Vertical wheel loads (N) and lateral positions (m), without yaw; roll and height are those at which the
-        reference carries the load on both wheels.
-    rolling : dict
-        speed (m/s), friction, and creepages: pairs (longitudinal, lateral) of a wheel that otherwise rolls freely.
+    The first table has, at the reference's height, normal_N and its relative error; where the model carries the load
+    itself, p_max_Pa, lateral_m, radius_m and their errors (relative, m, m), and height_m of the wheelset. Radii are
+    compared less those of the centred wheelset: what both wheels have in common, the rate of rolling follows.
 
-    Returns
-    -------
-    places : pandas.DataFrame
-        load_N, y_m, model; at the reference's height: normal_N and its relative error; where the model carries the
-        load itself: p_max_Pa, lateral_m, radius_m and their errors (relative, m, m), height_m (of the wheelset). Radii
-        are compared less those of the centred wheelset: what both wheels have in common, the rate of rolling follows.
-    forces : pandas.DataFrame
-        load_N, y_m, model, creepage (number of the pair), used (the reference's creep force over mu N) and errors of
-        the creep force over the reference's mu N under equal load: at equal motion of the wheelset, and at equal
-        creepage, where each model rolls on its own radius.
+    The second has per creepage ``used`` (the reference's creep force over mu N) and errors of the creep force over the
+    reference's mu N under equal load: at equal motion of the wheelset, and at equal creepage, where each model rolls on
+    its own radius.
     """
     wheels = {name: loaded_wheels(geometry, **settings) for name, settings in models.items()}
     places, forces = [], []
@@ -130,17 +111,8 @@ def _of_model(wheels, pose, rolling):
 
 
 def radius_differences(places):
-    """Rolling radius difference of a wheelset, left less right, from the radii of the left wheel.
-
-    Parameters
-    ----------
-    places : pandas.DataFrame
-        From `pose_errors`, shifts in pairs y and -y.
-
-    Returns
-    -------
-    pandas.DataFrame
-        load_N, model, y_m > 0, difference_m and slope (difference over 2 y).
+    """Rolling radius difference of a wheelset, left less right, from the radii of the left wheel in `pose_errors` at
+    shifts in pairs y and -y: load_N, model, y_m > 0, difference_m and slope (difference over 2 y).
     """
     keys = ["load_N", "model"]
     part = places[[*keys, "y_m", "radius_m"]].assign(y_nm=(1e9 * places["y_m"]).round())
@@ -151,19 +123,8 @@ def radius_differences(places):
 
 
 def conicity_under_load(differences, amplitudes, points=400):
-    """Equivalent conicity by harmonic linearisation: of a sine of the amplitude in the radius difference.
-
-    Parameters
-    ----------
-    differences : pandas.DataFrame
-        From `radius_differences`; linear in between.
-    amplitudes : sequence of float
-        m; NaN beyond the shifts.
-
-    Returns
-    -------
-    pandas.DataFrame
-        load_N, model, amplitude_m, conicity.
+    """Equivalent conicity by harmonic linearisation: of a sine of the amplitude (m) in the radius difference
+    (`radius_differences`, linear in between); NaN beyond the shifts.
     """
     sine, rows = np.sin((np.arange(points) + 0.5) * (0.5 * math.pi / points)), []
     for (load, model), part in differences.groupby(["load_N", "model"], sort=False):
@@ -187,21 +148,8 @@ QUANTITIES = {
 
 
 def summary(places, forces, zones, costs=None):
-    """Median, 95 % and worst error of each model over all loads and shifts of a zone.
-
-    Parameters
-    ----------
-    places, forces : pandas.DataFrame
-        From `pose_errors`.
-    zones : dict of str to (float, float)
-        Shifts from and to, m.
-    costs : pandas.DataFrame, optional
-        With columns model and us_per_patch, joined.
-
-    Returns
-    -------
-    pandas.DataFrame
-        model, zone, quantity, unit, count, median, q95, worst, worst_load_N, worst_y_m.
+    """Median, 95 % and worst error of each model (both tables of `pose_errors`) over all loads and shifts of a zone
+    (from, to, m), and where the worst is; ``costs`` (model, us_per_patch) are joined.
     """
     rows = []
     for model in places["model"].unique():

@@ -48,24 +48,12 @@ NOT_HELD = """
 
 
 def read():
-    """Content of the table of evidence.
-
-    Returns
-    -------
-    dict
-        ``sections``: titles with rows; ``shipped``: examples of CONTACT.
-    """
+    """Content of the table of evidence: ``sections``, titles with rows, and ``shipped``, examples of CONTACT."""
     return yaml.safe_load(SOURCE.read_text("utf-8"))
 
 
 def source_of(test):
-    """Source of a test with its decorators, from ``file::function`` below ``tests/``.
-
-    Raises
-    ------
-    LookupError
-        If there is no such file or function.
-    """
+    """Source of a test with its decorators, from ``file::function`` below ``tests/``; LookupError if there is none."""
     name, _, function = test.partition("::")
     path = ROOT / "tests" / name
     if not path.is_file():

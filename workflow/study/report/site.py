@@ -31,28 +31,11 @@ pre { background: #f4f4f4; padding: 0.6rem; overflow-x: auto; white-space: pre-w
 
 
 def write_site(items, results, config, captions):
-    """Write ``<results>/report/index.html`` and the pages that it leads to.
+    """Write ``<results>/report/index.html`` and the pages that it leads to, which it returns in reading order;
+    ValueError for a category without an answer.
 
-    Parameters
-    ----------
-    items : list of dict
-        What the rules mark for the report: rule, pattern (path, with wildcards), category, caption (file below
-        ``captions``), labels, params.
-    results : path-like
-    config : dict
-        Of the study.
-    captions : path-like
-        Folder of captions.
-
-    Returns
-    -------
-    list of Path
-        The pages, in reading order.
-
-    Raises
-    ------
-    ValueError
-        For a category without an answer.
+    ``items`` are what the rules mark for the report: rule, pattern (path, with wildcards), category, caption (file
+    below ``captions``), labels, params.
     """
     results, captions = Path(results), Path(captions)
     unknown = sorted({item["category"] for item in items} - set(ANSWERS))

@@ -35,18 +35,8 @@ WIDE = (20.0, 1e5)
 
 @styled
 def lateral_motion(runs):
-    """Lateral position of every wheelset over time, planar and spatial, one column per speed.
-
-    Drawn are the first `SWINGS` oscillations of the leading wheelset; the title says so where the run goes on.
-
-    Parameters
-    ----------
-    runs : dict of str to dict of str to Run
-        Runs by title of the column and by detection.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Lateral position of every wheelset over time, runs by title of the column, one per speed, and by detection: the
+    first `SWINGS` oscillations of the leading wheelset; the title says so where the run goes on.
     """
     names = wheelsets_of(next(iter(next(iter(runs.values())).values())))
     figure = Figure(figsize=(0.6 + 3.1 * len(runs), 1.1 + 1.15 * len(names)), layout="constrained")
@@ -76,18 +66,8 @@ def _swings(run, wheelset):
 
 @styled
 def guiding_forces(run, title, critical=None):
-    """Vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run.
-
-    Parameters
-    ----------
-    run : Run
-    title : str
-    critical : float, optional
-        Linear critical speed of the vehicle, m/s; the title says on which side of it the run is.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Vertical force Q, lateral force Y and Y/Q of every wheel over the last `LAST` seconds of a run; the title says on
+    which side of the vehicle's linear critical speed (m/s) it is.
     """
     names = wheelsets_of(run)
     figure = Figure(figsize=(7.2, 0.9 + 1.35 * len(names)), layout="constrained")
@@ -131,22 +111,9 @@ RESPONSE = (
 
 @styled
 def over_speed(tables, track, quantities, critical=None):
-    """Results of a sweep over speed: every vehicle, planar and spatial. Runs that derailed are crosses at the top.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        By vehicle, from :func:`study.speeds.tables.speed_table`.
-    track : str
-        Which of the tables' tracks to show.
-    quantities : sequence of (column, factor, label)
-        One panel each: ``HUNTING`` or ``RESPONSE``.
-    critical : dict of str to float, optional
-        Linear critical speed by vehicle, m/s: marked, as runs beyond it hunt whatever the track.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    """Results of a sweep over speed (`speed_table` by vehicle) on one track, planar and spatial, a panel for each
+    (column, factor, label) of ``HUNTING`` or ``RESPONSE``; runs that derailed are crosses at the top. Linear critical
+    speeds (m/s) are marked, as runs beyond them hunt whatever the track.
     """
     rows = -(-len(quantities) // 3)
     figure = Figure(figsize=(7.6, 0.7 + 2.2 * rows), layout="constrained")

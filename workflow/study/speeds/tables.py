@@ -11,22 +11,9 @@ OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "grow
 
 
 def speed_row(run, begin=0.5, body="car_body"):
-    """What one run of a sweep over speeds shows.
-
-    Parameters
-    ----------
-    run : Run
-        Output channels pose, contact and, for accelerations, acceleration.
-    begin : float
-        Part of the run after which forces, amplitude and ride count.
-    body : str
-        Body whose accelerations are given; left out where the vehicle has none of this name.
-
-    Returns
-    -------
-    dict
-        Columns carry their unit. Hunting is that of the leading wheelset over the whole run. A run that did not reach
-        its end (``status``) has no late part: what would be measured there is NaN.
+    """What one run of a sweep over speeds shows, with forces, amplitude and ride over the part after ``begin`` (of 1),
+    accelerations of a body where the vehicle has it, and hunting of the leading wheelset over the whole run. A run that
+    did not reach its end (``status``) has no late part: what would be measured there is NaN.
     """
     leading, whole = wheelsets_of(run)[0], run.status == "completed"
     start = begin * run.scene["integration"]["duration"] if whole else 0.0
@@ -61,12 +48,7 @@ def speed_row(run, begin=0.5, body="car_body"):
 
 
 def speed_table(runs):
-    """Rows of :func:`speed_row` for runs given as ``{(detection, track): [run, ...]}``, detection and track in front.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
+    """Rows of :func:`speed_row` for runs ``{(detection, track): [run, ...]}``, detection and track in front."""
     return pd.DataFrame(
         [
             {"detection": detection, "track": track} | speed_row(run)
@@ -77,19 +59,8 @@ def speed_table(runs):
 
 
 def cost_table(tables, job_seconds):
-    """Cost of sweeps over speed, planar against spatial, and what of each job is not integration.
-
-    Parameters
-    ----------
-    tables : dict of str to pandas.DataFrame
-        By vehicle, from :func:`speed_table`.
-    job_seconds : dict of str to float
-        Each vehicle's whole job, from the start of its process to its end, s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per vehicle, track and detection.
+    """Cost of sweeps over speed (`speed_table` by vehicle), planar against spatial, and what of each vehicle's job
+    (``job_seconds``, of its whole process) is not integration: a row per vehicle, track and detection.
     """
     rows = []
     for vehicle, table in tables.items():

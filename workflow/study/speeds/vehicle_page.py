@@ -19,17 +19,7 @@ _PAGE = """<!DOCTYPE html>
 
 
 def vehicle_page(paths):
-    """HTML page with the whole content of vehicle files, the marks of unpublished values set off.
-
-    Parameters
-    ----------
-    paths : sequence of str or Path
-        Vehicle files.
-
-    Returns
-    -------
-    str
-    """
+    """HTML page with the whole content of vehicle files, the marks of unpublished values set off."""
     parts = []
     for path in map(Path, paths):
         text = html.escape(path.read_text(encoding="utf-8"), quote=False)

@@ -29,21 +29,7 @@ FEW = 300
 
 @styled
 def sweep_scatter(table: pd.DataFrame, keys: list[str], measure: str) -> Figure:
-    """One measure of all runs of a sweep over each key, a panel per key.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From :func:`wrcore.sweep.batch.run_sweep`.
-    keys : list of str
-        Columns that were varied; words stand side by side.
-    measure : str
-        Column to show.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """One measure of all runs of a sweep's table over each key, a panel per key; words stand side by side."""
     columns = min(MOST_COLUMNS, len(keys))
     rows = -(-len(keys) // columns)
     figure = Figure(figsize=(0.8 + 2.4 * columns, 0.6 + 2.3 * rows), layout="constrained")

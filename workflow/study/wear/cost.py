@@ -13,21 +13,10 @@ WHOLE = 1e8
 
 
 def cost_table(plan, distance, whole=WHOLE, threads=1):
-    """How the cost of a distance splits, and what the whole would cost at the same rate.
+    """How the cost of a distance (m) of a plan splits, and what the whole (m) would cost at the same rate.
 
-    Parameters
-    ----------
-    plan : path-like or dict
-        See `wrcore.analysis.evolve.load_wear_plan`.
-    distance, whole : float
-        m.
-    threads : int
-
-    Returns
-    -------
-    pandas.DataFrame
-        Rows ``simulate`` (all runs), ``wear`` (their local wear), ``rest`` (smoothing, profiles, conicity, files) and
-        ``all``: cpu_s (processor time), share, extrapolated_cpu_h of the whole; wall_s and steps of all.
+    Rows ``simulate`` (all runs), ``wear`` (their local wear), ``rest`` (smoothing, profiles, conicity, files) and
+    ``all``: cpu_s (processor time), share, extrapolated_cpu_h of the whole; wall_s and steps of all.
     """
     with TemporaryDirectory() as folder:
         evolve(plan, folder, changes={"distance": 1.0})  # compiles

@@ -10,19 +10,7 @@ LOOKS = ("k-", "C0--", "C1-.", "C2:", "C3--", "C4-.", "C5:", "C6-", "C7--")
 
 @styled
 def fig_influences(found, distance):
-    """Depth over the profile for each setting and model.
-
-    Parameters
-    ----------
-    found : dict of str to tuple
-        u and depth (m) by name.
-    distance : float
-        m.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Depth over the profile (u and depth, m, by name) for each setting and model at a distance (m)."""
     figure = Figure(figsize=(6.8, 4.6), layout="constrained")
     axes, worn = figure.subplots(), []
     for (name, (u, depth)), look in zip(found.items(), LOOKS * (1 + len(found) // len(LOOKS)), strict=False):

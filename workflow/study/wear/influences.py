@@ -13,17 +13,8 @@ SEEDS = 100
 
 
 def with_copies(plan, copies):
-    """Changes of a plan that put further copies of each scene beside it, on other irregularities of the same kind.
-
-    Parameters
-    ----------
-    plan : dict
-    copies : int
-        In all, at least 1.
-
-    Returns
-    -------
-    dict
+    """Changes of a plan that put copies of each scene (so many in all) on other irregularities of its kind beside
+    it.
     """
     scenes = []
     for part in plan["scenes"]:
@@ -38,26 +29,8 @@ def with_copies(plan, copies):
 
 
 def variant_depth(source, changes, folder, copies=1):
-    """Depth that a plan with changes takes off a wheel.
-
-    Parameters
-    ----------
-    source : path-like
-        Wear plan.
-    changes : dict
-        Of the plan's keys.
-    folder : path-like
-    copies : int
-        See `with_copies`.
-
-    Returns
-    -------
-    u, depth : numpy.ndarray
-        m.
-    table : pandas.DataFrame
-        From `evolve`.
-    seconds : float
-        Processor time.
+    """Depth that a plan with changes, and copies as for `with_copies`, takes off a wheel: u and depth (m), table of
+    `evolve`, and processor time (s).
     """
     plan, _ = load_wear_plan(source, changes)
     if copies > 1:
@@ -69,18 +42,9 @@ def variant_depth(source, changes, folder, copies=1):
 
 
 def influence_table(found):
-    """Worn profiles beside the first of them.
-
-    Parameters
-    ----------
-    found : dict of str to tuple
-        What `variant_depth` returns, by name.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per variant: deepest loss (m), area of the loss (m^2), largest deviation from the first one's depth and
-        that of the area, both over the first one's, conicity at the end, steps, processor time (s).
+    """Worn profiles of `variant_depth` by name beside the first of them: deepest loss (m), area of the loss (m^2),
+    largest deviation from the first one's depth and that of the area, both over the first one's, conicity at the end,
+    steps, processor time (s).
     """
     u, first, _, _ = next(iter(found.values()))
     rows = []
