@@ -42,23 +42,14 @@ _CIRCLE_DEPTH = 0.040  # m; a circular rail head ends here: about the height of 
 
 @dataclass(frozen=True)
 class RailHead:
-    """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face.
-
-    Parameters
-    ----------
-    radii : tuple of float
-        mm, from the crown to the gauge corner.
-    half_widths : tuple of float
-        mm, half the width of the head where one radius meets the next; one fewer than ``radii``.
-    side : float
-        Inclination of the side face against the vertical (1/20).
-    source : str
-        Origin of the dimensions.
-    """
+    """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face."""
 
     radii: tuple
+    """mm, from the crown to the gauge corner."""
     half_widths: tuple
+    """mm, half the width of the head where one radius meets the next; one fewer than ``radii``."""
     side: float
+    """Inclination of the side face against the vertical, such as 1/20."""
     source: str
 
 
