@@ -130,13 +130,8 @@ def one_of(_, whole, name, k):
 
 
 class Handle:
-    """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing.
-
-    Parameters
-    ----------
-    value : NamedTuple
-        Its arrays live as long as the handle.
-    """
+    """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing; its arrays live as long as
+    the handle."""
 
     def __init__(self, value):
         self.value = value
@@ -185,14 +180,8 @@ class _KernelModel(models.PrimitiveModel):
 
 
 class Kernel:
-    """A kernel that returns nothing, compiled (or loaded) for some arguments, to be called by its address.
-
-    Parameters
-    ----------
-    function : numba dispatcher
-    *examples
-        Arguments; only their types matter.
-    """
+    """A kernel that returns nothing, compiled (or loaded) for the types of some example arguments, to be called by its
+    address."""
 
     def __init__(self, function, *examples):
         signature = tuple(typeof(example) for example in examples)
