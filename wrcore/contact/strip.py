@@ -80,17 +80,8 @@ def curvature_at(nodes, start, step, u):
 
 @jit(allocates=False, forceinline=True)
 def strip_point(geometry, pose, u):
-    """Extreme point of the strip at wheel coordinate u.
-
-    Returns
-    -------
-    ur, z : float
-        Rail coordinate below the point and its height, m.
-    radius, slope, second : float
-        R, R' and R'' of the interpolated profile.
-    along : float
-        Longitudinal share of the strip's radius direction, over q.
-    """
+    """Extreme point of the strip at wheel coordinate u: rail coordinate below it and its height (m), R, R' and R'' of
+    the interpolated profile, and the longitudinal share of the strip's radius direction, over q."""
     extra, slope, second = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
     radius = geometry.rolling_radius + extra
     along = slope * pose.tilt
