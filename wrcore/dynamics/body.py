@@ -56,16 +56,7 @@ def matrix_of(p):
 
 
 def angles(p):
-    """Roll, pitch and yaw (rad) of Euler parameters, the inverse of :func:`euler_parameters`.
-
-    Parameters
-    ----------
-    p : array_like, shape (..., 4)
-
-    Returns
-    -------
-    roll, pitch, yaw : numpy.ndarray, shape (...)
-    """
+    """Roll, pitch and yaw (rad) of Euler parameters (..., 4), the inverse of :func:`euler_parameters`."""
     e0, e1, e2, e3 = np.moveaxis(np.asarray(p, float), -1, 0)
     norm = e0**2 + e1**2 + e2**2 + e3**2
     roll = np.arcsin(np.clip(2.0 * (e2 * e3 + e0 * e1) / norm, -1.0, 1.0))

@@ -75,17 +75,8 @@ def apply_inverse_inertia(inertia, matrix, wrench, out):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_reactions(model, t, state, work):
-    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches.
-
-    Parameters
-    ----------
-    model : Model
-    t : float
-        Time, s.
-    state : numpy.ndarray
-    work : Workspace
-        With the rotations, and the wrenches of all other forces; its ``constraints`` are overwritten.
-    """
+    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches, which hold all other
+    forces; ``work.constraints`` is overwritten."""
     joints, scratch = model.joints, work.constraints
     values, accelerations, right = scratch.joints, scratch.accelerations, scratch.multipliers
     evaluate_joints(joints, t, model.speed, state, work.rotations, values)

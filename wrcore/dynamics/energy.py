@@ -131,14 +131,10 @@ def _directed_energy(elements, k, stretch, speed, own, limit):
 
 @jit
 def element_energies(elements, track, t, speed, state, rotations, turns):
-    """Energies and powers of all force elements; arguments as for ``wrcore.dynamics.suspension.element_forces``.
+    """Energy (J) of the springs of all force elements, its rate, the power that dampers and friction dissipate, and
+    that of the moving frame's ends (W); arguments as for ``wrcore.dynamics.suspension.element_forces``.
 
-    Returns
-    -------
-    stored : float
-        Energy of the springs, J; zero in nominal position, where a preload's spring is not relaxed.
-    rate, lost, driven : float
-        Rate of that energy, power dissipated by dampers and friction, and power of the moving frame's ends, W.
+    The energy is zero in nominal position, where a preload's spring is not relaxed.
     """
     own = STATE_SIZE * turns.shape[0]
     stored = rate = lost = driven = 0.0
@@ -288,23 +284,11 @@ def _energies(times, states, evaluation, model, work):
 
 
 def energy_channels(model, work, times, states):
-    """Energies and powers along a run.
+    """Energies (J; gravitational from z = 0, springs from nominal position) and powers (W) along a run, channels (n,)
+    by name with their unit, from ``times`` (s) and ``states`` (n, size).
 
-    Parameters
-    ----------
-    model : Model
-    work : Workspace
-        Of this model; overwritten, but for its counters of creep look-ups. Its arc lengths are those near which the
-        first ones are sought.
-    times : numpy.ndarray, shape (n,)
-        s.
-    states : numpy.ndarray, shape (n, state_size(model))
-
-    Returns
-    -------
-    dict of str to numpy.ndarray, shape (n,)
-        Channels by name, with their unit: energies in J (gravitational from z = 0, springs from nominal position),
-        powers in W.
+    ``work`` is overwritten, but for its counters of creep look-ups; its arc lengths are those near which the first ones
+    are sought.
     """
     times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
     begin, gives = work.arc_lengths.copy(), len(model.support.mass) > 0
@@ -364,19 +348,8 @@ def _drive_powers(model, work, times, states):
 
 
 def energy_balance(channels, times):
-    """Balance of the energy over a run, by Simpson's rule over its output times.
-
-    Parameters
-    ----------
-    channels : dict of str to numpy.ndarray, shape (n,)
-        From :func:`energy_channels`.
-    times : numpy.ndarray, shape (n,)
-        Uniform output times, s, close enough for the powers' fastest changes.
-
-    Returns
-    -------
-    EnergyBalance
-    """
+    """EnergyBalance over a run from its `energy_channels`, by Simpson's rule over uniform output times (s), which must
+    be close enough for the powers' fastest changes."""
     from scipy.integrate import cumulative_simpson  # its import takes longer than most runs
 
     def gone(name):

@@ -122,18 +122,8 @@ def rails_at(model, state, k):
 
 @jit(allocates=False)
 def support_wrenches(model, state, work, rate):
-    """Wrenches of rails that give on all wheels, and the rates of the track's states.
-
-    Parameters
-    ----------
-    model : Model
-    state : numpy.ndarray, shape (size,)
-    work : Workspace
-        With the motions of all wheels over rails at rest, which become those over rails that give. Filled: as by the
-        kernel of the wheels, and its ``support``.
-    rate : numpy.ndarray, shape (size,)
-        Written at the places of the track's states.
-    """
+    """Wrenches of rails that give on all wheels, as by the kernel of the wheels, and the rates of the track's states,
+    written into ``rate``; the motions in ``work``, over rails at rest, become those over rails that give."""
     support, own = model.support, work.support
     d, massless = support.mass.shape[0], support.mass[0] == 0.0
     size = d if massless else 2 * d
