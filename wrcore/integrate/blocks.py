@@ -68,16 +68,8 @@ class System(NamedTuple):
 
 
 def plan_elimination(model):
-    """Order the elimination by minimum degree: the body with the fewest neighbours left goes next and links them.
-
-    Parameters
-    ----------
-    model : Model
-
-    Returns
-    -------
-    Pattern
-    """
+    """Pattern of an elimination by minimum degree: the body with the fewest neighbours left goes next and links
+    them."""
     n, reached, own = len(model.bodies.mass), reached_bodies(model), own_state_bodies(model)
     pairs = {(i, j) for j in range(n) for i in reached[j]}
     links = {b: {b} | {k for i, j in pairs if b in (i, j) for k in (i, j)} for b in range(n)}
