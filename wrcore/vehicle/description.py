@@ -31,37 +31,24 @@ LARGEST_LIFT = 0.02
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle in its nominal position.
-
-    Attributes
-    ----------
-    name, source_file : str
-    body_names : tuple of str
-        In the order of the state vector.
-    positions : numpy.ndarray, shape (n, 3)
-        Nominal centres of mass, m.
-    rolling_radius, half_distance : float
-        Of the wheelsets, m; NaN for a vehicle without wheelsets.
-    bodies : Bodies
-    elements : Elements
-    joints : Joints
-    data : dict
-        The file's content with defaults, for provenance.
-    unit : Vehicle or None
-        The vehicle that a train repeats.
-    """
+    """A vehicle in its nominal position."""
 
     name: str
     source_file: str
     body_names: tuple
+    """In the order of the state vector."""
     positions: np.ndarray
+    """(n, 3): nominal centres of mass, m."""
     rolling_radius: float
     half_distance: float
+    """Of the wheelsets, m; NaN for a vehicle without wheelsets."""
     bodies: Bodies
     elements: Elements
     joints: Joints
     data: dict
+    """The file's content with defaults, for provenance."""
     unit: "Vehicle | None" = None
+    """The vehicle that a train repeats."""
 
     @property
     def wheelset_names(self):
@@ -84,23 +71,8 @@ class Vehicle:
 
 
 def load_vehicle(path, axle_boxes=True):
-    """Read and check a vehicle file.
-
-    Parameters
-    ----------
-    path : str or Path
-    axle_boxes : bool
-        False: axle boxes become part of their wheelsets.
-
-    Returns
-    -------
-    Vehicle
-
-    Raises
-    ------
-    InputError
-        Naming the file, the element and what was expected.
-    """
+    """Read and check a vehicle file; without ``axle_boxes`` these become part of their wheelsets. An InputError names
+    the file, the element and what was expected."""
     return build_vehicle(read_yaml(path), str(Path(path).name), axle_boxes)
 
 

@@ -7,19 +7,8 @@ from wrcore.errors import InputError
 
 
 def single_elements(items, layout):
-    """The elements as the kernels take them: wheelsets first, dampers along one direction each.
-
-    Parameters
-    ----------
-    items : list of dict
-        Checked elements of a vehicle file.
-    layout : Layout
-
-    Returns
-    -------
-    list of dict
-        With a further key ``points`` (q, 2): the whole characteristic, where an element has one.
-    """
+    """The elements as the kernels take them: wheelsets first, dampers along one direction each; a further key
+    ``points`` (q, 2) is the whole characteristic, where an element has one."""
     items = [{**item, "points": _polygon(item)} for item in items]
     return [single for item in items for single in _along_axes(_wheelset_first(item, layout))]
 
