@@ -52,23 +52,8 @@ REST_SPEED = 20.0
 
 @np.errstate(all="ignore")  # what overflows is no equilibrium
 def rest(scene, model):
-    """Where the bodies of a scene's vehicle stand in static equilibrium; speed and friction do not matter for it.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-
-    Returns
-    -------
-    Equilibrium
-        Velocities are those of a common motion ahead, without rotation.
-
-    Raises
-    ------
-    InputError
-        If there is none near the nominal position.
-    """
+    """Where the bodies of a scene's vehicle stand in static equilibrium, moving ahead together without rotation; speed
+    and friction do not matter for it. An InputError if there is none near the nominal position."""
     vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
     if unit is not None:
@@ -112,23 +97,11 @@ def _standing(scene, model, aside):
 
 
 def static_equilibrium(scene, model):
-    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
+    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
+    load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
 
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-
-    Returns
-    -------
-    Equilibrium
-        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip. Its state
-        is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`).
-
-    Raises
-    ------
-    InputError
-        If there is none near the nominal position.
+    Its state is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`). An InputError if there is
+    none near the nominal position.
     """
     at_rest = rest(scene, model)
     state = _moving_ahead(model, at_rest)
@@ -208,20 +181,8 @@ def initial_state(scene, model, at_rest=None, shared=None):
 
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
     rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
-    ``initial.bodies`` says of single bodies comes last and holds.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-    at_rest : Equilibrium, optional
-        Of the same vehicle, from :func:`rest`.
-    shared : dict, optional
-        Keeps equations of motion for the next scene, see `wrcore.dynamics.series.equations_of`.
-
-    Returns
-    -------
-    numpy.ndarray, shape (state_size(model),)
+    ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's `rest`; ``shared``
+    keeps equations of motion for the next scene (`wrcore.dynamics.series.equations_of`).
     """
     vehicle, data = scene.vehicle, scene.data
     at_rest, driven = at_rest or rest(scene, model), model
