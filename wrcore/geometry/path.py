@@ -155,8 +155,8 @@ def _on_last_circle(x, y, tx, ty, curvature, d):
 
 @jit(forceinline=True)
 def centreline(path, s):
-    """The Station at arc length s (m): straight before the path, with the last curvature, cant, widening and gradient
-    after it."""
+    """The Station at arc length s (m): straight before the path; its last curvature, cant, widening and gradient after
+    it."""
     if path.pieces.shape[0] == 0:
         return Station(s, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
     pieces, i = path.pieces, segment_at(path, s)

@@ -69,15 +69,11 @@ _S1002_SOURCE = "S1002 (EN 13715), sections with coefficients by H. Netter, DLR"
 
 
 def s1002_sections():
-    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm).
+    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm), f(0) = 0 at the tape circle,
+    in m.
 
-    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would
-    turn them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
-
-    Returns
-    -------
-    tuple of Arc, Line or Polynomial
-        f in m, f(0) = 0 at the tape circle.
+    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would turn
+    them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
     """
     h, g, f, d = (
         Arc.between(a * _MM, b * _MM, yc * _MM, -zc * _MM, r * _MM, -side) for a, b, yc, zc, r, side in _S1002_ARCS
@@ -101,16 +97,7 @@ def _closed(polynomial, f0, f1):
 
 
 def rail_sections(head):
-    """Sections of an upright rail head from the gauge side to the field side, crown at (0, 0), in m.
-
-    Parameters
-    ----------
-    head : RailHead
-
-    Returns
-    -------
-    tuple of Arc or Line
-    """
+    """Sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
     right, start, uc, fc, before = [], 0.0, 0.0, 0.0, 0.0
     ends = [w * _MM for w in head.half_widths] + [None]
     for radius, end in zip((r * _MM for r in head.radii), ends, strict=True):
