@@ -44,7 +44,7 @@ def table_folder():
 
 def cache_root():
     """Folder for everything that can be rebuilt: ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's
-    cache folder (``XDG_CACHE_HOME`` or ``~/.cache``); where that is no safe place, a temporary one with one line of
+    cache folder (``XDG_CACHE_HOME`` or ``~/.cache``); where that is not safe, a temporary one with a line of
     warning."""
     return _prepared(os.environ.get("WRCORE_CACHE") or _default())
 

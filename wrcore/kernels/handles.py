@@ -130,8 +130,7 @@ def one_of(_, whole, name, k):
 
 
 class Handle:
-    """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing; its arrays live as long as
-    the handle."""
+    """A named tuple of arrays and numbers, kept in memory as long as the handle, for kernels that allocate nothing."""
 
     def __init__(self, value):
         self.value = value
@@ -180,7 +179,7 @@ class _KernelModel(models.PrimitiveModel):
 
 
 class Kernel:
-    """A kernel that returns nothing, compiled (or loaded) for the types of some example arguments, to be called by its
+    """A kernel that returns nothing, compiled (or loaded) for the types of example arguments, to be called by its
     address."""
 
     def __init__(self, function, *examples):
