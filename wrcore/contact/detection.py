@@ -222,9 +222,7 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
 @jit(allocates=False, forceinline=True)
 def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patch):
     """Patch of the only overlap of a zone that begins at strip ``begin``: 1, 0 without penetration, -1 if too narrow.
-
-    ``overlap`` and the sums m0, m1, m2: see `scan`.
-    """
+    ``overlap`` and the sums m0, m1, m2: see `scan`."""
     wheel, start = geometry.scan_wheel, geometry.scan_wheel_start + (grid.node + begin) * SCAN_STEP
     outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
     if reduction == MAXIMUM:

@@ -35,11 +35,9 @@ def contact_modulus(shear_modulus, poisson_ratio):
 
 
 def _elliptic(flat):
-    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean.
-
-    With c_n the half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly
-    equal numbers where the ellipse is nearly a circle.
-    """
+    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean. With c_n the
+    half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly equal numbers
+    where the ellipse is nearly a circle."""
     mean, other, total, weight = np.ones_like(flat), np.sqrt(flat), np.zeros_like(flat), 1.0
     for _ in range(9):  # enough for a/b up to 1e13; the sixth is exact up to 1e3
         mean, other, difference = 0.5 * (mean + other), np.sqrt(mean * other), 0.5 * (mean - other)

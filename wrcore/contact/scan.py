@@ -100,10 +100,8 @@ def stray(pose):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def leaves_cells(pose):
-    """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly.
-
-    Small angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone.
-    """
+    """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly. Small
+    angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone."""
     return stray(pose) > STRAY
 
 
@@ -266,10 +264,7 @@ def cells_ahead(geometry, u, ur):
 def fine_sums(geometry, pose, ahead, first, last):
     """Integrals of g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``,
     the position (m) from which e counts, and the number of nodes in overlap, 0 where those of wheel and rail do not go
-    together.
-
-    ``ahead``: see `cells_ahead`, for the middle of the overlap.
-    """
+    together. ``ahead``: see `cells_ahead`, for the middle of the overlap."""
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
     density = 1.0 / step
     begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -ahead)

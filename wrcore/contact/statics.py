@@ -66,10 +66,8 @@ LARGEST_TURN = 0.02
 
 @jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
-    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding.
-
-    NaN if no height within ``Z_RANGE`` of ``nominal`` does.
-    """
+    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
+    within ``Z_RANGE`` of ``nominal`` does."""
     low, high = nominal - Z_RANGE, nominal + Z_RANGE
     if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
         return np.nan
@@ -141,11 +139,9 @@ def _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nom
 
 @jit(nogil=True)
 def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none.
-
-    The left wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe;
-    it runs where secants do not get there.
-    """
+    """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none. The left
+    wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe; it runs
+    where secants do not get there."""
     patches = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     roll, z = _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
     if not np.isnan(z):
