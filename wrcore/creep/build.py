@@ -119,10 +119,8 @@ def patch_remainder(axes, log_g, psi, kalker, level):
 
 
 def _interpolation(n, periodic):
-    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node.
-
-    Periodic: (n, n). Else (n + 2, n) with a vanishing third difference of the coefficients at either end.
-    """
+    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node. Periodic: (n, n). Else
+    (n + 2, n) with a vanishing third difference of the coefficients at either end."""
     if periodic:
         rows = 0.75 * np.eye(n) + 0.125 * (np.roll(np.eye(n), 1, 0) + np.roll(np.eye(n), -1, 0))
         return np.linalg.inv(rows)
@@ -146,9 +144,7 @@ def _overtones(n):
 
 def _flat_at_pole(n):
     """Matrix (n + 2, n) from values of odd harmonics along beta to coefficients that end with no value and no slope.
-
-    They are even about beta = 0. Of the two nodes nearest to the pole the values are not used.
-    """
+    They are even about beta = 0. Of the two nodes nearest to the pole the values are not used."""
     inner = n - 2
     rows = 0.75 * np.eye(inner) + 0.125 * (np.eye(inner, k=1) + np.eye(inner, k=-1))
     rows[0, 1] *= 2

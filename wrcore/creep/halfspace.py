@@ -60,10 +60,8 @@ def _project(z, bound, force, ramp):
 
 @jit
 def _start(op, creepage, slip, z):
-    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck.
-
-    Where that is beyond the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution.
-    """
+    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck. Where that is beyond
+    the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution."""
     xi, eta, phi = np.float32(creepage[0]), np.float32(creepage[1]), np.float32(creepage[2])
     stuck, size = op.stuck, op.bound.size
     for i in range(size):
@@ -87,10 +85,8 @@ def _slowed(creepage, slow):
 
 @jit
 def _to_faster(op, creepage, factor, result):
-    """From the force at a reduced creepage to the force at ``factor`` times it.
-
-    Where all panels slide fast, the force approaches that of the rigid slip alone like 1/factor.
-    """
+    """From the force at a reduced creepage to the force at ``factor`` times it. Where all panels slide fast, the force
+    approaches that of the rigid slip alone like 1/factor."""
     xi, eta, phi = creepage[0], creepage[1], creepage[2]
     fx = fy = mz = 0.0
     size = op.bound.size

@@ -77,10 +77,8 @@ class Operator(NamedTuple):
 
 
 def panel_counts(g, level):
-    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all.
-
-    The ratio of the two counts was chosen for least force error at a given total.
-    """
+    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all. The ratio of the
+    two counts was chosen for least force error at a given total."""
     ratio = np.exp(np.interp(np.log(g), np.log([0.18, 0.5, 1.0, 2.5, 7.0]), np.log([2.0, 1.15, 0.8, 0.65, 0.7])))
     ny = max(4, 2 * round(level * np.sqrt(ratio) / 2))
     return max(4, round(level**2 / ny)), ny
@@ -130,10 +128,8 @@ def make_panels(g, psi, n, ny):
 
 
 def _slip_points(n):
-    """Points between which the slip is a difference, over the half length; the first lies ahead of the patch.
-
-    It is half as far from the edge as the second: as far (or on the edge) C23 errs by 0.5 % at level 22, so by 0.3 %.
-    """
+    """Points between which the slip is a difference, over the half length; the first lies ahead of the patch. It is
+    half as far from the edge as the second: as far (or on the edge) C23 errs by 0.5 % at level 22, so by 0.3 %."""
     return np.concatenate([[1.5 - 0.5 * np.cos(np.pi / (2 * n))], np.cos((np.arange(n) + 0.5) * np.pi / n)])
 
 
