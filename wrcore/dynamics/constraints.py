@@ -216,10 +216,8 @@ def _own_tile(about, inertia, mobile, other_about, other_inertia, other_mobile, 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _couple_points(mobile, about, sign, push, tile, size):
-    """Add +-(S S^T/m + R J^-1 R^T) of two joints at points.
-
-    S is the unit matrix there, and R starts with -s~, so that g R^T = g x s.
-    """
+    """Add +-(S S^T/m + R J^-1 R^T) of two joints at points. S is the unit matrix there, and R starts with -s~, so that
+    g R^T = g x s."""
     arm = (about[1, 2], about[2, 0], about[0, 1])
     for i in range(size):
         g = (sign * mobile[i, 0], sign * mobile[i, 1], sign * mobile[i, 2])

@@ -74,11 +74,9 @@ def may_drive(model):
 
 
 def drive_links(model):
-    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration.
-
-    A speed profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link
-    from one wheelset to all others would double the cost of a Jacobian.
-    """
+    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration. A speed
+    profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link from one
+    wheelset to all others would double the cost of a Jacobian."""
     pairs = [(row[0], row[1]) for row in model.drive.rows if row[1] != FRAME]
     for body in model.drive.control[:, 0]:
         pairs += [(body, end) for end in _controlled(model) if end != body]

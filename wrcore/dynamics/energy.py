@@ -90,10 +90,8 @@ def _limit(elements, k, R, rho, u, W):
 
 @jit
 def _friction_energy(elements, k, stretch, speed, own, limit):
-    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit.
-
-    Approach stores what it would at the limit of the nominal position; what a limit that varies does counts as lost.
-    """
+    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit. Approach stores
+    what it would at the limit of the nominal position; what a limit that varies does counts as lost."""
     row, law = elements.directed[k], elements.law[k]
     force, rate = friction_force(elements, k, stretch, speed, own, limit)
     if law[1] == APPROACH:
@@ -132,10 +130,8 @@ def _directed_energy(elements, k, stretch, speed, own, limit):
 @jit
 def element_energies(elements, track, t, speed, state, rotations, turns):
     """Energy (J) of the springs of all force elements, its rate, the power that dampers and friction dissipate, and
-    that of the moving frame's ends (W); arguments as for ``wrcore.dynamics.suspension.element_forces``.
-
-    The energy is zero in nominal position, where a preload's spring is not relaxed.
-    """
+    that of the moving frame's ends (W); arguments as for ``wrcore.dynamics.suspension.element_forces``. The energy is
+    zero in nominal position, where a preload's spring is not relaxed."""
     own = STATE_SIZE * turns.shape[0]
     stored = rate = lost = driven = 0.0
     axes = np.empty((3, 3))
@@ -266,9 +262,7 @@ def _elastic_contact_energy(contact, work):
 @jit
 def _energies(times, states, evaluation, model, work):
     """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8).
-
-    ``evaluation``: the arguments of the model's `Equations` with this workspace.
-    """
+    ``evaluation``: the arguments of the model's `Equations` with this workspace."""
     rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
     equations, model_handle, work_handle = evaluation
     for i in range(times.shape[0]):
@@ -285,11 +279,8 @@ def _energies(times, states, evaluation, model, work):
 
 def energy_channels(model, work, times, states):
     """Energies (J; gravitational from z = 0, springs from nominal position) and powers (W) along a run, channels (n,)
-    by name with their unit, from ``times`` (s) and ``states`` (n, size).
-
-    ``work`` is overwritten, but for its counters of creep look-ups; its arc lengths are those near which the first ones
-    are sought.
-    """
+    by name with their unit, from ``times`` (s) and ``states`` (n, size). ``work`` is overwritten, but for its counters
+    of creep look-ups; its arc lengths are those near which the first ones are sought."""
     times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
     begin, gives = work.arc_lengths.copy(), len(model.support.mass) > 0
     if gives:
@@ -320,11 +311,9 @@ def energy_channels(model, work, times, states):
 
 
 def _track_energies(model, states, work):
-    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n).
-
-    Before them the model and the states, in which rails without mass have velocities, too: as found by this model, for
-    variants of it.
-    """
+    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n). Before them the
+    model and the states, in which rails without mass have velocities, too: as found by this model, for variants of
+    it."""
     support, places, d = model.support, support_places(model), len(model.support.mass)
     if support.mass[0] == 0.0:
         rates = Equations(model, work).at(0.0, states)

@@ -136,10 +136,8 @@ def wheel_loads(equations, state):
 
 def stand_on_rails(model, state, loads):
     """Move, lift and roll wheelsets that stand where rails are out of line, until their wheels carry their loads again.
-
     They stand in ``state``, changed in place, as on perfect rails; the path is taken as straight. Of ``loads`` (k, 2;
-    left and right, N) each wheelset's mean is what both of its wheels get.
-    """
+    left and right, N) each wheelset's mean is what both of its wheels get."""
     joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
     bare = frictionless(model)._replace(elements=pack_elements(), joints=joints, track=track)
     equations, base, deviations = Equations(bare), model.contact.geometry.rail_distance, np.zeros((3, 4))

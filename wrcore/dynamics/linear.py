@@ -105,12 +105,9 @@ def steady_running(model, state, iterations=10):
 
 
 def moved_states(model, state, moves):
-    """States (k, size) with displaced bodies and changed velocities.
-
-    A row of ``moves`` (k, 12 n + states): displacement (m, track axes) and rotation vector (rad, body axes) of body
-    after body; change of velocity (m/s, track axes) and of angular velocity (rad/s, body axes) of body after body;
-    changes of the elements' own states.
-    """
+    """States (k, size) with displaced bodies and changed velocities. A row of ``moves`` (k, 12 n + states):
+    displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s, track
+    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states."""
     n = len(model.bodies.mass)
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)

@@ -158,10 +158,8 @@ def independent_at(bodies, j):
 
 @jit(allocates=False, fastmath=FUSED)
 def _turn_wheels_apart(bodies, work, rate):
-    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia.
-
-    The wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset.
-    """
+    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia. The
+    wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset."""
     for j in range(bodies.independent.shape[0]):
         k = bodies.independent[j, 0]
         body = bodies.wheelsets[k]
