@@ -322,10 +322,8 @@ def _solve_velocities(system, own):
 
 @jit(allocates=False)
 def solve_stage(jacobian, system, sigma, increment):
-    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place.
-
-    Euler parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p.
-    """
+    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place. Euler
+    parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
     pattern, right, shift = system.pattern, system.right, system.shift
     n = pattern.order.shape[0]
     own = increment[STATE_SIZE * n :]

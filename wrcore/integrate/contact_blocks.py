@@ -31,10 +31,8 @@ UNIT = 1e3
 @jit(allocates=False)
 def take_mobility(jacobian, t, state, model, work):
     """Write the accelerations of all bodies by a wrench on each wheelset, at the rotations in ``work``, into
-    ``jacobian.mobility``; the wrenches in ``work`` are overwritten.
-
-    All in the wheelset's own axes, which do not spin: in these they hardly change.
-    """
+    ``jacobian.mobility``; the wrenches in ``work`` are overwritten. All in the wheelset's own axes, which do not spin:
+    in these they hardly change."""
     wheelsets, idle, bodies = model.bodies.wheelsets, jacobian.idle, model.bodies.mass.shape[0]
     _accelerations(t, state, model, work, -1, 0, idle)
     for k in range(wheelsets.shape[0]):
@@ -118,10 +116,8 @@ def _take_rails(jacobian, model, work):
 @jit(allocates=False)
 def contact_blocks(jacobian, state, model, work, fine, columns):
     """Fill ``columns`` (k, 12, 6) with the derivatives of the rails' force and moment by displacement, rotation,
-    velocity and angular velocity of their wheelsets, in the axes in which increments are counted.
-
-    Differences of velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten.
-    """
+    velocity and angular velocity of their wheelsets, in the axes in which increments are counted. Differences of
+    velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
     wheelsets, base, found, held = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, work.strips.held
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])

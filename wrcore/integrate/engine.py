@@ -129,11 +129,9 @@ def copy_into(target, source):
 
 @jit(allocates=False)
 def error_size(tolerances, rate, bodies, new, errors):
-    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed.
-
-    ``rate`` is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of
-    the state is not finite.
-    """
+    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed. ``rate``
+    is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of the state
+    is not finite."""
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):
         first = STATE_SIZE * b
@@ -200,11 +198,9 @@ def accept(control, memory, trial, step):
 
 @jit(allocates=False)
 def forget_wild_places(scratch, work):
-    """After a rejected attempt: undo arc lengths that wild stages have found.
-
-    The search for a wheelset's arc length starts from the last one. On a circle that its path goes round more than
-    once, one that a wild stage has led to another lap would be kept.
-    """
+    """After a rejected attempt: undo arc lengths that wild stages have found. The search for a wheelset's arc length
+    starts from the last one. On a circle that its path goes round more than once, one that a wild stage has led to
+    another lap would be kept."""
     for k in range(work.arc_lengths.shape[0]):
         if abs(work.arc_lengths[k] - scratch.arc_lengths[k]) > WILD or math.isnan(work.arc_lengths[k]):
             work.arc_lengths[k] = scratch.arc_lengths[k]
@@ -228,11 +224,9 @@ def _on_the_rails(limit, state, model, work):
 
 @jit(allocates=False)
 def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
-    """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL.
-
-    ``dense`` (s, d) are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are
-    the axes of the stages at the step's end, see `wrcore.integrate.moving_axes`.
-    """
+    """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
+    are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
+    stages at the step's end, see `wrcore.integrate.moving_axes`."""
     clock, stages = memory.clock, memory.stages
     work.strips.warm[0] = 0
     times, reached = record.times, record.reached[0]

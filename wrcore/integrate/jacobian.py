@@ -183,10 +183,8 @@ def turn_of(jacobian):
 
 @jit(allocates=False, inline="always")
 def contacts_alone(model):
-    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone.
-
-    Wheels that turn independently and rails that give are own states, whose rows and columns these do not tell.
-    """
+    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
+    independently and rails that give are own states, whose rows and columns these do not tell."""
     return (
         model.bodies.wheelsets.shape[0] > 0
         and model.bodies.independent.shape[0] == 0
@@ -301,11 +299,8 @@ def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
 @jit(allocates=False)
 def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slope, differences, equations, model, work):
     """Refresh the whole Jacobian at a state and its ``rate``, or only what the contacts put into one that was taken
-    whole before, and the drift with the derivative along it; returns the number of evaluations.
-
-    ``trial`` and ``slope`` (size,) are scratch; so is ``differences``, with as many places as columns are perturbed
-    together.
-    """
+    whole before, and the drift with the derivative along it; returns the number of evaluations. ``trial`` and ``slope``
+    (size,) are scratch; so is ``differences``, with as many places as columns are perturbed together."""
     n, drift, base = jacobian.axes.shape[0], jacobian.drift, jacobian.by_time
     jacobian.turn[RATE] = turn_rate(state, model, work)
     axes = turn_of(jacobian)

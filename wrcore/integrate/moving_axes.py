@@ -61,10 +61,8 @@ def _circle(turn, t):
 
 @jit(allocates=False)
 def carry(bodies, turn, drift, t, start, trial):
-    """Turn increments in ``trial`` (size,) into the state that they lead to, t (s) after the step's ``start``.
-
-    ``turn`` is rate and angle at the step's start, ``drift`` d at the places of positions, zero elsewhere.
-    """
+    """Turn increments in ``trial`` (size,) into the state that they lead to, t (s) after the step's ``start``. ``turn``
+    is rate and angle at the step's start, ``drift`` d at the places of positions, zero elsewhere."""
     ahead, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
     c0, s0, c, s = math.cos(ahead), math.sin(ahead), math.cos(whole), math.sin(whole)
     hc0, hs0, hc, hs = math.cos(0.5 * ahead), math.sin(0.5 * ahead), math.cos(0.5 * whole), math.sin(0.5 * whole)

@@ -80,9 +80,7 @@ def new_linear(model):
 @jit(allocates=False)
 def _renew(tableau, memory, scratch, linear, equations, model, work):
     """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
-
-    After a rejected step a Jacobian from an earlier state is refreshed first.
-    """
+    After a rejected step a Jacobian from an earlier state is refreshed first."""
     clock, counters = memory.clock, memory.counters
     age, step = counters[AGE], clock[NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
