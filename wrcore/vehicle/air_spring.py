@@ -36,10 +36,8 @@ SPEEDS = np.concatenate(([0.0], np.geomspace(1e-3, 5.0, 40)))
 
 def inflated(items, single_elements, layout, joints, gravity):
     """Checked elements with air springs made of what kernels know, each at the pressure that carries its share of the
-    load, and preloads (N by name) as :func:`wrcore.vehicle.statics.preloads` gives them; ``gravity`` in m/s^2.
-
-    An InputError names an air spring that carries nothing.
-    """
+    load, and preloads (N by name) as :func:`wrcore.vehicle.statics.preloads` gives them; ``gravity`` in m/s^2. An
+    InputError names an air spring that carries nothing."""
     springs = {item["name"]: item for item in items if item["kind"] == "air_spring"}
     pressures = {name: FIRST_PRESSURE for name in springs}
     for _ in range(PASSES):

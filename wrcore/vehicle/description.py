@@ -56,11 +56,9 @@ class Vehicle:
         return tuple(self.body_names[b] for b in self.bodies.wheelsets)
 
     def nominal_wheel_load(self, body):
-        """Rough vertical load of a wheel of a wheelset in nominal position, N.
-
-        All bodies' weight in equal parts where springs carry bodies (without those that joints hold at their height),
-        else the wheelset's own weight less its preloads.
-        """
+        """Rough vertical load of a wheel of a wheelset in nominal position, N. All bodies' weight in equal parts where
+        springs carry bodies (without those that joints hold at their height), else the wheelset's own weight less its
+        preloads."""
         if len(self.bodies.mass) > len(self.bodies.wheelsets):
             joints = [(item["kind"], item.get("axis"), item["bodies"][0]) for item in self.data["joints"]]
             held = {body for kind, axis, body in joints if kind == "coordinate" and axis == "z"}
@@ -77,11 +75,9 @@ def load_vehicle(path, axle_boxes=True):
 
 
 def build_vehicle(data, source, axle_boxes=True):
-    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors.
-
-    Without ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and
-    yaw; in pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset.
-    """
+    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors. Without
+    ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and yaw; in
+    pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset."""
     data = _validated(data, source)
     _check_bodies(data["bodies"], source)
     _check_names(data, source)

@@ -32,11 +32,9 @@ def _along_axes(item):
 
 
 def _wheelset_first(item, layout):
-    """The element with a wheelset as its first body: forces must act at a point of the axle, which does not spin.
-
-    The axes are then those of the other body; preload and characteristic belong to the opposite motion. An element on
-    a line may stay as it is: its line goes through both ends.
-    """
+    """The element with a wheelset as its first body: forces must act at a point of the axle, which does not spin. The
+    axes are then those of the other body; preload and characteristic belong to the opposite motion. An element on a
+    line may stay as it is: its line goes through both ends."""
     field = f"elements.{item['name']}"
     first, second = layout.ends(item, field)
     if on_line(item) or item["kind"] == "anti_roll_bar" or second == FRAME or not layout.spins[second]:
@@ -69,9 +67,7 @@ def end_points(item):
 
 def rotational(item, layout):
     """Stiffness (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) against relative rotation, shape (3, 3).
-
-    A spring that bends does not bend in pitch of a wheelset, nor of an axle box that is part of one.
-    """
+    A spring that bends does not bend in pitch of a wheelset, nor of an axle box that is part of one."""
     zero = [0.0, 0.0, 0.0]
     if item["kind"] == "anti_roll_bar":
         return np.array([[item["stiffness"], 0.0, 0.0], [item.get("damping", 0.0), 0.0, 0.0], zero])

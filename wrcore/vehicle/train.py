@@ -31,8 +31,7 @@ def train_of(vehicle, count, spacing, source):
 
 
 def repeated(data, count, spacing):
-    """The content of a vehicle file, checked and with defaults, for a train of ``count`` vehicles ``spacing`` (m)
-    each."""
+    """The content of a vehicle file, checked and with defaults, for a train of vehicles ``spacing`` (m) apart."""
     train = {**data, "bodies": {}, "elements": [], "joints": []}
     for k in range(count):
         prefix, shift = f"vehicle_{k + 1}_", -k * spacing
