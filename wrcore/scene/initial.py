@@ -155,10 +155,8 @@ def _radii(scene, model, k, state, roll, yaw):
 
 
 def _settled(scene, model, k, y, yaw, load, state):
-    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest.
-
-    Rails that give are where the state has them.
-    """
+    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest. Rails
+    that give are where the state has them."""
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
@@ -250,10 +248,8 @@ def _with_axle_boxes(vehicle, state):
 
 
 def _steady(vehicle, model, state):
-    """Steady running near a state; the state itself where there is none (no creep force, say).
-
-    The vehicles of a train do not act on each other: the first one's is that of all.
-    """
+    """Steady running near a state; the state itself where there is none (no creep force, say). The vehicles of a train
+    do not act on each other: the first one's is that of all."""
     unit = _unit(vehicle, model)
     if unit is not None:
         size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
@@ -272,10 +268,8 @@ def _steady(vehicle, model, state):
 
 @np.errstate(all="ignore")  # what overflows is no better
 def _balanced(vehicle, model, equations, state):
-    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates.
-
-    Newton's method for all wheelsets at once: as long as the other bodies stay, none of them acts on another.
-    """
+    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates. Newton's
+    method for all wheelsets at once: as long as the other bodies stay, none of them acts on another."""
     wheelsets = model.bodies.wheelsets
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
@@ -304,9 +298,7 @@ def _balanced(vehicle, model, equations, state):
 
 def _improved(standing, stands, steps):
     """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
-
-    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding.
-    """
+    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding."""
     own, slopes = slice(len(steps)), None
     left = standing(stands)[1][:, own]
     for _ in range(20):
@@ -331,10 +323,8 @@ def _improved(standing, stands, steps):
 
 
 def _on_path(path, s, speed, part):
-    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here.
-
-    The path's axes at the body move along it with a speed, m/s.
-    """
+    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here. The path's
+    axes at the body move along it with a speed, m/s."""
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)
     turn = frame @ np.array(frame_turn(station)) * speed

@@ -22,11 +22,9 @@ def check_support(spec, source):
 
 
 def track_support(spec, half_distance, elements, wheelsets):
-    """What stands under each wheelset, and force elements that count its states among their own.
-
-    ``half_distance`` is that of the rails from the track's centre line (m), where the halves of the ballast are taken
-    to carry the sleeper.
-    """
+    """What stands under each wheelset, and force elements that count its states among their own. ``half_distance`` is
+    that of the rails from the track's centre line (m), where the halves of the ballast are taken to carry the
+    sleeper."""
     if spec is None:
         return no_support(), elements
     rail, sleeper = spec["rail"], spec.get("sleeper")
