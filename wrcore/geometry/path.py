@@ -220,10 +220,8 @@ def frame_turn(station):
 @jit
 def rail_direction(station, y, z, dy, dz):
     """Slopes towards n and b, over the advance along t, of the line of a rail whose origin lies at y n + z b (m), and
-    that advance per metre of centre line; ``dy`` and ``dz`` are derivatives by s.
-
-    The twist of a cant ramp is contained in the slopes; the advance is 1 - curvature y on a level curve.
-    """
+    that advance per metre of centre line; ``dy`` and ``dz`` are derivatives by s. The twist of a cant ramp is contained
+    in the slopes; the advance is 1 - curvature y on a level curve."""
     along, left, up = frame_turn(station)
     stretch = 1.0 - up * y + left * z
     return (dy - along * z) / stretch, (dz + along * y) / stretch, stretch

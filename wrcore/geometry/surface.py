@@ -16,9 +16,7 @@ SIDES = {"left": 1.0, "right": -1.0}
 def wheel_surface(wheel, r0, half_distance, side, u, s):
     """Points (..., 3) of a wheel's surface in the wheelset's frame, m, Eqs. (4)-(6), at lateral coordinates u (m) and
     angles s (rad) that broadcast: ``s = 0`` is the lowest generator, s turns about the side's outward axle direction.
-
-    The profile's tape circle has the radius ``r0`` and the distance ``half_distance`` from the centre, m.
-    """
+    The profile's tape circle has the radius ``r0`` and the distance ``half_distance`` from the centre, m."""
     u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
     f = wheel(u) - r0
     local = np.stack([f * np.sin(s), u, f * np.cos(s)], axis=-1)
