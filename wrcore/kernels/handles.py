@@ -93,10 +93,8 @@ def _write(value, memory):
 
 
 def _pack(kind, value, begin, memory):
-    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned.
-
-    A kernel that does it has to be compiled for each type, at a second each.
-    """
+    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned. A kernel
+    that does it has to be compiled for each type, at a second each."""
     if isinstance(kind, types.BaseTuple):
         end, coarsest = begin, 1
         for one, part in zip(kind.types, value, strict=True):
