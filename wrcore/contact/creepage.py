@@ -5,28 +5,12 @@ from wrcore.kernels.jit import FUSED, jit
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed):
-    """Creepages and approach speed of a patch on a tangent track.
+    """Longitudinal and lateral creepage (-), spin (1/m), wheel relative to rail, and approach speed (rate of
+    penetration, m/s) of a patch on a tangent track at the rolling speed V > 0 (m/s).
 
-    The contact frame is (1) forward, (2) lateral in the tangent plane, (3) normal from rail into wheel:
-    (1, 0, 0), (0, cos, sin), (0, -sin, cos) of the contact angle.
-
-    Parameters
-    ----------
-    vx, vy, vz, wx, wy, wz : float
-        Velocity of the wheelset's centre (m/s) and its angular velocity (rad/s) in the track frame.
-    px, py, pz : float
-        Contact point relative to the wheelset's centre, m.
-    cosine, sine : float
-        Of the contact angle.
-    speed : float
-        Rolling speed V, m/s, > 0.
-
-    Returns
-    -------
-    xi, eta, phi : float
-        Longitudinal and lateral creepage (-) and spin (1/m), wheel relative to rail.
-    approach_speed : float
-        Rate of penetration, m/s.
+    Velocity of the wheelset's centre (m/s), its angular velocity (rad/s) and the patch relative to the centre (m) are
+    given in the track frame. The contact frame is (1) forward, (2) lateral in the tangent plane, (3) normal from rail
+    into wheel: (1, 0, 0), (0, cos, sin), (0, -sin, cos) of the contact angle.
     """
     slowness = 1.0 / speed
     ux = vx + wy * pz - wz * py

@@ -199,18 +199,8 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
 
 @jit(allocates=False)
 def planar_error_bound(geometry, side, y, z, ex, ey, ez):
-    """Bound of the normal penetration that planar detection misses for one wheel, from yaw and contact angle.
-
-    Parameters
-    ----------
-    geometry, side, y, z, ex, ey, ez
-        As for :func:`find_patches`.
-
-    Returns
-    -------
-    float
-        Metres; 0 where no strip comes near the rail.
-    """
+    """Bound (m) of the normal penetration that planar detection misses for one wheel, from yaw and contact angle; 0
+    where no strip comes near the rail. Arguments as for :func:`find_patches`."""
     pose = make_pose(side, y, z, ex, ey, ez, False)
     window = make_window(geometry, pose)
     grid, wheel, rail = window.grid, geometry.scan_wheel, geometry.scan_rail
@@ -232,9 +222,7 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
 @jit(allocates=False, forceinline=True)
 def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, patch):
     """Patch of the only overlap of a zone that begins at strip ``begin``: 1, 0 without penetration, -1 if too narrow.
-
-    ``overlap`` and the sums m0, m1, m2: see `scan`.
-    """
+    ``overlap`` and the sums m0, m1, m2: see `scan`."""
     wheel, start = geometry.scan_wheel, geometry.scan_wheel_start + (grid.node + begin) * SCAN_STEP
     outside, beyond = start + (overlap.first - 1) * SCAN_STEP, start + (overlap.last + 1) * SCAN_STEP
     if reduction == MAXIMUM:
@@ -275,33 +263,13 @@ def _search_zone(geometry, pose, window, reduction, begin, end, patches, count):
 
 @jit(allocates=False, forceinline=True)
 def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
-    """All contact patches of one wheel.
+    """Number of contact patches of one wheel, which fill ``patches`` (MAX_PATCHES, PATCH_COLUMNS) from the flange side
+    to the field side in the columns U_WHEEL to CURVATURE_Y.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    side : float
-        +1 left, -1 right.
-    y, z : float
-        Wheelset centre in the track frame, m.
-    ex, ey, ez : float
-        The wheel's outward axle direction (unit vector in the track frame).
-    spatial : bool
-        Spatial instead of planar detection.
-    reduction : int
-        MAXIMUM or MOMENT of :mod:`wrcore.contact.reduction`.
-    patches : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
-        Filled from the top: columns U_WHEEL to CURVATURE_Y; X counts from the wheelset's cross-section, the curvatures
-        are A and B of the gap A x^2 + B y^2 (1/m).
-
-    Returns
-    -------
-    int
-        Number of patches, from the flange side to the field side.
-
-    Notes
-    -----
-    Two overlaps separated by less than the scan's step of 0.6 mm count as one: patches so close carry load as one.
+    ``side`` is +1 left, -1 right; the wheelset's centre y, z (m) and the wheel's outward axle direction ex, ey, ez
+    (unit vector) are in the track frame. X counts from the wheelset's cross-section, the curvatures are A and B of the
+    gap A x^2 + B y^2 (1/m). Two overlaps separated by less than the scan's step of 0.6 mm count as one: patches so
+    close carry load as one.
     """
     pose = make_pose(side, y, z, ex, ey, ez, spatial)
     window = make_window(geometry, pose)

@@ -43,18 +43,12 @@ _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
 @checked
 @dataclass(frozen=True)
 class WheelOnRail:
-    """One side of a pair.
-
-    Parameters
-    ----------
-    wheel, rail : ProfileCurve
-    rolling_radius : float
-        Radius at the tape circle, m.
-    """
+    """One side of a pair."""
 
     wheel: ProfileCurve
     rail: ProfileCurve
     rolling_radius: float = 0.46
+    """Radius at the tape circle, m."""
 
     def __post_init__(self):
         if (self.wheel.kind, self.rail.kind) != ("wheel", "rail"):

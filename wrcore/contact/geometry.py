@@ -92,27 +92,9 @@ class ContactGeometry(NamedTuple):
 
 
 def contact_geometry(wheel, rail, track, rolling_radius, half_distance):
-    """Compile a wheel-rail pair and its placement for the contact search.
-
-    Parameters
-    ----------
-    wheel, rail : ProfileCurve
-        Profiles with equally spaced nodes.
-    track : Track
-    rolling_radius : float
-        Radius at the tape circle, m.
-    half_distance : float
-        Distance of the tape circle from the wheelset's centre, m.
-
-    Returns
-    -------
-    ContactGeometry
-
-    Raises
-    ------
-    InputError
-        If wheel and rail are exchanged, or a length is none in m.
-    """
+    """ContactGeometry of a wheel-rail pair, profiles with equally spaced nodes, and its placement for the contact
+    search; the tape circle has the radius ``rolling_radius`` and the distance ``half_distance`` from the wheelset's
+    centre, m. InputError if wheel and rail are exchanged, or a length is none in m."""
     if wheel.kind != "wheel" or rail.kind != "rail":
         raise InputError(wheel.name, "kind", f"expected a wheel and a rail, got {wheel.kind} and {rail.kind}")
     check_number(rolling_radius, *RADII, "wheel", "rolling_radius", "m")

@@ -35,11 +35,9 @@ def contact_modulus(shear_modulus, poisson_ratio):
 
 
 def _elliptic(flat):
-    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean.
-
-    With c_n the half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly
-    equal numbers where the ellipse is nearly a circle.
-    """
+    """K of the ellipse with (b/a)^2 = ``flat``, E/flat - K and K - E, by the arithmetic-geometric mean. With c_n the
+    half differences of the means and S the sum of 2^(n-1) c_n^2, K - E = K S: no difference of two nearly equal numbers
+    where the ellipse is nearly a circle."""
     mean, other, total, weight = np.ones_like(flat), np.sqrt(flat), np.zeros_like(flat), 1.0
     for _ in range(9):  # enough for a/b up to 1e13; the sixth is exact up to 1e3
         mean, other, difference = 0.5 * (mean + other), np.sqrt(mean * other), 0.5 * (mean - other)
@@ -87,12 +85,7 @@ def hertz_shape(ratio):
 
 @lru_cache(maxsize=1)
 def hertz_table():
-    """Tabulate the shape functions (cubic Hermite nodes with slopes of the interpolating spline).
-
-    Returns
-    -------
-    HertzTable
-    """
+    """HertzTable of the shape functions: cubic Hermite nodes with slopes of the interpolating spline."""
     log_ratio, step = np.linspace(0.0, LOG_RATIO_MAX, _NODES // 2 + 1, retstep=True)
     p_large, p_small, k = hertz_shape(np.exp(log_ratio))
     p, k = np.concatenate([p_small[:0:-1], p_large]), np.concatenate([k[:0:-1], k])
@@ -123,36 +116,19 @@ def hertz_shape_at(table, A, B):
 
 @jit(allocates=False, fastmath=FUSED)
 def hertz_ellipse(table, A, B):
-    """Stiffness and semi-axis factors for relative curvatures A (rolling) and B (lateral), 1/m.
-
-    Returns
-    -------
-    stiffness, a_factor, b_factor : float
-        N = E* stiffness delta^1.5 (stiffness in sqrt(m)); a = a_factor sqrt(delta), b = b_factor sqrt(delta), both
-        factors in sqrt(m).
-    """
+    """Stiffness and semi-axis factors, all in sqrt(m), for relative curvatures A (rolling) and B (lateral), 1/m:
+    N = E* stiffness delta^1.5, a = a_factor sqrt(delta), b = b_factor sqrt(delta)."""
     return hertz_shape_at(table, A, B)[:3]
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def damping_factor(approach_speed, c_e, v0):
-    """Damping factor c_d of Eq. (7): c_e when separating, 1 when approaching, a cubic in |speed| < v0.
+    """Damping factor c_d of Eq. (7) at an approach speed (m/s): c_e (0 to 1; 1: no damping) when separating, 1 when
+    approaching, a cubic in |speed| < v0 (m/s).
 
-    C1 and never negative, so the normal force never pulls. At rest it is (1 + c_e)/2: the static penetration is
-    larger than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e).
-
-    Parameters
-    ----------
-    approach_speed : float
-        Rate of penetration, m/s, positive while approaching.
-    c_e : float
-        Factor of fast separation, 0 < c_e <= 1; 1 switches damping off.
-    v0 : float
-        Speed at which the factor saturates, m/s, > 0.
-
-    References
-    ----------
-    Ambrosio and Pombo, Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020).
+    C1 and never negative, so the normal force never pulls. At rest it is (1 + c_e)/2: the static penetration is larger
+    than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e). Ambrosio and Pombo,
+    Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020).
     """
     if approach_speed >= v0:
         return 1.0

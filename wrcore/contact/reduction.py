@@ -63,10 +63,8 @@ GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 @jit(allocates=False)
 def deepest_point(geometry, pose, u, tolerance, outside, beyond):
     """Lateral wheel coordinate between ``outside`` and ``beyond`` where the slopes agree, from ``u``: Newton's steps
-    inside a shrinking bracket. What lies beyond belongs to other overlaps.
-
-    Returns ``u`` itself where there is none (edge of a profile).
-    """
+    inside a shrinking bracket. What lies beyond belongs to other overlaps. Returns ``u`` itself where there is none
+    (edge of a profile)."""
     low, high, new = outside, beyond, u
     for _ in range(60):
         value, rate = slope_difference(geometry, pose, new)
@@ -130,9 +128,8 @@ def _edge_by_bracket(geometry, pose, outside, inside):
 @jit(allocates=False)
 def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     """Both ends of a narrow overlap: from the parabola at its deepest point where that leads there, else by bracketing.
-
-    ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside; ``deepest`` is a strip near the deepest one.
-    """
+    ``outside`` and ``beyond`` lie outside, ``first`` and ``last`` inside; ``deepest`` is a strip near the deepest
+    one."""
     u = deepest_point(geometry, pose, deepest, _LOOSE_TOLERANCE, outside, beyond)
     gap, rate = gap_at(geometry, pose, u)[0], slope_difference(geometry, pose, u)[1]
     start = end = np.nan
@@ -167,10 +164,8 @@ def overlap_moments(geometry, pose, first, last):
 @jit(allocates=False, forceinline=True)
 def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration, patch):
     """Position columns of a patch: the contact surface of two equal bodies lies midway between the undeformed ones.
-
     ``rail_z`` is the rail's height at ``ur``, ``slope`` the contact plane's over the rail's lateral coordinate, ``u``,
-    ``along`` and ``radius`` the wheel's strip.
-    """
+    ``along`` and ``radius`` the wheel's strip."""
     secant = math.sqrt(1.0 + slope * slope)
     cosine = 1.0 / secant
     dy, _ = radius_direction(pose, along)

@@ -100,10 +100,8 @@ def stray(pose):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def leaves_cells(pose):
-    """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly.
-
-    Small angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone.
-    """
+    """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly. Small
+    angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone."""
     return stray(pose) > STRAY
 
 
@@ -222,15 +220,9 @@ def _strips(low, high):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scan(window, wheel, rail, begin, end):
-    """Sums over the strips from ``begin`` to before ``end``, at most `MOST_STRIPS`: what a single overlap needs.
-
-    Returns
-    -------
-    m0, m1, m2 : float
-        Sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, i counted from ``begin``.
-    overlap, close : Strips
-        Strips with a negative gap, and with one below ``window.reserves`` times their reserve.
-    """
+    """Sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, from ``begin``, where i = 0, to before ``end``, at
+    most `MOST_STRIPS`: what a single overlap needs; then the Strips with a negative gap, and those with one below
+    ``window.reserves`` times their reserve."""
     grid, zero = window.grid, lanes8(0.0)
     m0, m1, m2 = zero, zero, zero
     overlap_low = overlap_high = close_low = close_high = np.uint64(0)
@@ -270,19 +262,9 @@ def cells_ahead(geometry, u, ur):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_sums(geometry, pose, ahead, first, last):
-    """Moments of g^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``.
-
-    ``ahead``: see `cells_ahead`, for the middle of the overlap.
-
-    Returns
-    -------
-    m0, m1, m2 : float
-        Integrals of g^2, g^2 e, g^2 e^2 over the overlap, e from the position ``origin``.
-    origin : float
-        m.
-    nodes : int
-        Number of nodes in overlap; 0 where the nodes of wheel and rail do not go together.
-    """
+    """Integrals of g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``,
+    the position (m) from which e counts, and the number of nodes in overlap, 0 where those of wheel and rail do not go
+    together. ``ahead``: see `cells_ahead`, for the middle of the overlap."""
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
     density = 1.0 / step
     begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -ahead)

@@ -29,30 +29,11 @@ ROLL_RANGE = 0.05
 
 @jit(allocates=False)
 def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches):
-    """Patches of one wheel in a given pose with their static normal forces (damping factor 1).
+    """Number of patches of one wheel (``side`` +1 left, -1 right) in a pose of the wheelset (m, rad) and the vertical
+    force on it (N), at rest; fills ``patches`` (MAX_PATCHES, PATCH_COLUMNS), semi-axes and normal forces with them.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    hertz : HertzTable
-    modulus : float
-        Stiffness factor in front of Hertz's law, Pa: E* or, with the damping factor at rest, E* (1 + c_e)/2.
-    side : float
-        +1 left, -1 right.
-    y, z, roll, yaw : float
-        Pose of the wheelset, m and rad.
-    spatial : bool
-    reduction : int
-        MAXIMUM or MOMENT.
-    patches : numpy.ndarray, shape (MAX_PATCHES, PATCH_COLUMNS)
-        Filled, including semi-axes and normal force.
-
-    Returns
-    -------
-    count : int
-        Number of patches.
-    force : float
-        Vertical force on the wheel, N.
+    ``modulus`` (Pa) is the stiffness factor in front of Hertz's law: E*, or E* (1 + c_e)/2 with the damping factor at
+    rest.
     """
     ex, ey, ez = -math.sin(yaw) * math.cos(roll), math.cos(yaw) * math.cos(roll), math.sin(roll)
     count = find_patches(geometry, side, y, z, side * ex, side * ey, side * ez, spatial, reduction, patches)
@@ -85,10 +66,8 @@ LARGEST_TURN = 0.02
 
 @jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
-    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding.
-
-    NaN if no height within ``Z_RANGE`` of ``nominal`` does.
-    """
+    """Wheelset height z (m) at which one wheel carries ``load`` (N) vertically; bisection to rounding. NaN if no height
+    within ``Z_RANGE`` of ``nominal`` does."""
     low, high = nominal - Z_RANGE, nominal + Z_RANGE
     if wheel_at_rest(geometry, hertz, modulus, side, y, low, roll, yaw, spatial, reduction, patches)[1] < load:
         return np.nan
@@ -160,11 +139,9 @@ def _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nom
 
 @jit(nogil=True)
 def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none.
-
-    The left wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe;
-    it runs where secants do not get there.
-    """
+    """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none. The left
+    wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe; it runs
+    where secants do not get there."""
     patches = np.empty((MAX_PATCHES, PATCH_COLUMNS))
     roll, z = _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
     if not np.isnan(z):
@@ -186,20 +163,7 @@ def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
 
 
 def settle_apart(geometries, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """As `settle`, for a left and a right wheel, or rail, that differ.
-
-    Parameters
-    ----------
-    geometries : sequence of ContactGeometry
-        Of the left and the right wheel.
-    hertz, modulus, y, yaw, spatial, reduction, load, nominal
-        As `wheel_at_rest` and `settle` take them.
-
-    Returns
-    -------
-    roll, z : float
-        rad and m; NaN where there is none.
-    """
+    """As `settle`, for a left and a right wheel, or rail, that differ: ``geometries`` of both."""
     from scipy.optimize import brentq  # its import takes longer than most starts
 
     handles, patches = [Handle(geometry) for geometry in geometries], np.empty((MAX_PATCHES, PATCH_COLUMNS))

@@ -80,17 +80,8 @@ def curvature_at(nodes, start, step, u):
 
 @jit(allocates=False, forceinline=True)
 def strip_point(geometry, pose, u):
-    """Extreme point of the strip at wheel coordinate u.
-
-    Returns
-    -------
-    ur, z : float
-        Rail coordinate below the point and its height, m.
-    radius, slope, second : float
-        R, R' and R'' of the interpolated profile.
-    along : float
-        Longitudinal share of the strip's radius direction, over q.
-    """
+    """Extreme point of the strip at wheel coordinate u: rail coordinate below it and its height (m), R, R' and R'' of
+    the interpolated profile, and the longitudinal share of the strip's radius direction, over q."""
     extra, slope, second = cubic_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
     radius = geometry.rolling_radius + extra
     along = slope * pose.tilt
@@ -125,11 +116,9 @@ def gap_at(geometry, pose, u):
 
 @jit(allocates=False, forceinline=True)
 def wheel_slope(pose, slope, along):
-    """Slope of the wheel in the cross-section over the rail's lateral coordinate.
-
-    Spatial: the normal d - R' e has no x component, so its y, z part is normal to the tangent in the cross-section.
-    Planar: the generator's tangent, projected.
-    """
+    """Slope of the wheel in the cross-section over the rail's lateral coordinate. Spatial: the normal d - R' e has no x
+    component, so its y, z part is normal to the tangent in the cross-section. Planar: the generator's tangent,
+    projected."""
     if pose.tilt != 0.0:
         dy, dz = radius_direction(pose, along)
         return -pose.side * (dy - slope * pose.ey) / (dz - slope * pose.ez)
@@ -146,11 +135,9 @@ def gap_and_slope(geometry, pose, u):
 
 @jit(allocates=False, forceinline=True)
 def slope_difference(geometry, pose, u):
-    """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate.
-
-    The difference is negative on the near and positive on the far side of a point of greatest penetration. The rate
-    (1/m) leaves out the small turn of the wheel's slope by roll and yaw: good enough for Newton's steps.
-    """
+    """Slope of the wheel minus slope of the rail below it, both over the rail's lateral coordinate, and its rate. The
+    difference is negative on the near and positive on the far side of a point of greatest penetration. The rate (1/m)
+    leaves out the small turn of the wheel's slope by roll and yaw: good enough for Newton's steps."""
     ur, _, _, slope, second, along = strip_point(geometry, pose, u)
     _, rail_slope, rail_second = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
     return wheel_slope(pose, slope, along) - rail_slope, -second - rail_second

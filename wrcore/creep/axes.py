@@ -40,42 +40,29 @@ _PER_TURN = 0.5 / np.pi
 
 
 class TableAxes(NamedTuple):
-    """Extent and node counts of the axes; a kernel argument.
-
-    Fields
-    ------
-    log_g_min, log_g_max, psi_max : float
-        Range of ln(a/b) and of abs(psi); psi_max = 0 for the plane of ellipses.
-    n_g, n_psi, n_t, n_alpha, n_beta : int
-        Nodes; alpha: on the full circle (even), beta: from 0 to pi/2 with both ends.
-    """
+    """Extent and node counts of the axes; a kernel argument."""
 
     log_g_min: float
     log_g_max: float
     psi_max: float
+    """Range of ln(a/b) and of abs(psi); psi_max = 0 for the plane of ellipses."""
     n_g: int
     n_psi: int
     n_t: int
     n_alpha: int
     n_beta: int
+    """Nodes; alpha: on the full circle (even), beta: from 0 to pi/2 with both ends."""
 
 
 class CreepTableData(NamedTuple):
-    """A creep table as kernels want it.
-
-    Fields
-    ------
-    axes : TableAxes
-    kalker : KalkerData
-        Coefficients for the table's Poisson's ratio.
-    coefficients : (n,) ndarray of float32
-        B-spline coefficients in the order g, psi, t, alpha, beta, output; one ghost on either side of each axis (none
-        for psi in the plane of ellipses, whose alpha covers only -pi/2..pi/2); outputs fx, fy, mz and one zero.
-    """
+    """A creep table as kernels want it."""
 
     axes: TableAxes
     kalker: KalkerData
+    """Coefficients for the table's Poisson's ratio."""
     coefficients: np.ndarray
+    """(n,) float32: B-spline coefficients in the order g, psi, t, alpha, beta, output; one ghost on either side of each
+    axis (none for psi in the plane of ellipses, whose alpha covers only -pi/2..pi/2); outputs fx, fy, mz, 0."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -131,21 +118,7 @@ def node_distances(n_t):
 
 
 def creepages_at(g, t, alpha, beta, kalker):
-    """Inverse of the axes: creepages of the nodes.
-
-    Parameters
-    ----------
-    g : float
-        a/b.
-    t, alpha, beta : ndarray
-        Coordinates of equal shape, t < 1.
-    kalker : KalkerData
-
-    Returns
-    -------
-    ndarray (..., 3)
-        xi', eta', phi'.
-    """
+    """Inverse of the axes: creepages xi', eta', phi' (..., 3) of nodes t < 1, alpha, beta of equal shape at g = a/b."""
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     sx, sy, sp, spin, rate = scales(g, c11, c22, c23)
     direction = np.stack([np.cos(beta) * np.cos(alpha) / sx, np.cos(beta) * np.sin(alpha) / sy, np.sin(beta) / sp], -1)
@@ -184,23 +157,8 @@ def _solid(c, start, row, layer, wt, wa, wb):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def table_lookup(table, g, psi, xi, eta, phi):
-    """Creep force from the table.
-
-    Parameters
-    ----------
-    table : CreepTableData
-    g, psi : float
-        a/b and shape number. Outside the table's range the nearest patch inside is taken and the flag is set.
-    xi, eta, phi : float
-        Nondimensional creepages xi', eta', phi'; any finite value (NaN or infinity give NaN and the flag).
-
-    Returns
-    -------
-    fx, fy, mz : float
-        Fx/(mu N), Fy/(mu N), Mz/(mu N c).
-    out_of_range : int
-        1 where a/b or psi lay outside.
-    """
+    """Creep force fx, fy, mz from the table, over mu N and mu N c, and 1 where a/b or psi lay outside its range: then
+    the nearest patch inside is taken. Creepages that are not finite give NaN and the flag."""
     return table_lookup_at(table, np.log(g), g, psi, xi, eta, phi)
 
 

@@ -98,12 +98,7 @@ def _fill(axes, ellipse, alpha_index, beta_index, values):
 
 
 def patch_remainder(axes, log_g, psi, kalker, level):
-    """R at all nodes of one patch (see `axes`): solve, subtract the linear part, divide by t.
-
-    Returns
-    -------
-    ndarray (n_t, n_alpha, n_beta, 3)
-    """
+    """R (n_t, n_alpha, n_beta, 3) at all nodes of a patch (see `axes`): solve, less the linear part, divided by t."""
     g, ellipse = np.exp(log_g), psi == 0
     contact = RollingContact(g, psi, kalker.nu, level)
     alpha_index, beta_index = _directions(axes, ellipse)
@@ -124,10 +119,8 @@ def patch_remainder(axes, log_g, psi, kalker, level):
 
 
 def _interpolation(n, periodic):
-    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node.
-
-    Periodic: (n, n). Else (n + 2, n) with a vanishing third difference of the coefficients at either end.
-    """
+    """Matrix from node values to quadratic B-spline coefficients, (1/8, 6/8, 1/8) at each node. Periodic: (n, n). Else
+    (n + 2, n) with a vanishing third difference of the coefficients at either end."""
     if periodic:
         rows = 0.75 * np.eye(n) + 0.125 * (np.roll(np.eye(n), 1, 0) + np.roll(np.eye(n), -1, 0))
         return np.linalg.inv(rows)
@@ -151,9 +144,7 @@ def _overtones(n):
 
 def _flat_at_pole(n):
     """Matrix (n + 2, n) from values of odd harmonics along beta to coefficients that end with no value and no slope.
-
-    They are even about beta = 0. Of the two nodes nearest to the pole the values are not used.
-    """
+    They are even about beta = 0. Of the two nodes nearest to the pole the values are not used."""
     inner = n - 2
     rows = 0.75 * np.eye(inner) + 0.125 * (np.eye(inner, k=1) + np.eye(inner, k=-1))
     rows[0, 1] *= 2
@@ -180,21 +171,13 @@ def _mirror_psi(values):
 
 
 def spline_coefficients(values):
-    """B-spline coefficients with ghosts, flattened as `CreepTableData` wants them.
+    """B-spline coefficients, with ghosts, of R at the nodes (n_g, n_psi, n_t, n_alpha, n_beta, 3), flattened as
+    `CreepTableData` wants them and rounded to 1e-9, so that rounding in a matrix product neither breaks a symmetry nor
+    tells two builds apart.
 
     At the spin axis, the pole of (alpha, beta), a smooth force has a slope that goes with cos(alpha) and sin(alpha).
     Interpolation alone gives it overtones, too, and with them slopes that turn within any small distance of the axis.
     They are held flat there, at the price of node values that are off by up to 0.2 % of mu N beside the pole.
-
-    Parameters
-    ----------
-    values : ndarray (n_g, n_psi, n_t, n_alpha, n_beta, 3)
-        R at the nodes.
-
-    Returns
-    -------
-    ndarray of float32
-        Rounded to 1e-9, so that rounding in a matrix product neither breaks a symmetry nor tells two builds apart.
     """
     n_g, n_psi, n_t, n_alpha, n_beta, _ = values.shape
     c = _along(_interpolation(n_g, False), values, 0)
@@ -215,21 +198,8 @@ def spline_coefficients(values):
 
 
 def build_data(nu, planes, resolution, progress=None):
-    """Solve all nodes of a table and interpolate.
-
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio.
-    planes : {"ellipse", "sdec"}
-    resolution : Resolution
-    progress : callable, optional
-        Wraps the list of patches, e.g. ``tqdm.tqdm``.
-
-    Returns
-    -------
-    CreepTableData
-    """
+    """Solve all nodes of a table for Poisson's ratio ``nu`` and ``planes`` ("ellipse" or "sdec") and interpolate: its
+    CreepTableData. ``progress`` wraps the list of patches."""
     axes, kalker = table_axes(planes, resolution), kalker_data(nu)
     log_g, psi, *_ = axis_values(axes)
     values = np.empty((axes.n_g, axes.n_psi, axes.n_t, axes.n_alpha, axes.n_beta, 3))
@@ -252,21 +222,8 @@ def random_creepages(g, count, kalker, rng):
 
 
 def random_errors(data, level, patches=48, per_patch=40, seed=0):
-    """Table against the exact solver at random patches and creepages.
-
-    Parameters
-    ----------
-    data : CreepTableData
-    level : int
-        Level of the exact solver.
-    patches, per_patch, seed : int
-        Patches drawn (ln(a/b) and psi uniform over the table's range), creepages on each, seed.
-
-    Returns
-    -------
-    force, moment : ndarray (patches per_patch,)
-        Error of (fx, fy) as a vector's length, and of mz.
-    """
+    """Errors of the table against the exact solver, of (fx, fy) as a vector's length and of mz, (patches per_patch,)
+    each, at patches drawn uniformly over its range of ln(a/b) and psi with random creepages on each."""
     rng, axes = np.random.default_rng(seed), data.axes
     force, moment = [], []
     for _ in range(patches):

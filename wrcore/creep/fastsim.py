@@ -14,40 +14,22 @@ from wrcore.kernels.jit import jit
 
 
 class FastsimData(NamedTuple):
-    """Settings of FASTSIM; a kernel argument.
-
-    Fields
-    ------
-    n_x, n_y : int
-        Steps along a strip, strips.
-    elliptic : int
-        0: bound of the traction parabolic in x and y (Kalker's choice); 1: Hertzian.
-    """
+    """Settings of FASTSIM; a kernel argument."""
 
     n_x: int
     n_y: int
+    """Steps along a strip, strips."""
     elliptic: int
+    """0: bound of the traction parabolic in x and y (Kalker's choice); 1: Hertzian."""
 
 
 @jit(allocates=False)
 def fastsim(settings, kalker, g, psi, xi, eta, phi):
-    """Creep force by FASTSIM with three flexibilities.
+    """Creep force fx, fy, mz, over mu N and mu N c, by FASTSIM with three flexibilities; arguments as for `laws`.
 
     Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
     lateral and spin creepage; the traction starts at zero at the leading edge, follows s = 0 and is cut back to its
     bound where it exceeds it. An SDEC patch takes the flexibilities of its mean ellipse.
-
-    Parameters
-    ----------
-    settings : FastsimData
-    kalker : KalkerData
-    g, psi, xi, eta, phi : float
-        a/b, shape number, nondimensional creepages (see `laws`).
-
-    Returns
-    -------
-    fx, fy, mz : float
-        Over mu N, mu N, mu N c.
     """
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)

@@ -60,10 +60,8 @@ def _project(z, bound, force, ramp):
 
 @jit
 def _start(op, creepage, slip, z):
-    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck.
-
-    Where that is beyond the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution.
-    """
+    """Rigid slip w = (xi - phi y, eta + phi x) at the slip points, and z as if all panels stuck. Where that is beyond
+    the bound, z is the bound less w/h times the share beyond: where all slides fast, the solution."""
     xi, eta, phi = np.float32(creepage[0]), np.float32(creepage[1]), np.float32(creepage[2])
     stuck, size = op.stuck, op.bound.size
     for i in range(size):
@@ -87,10 +85,8 @@ def _slowed(creepage, slow):
 
 @jit
 def _to_faster(op, creepage, factor, result):
-    """From the force at a reduced creepage to the force at ``factor`` times it.
-
-    Where all panels slide fast, the force approaches that of the rigid slip alone like 1/factor.
-    """
+    """From the force at a reduced creepage to the force at ``factor`` times it. Where all panels slide fast, the force
+    approaches that of the rigid slip alone like 1/factor."""
     xi, eta, phi = creepage[0], creepage[1], creepage[2]
     fx = fy = mz = 0.0
     size = op.bound.size
@@ -202,21 +198,11 @@ def _resultant(op, force, result):
 
 @jit
 def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterations, traction, slip_out):
-    """Solve all rows of ``creepages``; kernel behind `RollingContact`.
+    """Solve for K rows of ``creepages`` (xi', eta', phi'): fills ``results`` (K, 3) with fx, fy, mz, ``iterations``
+    (K,), negative where the tolerance was not met, and, unless empty, panel forces and slip (K, 2 N).
 
-    Up to ``batch`` cases are iterated together so that the resolvent is a matrix product; a case that has converged
-    makes room for the next one.
-
-    Parameters
-    ----------
-    op : Operator
-    creepages : (K, 3) xi', eta', phi'.
-    tolerance : float
-        Stop when the sum over panels of abs(y - F), over that of abs(F), is below.
-    max_iterations, batch : int
-    results : (K, 3), written: fx, fy, mz.
-    iterations : (K,) int, written; negative where the tolerance was not met.
-    traction, slip_out : (K or 0, 2 N) float32, written where not empty: panel forces and slip.
+    The sum over panels of abs(y - F) has to fall below ``tolerance`` times that of abs(F). Up to ``batch`` cases are
+    iterated together so that the resolvent is a matrix product; one that has converged makes room for the next.
     """
     cases, size = creepages.shape[0], op.bound.size
     width = min(batch, cases)
@@ -271,36 +257,27 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
 
 @dataclass(frozen=True)
 class ContactField:
-    """Traction, slip and adhesion over the panels of one case, for plots (nondimensional, see `RollingContact`).
-
-    Attributes
-    ----------
-    x, y : (N,) ndarray
-        Load points of the panels over c.
-    x_edges : (ny, n + 1) ndarray, y_edges : (ny + 1,) ndarray
-        Outlines of the panels over c.
-    px, py, bound : (N,) ndarray
-        Mean traction of a panel and its bound, times c^2/(mu N).
-    sx, sy : (N,) ndarray
-        Slip (wheel minus rail), times G c^2/(mu N); zero where ``stick``.
-    stick : (N,) ndarray of bool
-    fx, fy, mz : float
-        Resultants over mu N and mu N c.
-    """
+    """Traction, slip and adhesion over the panels of one case, for plots (nondimensional, see `RollingContact`)."""
 
     x: np.ndarray
     y: np.ndarray
+    """(N,): load points of the panels over c."""
     x_edges: np.ndarray
     y_edges: np.ndarray
+    """(ny, n + 1) and (ny + 1,): outlines of the panels over c."""
     px: np.ndarray
     py: np.ndarray
     bound: np.ndarray
+    """(N,): mean traction of a panel and its bound, times c^2/(mu N)."""
     sx: np.ndarray
     sy: np.ndarray
+    """(N,): slip (wheel minus rail), times G c^2/(mu N); zero where ``stick``."""
     stick: np.ndarray
+    """(N,) bool."""
     fx: float
     fy: float
     mz: float
+    """Resultants over mu N and mu N c."""
 
 
 class RollingContact:

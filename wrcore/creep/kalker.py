@@ -28,20 +28,14 @@ LEVELS = (32, 48)
 
 
 class KalkerData(NamedTuple):
-    """Coefficients for one nu as cubic polynomials on equal cells of ln(a/b); a kernel argument.
-
-    Fields
-    ------
-    nu, start, spacing : float
-        Poisson's ratio; first node and spacing of ln(a/b).
-    cubic : (cells, 4, 4) ndarray
-        Per cell and power 0..3 of the distance from its lower node: C11, C22, C23, C33.
-    """
+    """Coefficients for one nu as cubic polynomials on equal cells of ln(a/b); a kernel argument."""
 
     nu: float
     start: float
     spacing: float
+    """Poisson's ratio; first node and spacing of ln(a/b)."""
     cubic: np.ndarray
+    """(cells, 4, 4): per cell and power 0..3 of the distance from its lower node: C11, C22, C23, C33."""
 
 
 def adhesion_coefficients(g, nu, level):
@@ -140,16 +134,5 @@ def coefficients_at(log_g, data):
 
 @jit(allocates=False, forceinline=True)
 def kalker_coefficients(g, data):
-    """C11, C22, C23, C33 at a/b = g; outside 1/32..32 the values at the end of the range.
-
-    Parameters
-    ----------
-    g : float
-        a/b > 0.
-    data : KalkerData
-
-    Returns
-    -------
-    c11, c22, c23, c33 : float
-    """
+    """C11, C22, C23, C33 at a/b = g; outside 1/32..32 the values at the end of the range."""
     return coefficients_at(np.log(g), data)

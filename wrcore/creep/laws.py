@@ -32,17 +32,10 @@ class PolachFactors(NamedTuple):
 
 
 class CreepData(NamedTuple):
-    """What the laws need beside their arguments; a kernel argument.
-
-    Fields
-    ------
-    table : CreepTableData
-        Without nodes where the law is not the table; its ``kalker`` serves all laws.
-    fastsim : FastsimData
-    polach : PolachFactors
-    """
+    """What the laws need beside their arguments; a kernel argument."""
 
     table: CreepTableData
+    """Without nodes where the law is not the table; its ``kalker`` serves all laws."""
     fastsim: FastsimData
     polach: PolachFactors
 
@@ -75,31 +68,15 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 
 
 @jit(allocates=False, fastmath=FUSED)
 def linear(kalker, g, xi, eta, phi):
-    """Kalker's linear theory: fx = -C11 xi', fy = -C22 eta' - C23 phi', mz = C23 eta' - C33 phi'; no bound.
-
-    Parameters
-    ----------
-    kalker : KalkerData
-    g, xi, eta, phi : float
-
-    Returns
-    -------
-    fx, fy, mz : float
-    """
+    """Kalker's linear theory: fx = -C11 xi', fy = -C22 eta' - C23 phi', mz = C23 eta' - C33 phi'; no bound."""
     c11, c22, c23, c33 = kalker_coefficients(g, kalker)
     return -c11 * xi, -c22 * eta - c23 * phi, c23 * eta - c33 * phi
 
 
 @jit(allocates=False, fastmath=FUSED)
 def she(kalker, g, xi, eta, phi):
-    """Shen, Hedrick and Elkins: the linear force, reduced to u - u^2/3 + u^3/27 (1 for u >= 3), direction kept.
-
-    u is the linear force over mu N. The spin moment is reduced by the same factor (the paper leaves it open).
-
-    References
-    ----------
-    Shen, Hedrick, Elkins, Proc. 8th IAVSD Symposium (1983) 591-605.
-    """
+    """Shen, Hedrick and Elkins (Proc. 8th IAVSD Symposium (1983) 591-605): the linear force, u over mu N, reduced to
+    u - u^2/3 + u^3/27 (1 for u >= 3), direction kept; the spin moment by the same factor (the paper leaves it open)."""
     fx, fy, mz = linear(kalker, g, xi, eta, phi)
     u = np.sqrt(fx * fx + fy * fy)
     factor = 1 - u / 3 + u * u / 27 if u < 3 else 1 / u
@@ -112,13 +89,9 @@ def polach(kalker, factors, g, xi, eta, phi):
 
     With the creepages s, s_yc = s_y + phi a where that is larger in size than s_y, s_c = sqrt(s_x^2 + s_yc^2):
     eps = (pi/4) c_jj s_c, F = (2/pi) (k_A eps/(1 + (k_A eps)^2) + atan(k_S eps)), F_x = -F s_x/s_c,
-    F_y = -F s_y/s_c + (9/16) a k K phi/s_c, k = 1 + 6.3 (1 - exp(-a/b)), K(eps_s) from
-    eps_s = (8/3) b C23 abs(s_yc)/k (lengths over c). The factors k_A and k_S do not touch the part that spin makes.
-
-    References
-    ----------
-    Polach, A fast wheel-rail forces calculation computer code, Vehicle System Dynamics Suppl. 33 (1999) 728-739.
-    Polach, Creep forces in simulations of traction vehicles running on adhesion limit, Wear 258 (2005) 992-1000.
+    F_y = -F s_y/s_c + (9/16) a k K phi/s_c, k = 1 + 6.3 (1 - exp(-a/b)), K(eps_s) from eps_s = (8/3) b C23 abs(s_yc)/k
+    (lengths over c). The factors k_A and k_S do not touch the part that spin makes. Polach, Vehicle System Dynamics
+    Suppl. 33 (1999) 728-739, and with k_A and k_S Wear 258 (2005) 992-1000.
     """
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
@@ -167,46 +140,15 @@ def creep_force_at(law, data, log_g, g, psi, xi, eta, phi):
 
 @jit(allocates=False, fastmath=FUSED)
 def creep_force(law, data, g, psi, xi, eta, phi):
-    """Creep force by the law with number ``law`` (see `LAWS`).
-
-    Parameters
-    ----------
-    law : int
-    data : CreepData
-    g, psi : float
-        a/b and shape number.
-    xi, eta, phi : float
-        Nondimensional creepages.
-
-    Returns
-    -------
-    fx, fy, mz : float
-        Over mu N, mu N, mu N c.
-    out_of_range : int
-        1 where the patch lies outside what the law's data cover; the nearest patch inside was taken.
-    """
+    """Creep force fx, fy, mz, over mu N and mu N c, by the law with number ``law`` (see `LAWS`), and 1 where the patch
+    lies outside what the law's data cover: the nearest patch inside was taken."""
     return creep_force_at(law, data, np.log(g), g, psi, xi, eta, phi)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def creep_forces(law, data, g, psi, creepages, forces):
-    """One law over many cases.
-
-    Parameters
-    ----------
-    law : int
-    data : CreepData
-    g, psi : ndarray (n,)
-    creepages : ndarray (n, 3)
-        xi', eta', phi'.
-    forces : ndarray (n, 3)
-        Filled: fx, fy, mz.
-
-    Returns
-    -------
-    int
-        Number of cases whose patch lay out of range.
-    """
+    """One law over n cases: fills ``forces`` (n, 3) with fx, fy, mz and returns the number of those whose patch lay out
+    of range; ``creepages`` (n, 3) are xi', eta', phi'."""
     outside = 0
     for i in range(g.size):
         xi, eta, phi = creepages[i]

@@ -29,31 +29,26 @@ UPWIND = 0.6
 
 
 class Panels(NamedTuple):
-    """Geometry of the panels of one patch (lengths over c, forces over mu N); strip-major order, N = ny n panels.
-
-    Fields
-    ------
-    n, ny : int
-        Panels per strip (from the leading edge backwards), strips (towards +y).
-    y_edge : (3 ny + 1,) edges of the sub-strips.
-    half_length, y_line, share : (3 ny,) half length, load centroid and share in the strip's load of each sub-strip.
-    bound : (N,) largest force of a panel; sums to 1.
-    x_slip, x_force, y : (N,) where the slip row holds, centroid of the bound, lateral position.
-    ahead, behind : (n,) weights that carry elastic slip from ``x_slip`` to ``x_force`` (see `halfspace`).
-    """
+    """Geometry of the panels of one patch (lengths over c, forces over mu N); strip-major order, N = ny n panels."""
 
     n: int
     ny: int
+    """Panels per strip (from the leading edge backwards), strips (towards +y)."""
     y_edge: np.ndarray
+    """(3 ny + 1,): edges of the sub-strips."""
     half_length: np.ndarray
     y_line: np.ndarray
     share: np.ndarray
+    """(3 ny,): half length, load centroid and share in the strip's load of each sub-strip."""
     bound: np.ndarray
+    """(N,): largest force of a panel; sums to 1."""
     x_slip: np.ndarray
     x_force: np.ndarray
     y: np.ndarray
+    """(N,): where the slip row holds, centroid of the bound, lateral position."""
     ahead: np.ndarray
     behind: np.ndarray
+    """(n,): weights that carry elastic slip from ``x_slip`` to ``x_force`` (see `halfspace`)."""
 
 
 class Operator(NamedTuple):
@@ -82,10 +77,8 @@ class Operator(NamedTuple):
 
 
 def panel_counts(g, level):
-    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all.
-
-    The ratio of the two counts was chosen for least force error at a given total.
-    """
+    """Panels per strip and strips (even) for the axis ratio ``g``: about ``level**2`` panels in all. The ratio of the
+    two counts was chosen for least force error at a given total."""
     ratio = np.exp(np.interp(np.log(g), np.log([0.18, 0.5, 1.0, 2.5, 7.0]), np.log([2.0, 1.15, 0.8, 0.65, 0.7])))
     ny = max(4, 2 * round(level * np.sqrt(ratio) / 2))
     return max(4, round(level**2 / ny)), ny
@@ -106,19 +99,7 @@ def _moments_of_squared_length(y0, y1, g, psi):
 
 
 def make_panels(g, psi, n, ny):
-    """Lay out ``ny`` strips of ``n`` panels on the patch (g, psi).
-
-    Parameters
-    ----------
-    g, psi : float
-        a/b > 0 and shape number, abs(psi) < 1.
-    n, ny : int
-        Panels per strip, strips.
-
-    Returns
-    -------
-    Panels
-    """
+    """Lay out ``ny`` strips of ``n`` panels on the patch of g = a/b and shape number psi, abs(psi) < 1."""
     edges = np.linspace(-1, 1, SUB_STRIPS * ny + 1) / np.sqrt(g)
     moments = np.array([_moments_of_squared_length(*pair, g, psi) for pair in zip(edges[:-1], edges[1:], strict=True)])
     load = 0.75 / np.sqrt(g) * moments[:, 0]
@@ -147,10 +128,8 @@ def make_panels(g, psi, n, ny):
 
 
 def _slip_points(n):
-    """Points between which the slip is a difference, over the half length; the first lies ahead of the patch.
-
-    It is half as far from the edge as the second: as far (or on the edge) C23 errs by 0.5 % at level 22, so by 0.3 %.
-    """
+    """Points between which the slip is a difference, over the half length; the first lies ahead of the patch. It is
+    half as far from the edge as the second: as far (or on the edge) C23 errs by 0.5 % at level 22, so by 0.3 %."""
     return np.concatenate([[1.5 - 0.5 * np.cos(np.pi / (2 * n))], np.cos((np.arange(n) + 0.5) * np.pi / n)])
 
 
@@ -214,21 +193,8 @@ def _slip_matrix(panels, points, cosines, nu, rows):
 
 
 def slip_matrix(panels, nu, rows=None):
-    """Slip at the panels of the first ``rows`` strips by unit forces, s = w - du/dx with w = 0.
-
-    Parameters
-    ----------
-    panels : Panels
-    nu : float
-        Poisson's ratio, 0 to 0.5.
-    rows : int, optional
-        Strips wanted (default all).
-
-    Returns
-    -------
-    axx, ayy, axy : ndarray (rows n, N)
-        axy is both the x slip by forces in y and the y slip by forces in x.
-    """
+    """Slip at the panels of the first ``rows`` strips by unit forces, s = w - du/dx with w = 0: axx, ayy and axy (rows
+    n, N), the last one both the x slip by forces in y and the y slip by forces in x."""
     cosines = np.cos(np.pi * np.arange(panels.n + 1) / panels.n)
     matrix = _slip_matrix(panels, _slip_points(panels.n), cosines, float(nu), rows or panels.ny)
     return tuple(np.moveaxis(matrix, 2, 0))
@@ -255,24 +221,8 @@ def _mirrored(block, n):
 
 
 def stuck_forces(panels, nu, symmetric, precision=np.float64):
-    """Panel forces by unit creepages where all panels stick, A F = -w.
-
-    Parameters
-    ----------
-    panels : Panels
-    nu : float
-    symmetric : bool
-        psi = 0: solve by mirror halves.
-    precision : type
-        Of the solution.
-
-    Returns
-    -------
-    blocks : list of ndarray
-        The whole of A, or its blocks on (Fx even, Fy odd) and (Fx odd, Fy even) in y.
-    stuck : ndarray (3, 2 N)
-        Rows belong to xi', eta', phi'.
-    """
+    """A, or for psi = 0 (``symmetric``) its blocks on (Fx even, Fy odd) and (Fx odd, Fy even) in y, and the panel
+    forces (3, 2 N) by unit xi', eta', phi' where all panels stick, A F = -w."""
     n, rows = panels.n, panels.ny // 2 if symmetric else panels.ny
     size = rows * n
     zero, one, spin = np.zeros(size), np.ones(size), (-panels.y[:size], panels.x_slip[:size])
@@ -300,19 +250,8 @@ def resultants(panels, force):
 
 
 def make_operator(g, psi, nu, n, ny):
-    """Discretise and factorise one patch.
-
-    Parameters
-    ----------
-    g, psi, nu : float
-        a/b, shape number, Poisson's ratio.
-    n, ny : int
-        Panels per strip; strips, even.
-
-    Returns
-    -------
-    Operator
-    """
+    """Discretise and factorise the patch of g = a/b, shape number psi and Poisson's ratio nu, with n panels on each of
+    an even number ny of strips."""
     panels = make_panels(g, psi, n, ny)
     symmetric = psi == 0
     blocks, stuck = stuck_forces(panels, nu, symmetric, np.float32)

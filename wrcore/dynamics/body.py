@@ -23,10 +23,8 @@ POSITION, EULER, VELOCITY, OMEGA = 0, 3, 7, 10
 
 
 def euler_parameters(roll, pitch, yaw):
-    """Euler parameters of the rotation Rz(yaw) Rx(roll) Ry(pitch), shape (4,).
-
-    Pitch comes first, about the body's own lateral axis, so that it is the spin of a wheelset.
-    """
+    """Euler parameters of the rotation Rz(yaw) Rx(roll) Ry(pitch), shape (4,). Pitch comes first, about the body's own
+    lateral axis, so that it is the spin of a wheelset."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -56,16 +54,7 @@ def matrix_of(p):
 
 
 def angles(p):
-    """Roll, pitch and yaw (rad) of Euler parameters, the inverse of :func:`euler_parameters`.
-
-    Parameters
-    ----------
-    p : array_like, shape (..., 4)
-
-    Returns
-    -------
-    roll, pitch, yaw : numpy.ndarray, shape (...)
-    """
+    """Roll, pitch and yaw (rad) of Euler parameters (..., 4), the inverse of :func:`euler_parameters`."""
     e0, e1, e2, e3 = np.moveaxis(np.asarray(p, float), -1, 0)
     norm = e0**2 + e1**2 + e2**2 + e3**2
     roll = np.arcsin(np.clip(2.0 * (e2 * e3 + e0 * e1) / norm, -1.0, 1.0))
@@ -92,11 +81,9 @@ def rotation_matrix(state, at, matrix):
 
 @jit(allocates=False, fastmath=FUSED)
 def euler_rates(state, at, wx, wy, wz, alpha, rate):
-    """Rates of the Euler parameters for an angular velocity in track axes, p' = 1/2 E(p)^T w.
-
-    The norm p . p = 1 is an invariant of this equation; the term alpha (1 - p . p) p takes away what the integrator
-    adds to it (Baumgarte's feedback for a first-order equation).
-    """
+    """Rates of the Euler parameters for an angular velocity in track axes, p' = 1/2 E(p)^T w. The norm p . p = 1 is an
+    invariant of this equation; the term alpha (1 - p . p) p takes away what the integrator adds to it (Baumgarte's
+    feedback for a first-order equation)."""
     e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
     correction = alpha * (1.0 - e0 * e0 - e1 * e1 - e2 * e2 - e3 * e3)
     rate[at + 3] = 0.5 * (-e1 * wx - e2 * wy - e3 * wz) + correction * e0

@@ -75,17 +75,8 @@ def apply_inverse_inertia(inertia, matrix, wrench, out):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_reactions(model, t, state, work):
-    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches.
-
-    Parameters
-    ----------
-    model : Model
-    t : float
-        Time, s.
-    state : numpy.ndarray
-    work : Workspace
-        With the rotations, and the wrenches of all other forces; its ``constraints`` are overwritten.
-    """
+    """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches, which hold all other
+    forces; ``work.constraints`` is overwritten."""
     joints, scratch = model.joints, work.constraints
     values, accelerations, right = scratch.joints, scratch.accelerations, scratch.multipliers
     evaluate_joints(joints, t, model.speed, state, work.rotations, values)
@@ -225,10 +216,8 @@ def _own_tile(about, inertia, mobile, other_about, other_inertia, other_mobile, 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _couple_points(mobile, about, sign, push, tile, size):
-    """Add +-(S S^T/m + R J^-1 R^T) of two joints at points.
-
-    S is the unit matrix there, and R starts with -s~, so that g R^T = g x s.
-    """
+    """Add +-(S S^T/m + R J^-1 R^T) of two joints at points. S is the unit matrix there, and R starts with -s~, so that
+    g R^T = g x s."""
     arm = (about[1, 2], about[2, 0], about[0, 1])
     for i in range(size):
         g = (sign * mobile[i, 0], sign * mobile[i, 1], sign * mobile[i, 2])

@@ -74,11 +74,9 @@ def may_drive(model):
 
 
 def drive_links(model):
-    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration.
-
-    A speed profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link
-    from one wheelset to all others would double the cost of a Jacobian.
-    """
+    """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration. A speed
+    profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link from one
+    wheelset to all others would double the cost of a Jacobian."""
     pairs = [(row[0], row[1]) for row in model.drive.rows if row[1] != FRAME]
     for body in model.drive.control[:, 0]:
         pairs += [(body, end) for end in _controlled(model) if end != body]
@@ -132,19 +130,8 @@ def actuator(model, i, force, t, state, work):
 
 @jit(allocates=False)
 def add_drive(model, t, state, work, rate):
-    """Add the torques of motors and brakes to the wrenches of the bodies, and write the rate of the integral.
-
-    Parameters
-    ----------
-    model : Model
-    t : float
-        s.
-    state : numpy.ndarray, shape (size,)
-    work : Workspace
-        With the rotations and arc lengths of this state; its wrenches are added to.
-    rate : numpy.ndarray, shape (size,)
-        Written at the integral's place: m/s.
-    """
+    """Add the torques of motors and brakes to the wrenches of the bodies, and write the rate of the controller's
+    integral (m/s) into ``rate``; ``work`` has the rotations and arc lengths of this state."""
     force, _, change = controlled_force(model, t, state, work)
     if model.drive.control.shape[0] > 0:
         rate[STATE_SIZE * model.bodies.mass.shape[0] + model.elements.states] = change
@@ -160,18 +147,8 @@ def add_drive(model, t, state, work, rate):
 
 @jit(allocates=False)
 def fill_drive(model, t, state, work, torques, rates, control):
-    """Torques and relative rotation rates of all actuators; the controller's force and the speed that it wants.
-
-    Parameters
-    ----------
-    model : Model
-    t, state, work
-        Of an evaluation that has just been made.
-    torques, rates : numpy.ndarray, shape (m,)
-        Filled: N m and rad/s.
-    control : numpy.ndarray, shape (2,)
-        Filled: force at the rims (N), speed wanted (m/s).
-    """
+    """Fill ``torques`` (N m) and relative rotation ``rates`` (rad/s) of all actuators, and ``control`` with the
+    controller's force at the rims (N) and the speed that it wants (m/s), right after an evaluation."""
     control[0], control[1], _ = controlled_force(model, t, state, work)
     for i in range(torques.shape[0]):
         torques[i], rates[i] = actuator(model, i, control[0], t, state, work)

@@ -90,10 +90,8 @@ def _limit(elements, k, R, rho, u, W):
 
 @jit
 def _friction_energy(elements, k, stretch, speed, own, limit):
-    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit.
-
-    Approach stores what it would at the limit of the nominal position; what a limit that varies does counts as lost.
-    """
+    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit. Approach stores
+    what it would at the limit of the nominal position; what a limit that varies does counts as lost."""
     row, law = elements.directed[k], elements.law[k]
     force, rate = friction_force(elements, k, stretch, speed, own, limit)
     if law[1] == APPROACH:
@@ -131,15 +129,9 @@ def _directed_energy(elements, k, stretch, speed, own, limit):
 
 @jit
 def element_energies(elements, track, t, speed, state, rotations, turns):
-    """Energies and powers of all force elements; arguments as for ``wrcore.dynamics.suspension.element_forces``.
-
-    Returns
-    -------
-    stored : float
-        Energy of the springs, J; zero in nominal position, where a preload's spring is not relaxed.
-    rate, lost, driven : float
-        Rate of that energy, power dissipated by dampers and friction, and power of the moving frame's ends, W.
-    """
+    """Energy (J) of the springs of all force elements, its rate, the power that dampers and friction dissipate, and
+    that of the moving frame's ends (W); arguments as for ``wrcore.dynamics.suspension.element_forces``. The energy is
+    zero in nominal position, where a preload's spring is not relaxed."""
     own = STATE_SIZE * turns.shape[0]
     stored = rate = lost = driven = 0.0
     axes = np.empty((3, 3))
@@ -270,9 +262,7 @@ def _elastic_contact_energy(contact, work):
 @jit
 def _energies(times, states, evaluation, model, work):
     """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8).
-
-    ``evaluation``: the arguments of the model's `Equations` with this workspace.
-    """
+    ``evaluation``: the arguments of the model's `Equations` with this workspace."""
     rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
     equations, model_handle, work_handle = evaluation
     for i in range(times.shape[0]):
@@ -288,24 +278,9 @@ def _energies(times, states, evaluation, model, work):
 
 
 def energy_channels(model, work, times, states):
-    """Energies and powers along a run.
-
-    Parameters
-    ----------
-    model : Model
-    work : Workspace
-        Of this model; overwritten, but for its counters of creep look-ups. Its arc lengths are those near which the
-        first ones are sought.
-    times : numpy.ndarray, shape (n,)
-        s.
-    states : numpy.ndarray, shape (n, state_size(model))
-
-    Returns
-    -------
-    dict of str to numpy.ndarray, shape (n,)
-        Channels by name, with their unit: energies in J (gravitational from z = 0, springs from nominal position),
-        powers in W.
-    """
+    """Energies (J; gravitational from z = 0, springs from nominal position) and powers (W) along a run, channels (n,)
+    by name with their unit, from ``times`` (s) and ``states`` (n, size). ``work`` is overwritten, but for its counters
+    of creep look-ups; its arc lengths are those near which the first ones are sought."""
     times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
     begin, gives = work.arc_lengths.copy(), len(model.support.mass) > 0
     if gives:
@@ -336,11 +311,9 @@ def energy_channels(model, work, times, states):
 
 
 def _track_energies(model, states, work):
-    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n).
-
-    Before them the model and the states, in which rails without mass have velocities, too: as found by this model, for
-    variants of it.
-    """
+    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n). Before them the
+    model and the states, in which rails without mass have velocities, too: as found by this model, for variants of
+    it."""
     support, places, d = model.support, support_places(model), len(model.support.mass)
     if support.mass[0] == 0.0:
         rates = Equations(model, work).at(0.0, states)
@@ -364,19 +337,8 @@ def _drive_powers(model, work, times, states):
 
 
 def energy_balance(channels, times):
-    """Balance of the energy over a run, by Simpson's rule over its output times.
-
-    Parameters
-    ----------
-    channels : dict of str to numpy.ndarray, shape (n,)
-        From :func:`energy_channels`.
-    times : numpy.ndarray, shape (n,)
-        Uniform output times, s, close enough for the powers' fastest changes.
-
-    Returns
-    -------
-    EnergyBalance
-    """
+    """EnergyBalance over a run from its `energy_channels`, by Simpson's rule over uniform output times (s), which must
+    be close enough for the powers' fastest changes."""
     from scipy.integrate import cumulative_simpson  # its import takes longer than most runs
 
     def gone(name):

@@ -32,36 +32,18 @@ FRICTIONLESS = 1e-9
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Vehicle at rest relative to the moving frame.
-
-    Attributes
-    ----------
-    state : numpy.ndarray
-    wheel_loads : numpy.ndarray, shape (k, 2)
-        Vertical force of the rails on each wheel, N: wheelsets as in ``model.bodies.wheelsets``, left and right.
-    residual : float
-        Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle.
-    """
+    """Vehicle at rest relative to the moving frame."""
 
     state: np.ndarray
     wheel_loads: np.ndarray
+    """(k, 2): vertical force of the rails on left and right wheels, N: wheelsets as in ``model.bodies.wheelsets``."""
     residual: float
+    """Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle."""
 
 
 def displaced(state, model, displacement):
-    """A state with displaced bodies.
-
-    Parameters
-    ----------
-    state : numpy.ndarray
-    model : Model
-    displacement : numpy.ndarray, shape (6 n + states,)
-        Per body: translation (m), rotation vector in track axes (rad); then changes of the elements' own states (m).
-
-    Returns
-    -------
-    numpy.ndarray
-    """
+    """A state with displaced bodies: ``displacement`` (6 n + states,) has each body's translation (m) and rotation
+    vector (rad) in track axes, then changes of the elements' own states (m)."""
     out = state.copy()
     n = len(model.bodies.mass)
     for b in range(n):
@@ -106,21 +88,9 @@ def _accelerations(rates, model):
 
 
 def solve_equilibrium(model, state, iterations=50):
-    """Newton's method from a nearby state.
-
-    Parameters
-    ----------
-    model : Model
-        On a tangent track.
-    state : numpy.ndarray, shape (state_size(model),)
-        All bodies moving ahead at the speed of the frame, wheels about to touch the rails or pressed onto them.
-    iterations : int
-
-    Returns
-    -------
-    Equilibrium
-        Check ``residual``: it is large where Newton's method found no equilibrium.
-    """
+    """Equilibrium on a tangent track by Newton's method from a nearby state, in which all bodies move ahead at the
+    frame's speed, wheels about to touch the rails or pressed onto them; a large ``residual`` means that none was
+    found."""
     model = model._replace(beta=model.beta or 1.0)  # without feedback a joint's violation would not show
     equations = Equations(model)
     unknown = _unknowns(model)
@@ -166,16 +136,8 @@ def wheel_loads(equations, state):
 
 def stand_on_rails(model, state, loads):
     """Move, lift and roll wheelsets that stand where rails are out of line, until their wheels carry their loads again.
-
-    Parameters
-    ----------
-    model : Model
-        Its path is taken as straight.
-    state : numpy.ndarray
-        Changed in place; wheelsets as they stand on perfect rails.
-    loads : numpy.ndarray, shape (k, 2)
-        Of left and right wheels, N; each wheelset's mean is what both of its wheels get.
-    """
+    They stand in ``state``, changed in place, as on perfect rails; the path is taken as straight. Of ``loads`` (k, 2;
+    left and right, N) each wheelset's mean is what both of its wheels get."""
     joints, track = model.joints._replace(equations=0), model.track._replace(path=tangent_path())
     bare = frictionless(model)._replace(elements=pack_elements(), joints=joints, track=track)
     equations, base, deviations = Equations(bare), model.contact.geometry.rail_distance, np.zeros((3, 4))

@@ -93,31 +93,8 @@ class Joints(NamedTuple):
 
 
 def build_joints(items, spins, source="joints"):
-    """Check joints and prepare everything that the solver can know in advance.
-
-    Parameters
-    ----------
-    items : sequence of Joint
-    spins : array_like of int, shape (bodies,)
-        1 for wheelsets, whose frames do not spin with them.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Joints
-
-    Raises
-    ------
-    InputError
-        Naming the joint.
-
-    Examples
-    --------
-    >>> box = Joint("box", "revolute", (0, 1), [[0, 1.0, 0], [0, 0, 0]], axis=1)
-    >>> build_joints([box], [1, 0]).equations
-    5
-    """
+    """Check joints and prepare everything that the solver can know in advance; ``spins`` (bodies,) is 1 for wheelsets,
+    whose frames do not spin with them. An InputError names ``source`` and the joint."""
     items = [_checked(item, spins, f"joints.{item.name}", source) for item in items]
     size = np.array([EQUATIONS[item.kind] for item in items], np.int64)
     order, listed = order_joints([item.bodies for item in items], size)
@@ -173,16 +150,7 @@ class JointState(NamedTuple):
 
 
 def joint_state(joints):
-    """Allocate a JointState; what no motion changes is filled in.
-
-    Parameters
-    ----------
-    joints : Joints
-
-    Returns
-    -------
-    JointState
-    """
+    """Allocate a JointState; what no motion changes is filled in."""
     n = len(joints.kind)
     along = np.zeros((n, MOST_EQUATIONS, 3))
     for k in range(n):
@@ -195,21 +163,8 @@ def joint_state(joints):
 
 
 def joint_jacobian(joints, values, bodies):
-    """The matrix D of all joints, for reading and checking; the solver does without it.
-
-    Parameters
-    ----------
-    joints : Joints
-    values : JointState
-        Filled by :func:`evaluate_joints`.
-    bodies : int
-        Number of bodies.
-
-    Returns
-    -------
-    numpy.ndarray, shape (equations, bodies, 6)
-        Rows joint by joint in the order of ``joints``.
-    """
+    """The matrix D (equations, bodies, 6) of all joints, rows joint by joint, from `evaluate_joints`, for reading and
+    checking; the solver does without it."""
     blocks = []
     for k, size in enumerate(joints.size):
         block = np.zeros((size, bodies, 6))
@@ -222,18 +177,7 @@ def joint_jacobian(joints, values, bodies):
 
 @jit(allocates=False, forceinline=True)
 def evaluate_joints(joints, t, speed, state, rotations, out):
-    """Evaluate all constraints.
-
-    Parameters
-    ----------
-    joints : Joints
-    t, speed : float
-        Time (s), speed of the moving frame (m/s).
-    state, rotations : numpy.ndarray
-        State vector, rotation matrices (bodies + 1, 3, 3) with the unit matrix as the last one.
-    out : JointState
-        Filled.
-    """
+    """Fill a JointState with all constraints at a state; ``rotations`` (bodies + 1, 3, 3) end with the unit matrix."""
     mark = joints.markers
     for k in range(joints.kind.shape[0]):
         kind, i, j = joints.kind[k], joints.bodies[k, 0], joints.bodies[k, 1]

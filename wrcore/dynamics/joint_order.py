@@ -38,21 +38,8 @@ class JointOrder(NamedTuple):
 
 
 def order_joints(bodies, size):
-    """Order joints and describe their matrix.
-
-    Parameters
-    ----------
-    bodies : sequence of (int, int)
-        Bodies of each joint; FRAME for the moving frame.
-    size : array_like of int
-        Equations of each joint.
-
-    Returns
-    -------
-    order : JointOrder
-    listed : numpy.ndarray of int
-        Place of each joint of the new order in the lists given.
-    """
+    """JointOrder of joints, by the two bodies of each (FRAME for the moving frame) and its equations, which describes
+    their matrix, and the place of each joint of that order in the lists given."""
     clusters = _clusters([{k for k, other in enumerate(bodies) if _shared(ends, other)} for ends in bodies])
     listed = [joint for cluster in clusters for joint in cluster]
     ends = [bodies[k] for k in listed]

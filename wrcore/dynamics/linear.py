@@ -34,50 +34,25 @@ RANK = 1e-9
 
 @dataclass(frozen=True)
 class Linearisation:
-    """x' = A x for small motions about a steady state.
-
-    Attributes
-    ----------
-    matrix : numpy.ndarray, shape (m, m)
-        A, in independent coordinates: first displacements, then velocities, then the force elements' own states.
-    basis : numpy.ndarray, shape (12 n + states, m)
-        Turns independent coordinates into those of the n bodies, as :func:`moved_states` takes them.
-    state : numpy.ndarray
-        The steady state.
-    speed : float
-        m/s.
-    places : int
-        Number of independent displacements.
-    residual : numpy.ndarray, shape (m,)
-        What should be zero at a steady state: x' there, without the velocities (m/s^2, rad/s^2, m/s).
-    """
+    """x' = A x for small motions about a steady state."""
 
     matrix: np.ndarray
+    """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' own states."""
     basis: np.ndarray
+    """(12 n + states, m): turns independent coordinates into the moves of the n bodies, see :func:`moved_states`."""
     state: np.ndarray
     speed: float
+    """m/s."""
     places: int
+    """Number of independent displacements."""
     residual: np.ndarray
+    """(m,): what should be zero at a steady state: x' there, without the velocities (m/s^2, rad/s^2, m/s)."""
 
 
 def linearise(model, state):
-    """Linearise the equations of motion about a steady state.
-
-    Parameters
-    ----------
-    model : Model
-        On a tangent track.
-    state : numpy.ndarray, shape (state_size(model),)
-        All bodies run ahead without turning (wheelsets spin) and without acceleration, as in :func:`steady_running`.
-
-    Returns
-    -------
-    Linearisation
-
-    Notes
-    -----
-    Central differences in all independent coordinates; all right-hand sides in one compiled call.
-    """
+    """Linearise the equations of motion about a steady state on a tangent track, in which all bodies run ahead without
+    turning (wheelsets spin) and without acceleration, as in :func:`steady_running`: central differences in all
+    independent coordinates, all right-hand sides in one compiled call."""
     from scipy.linalg import block_diag  # a tenth of a second that runs need not wait
 
     size = 6 * len(model.bodies.mass)
@@ -99,21 +74,11 @@ def linearise(model, state):
 
 
 def steady_running(model, state, iterations=10):
-    """Linearise about the steady state near a given one: Newton's method on the displacements and the wheelsets' spins.
+    """Linearise about the steady state near a given one: Newton's method on the displacements and the wheelsets' spins,
+    on a tangent track, from bodies that run ahead at the model's speed, wheels pressed onto the rails.
 
-    Parameters
-    ----------
-    model : Model
-        On a tangent track.
-    state : numpy.ndarray, shape (state_size(model),)
-        All bodies run ahead at the model's speed, wheels pressed onto the rails.
-    iterations : int
-
-    Returns
-    -------
-    Linearisation
-        Check ``residual``. A free wheelset keeps some: nothing drives it, and its spin creepage slows it down. A
-        displacement that nothing resists, such as that along the track, stays as it is.
+    Check ``residual``. A free wheelset keeps some: nothing drives it, and its spin creepage slows it down. A
+    displacement that nothing resists, such as that along the track, stays as it is.
     """
     best = linearise(model, state)
     places, size = best.places, len(best.matrix)
@@ -140,20 +105,9 @@ def steady_running(model, state, iterations=10):
 
 
 def moved_states(model, state, moves):
-    """States with displaced bodies and changed velocities.
-
-    Parameters
-    ----------
-    model : Model
-    state : numpy.ndarray, shape (size,)
-    moves : numpy.ndarray, shape (k, 12 n + states)
-        Displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s,
-        track axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states.
-
-    Returns
-    -------
-    numpy.ndarray, shape (k, size)
-    """
+    """States (k, size) with displaced bodies and changed velocities. A row of ``moves`` (k, 12 n + states):
+    displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s, track
+    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states."""
     n = len(model.bodies.mass)
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)

@@ -9,24 +9,8 @@ FRAME = -1
 
 @jit(allocates=False, inline="always")
 def marker_motion(speed, t, state, rotations, body, local_x, local_y, local_z):
-    """Position and velocity of a marker in absolute axes.
-
-    Parameters
-    ----------
-    speed, t : float
-        Speed of the moving frame (m/s) and time (s); its markers are those of a tangent track.
-    state, rotations : numpy.ndarray
-        State vector and rotation matrices of the bodies.
-    body : int
-        Body number, or FRAME.
-    local_x, local_y, local_z : float
-        Marker in the body's axes, m.
-
-    Returns
-    -------
-    point, arm, velocity : tuple of float
-        Position (m), its part relative to the body's centre (m; zero for the frame), and velocity (m/s).
-    """
+    """Position (m), its part relative to the body's centre (m; zero for the frame) and velocity (m/s), absolute, of a
+    marker in the axes (m) of a body or of FRAME, which runs along a tangent track at ``speed``."""
     if body == FRAME:
         return (local_x + speed * t, local_y, local_z), (0.0, 0.0, 0.0), (speed, 0.0, 0.0)
     at = STATE_SIZE * body

@@ -9,24 +9,8 @@ from wrcore.kernels.jit import jit
 
 @jit(allocates=False, nogil=True)
 def evaluations_at(times, states, equations, model, work, rates, patches, bounds):
-    """Rates and contact patches of all wheels at given states.
-
-    Parameters
-    ----------
-    times : numpy.ndarray, shape (n,)
-        s.
-    states : numpy.ndarray, shape (n, size)
-    equations : Kernel
-        The right-hand side.
-    model : Model
-    work : Workspace
-    rates : numpy.ndarray, shape (n, size)
-        Filled.
-    patches : numpy.ndarray, shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS)
-        Filled where there is a patch: wheelsets in the model's order, left and right.
-    bounds : numpy.ndarray, shape (n, k, 2)
-        Filled: bound of planar detection's error, m.
-    """
+    """Fill ``rates`` (n, size), ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS; where there is one) and ``bounds`` of
+    planar detection's error (n, k, 2; m) at n times (s) and states; wheelsets in the model's order, left and right."""
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rates[i])
         for k in range(work.counts.shape[0]):
@@ -45,24 +29,9 @@ def _fill_drives(times, states, equations, model, work, rate, torques, rates, co
 
 
 def drive_history(model, work, times, states):
-    """What motors, brakes and the speed controller did at given states.
-
-    Parameters
-    ----------
-    model : Model
-    work : Workspace
-        Of this model; overwritten.
-    times : numpy.ndarray, shape (n,)
-        s.
-    states : numpy.ndarray, shape (n, state_size(model))
-
-    Returns
-    -------
-    torques, rates : numpy.ndarray, shape (n, m)
-        On the wheelsets along their axles (N m), and the relative rotation rates about these (rad/s).
-    control : numpy.ndarray, shape (n, 2)
-        The controller's force at the rims (N) and the speed that it wants (m/s); zeros without one.
-    """
+    """What motors, brakes and the speed controller did at n times (s) and states: torques on the wheelsets along their
+    axles (N m) and relative rotation rates about these (rad/s), (n, m) each; the controller's force at the rims (N) and
+    the speed that it wants (m/s), (n, 2), zeros without one. ``work`` is overwritten."""
     shape = len(times), len(model.drive.rows)
     torques, rates, control = np.zeros(shape), np.zeros(shape), np.zeros((len(times), 2))
     _fill_drives(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), torques, rates, control)

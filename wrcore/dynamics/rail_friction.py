@@ -14,16 +14,8 @@ def arc_length_at(model, state, work, k):
 
 @jit(allocates=False)
 def fill_rail_friction(model, state, work):
-    """Write the friction coefficients of the rails under all wheels into the wheels' motions.
-
-    Parameters
-    ----------
-    model : Model
-        With two schedules over arc length in ``friction``: left and right rail.
-    state : numpy.ndarray, shape (size,)
-    work : Workspace
-        Its motions are those of this state.
-    """
+    """Write the friction coefficients of the rails under all wheels into the wheels' motions, which are those of
+    ``state``, from the model's two schedules over arc length: left and right rail."""
     for k in range(model.bodies.wheelsets.shape[0]):
         s = arc_length_at(model, state, work, k)
         for wheel in range(2):

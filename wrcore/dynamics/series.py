@@ -10,19 +10,8 @@ from wrcore.kernels.handles import Kind
 
 
 def equations_of(model, shared=None):
-    """Equations of motion that each thread turns from one model to the next.
-
-    Parameters
-    ----------
-    model : Model
-    shared : dict, optional
-        Keeps them for the next call, which takes them away. Left out: new ones.
-
-    Returns
-    -------
-    Equations
-        As if new.
-    """
+    """Equations of motion, as if new, that each thread turns from one model to the next; ``shared`` keeps them for the
+    next call, which takes them away."""
     if shared is None:
         return Equations(model)
     key = "equations", threading.get_ident(), *structure(model)

@@ -122,18 +122,8 @@ def rails_at(model, state, k):
 
 @jit(allocates=False)
 def support_wrenches(model, state, work, rate):
-    """Wrenches of rails that give on all wheels, and the rates of the track's states.
-
-    Parameters
-    ----------
-    model : Model
-    state : numpy.ndarray, shape (size,)
-    work : Workspace
-        With the motions of all wheels over rails at rest, which become those over rails that give. Filled: as by the
-        kernel of the wheels, and its ``support``.
-    rate : numpy.ndarray, shape (size,)
-        Written at the places of the track's states.
-    """
+    """Wrenches of rails that give on all wheels, as by the kernel of the wheels, and the rates of the track's states,
+    written into ``rate``; the motions in ``work``, over rails at rest, become those over rails that give."""
     support, own = model.support, work.support
     d, massless = support.mass.shape[0], support.mass[0] == 0.0
     size = d if massless else 2 * d
@@ -187,10 +177,8 @@ def _press(model, work, faster):
 
 @jit(allocates=False)
 def _find_slopes(model, work):
-    """Derivatives of the forces on the rails by the rails' speeds, where forces are known; patches stay.
-
-    For patches on strips ellipses stand in, as in a Jacobian: the derivatives only lead to the solution.
-    """
+    """Derivatives of the forces on the rails by the rails' speeds, where forces are known; patches stay. For patches on
+    strips ellipses stand in, as in a Jacobian: the derivatives only lead to the solution."""
     own, strips, cheap = work.support, work.strips, work.strips.cheap[0]
     if model.contact.strips.strips > 0:
         strips.cheap[0], strips.held[0] = 1, 0
@@ -229,10 +217,8 @@ def _renew_matrix(support, own, k, wheel, a, b, differences):
 
 @jit(allocates=False)
 def _step(support, own, k, wheel, differences):
-    """Newton's step of one rail, or half of the last one, back, where that came no closer.
-
-    Returns whether the next step wants derivatives by differences.
-    """
+    """Newton's step of one rail, or half of the last one, back, where that came no closer. Returns whether the next
+    step wants derivatives by differences."""
     a, b = own.residuals[k, wheel, 0], own.residuals[k, wheel, 1]
     step, left, before = own.steps[k, wheel], math.sqrt(a * a + b * b), own.left[k, wheel]
     if left > (1.0 - ENOUGH * own.parts[k, wheel]) * before:

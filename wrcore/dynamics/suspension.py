@@ -94,23 +94,12 @@ class Elements(NamedTuple):
 
 
 def pack_elements(springs=(), directed=(), turning=()):
-    """Sort elements by pair.
+    """Sort elements by pair (first body, second body, ahead).
 
-    Parameters
-    ----------
-    springs : sequence of (pair, row)
-        Elements along three axes: pair = (first body, second body, ahead) and the 15 numbers of a row of
-        ``Elements.springs``.
-    directed : sequence of (pair, row, direction, law, points, pressing)
-        Elements along one direction: the 10 numbers of a row of ``Elements.directed``, direction, law, the points
-        (q, 2) of the characteristic, or None, and the element that presses: None, or (0, k) and (1, k) for the k-th of
-        ``springs`` and of ``directed``.
-    turning : sequence of (pair, stiffness, damping, cubic stiffness)
-        Against relative rotation about the second body's axes, three numbers each; summed pair by pair.
-
-    Returns
-    -------
-    Elements
+    ``springs``: (pair, the 15 numbers of a row of ``Elements.springs``). ``directed``: (pair, the 10 of
+    ``Elements.directed``, direction, law, points (q, 2) of the characteristic or None, the element that presses: None,
+    or (0, k) and (1, k) for the k-th of ``springs`` and of ``directed``). ``turning``: (pair, stiffness, damping, cubic
+    stiffness) against relative rotation about the second body's axes, three numbers each; summed pair by pair.
     """
     pairs = sorted({item[0] for group in (springs, directed, turning) for item in group})
     orders = [sorted(range(len(group)), key=lambda k: group[k][0]) for group in (springs, directed)]
@@ -173,17 +162,8 @@ def _directed_force(elements, k, stretch, speed, state, own):
 
 @jit(allocates=False, fastmath=FUSED)
 def friction_limit(elements, k, rotation, place, velocity, turn):
-    """Force at which the k-th element along one direction, one with a limit, slips, N.
-
-    Parameters
-    ----------
-    elements : Elements
-    k : int
-    rotation : tuple of 3 tuples of 3 float
-        R of the pair.
-    place, velocity, turn : tuples of 3 float
-        rho (m), u (m/s) and W (rad/s) of the pair.
-    """
+    """Force at which the k-th element along one direction, one with a limit, slips, N; R, rho (m), u (m/s) and W
+    (rad/s) of its pair as tuples."""
     first, other = elements.law[k, 2], elements.law[k, 3]
     if other == -1:
         return elements.table[first, 0]
@@ -217,24 +197,11 @@ def friction_force(elements, k, stretch, speed, inner, limit):
 
 @jit(allocates=False, fastmath=FUSED)
 def element_forces(elements, track, t, speed, state, rotations, turns, wrenches, rate):
-    """Add the forces of all elements to the wrenches of the bodies and write the rates of the elements' own states.
+    """Add the forces of all elements to the ``wrenches`` (n, 6) of the bodies (about centres of mass, track axes) and
+    write the rates of the elements' own states (m/s) at their places in ``rate``.
 
-    Parameters
-    ----------
-    elements : Elements
-    track : TrackModel
-    t, speed : float
-        Time (s), speed of the moving frame (m/s).
-    state : numpy.ndarray
-        State vector of all bodies, followed by the elements' own states.
-    rotations : numpy.ndarray, shape (n + 1, 3, 3)
-        Rotation matrices of the bodies; the last one is the moving frame's.
-    turns : numpy.ndarray, shape (n, 3)
-        Angular velocities of the bodies' frames in track axes, rad/s.
-    wrenches : numpy.ndarray, shape (n, 6)
-        Added to: force and moment about the centre of mass of each body, track axes.
-    rate : numpy.ndarray
-        Written at the places of the elements' own states: m/s.
+    ``rotations`` (n + 1, 3, 3) end with the moving frame's; ``turns`` (n, 3) are the angular velocities of the bodies'
+    frames in track axes, rad/s; ``speed`` is the frame's, m/s.
     """
     own = STATE_SIZE * wrenches.shape[0]
     for p in range(elements.pairs.shape[0]):

@@ -123,16 +123,7 @@ def own_states(model):
 
 
 def workspace(model):
-    """Allocate the scratch arrays for a model.
-
-    Parameters
-    ----------
-    model : Model
-
-    Returns
-    -------
-    Workspace
-    """
+    """Allocate the scratch arrays for a model."""
     n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
     return Workspace(
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
@@ -167,10 +158,8 @@ def independent_at(bodies, j):
 
 @jit(allocates=False, fastmath=FUSED)
 def _turn_wheels_apart(bodies, work, rate):
-    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia.
-
-    The wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset.
-    """
+    """Rates of half the difference of rolling rates: each wheel has half the wheelset's pitch moment of inertia. The
+    wheelset's own rolling rate is the mean of both, whose equation is that of a solid wheelset."""
     for j in range(bodies.independent.shape[0]):
         k = bodies.independent[j, 0]
         body = bodies.wheelsets[k]
@@ -237,21 +226,12 @@ def _add_rail_wrenches(model, state, work, rate):
 
 @jit(allocates=False, fastmath=FUSED)
 def fill_derivatives(t, state, model, work, rate):
-    """Right-hand side of the equations of motion.
+    """Right-hand side of the equations of motion: fills ``rate``; patches and counts in ``work`` belong to this
+    evaluation afterwards.
 
-    Parameters
-    ----------
-    t : float
-        Time, s.
-    state : numpy.ndarray, shape (state_size(model),)
-        Per body: position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the force
-        elements' own states (m), those of wheels that turn independently (rad/s) and of a track that gives (m, m/s,
-        :mod:`wrcore.dynamics.support`), and the speed controller's integral (m).
-    model : Model
-    work : Workspace
-        Overwritten; patches and counts belong to this evaluation afterwards.
-    rate : numpy.ndarray
-        Filled: time derivative of the state.
+    The state: per body position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the
+    force elements' own states (m), those of wheels that turn independently (rad/s) and of a track that gives (m, m/s,
+    :mod:`wrcore.dynamics.support`), and the speed controller's integral (m).
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
@@ -343,19 +323,8 @@ def with_kernels(model, work):
 
 
 class Equations:
-    """A model's equations of motion with their scratch arrays, for kernels and as ``function(t, state)``.
-
-    Parameters
-    ----------
-    model : Model
-    work : Workspace, optional
-
-    Attributes
-    ----------
-    work : Workspace
-    arguments : tuple
-        ``(equations, model, work)`` as kernels take them: the right-hand side and handles.
-    """
+    """A model's equations of motion with their scratch arrays, as ``function(t, state)`` and, for kernels, as
+    ``arguments``: the right-hand side, and handles of model and work."""
 
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work

@@ -68,31 +68,13 @@ def _rail_frame(frame, lateral, vertical, out):
 
 @jit(allocates=False, fastmath=FUSED)
 def rail_motions(track, distances, state, at, axle, guess, frame, values, rails, shifts, motions):
-    """A wheelset's motion in the frames of its two rails.
+    """A wheelset's motion in the frames of its two rails; returns its arc length (m), sought from ``guess``, NaN if
+    there is none.
 
-    Parameters
-    ----------
-    track : TrackModel
-    distances : tuple of float
-        Profile origins of the left and the right rail from the track's centre line, m.
-    state : numpy.ndarray
-    at : int
-        Start of the wheelset's state.
-    axle : numpy.ndarray, shape (3, 3)
-        Its rotation matrix.
-    guess : float
-        Arc length from which its own is sought, m.
-    frame, values : numpy.ndarray, shapes (3, 3) and (3, 4)
-        Scratch.
-    rails, shifts : numpy.ndarray, shapes (2, 3, 3) and (2, 2)
-        Filled: axes of the left and the right rail's frame, and where it is off its nominal place, left and up (m).
-    motions : numpy.ndarray, shape (2, MOTION_COLUMNS)
-        Filled, see `wrcore.dynamics.wheel.wheel_wrenches`.
-
-    Returns
-    -------
-    float
-        Arc length of the wheelset, m; NaN if there is none.
+    ``distances`` are those of the profiles' origins from the track's centre line (m), ``at`` is the start of the
+    wheelset's state, ``axle`` its rotation matrix; ``frame`` (3, 3) and ``values`` (3, 4) are scratch. Fills ``rails``
+    (2, 3, 3), axes of the left and the right rail's frame; ``shifts`` (2, 2), where it is off its nominal place, left
+    and up (m); and ``motions`` (2, MOTION_COLUMNS), see `wrcore.dynamics.wheel.wheel_wrenches`.
     """
     s = arc_length_of(track.path, state[at], state[at + 1], state[at + 2], guess)
     station = track_frame(track.path, s, frame)
@@ -123,16 +105,8 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
 
 @jit(allocates=False, fastmath=FUSED)
 def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
-    """Turn what was found in the frames of two rails into absolute axes, and patches to where they are in the track's.
-
-    Parameters
-    ----------
-    rails, shifts : numpy.ndarray, shapes (2, 3, 3) and (2, 2)
-        From `rail_motions`.
-    wrenches : numpy.ndarray, shape (2, 6)
-    patches : numpy.ndarray, shape (2, MAX_PATCHES, PATCH_COLUMNS)
-    counts : numpy.ndarray, shape (2,)
-    """
+    """Turn what was found in the frames of two rails (from `rail_motions`) into absolute axes, and patches to where
+    they are in the track's."""
     for wheel in range(2):
         rail, wrench = rails[wheel], wrenches[wheel]
         wrench[0], wrench[1], wrench[2] = _turn_back(rail, wrench[0], wrench[1], wrench[2])
@@ -144,23 +118,8 @@ def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
 
 @jit(allocates=False, fastmath=FUSED)
 def moving_frame(track, speed, t, ahead, axes):
-    """The track's frame that runs ahead along the track at constant speed.
-
-    Parameters
-    ----------
-    track : TrackModel
-    speed, t : float
-        m/s and s.
-    ahead : float
-        Arc length ahead of the frame's start, m.
-    axes : numpy.ndarray, shape (3, 3)
-        Filled with the frame.
-
-    Returns
-    -------
-    origin, velocity, turn : tuple of float
-        Position (m), velocity (m/s) and angular velocity (rad/s) in absolute axes.
-    """
+    """Origin (m), velocity (m/s) and angular velocity (rad/s), in absolute axes, of the track's frame that runs along
+    the track at constant speed, ``ahead`` (m) of its start; fills ``axes`` (3, 3)."""
     station = track_frame(track.path, ahead + speed * t, axes)
     along, left, up = frame_turn(station)
     velocity = (speed * axes[0, 0], speed * axes[1, 0], speed * axes[2, 0])
@@ -169,24 +128,8 @@ def moving_frame(track, speed, t, ahead, axes):
 
 @jit
 def track_poses(track, states, at, guess):
-    """Where one body is in the track's frame, and that frame, for each row of ``states``.
-
-    Parameters
-    ----------
-    track : TrackModel
-    states : numpy.ndarray, shape (n, size)
-    at : int
-        Start of the body's state.
-    guess : float
-        Arc length of the first row, roughly, m.
-
-    Returns
-    -------
-    poses : numpy.ndarray, shape (n, 6)
-        Arc length s, y, z (m), roll, yaw and pitch (rad) relative to the track's frame at s.
-    axes : numpy.ndarray, shape (n, 3, 3)
-        That frame.
-    """
+    """Poses (n, 6) of the body whose state starts ``at`` in the track's frame, arc length s, y, z (m), roll, yaw and
+    pitch (rad), and that frame (n, 3, 3), for each row of ``states``; ``guess`` is about the first s."""
     poses, axes, body = np.empty((len(states), 6)), np.empty((len(states), 3, 3)), np.empty((3, 3))
     s = guess
     for i in range(len(states)):

@@ -168,26 +168,16 @@ def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, 
 def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
     """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
 
+    A row of ``motions`` (k, 2, MOTION_COLUMNS), left and right: side (+1 left, -1 right); y and z of the wheelset's
+    centre (m); axle direction, pointing left (3); velocity of the centre (m/s, 3) and angular velocity (rad/s, 3);
+    curvature of the rail's line towards y and towards z (1/m; 0 on a tangent track); the rail's coefficient of friction
+    at no slip. Fills ``patches`` (k, 2, MAX_PATCHES, PATCH_COLUMNS), rows beyond their ``counts`` keep old content;
+    AUTO's ``bounds`` of planar detection's error (m); ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's
+    centre (N m). The second of the ``counters`` counts creep look-ups out of the table's range. While ``work.held[0]``
+    is `PATCHES_HELD` the patches are those of the last call: only velocities have changed.
+
     One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
     chains of neighbours overlap.
-
-    Parameters
-    ----------
-    model : ContactModel
-    motions : numpy.ndarray, shape (k, 2, MOTION_COLUMNS)
-        Of left and right wheels: side (+1 left, -1 right); y and z of the wheelset's centre (m); axle direction,
-        pointing left (3); velocity of the centre (m/s, 3) and angular velocity (rad/s, 3); curvature of the rail's line
-        towards y and towards z (1/m; 0 on a tangent track); the rail's coefficient of friction at no slip.
-    patches : numpy.ndarray, shape (k, 2, MAX_PATCHES, PATCH_COLUMNS)
-        Filled: the wheels' patches; rows beyond their counts keep old content.
-    counts, bounds : numpy.ndarray, shape (k, 2)
-        Filled: number of patches; AUTO's bound of planar detection's error (m).
-    wrenches : numpy.ndarray, shape (k, 2, 6)
-        Filled: force (N) and moment about the wheelset's centre (N m).
-    counters : numpy.ndarray, shape (3,)
-        The second one counts creep look-ups outside the range of the creep law's table.
-    work : StripWork
-        While ``held[0]`` is `PATCHES_HELD` the patches are those of the last call: only velocities have changed.
     """
     held = work.held[0] == PATCHES_HELD
     if not held:

@@ -67,21 +67,8 @@ def no_irregularity():
 
 @jit
 def irregularity_at(data, s, out):
-    """Deviations and their derivatives at an arc length.
-
-    Parameters
-    ----------
-    data : IrregularityData
-    s : float
-        Arc length, m.
-    out : numpy.ndarray, shape (3, 4)
-        Filled: deviations (m), first and second derivatives (1, 1/m) of the four channels; zero outside the range.
-
-    Returns
-    -------
-    bool
-        False for perfect rails: then ``out`` is left as it is.
-    """
+    """Deviations (m) and their first and second derivatives at arc length s (m) into ``out`` (3, 4), zero outside the
+    range; False, with ``out`` left as it is, for perfect rails."""
     if data.coefficients.shape[0] == 0:
         return False
     out[:, :] = 0.0

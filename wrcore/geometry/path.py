@@ -89,41 +89,20 @@ class Station(NamedTuple):
 
 
 def tangent_path():
-    """PathData of a straight, level path without an end.
-
-    Returns
-    -------
-    PathData
-    """
+    """PathData of a straight, level path without an end."""
     return PathData(np.zeros((0, COLUMNS)), np.zeros(0), np.zeros(0, np.int64), 0.0, 1.0, 0.0)
 
 
 def path_data(
     knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None, aside=0.0
 ):
-    """Cut a path into pieces.
+    """PathData from curvature (1/m, 0 at the first knot), cant (m, right rail higher) and widening (m) at increasing
+    arc lengths ``knots`` (m), all (k,): straight before the first, constant after the last.
 
-    Parameters
-    ----------
-    knots : (k,) array_like
-        Arc lengths of the joints, m, increasing. Before the first the path is straight, after the last all quantities
-        keep their values.
-    curvature, cant, widening : (k,) array_like
-        Values at the knots (1/m, m, m); the first curvature must be 0. Cant positive: right rail higher.
-    rounding : float
-        Length over which corners of cant and widening are rounded, m.
-    shapes : (k - 1,) sequence of str, optional
-        How they change from knot to knot, see `wrcore.geometry.ramps`; without: linearly.
-    cant_about : {"lower_rail", "inner_rail", "centreline"}
-        What keeps its height; inner_rail: that of the curve.
-    incline : wrcore.geometry.ramps.Incline, optional
-        Height of the alignment before cant, and its slope.
-    aside : float
-        See `PathData`.
-
-    Returns
-    -------
-    PathData
+    The k - 1 ``shapes`` are those of `wrcore.geometry.ramps`, linear if left out; corners of cant and widening are
+    rounded over the length ``rounding`` (m). ``cant_about`` is "lower_rail", "inner_rail" (of the curve) or
+    "centreline": what keeps its height. ``incline`` (`wrcore.geometry.ramps.Incline`) is the height before cant,
+    ``aside`` that of `PathData`.
     """
     knots = np.asarray(knots, float)
     pieces, borders = cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
@@ -176,18 +155,8 @@ def _on_last_circle(x, y, tx, ty, curvature, d):
 
 @jit(forceinline=True)
 def centreline(path, s):
-    """The centre line at an arc length.
-
-    Parameters
-    ----------
-    path : PathData
-    s : float
-        Arc length, m. Before the path it is straight; after it the last curvature, cant, widening and gradient stay.
-
-    Returns
-    -------
-    Station
-    """
+    """The Station at arc length s (m): straight before the path; its last curvature, cant, widening and gradient after
+    it."""
     if path.pieces.shape[0] == 0:
         return Station(s, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
     pieces, i = path.pieces, segment_at(path, s)
@@ -231,20 +200,8 @@ def fill_frame(station, matrix):
 
 @jit(forceinline=True)
 def track_frame(path, s, matrix):
-    """Frame of the track at arc length s (m): A = [t n b], Eq. (3), with the cant's roll about t.
-
-    Parameters
-    ----------
-    path : PathData
-    s : float
-    matrix : numpy.ndarray, shape (3, 3)
-        Filled: columns t, n, b.
-
-    Returns
-    -------
-    Station
-        The centre line at s.
-    """
+    """The Station at arc length s (m); fills ``matrix`` (3, 3) with the track's frame A = [t n b], Eq. (3), rolled by
+    the cant about t."""
     station = centreline(path, s)
     fill_frame(station, matrix)
     return station
@@ -262,24 +219,9 @@ def frame_turn(station):
 
 @jit
 def rail_direction(station, y, z, dy, dz):
-    """Direction of a rail whose origin lies at (y, z) of the track's cross-section.
-
-    Parameters
-    ----------
-    station : Station
-    y, z : float
-        Rail's origin along n and b, m.
-    dy, dz : float
-        Their derivatives by s (widening and irregularity).
-
-    Returns
-    -------
-    lateral, vertical : float
-        Slopes of the rail's line towards n and b in the track frame, both over the advance along t. The twist of a
-        cant ramp is contained in them.
-    stretch : float
-        Advance along t per metre of the centre line: 1 - curvature y on a level curve.
-    """
+    """Slopes towards n and b, over the advance along t, of the line of a rail whose origin lies at y n + z b (m), and
+    that advance per metre of centre line; ``dy`` and ``dz`` are derivatives by s. The twist of a cant ramp is contained
+    in the slopes; the advance is 1 - curvature y on a level curve."""
     along, left, up = frame_turn(station)
     stretch = 1.0 - up * y + left * z
     return (dy - along * z) / stretch, (dz + along * y) / stretch, stretch
@@ -323,21 +265,8 @@ def _nearest(path, x, y, z):
 
 @jit
 def arc_length_of(path, x, y, z, guess):
-    """Arc length whose cross-section contains a point: (p - r(s)) . t(s) = 0.
-
-    Parameters
-    ----------
-    path : PathData
-    x, y, z : float
-        Point, m, closer to the path than its radius.
-    guess : float
-        Start of the iteration, m: the last arc length. NaN: the whole path is searched first.
-
-    Returns
-    -------
-    float
-        m; the solution next to the guess, NaN if there is none.
-    """
+    """Arc length (m) next to ``guess`` whose cross-section contains a point closer to the path than its radius,
+    (p - r(s)) . t(s) = 0; NaN if there is none. A NaN ``guess``: the whole path is searched first."""
     if path.pieces.shape[0] == 0:
         return x
     s = _newton(path, x, y, z, guess)

@@ -32,15 +32,8 @@ _DEGREE = 7
 
 
 def cut(knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None):
-    """Cut a path into pieces; the arguments are those of :func:`wrcore.geometry.path.path_data`.
-
-    Returns
-    -------
-    pieces : (n + 1, COLUMNS) ndarray
-        The first is straight and reaches back without end, the last keeps curvature, cant, widening and gradient.
-    borders : (n,) ndarray
-        Arc lengths between the pieces, m.
-    """
+    """Pieces (n + 1, COLUMNS) of a path, the first straight and without beginning, and the arc lengths (n,) between
+    them (m); the arguments are those of :func:`wrcore.geometry.path.path_data`."""
     curvature, cant, half = np.asarray(curvature, float), np.asarray(cant, float), 0.5 * rounding
     shapes = ["linear"] * (len(knots) - 1) if shapes is None else shapes
     turn = ramps(knots, curvature, shapes, 0.0)

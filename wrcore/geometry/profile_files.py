@@ -27,31 +27,12 @@ _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
 def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
-    """Profile from a point file.
+    """ProfileCurve of a ``kind`` from the path of a point file, or from a dict of ``points`` (the path) and how to read
+    it.
 
-    Parameters
-    ----------
-    spec : str, pathlib.Path or dict
-        Path, or ``{"points": path, "unit": "m"|"mm", "inclined": bool, "smoothing": float, "mirrored": bool,
-        "downwards": bool, "shift": [float, float]}``; ``inclined`` (default True) says that a rail's points already lie
-        in the track pose, ``smoothing`` is a distance in m. For files of columns: ``mirrored`` says that the first
-        column counts towards the track's centre, ``downwards`` that the second one counts down, and ``shift`` (m) is
-        added to u and f after that.
-    kind : {"wheel", "rail"}
-        What the profile is used for.
-    inclination : float
-        Applied to a rail whose points are not inclined.
-    window, spacing : float
-        See `ProfileCurve.from_points`.
-
-    Returns
-    -------
-    ProfileCurve
-
-    Raises
-    ------
-    InputError
-        Names the file and the line or key at fault.
+    Keys: ``unit`` (m or mm); ``inclined`` (default True): a rail's points lie in the track pose already, else
+    ``inclination`` turns them; ``smoothing`` (m). For files of columns: ``mirrored``: the first column counts towards
+    the track's centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that.
     """
     spec = _checked(spec if isinstance(spec, dict) else {"points": spec}, kind)
     path, unit = Path(spec["points"]), spec.get("unit")
@@ -129,24 +110,8 @@ def _numbers(path, line, text):
 
 
 def read_columns(path, text, unit=None):
-    """Points of a CSV or blank-separated file.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        For error messages.
-    text : str
-        Content.
-    unit : {"m", "mm"}, optional
-        Declared unit; a header line may state it instead, or must agree.
-
-    Returns
-    -------
-    u, f : (n,) ndarray
-        m.
-    lines : list of int
-        Line number of each point.
-    """
+    """Points u, f (n,) in m of a CSV or blank-separated file and the line number of each; a header line may state the
+    ``unit``, or must agree with it."""
     points, lines, stated, whole = [], [], False, True
     for number, line in enumerate(text.splitlines(), 1):
         line = line.partition("#")[0].strip()
@@ -211,26 +176,11 @@ def _value(path, keys, name, default):
 
 
 def read_simpack(path, text, smoothed=False):
-    """Points of a SIMPACK .prw or .prr file.
+    """Points u (to the field side) and f (up), (n,) in m, of a SIMPACK .prw or .prr file, and the line number of each.
 
     Applied, in the order of the file's own numbering: shift, bounds, mirroring, inversion, unit. Rotation, minimum
-    distance and SIMPACK's approximation are refused where they are not zero, as their definition is not public.
-
-    Parameters
-    ----------
-    path : pathlib.Path
-        For error messages.
-    text : str
-        Content.
-    smoothed : bool
-        The caller smooths by itself: the file's approximation value is not needed.
-
-    Returns
-    -------
-    u, f : (n,) ndarray
-        m; u to the field side, f up.
-    lines : ndarray of int
-        Line number of each point.
+    distance and, unless the caller smooths, SIMPACK's approximation are refused where they are not zero, as their
+    definition is not public.
     """
     keys, begin = _header(path, text)
     for name in _UNSUPPORTED[: 2 if smoothed else 3]:

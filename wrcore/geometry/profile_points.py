@@ -29,15 +29,7 @@ _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field si
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Parametric cubic spline (u(s), f(s)), s in [0, 1].
-
-    Parameters
-    ----------
-    curve : scipy.interpolate.BSpline
-        Two columns u and f, m.
-    name : str
-        Named in error messages.
-    """
+    """Parametric cubic spline (u(s), f(s)), s in [0, 1], in m."""
 
     curve: "BSpline"
     name: str
@@ -122,15 +114,8 @@ class Outline:
 
 
 def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0):
-    """Check points and lay a spline through them.
-
-    See `wrcore.geometry.profile.ProfileCurve.from_points` for the arguments.
-
-    Returns
-    -------
-    Outline
-        In its pose: wheel f(0) = 0, rail with its origin at the highest point.
-    """
+    """Outline through points that have been checked, in its pose: wheel f(0) = 0, rail with its origin at the highest
+    point; arguments as for `wrcore.geometry.profile.ProfileCurve.from_points`."""
     u, f = np.array(u, dtype=float), np.array(f, dtype=float)
     lines = np.arange(1, u.size + 1) if lines is None else np.asarray(lines)
     _check_numbers(u, f, name, lines)

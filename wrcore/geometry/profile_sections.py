@@ -13,26 +13,17 @@ _ROUNDING = 1e-15  # m; slack of comparisons between points that coincide in exa
 
 @dataclass(frozen=True)
 class Arc:
-    """Circular arc c + sign R (sin b, cos b), b from ``first`` to ``last`` in the order of increasing u.
-
-    Parameters
-    ----------
-    uc, fc : float
-        Centre, m.
-    radius : float
-        Radius R, m.
-    first, last : float
-        Angle b of the normal against the vertical at both ends, rad; the slope is -tan(b).
-    sign : int
-        +1: upper half of the circle (rail head), -1: lower half (flange tip).
-    """
+    """Circular arc c + sign R (sin b, cos b), b from ``first`` to ``last`` in the order of increasing u."""
 
     uc: float
     fc: float
+    """Centre, m."""
     radius: float
     first: float
     last: float
+    """Angle b of the normal against the vertical at both ends, rad; the slope is -tan(b)."""
     sign: int = 1
+    """+1: upper half of the circle (rail head), -1: lower half (flange tip)."""
 
     @classmethod
     def between(cls, start, end, uc, fc, radius, sign):
@@ -135,11 +126,8 @@ class Line:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """f = scale * sum c_k (u / scale)^k from ``u0`` to ``u1`` (m).
-
-    ``coefficients`` ascend; ``scale`` (m) is the unit in which they are published (1e-3 for mm). Wheels only: a
-    polynomial is not turned.
-    """
+    """f = scale * sum c_k (u / scale)^k from ``u0`` to ``u1`` (m), ``coefficients`` ascending, ``scale`` (m) the unit
+    in which they are published. Wheels only: a polynomial is not turned."""
 
     u0: float
     u1: float
@@ -173,37 +161,16 @@ def _rotate(u, f, angle):
 
 
 def incline(sections, inclination):
-    """Lay an upright rail into its track pose.
-
-    The rail is turned by atan(inclination) so that its top leans to the gauge side (-u); the origin then moves to
-    the highest point.
-
-    Parameters
-    ----------
-    sections : sequence of Arc or Line
-        Upright rail.
-    inclination : float
-        Ratio, for instance 1/40; 0 leaves the rail upright.
-
-    Returns
-    -------
-    tuple of Arc or Line
-    """
+    """Upright rail turned by atan(inclination) into its track pose, top towards the gauge side (-u), with the origin at
+    its highest point."""
     turned = [s.rotated(np.arctan(inclination)) for s in sections]
     u, f = max((s.highest() for s in turned), key=lambda p: p[1])
     return tuple(s.shifted(-u, -f) for s in turned)
 
 
 def usable_span(sections, steepest):
-    """Connected range of u around 0 in which no section is steeper than ``steepest``.
-
-    Returns
-    -------
-    low, high : float
-        Range, m.
-    sections : tuple
-        The sections that the range touches.
-    """
+    """Connected range of u around 0 (low, high, m) in which no section is steeper than ``steepest``, and the sections
+    that it touches."""
     spans = [s.span(steepest) for s in sections]
     home = next(i for i, s in enumerate(spans) if s is not None and s[0] <= 0.0 <= s[1])
     first = last = home
@@ -232,10 +199,8 @@ def evaluate(sections, u):
 
 
 def innermost(sections, depth):
-    """Abscissa (m) of the leftmost point that lies at most ``depth`` (m) below the ordinate 0.
-
-    Returns NaN where the sections end above that depth on the gauge side.
-    """
+    """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0; NaN where the sections end above
+    that on the gauge side."""
     level = -depth
     if min(s.ends[0][1] for s in sections if s.ends[0][0] < 0.0) > level:
         return float("nan")

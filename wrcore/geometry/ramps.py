@@ -91,11 +91,9 @@ def _rounding(x, half):
 
 
 class Change(NamedTuple):
-    """What a quantity changes by over one segment in a shape other than linear.
-
-    Before ``crossing`` it follows ``size`` times the shape, after it ``size_after`` times the shape, towards ``total``:
-    the fold of a height whose cant changes sign, rounded like a corner.
-    """
+    """What a quantity changes by over one segment in a shape other than linear: ``size`` times the shape before
+    ``crossing``, after it ``size_after`` times the shape, towards ``total`` (the fold of a height whose cant changes
+    sign, rounded like a corner)."""
 
     start: float
     length: float
@@ -155,20 +153,8 @@ class Ramps(NamedTuple):
 
 
 def ramps(knots, values, shapes, half):
-    """The ramps between values at knots.
-
-    Parameters
-    ----------
-    knots, values : (k,) ndarray
-    shapes : sequence of str
-        Of the k - 1 segments, see `STEEPEST`.
-    half : float
-        Half the rounding length of corners, m; 0: corners stay.
-
-    Returns
-    -------
-    Ramps
-    """
+    """Ramps between values at knots, both (k,), with the k - 1 ``shapes`` of `STEEPEST`; ``half`` is half the rounding
+    length of corners (m), 0 keeps them."""
     changes = [
         Change(knots[i], knots[i + 1] - knots[i], shapes[i], size, size)
         for i, size in enumerate(np.diff(values))
@@ -178,11 +164,8 @@ def ramps(knots, values, shapes, half):
 
 
 def height(knots, cant, raised, shapes, half):
-    """Height of the centre line, from its values ``raised`` at the knots.
-
-    Between knots it changes with the cant. Where this changes sign, the rail that keeps its height is another one
-    before and after: the height goes by way of zero.
-    """
+    """Height of the centre line, from its values ``raised`` at the knots: between them it changes with the cant, by way
+    of zero where this changes sign, as another rail keeps its height then."""
     shapes = list(shapes)
     crossed = cant[:-1] * cant[1:] < 0.0
     linear = np.array([shape == "linear" for shape in shapes])
@@ -223,11 +206,8 @@ def _others(values, shapes):
 
 
 class Incline(NamedTuple):
-    """Height along gradients that vertical curves join: dz/ds is a broken line whose corners are rounded over +-half.
-
-    A vertical curve is a parabola: dz/ds is linear in the arc length. Rounded, its curvature begins and ends over the
-    rounding length instead of at once.
-    """
+    """Height along gradients that vertical curves join: dz/ds is a broken line (a vertical curve is a parabola) whose
+    corners are rounded over +-half."""
 
     slope: Broken
     half: float
@@ -252,23 +232,9 @@ class Incline(NamedTuple):
 
 
 def incline(lengths, gradients, radii, half):
-    """Height along gradients.
-
-    Parameters
-    ----------
-    lengths : (n,) array_like
-        Arc lengths from one change of gradient to the next, m; the first begins at 0, the last has no end.
-    gradients : (n,) array_like
-        Rise over horizontal distance.
-    radii : (n,) array_like
-        Of the vertical curve between each gradient and the one before it, m; it lies half to either side.
-    half : float
-        Half the rounding length, m.
-
-    Returns
-    -------
-    Incline
-    """
+    """Incline along n gradients (rise over horizontal distance), each over its arc length in ``lengths`` (m; the first
+    begins at 0, the last has no end), with vertical curves of ``radii`` (m) half to either side of a change; ``half``:
+    half the rounding length, m."""
     slopes = np.sin(np.arctan(np.asarray(gradients, float)))
     reach = 0.5 * np.asarray(radii, float)[1:] * np.abs(np.diff(slopes))
     changes = np.cumsum(np.asarray(lengths, float)[:-1])

@@ -7,19 +7,8 @@ import numpy as np
 
 
 def spline_slopes(step, values):
-    """Slopes at the nodes of the cubic spline that is ``not a knot`` at its last nodes but one.
-
-    Parameters
-    ----------
-    step : float
-        Distance of the nodes.
-    values : numpy.ndarray, shape (n, m)
-        Values of m functions at n >= 4 nodes.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, m)
-    """
+    """Slopes (n, m) at n >= 4 nodes, ``step`` apart, of the cubic splines through ``values`` (n, m) that are ``not a
+    knot`` at their last nodes but one."""
     # m[i-1] + 4 m[i] + m[i+1] = right[i]; the third derivative is the same on both sides of the second node
     slopes = np.empty(values.shape)
     slopes[1:-1] = 3.0 * (values[2:] - values[:-2]) / step
@@ -36,12 +25,7 @@ def spline_slopes(step, values):
 
 
 def spline_cubics(step, values):
-    """Coefficients of that spline's cubics, in ascending powers of the distance from a cell's first node.
-
-    Returns
-    -------
-    numpy.ndarray, shape (n - 1, 4, m)
-    """
+    """Coefficients (n - 1, 4, m) of those splines, in ascending powers of the distance from a cell's first node."""
     slopes, rise = spline_slopes(step, values), np.diff(values, axis=0)
     first, last = step * slopes[:-1], step * slopes[1:]
     powers = [values[:-1], first, 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise]

@@ -42,23 +42,14 @@ _CIRCLE_DEPTH = 0.040  # m; a circular rail head ends here: about the height of 
 
 @dataclass(frozen=True)
 class RailHead:
-    """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face.
-
-    Parameters
-    ----------
-    radii : tuple of float
-        mm, from the crown to the gauge corner.
-    half_widths : tuple of float
-        mm, half the width of the head where one radius meets the next; one fewer than ``radii``.
-    side : float
-        Inclination of the side face against the vertical (1/20).
-    source : str
-        Origin of the dimensions.
-    """
+    """Symmetric rail head: tangent arcs from the crown outwards, then a straight side face."""
 
     radii: tuple
+    """mm, from the crown to the gauge corner."""
     half_widths: tuple
+    """mm, half the width of the head where one radius meets the next; one fewer than ``radii``."""
     side: float
+    """Inclination of the side face against the vertical, such as 1/20."""
     source: str
 
 
@@ -78,15 +69,11 @@ _S1002_SOURCE = "S1002 (EN 13715), sections with coefficients by H. Netter, DLR"
 
 
 def s1002_sections():
-    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm).
+    """Sections of the S1002 wheel from the flange back (-70 mm) to the field side (60 mm), f(0) = 0 at the tape circle,
+    in m.
 
-    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would
-    turn them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
-
-    Returns
-    -------
-    tuple of Arc, Line or Polynomial
-        f in m, f(0) = 0 at the tape circle.
+    The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would turn
+    them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
     """
     h, g, f, d = (
         Arc.between(a * _MM, b * _MM, yc * _MM, -zc * _MM, r * _MM, -side) for a, b, yc, zc, r, side in _S1002_ARCS
@@ -110,16 +97,7 @@ def _closed(polynomial, f0, f1):
 
 
 def rail_sections(head):
-    """Sections of an upright rail head from the gauge side to the field side, crown at (0, 0), in m.
-
-    Parameters
-    ----------
-    head : RailHead
-
-    Returns
-    -------
-    tuple of Arc or Line
-    """
+    """Sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
     right, start, uc, fc, before = [], 0.0, 0.0, 0.0, 0.0
     ends = [w * _MM for w in head.half_widths] + [None]
     for radius, end in zip((r * _MM for r in head.radii), ends, strict=True):

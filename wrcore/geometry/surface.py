@@ -14,25 +14,9 @@ SIDES = {"left": 1.0, "right": -1.0}
 
 
 def wheel_surface(wheel, r0, half_distance, side, u, s):
-    """Points of a wheel's surface in the wheelset's frame, Eqs. (4)-(6).
-
-    Parameters
-    ----------
-    wheel : ProfileCurve
-        Wheel profile, ordinate zero at the tape circle.
-    r0 : float
-        Rolling radius at the tape circle, m.
-    half_distance : float
-        Distance of the tape circle from the wheelset's centre, m.
-    side : {"left", "right"}
-    u, s : array_like
-        Lateral coordinate (m, to the field side) and angle about the axle (rad); broadcast together.
-
-    Returns
-    -------
-    numpy.ndarray, shape (..., 3)
-        Points, m. ``s = 0`` is the lowest generator; s turns about the side's outward axle direction.
-    """
+    """Points (..., 3) of a wheel's surface in the wheelset's frame, m, Eqs. (4)-(6), at lateral coordinates u (m) and
+    angles s (rad) that broadcast: ``s = 0`` is the lowest generator, s turns about the side's outward axle direction.
+    The profile's tape circle has the radius ``r0`` and the distance ``half_distance`` from the centre, m."""
     u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
     f = wheel(u) - r0
     local = np.stack([f * np.sin(s), u, f * np.cos(s)], axis=-1)
@@ -46,27 +30,13 @@ def wheelset_transform(points, x=0.0, y=0.0, z=0.0, roll=0.0, yaw=0.0):
 
 
 def rail_surface(rail, track, side, u, s):
-    """Points of a rail's surface in the track's absolute frame, Eqs. (1)-(3).
+    """Points (..., 3) of a rail's surface in the track's absolute frame, m, Eqs. (1)-(3), at lateral coordinates u and
+    arc lengths s of the centre line (m) that broadcast.
 
-    r_P = r_r(s) + A_r(s) {0, u, f(u)}, A_r = [t n b]. The rail's origin r_r lies in the track's cross-section at s,
-    at half the gauge plus its part of the widening, moved by the irregularity. The profile lies in that cross-section,
+    r_P = r_r(s) + A_r(s) {0, u, f(u)}, A_r = [t n b]. The rail's origin r_r lies in the track's cross-section at s, at
+    half the gauge plus its part of the widening, moved by the irregularity. The profile lies in that cross-section,
     too, without turning: A_r is the frame of the track. Square to the rail's own line it would differ by the square of
     the angle between both, 1e-5 of the profile's size in a steep cant ramp.
-
-    Parameters
-    ----------
-    rail : ProfileCurve
-        Rail profile as it lies in the track.
-    track : Track
-    side : {"left", "right"}
-    u, s : array_like
-        Lateral coordinate (m, to the field side) and arc length along the track's centre line (m; x on a tangent
-        track); broadcast together.
-
-    Returns
-    -------
-    numpy.ndarray, shape (..., 3)
-        Points, m.
     """
     u, s = np.broadcast_arrays(np.asarray(u, float), np.asarray(s, float))
     lateral, height = SIDES[side] * (track.rail_distance(rail) + u), rail(u)

@@ -68,16 +68,8 @@ class System(NamedTuple):
 
 
 def plan_elimination(model):
-    """Order the elimination by minimum degree: the body with the fewest neighbours left goes next and links them.
-
-    Parameters
-    ----------
-    model : Model
-
-    Returns
-    -------
-    Pattern
-    """
+    """Pattern of an elimination by minimum degree: the body with the fewest neighbours left goes next and links
+    them."""
     n, reached, own = len(model.bodies.mass), reached_bodies(model), own_state_bodies(model)
     pairs = {(i, j) for j in range(n) for i in reached[j]}
     links = {b: {b} | {k for i, j in pairs if b in (i, j) for k in (i, j)} for b in range(n)}
@@ -330,10 +322,8 @@ def _solve_velocities(system, own):
 
 @jit(allocates=False)
 def solve_stage(jacobian, system, sigma, increment):
-    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place.
-
-    Euler parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p.
-    """
+    """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place. Euler
+    parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
     pattern, right, shift = system.pattern, system.right, system.shift
     n = pattern.order.shape[0]
     own = increment[STATE_SIZE * n :]

@@ -29,22 +29,8 @@ the tolerances)."""
 
 
 def fastest_rate(model, equations, t, state):
-    """Largest absolute eigenvalue of the equations of motion at a state, roughly: the power method, 1/s.
-
-    Parameters
-    ----------
-    model : Model
-    equations : Equations
-        Of the model; its counters and places stay as they are.
-    t : float
-        s.
-    state : numpy.ndarray, shape (size,)
-
-    Returns
-    -------
-    float
-        NaN where the rate of the state is not finite.
-    """
+    """Largest absolute eigenvalue (1/s) of the equations of motion at a state, roughly, by the power method; NaN where
+    the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
     work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
     unit = unit[0] + pace(model, state, state) * unit[1]
     kept = [(own, own.copy()) for own in (work.arc_lengths, work.counters)]
@@ -61,19 +47,7 @@ def fastest_rate(model, equations, t, state):
 
 
 def cheaper_method(model, equations, t, state, longest_step):
-    """``rodas4`` or ``tsit5``, whichever takes less for a run from a state.
-
-    Parameters
-    ----------
-    model, equations, t, state
-        As for `fastest_rate`.
-    longest_step : float
-        s.
-
-    Returns
-    -------
-    str
-    """
+    """``rodas4`` or ``tsit5``, whichever takes less for a run from a state with steps up to ``longest_step`` (s)."""
     bodies = model.bodies
     if may_drive(model):  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4"

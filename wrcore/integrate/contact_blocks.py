@@ -30,20 +30,9 @@ UNIT = 1e3
 
 @jit(allocates=False)
 def take_mobility(jacobian, t, state, model, work):
-    """Write the accelerations of all bodies by a wrench on each wheelset, into ``jacobian.mobility``.
-
-    All in the wheelset's own axes, which do not spin: in these they hardly change.
-
-    Parameters
-    ----------
-    jacobian : Jacobian
-    t : float
-    state : numpy.ndarray
-        Of the evaluation whose rotations are in ``work``.
-    model : Model
-    work : Workspace
-        Its wrenches are overwritten.
-    """
+    """Write the accelerations of all bodies by a wrench on each wheelset, at the rotations in ``work``, into
+    ``jacobian.mobility``; the wrenches in ``work`` are overwritten. All in the wheelset's own axes, which do not spin:
+    in these they hardly change."""
     wheelsets, idle, bodies = model.bodies.wheelsets, jacobian.idle, model.bodies.mass.shape[0]
     _accelerations(t, state, model, work, -1, 0, idle)
     for k in range(wheelsets.shape[0]):
@@ -126,22 +115,9 @@ def _take_rails(jacobian, model, work):
 
 @jit(allocates=False)
 def contact_blocks(jacobian, state, model, work, fine, columns):
-    """Derivatives of the rails' wrenches by the motion of their wheelsets.
-
-    Parameters
-    ----------
-    jacobian : Jacobian
-        Its scratch arrays are overwritten.
-    state : numpy.ndarray
-    model : Model
-    work : Workspace
-        What it holds of wheels and patches is overwritten.
-    fine : float
-        Differences of velocities are multiplied by this.
-    columns : numpy.ndarray, shape (k, 12, 6)
-        Filled: force and moment by displacement, rotation, velocity and angular velocity, in the axes in which
-        increments are counted.
-    """
+    """Fill ``columns`` (k, 12, 6) with the derivatives of the rails' force and moment by displacement, rotation,
+    velocity and angular velocity of their wheelsets, in the axes in which increments are counted. Differences of
+    velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
     wheelsets, base, found, held = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, work.strips.held
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
@@ -197,19 +173,8 @@ def _respond(mobility, axes, c, s, wrench, body, out):
 
 @jit(allocates=False)
 def renew_contacts(joined, whole, jacobian, t, state, model, work, fine):
-    """Bring the contacts' part of the Jacobian up to date, or add it where the whole was taken without.
-
-    Parameters
-    ----------
-    joined : Joined
-        Bodies that accelerate with each wheelset.
-    whole : bool
-        The Jacobian has just been taken at the wrenches of the rails; else the old part is replaced.
-    jacobian : Jacobian
-    t : float
-    state, model, work, fine
-        As for :func:`contact_blocks`.
-    """
+    """Replace the contacts' part of the Jacobian, or add it where the ``whole`` has just been taken at the wrenches of
+    the rails; ``joined``: bodies that accelerate with each wheelset."""
     columns, out = jacobian.columns, jacobian.idle
     contact_blocks(jacobian, state, model, work, fine, columns)
     if whole:

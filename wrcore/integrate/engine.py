@@ -107,22 +107,7 @@ class Record(NamedTuple):
 
 
 def new_memory(state, start, stages, first_step):
-    """Memory of a run that has not begun.
-
-    Parameters
-    ----------
-    state : numpy.ndarray, shape (n,)
-    start : float
-        s.
-    stages : int
-        Number of stages of the method.
-    first_step : float
-        s.
-
-    Returns
-    -------
-    Memory
-    """
+    """Memory of a run that has not begun: ``start`` and ``first_step`` in s, ``stages`` of the method."""
     clock = np.array([start, start, first_step, 1.0, np.inf, start, 0.0])
     counters = np.zeros(COUNTERS_SIZE, np.int64)
     counters[AGE] = -1
@@ -144,11 +129,9 @@ def copy_into(target, source):
 
 @jit(allocates=False)
 def error_size(tolerances, rate, bodies, new, errors):
-    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed.
-
-    ``rate`` is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of
-    the state is not finite.
-    """
+    """Largest error of any body, the root mean square of its 13 components in units of what they are allowed. ``rate``
+    is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of the state
+    is not finite."""
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):
         first = STATE_SIZE * b
@@ -167,24 +150,11 @@ def error_size(tolerances, rate, bodies, new, errors):
 
 @jit(allocates=False)
 def judge(control, exponent, hold, memory, error):
-    """Accept or reject an attempt by its error and choose the next step's length.
+    """Accept or reject an attempt by its error and choose the next step's length, which stays if it could grow by less
+    than ``hold``; ``exponent`` is the order of the error estimate in h.
 
     Proportional-integral control with exponents 0.7 and 0.4 (Gustafsson, ACM Trans. Math. Softw. 17 (1991) 533-554):
     where stability bounds the step it settles on the bound, while control by the last error alone swings about it.
-
-    Parameters
-    ----------
-    control : Control
-    exponent : float
-        Order of the error estimate in h.
-    hold : float
-        The step is kept as it is if it could grow by less than this factor.
-    memory : Memory
-    error : float
-
-    Returns
-    -------
-    bool
     """
     clock, counters = memory.clock, memory.counters
     step = clock[NEXT]
@@ -228,11 +198,9 @@ def accept(control, memory, trial, step):
 
 @jit(allocates=False)
 def forget_wild_places(scratch, work):
-    """After a rejected attempt: undo arc lengths that wild stages have found.
-
-    The search for a wheelset's arc length starts from the last one. On a circle that its path goes round more than
-    once, one that a wild stage has led to another lap would be kept.
-    """
+    """After a rejected attempt: undo arc lengths that wild stages have found. The search for a wheelset's arc length
+    starts from the last one. On a circle that its path goes round more than once, one that a wild stage has led to
+    another lap would be kept."""
     for k in range(work.arc_lengths.shape[0]):
         if abs(work.arc_lengths[k] - scratch.arc_lengths[k]) > WILD or math.isnan(work.arc_lengths[k]):
             work.arc_lengths[k] = scratch.arc_lengths[k]
@@ -256,26 +224,9 @@ def _on_the_rails(limit, state, model, work):
 
 @jit(allocates=False)
 def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
-    """Write the outputs that the run has come to and say whether it goes on.
-
-    Parameters
-    ----------
-    control : Control
-    dense : numpy.ndarray, shape (s, d)
-    scale : float
-        Factor of the stages in the dense output.
-    turn, drift : numpy.ndarray, shapes (2,) and (n,)
-        Axes of the stages, at the step's end: see `wrcore.integrate.moving_axes`.
-    memory : Memory
-    record : Record
-    model : Model
-    work : Workspace
-
-    Returns
-    -------
-    int
-        RUNNING, COMPLETED, DERAILED or TOO_SMALL.
-    """
+    """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
+    are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
+    stages at the step's end, see `wrcore.integrate.moving_axes`."""
     clock, stages = memory.clock, memory.stages
     work.strips.warm[0] = 0
     times, reached = record.times, record.reached[0]
@@ -310,27 +261,7 @@ def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
 
 @jit(allocates=False, nogil=True)
 def advance_explicit(tableau, control, memory, scratch, record, budget, equations, model, work):
-    """Advance a run by an explicit pair.
-
-    Parameters
-    ----------
-    tableau : ExplicitTableau
-    control : Control
-    memory : Memory
-    scratch : Scratch
-    record : Record
-    budget : int
-        Attempts before the kernel returns.
-    equations : Kernel
-        The right-hand side.
-    model : Model
-    work : Workspace
-
-    Returns
-    -------
-    int
-        Outcome.
-    """
+    """Advance a run by an explicit pair, at most ``budget`` attempts; returns its outcome."""
     clock, counters, state, stages, trial = memory.clock, memory.counters, memory.state, memory.stages, scratch.trial
     n, last = state.shape[0], stages.shape[0] - 1
     while True:

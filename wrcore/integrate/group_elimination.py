@@ -10,19 +10,9 @@ from wrcore.kernels.jit import jit
 
 @jit(allocates=False)
 def eliminate_groups(jacobian, system, sigma, increment, task):
-    """Do one of the tasks of `wrcore.integrate.groups` for all groups.
-
-    Parameters
-    ----------
-    jacobian : Jacobian
-    system : System
-        FACTORISE: its blocks are changed; else its right-hand side is, or its velocities are known.
-    sigma : float
-        1/s.
-    increment : numpy.ndarray, shape (size,)
-        Right-hand side of a stage, in the shape of a state; RESTORE: with the groups' states. Else left as it is.
-    task : int
-    """
+    """Do one of the tasks of `wrcore.integrate.groups` for all groups: FACTORISE changes the blocks of ``system``,
+    REDUCE its right-hand side by that of a stage, ``increment`` (size,), into which RESTORE writes the groups'
+    states."""
     for k in range(system.groups.starts.shape[0] - 1):
         if task == FACTORISE:
             _invert_corner(jacobian, system.groups, sigma, k)

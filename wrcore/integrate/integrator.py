@@ -59,45 +59,19 @@ def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=0.0, step=0.0, longest_step=0.05, derailed_y=np.inf,
     progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
 ):  # fmt: skip
-    """Integrate a model's equations of motion and sample them at given times.
+    """Trajectory of a model's equations of motion at increasing output times (s), the last of which ends the run.
 
-    Parameters
-    ----------
-    model : Model
-    start : numpy.ndarray, shape (size,), or Checkpoint
-        State at ``times[0]``, or the end of an earlier run, which goes on by the same method.
-    times : numpy.ndarray, shape (n,)
-        Increasing output times, s; the last one ends the run. After a checkpoint: not before its ``t``.
-    method : str
-        One of `METHODS` or `REFERENCES`, or ``auto``.
-    rtol, atol : float
-        Tolerance of a step: part of 1 cm that positions may err by, and what comes on top, m. All else follows from
-        that: :mod:`wrcore.integrate.tolerances`. The references use the same, but average over all components.
-    step : float
-        Length of all steps, s; 0 for steps by the tolerance. Compiled methods only.
-    longest_step : float
-        Bound of the steps, s.
-    derailed_y : float
-        Lateral distance of a wheelset from the track's centre that ends the run, m.
-    progress : callable, optional
-        Called now and then with the time reached, s.
-    chunk : int
-        Attempts between two such calls; of no influence on the result.
-    stop : callable, optional
-        ``stop() -> str``, asked as often: a reason to end the run as stalled, or an empty string.
-    most_steps : int
-        Steps to be tried in all, those before a checkpoint among them; 0: no bound. Accepted ones with the references.
-    equations : Equations, optional
-        Of this very model, where they are at hand. Compiled methods only.
+    ``start`` is the state at the first time, or the Checkpoint of an earlier run, which goes on by the same method, not
+    before its ``t``. ``method`` is one of `METHODS` or `REFERENCES`, or ``auto``. Positions may err in a step by the
+    part ``rtol`` of 1 cm and by ``atol`` (m) on top; all else follows (:mod:`wrcore.integrate.tolerances`), but the
+    references average over all components. ``step`` (s) fixes the length of all steps (0: by the tolerance),
+    ``longest_step`` (s) bounds it. A wheelset farther than ``derailed_y`` (m) from the track's centre ends the run.
 
-    Returns
-    -------
-    Trajectory
-
-    Raises
-    ------
-    InputError
-        If the start is none of this model, or a checkpoint of a reference.
+    Every ``chunk`` attempts, of no influence on the result, ``progress`` is called with the time reached and ``stop()``
+    asked for a reason to end the run as stalled, or an empty string. ``most_steps`` bounds the steps tried, those
+    before a checkpoint among them (references: the accepted ones; 0: no bound). ``equations``: those of this very
+    model, where they are at hand; these and ``step`` are for compiled methods only. An InputError if the start is none
+    of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
     start, goes_on = _checked(start, model), isinstance(start, Checkpoint)

@@ -130,16 +130,7 @@ def _sweep(evaluations):
 
 
 def plan_sweep(model):
-    """Plan the evaluations for the whole Jacobian.
-
-    Parameters
-    ----------
-    model : Model
-
-    Returns
-    -------
-    Sweep
-    """
+    """Plan the evaluations for the whole Jacobian."""
     n, own = len(model.bodies.mass), own_state_bodies(model)
     reached = reached_bodies(model)
 
@@ -164,12 +155,7 @@ def plan_sweep(model):
 
 
 def joined_bodies(model):
-    """Bodies that accelerate together with each wheelset.
-
-    Returns
-    -------
-    Joined
-    """
+    """Bodies that accelerate together with each wheelset."""
     joined = [sorted(joined_sets(model)[b]) for b in model.bodies.wheelsets]
     return Joined(
         np.cumsum([0] + [len(bodies) for bodies in joined]),
@@ -197,10 +183,8 @@ def turn_of(jacobian):
 
 @jit(allocates=False, inline="always")
 def contacts_alone(model):
-    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone.
-
-    Wheels that turn independently and rails that give are own states, whose rows and columns these do not tell.
-    """
+    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
+    independently and rails that give are own states, whose rows and columns these do not tell."""
     return (
         model.bodies.wheelsets.shape[0] > 0
         and model.bodies.independent.shape[0] == 0
@@ -314,33 +298,9 @@ def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
 
 @jit(allocates=False)
 def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slope, differences, equations, model, work):
-    """Refresh the whole Jacobian or the contacts' part, and the drift with the derivative along it.
-
-    Parameters
-    ----------
-    sweep : Sweep
-    joined : Joined
-    whole : bool
-        False: only what the contacts put into it, which the whole must have been taken for once.
-    jacobian : Jacobian
-        Overwritten.
-    t : float
-    state, rate : numpy.ndarray, shape (size,)
-        Where the Jacobian is taken, and the right-hand side there.
-    trial, slope : numpy.ndarray, shape (size,)
-        Scratch.
-    differences : numpy.ndarray, shape (p,)
-        Scratch, at least as many as the largest number of columns perturbed together.
-    equations : Kernel
-        The right-hand side.
-    model : Model
-    work : Workspace
-
-    Returns
-    -------
-    int
-        Number of evaluations.
-    """
+    """Refresh the whole Jacobian at a state and its ``rate``, or only what the contacts put into one that was taken
+    whole before, and the drift with the derivative along it; returns the number of evaluations. ``trial`` and ``slope``
+    (size,) are scratch; so is ``differences``, with as many places as columns are perturbed together."""
     n, drift, base = jacobian.axes.shape[0], jacobian.drift, jacobian.by_time
     jacobian.turn[RATE] = turn_rate(state, model, work)
     axes = turn_of(jacobian)

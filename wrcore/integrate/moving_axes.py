@@ -61,21 +61,8 @@ def _circle(turn, t):
 
 @jit(allocates=False)
 def carry(bodies, turn, drift, t, start, trial):
-    """Turn increments into the state that they lead to.
-
-    Parameters
-    ----------
-    bodies : int
-        Their number.
-    turn : (float, float)
-        Rate and angle at the step's start.
-    drift : numpy.ndarray, shape (size,)
-        d at the places of positions, zero elsewhere.
-    t : float
-        Since the step's start, s.
-    start, trial : numpy.ndarray, shape (size,)
-        State there; increments, overwritten with the state.
-    """
+    """Turn increments in ``trial`` (size,) into the state that they lead to, t (s) after the step's ``start``. ``turn``
+    is rate and angle at the step's start, ``drift`` d at the places of positions, zero elsewhere."""
     ahead, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
     c0, s0, c, s = math.cos(ahead), math.sin(ahead), math.cos(whole), math.sin(whole)
     hc0, hs0, hc, hs = math.cos(0.5 * ahead), math.sin(0.5 * ahead), math.cos(0.5 * whole), math.sin(0.5 * whole)

@@ -22,19 +22,8 @@ LEAST_RTOL = 3e-14
 
 def integrate_by_reference(model, state, times, method, tolerances, longest_step, derailed_y, progress=None, halt=None,
                            most_steps=0):  # fmt: skip
-    """Integrate a model with a solver of another library; arguments as for `integrator.integrate`.
-
-    ``tolerances`` are those of the components, shape (size,).
-
-    Returns
-    -------
-    Trajectory
-
-    Raises
-    ------
-    InputError
-        ``cvode`` without scikit-sundae.
-    """
+    """Trajectory of a model by a solver of another library; arguments as for `integrator.integrate`, but ``tolerances``
+    (size,) of the components. An InputError for ``cvode`` without scikit-sundae."""
     function = Equations(model)
 
     def stop(t, state):
@@ -50,34 +39,13 @@ def integrate_function(
     function, state, times, method="scipy_rk45", rtol=1e-6, atol=1e-9, longest_step=np.inf, stop=None, progress=None,
     halt=None, most_steps=0,
 ):  # fmt: skip
-    """Integrate any right-hand side with a solver of another library.
+    """Trajectory of any right-hand side ``function(t, state)``, which must return a new array, by a solver of another
+    library.
 
-    Parameters
-    ----------
-    function : callable
-        ``function(t, state) -> rate``; must return a new array.
-    state : numpy.ndarray, shape (size,)
-        Initial state.
-    times : numpy.ndarray, shape (n,)
-        Increasing output times, s; the last one ends the run.
-    method : str
-        A key of `SOLVERS`, or ``cvode``.
-    rtol, atol : float or numpy.ndarray, shape (n,)
-        Tolerances of the library's step control; the latter may be one for each component.
-    longest_step : float
-        s.
-    stop : callable, optional
-        ``stop(t, state) -> str``: a reason to end the run, or an empty string. Asked after each step.
-    progress : callable, optional
-        Called with the time reached after each step.
-    halt : callable, optional
-        ``halt() -> str``, asked after each step of scipy's solvers: a reason to end the run as stalled.
-    most_steps : int
-        Accepted steps after which it ends as stalled; 0: no bound.
-
-    Returns
-    -------
-    Trajectory
+    ``method`` is a key of `SOLVERS` or ``cvode``, ``rtol`` and ``atol`` (one, or one for each component) are the
+    library's tolerances. After each step ``progress`` is called with the time reached, and ``stop(t, state)`` and, with
+    scipy's solvers, ``halt()`` are asked for a reason to end the run, the latter as stalled, or an empty string.
+    ``most_steps`` bounds the accepted steps (0: no bound).
     """
     evaluations = 0
 

@@ -69,12 +69,7 @@ class Linear(NamedTuple):
 
 
 def new_linear(model):
-    """Plan the Jacobian of a model and its elimination, and allocate their arrays.
-
-    Returns
-    -------
-    Linear
-    """
+    """Plan the Jacobian of a model and its elimination, and allocate their arrays."""
     sweep, jacobian, system = plan_sweep(model), new_jacobian(model), new_system(model)
     if len(system.groups.members):
         kernel = Kernel(eliminate_groups, jacobian, system, 0.0, system.pivot, 0)
@@ -85,9 +80,7 @@ def new_linear(model):
 @jit(allocates=False)
 def _renew(tableau, memory, scratch, linear, equations, model, work):
     """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
-
-    After a rejected step a Jacobian from an earlier state is refreshed first.
-    """
+    After a rejected step a Jacobian from an earlier state is refreshed first."""
     clock, counters = memory.clock, memory.counters
     age, step = counters[AGE], clock[NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
@@ -142,28 +135,7 @@ def _touchdown_error(tableau, control, memory, scratch, linear, model):
 
 @jit(allocates=False, nogil=True)
 def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget, equations, model, work):
-    """Advance a run by a Rosenbrock method.
-
-    Parameters
-    ----------
-    tableau : RosenbrockTableau
-    control : Control
-    memory : Memory
-    scratch : Scratch
-    linear : Linear
-    record : Record
-    budget : int
-        Attempts before the kernel returns.
-    equations : Kernel
-        The right-hand side.
-    model : Model
-    work : Workspace
-
-    Returns
-    -------
-    int
-        Outcome.
-    """
+    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome."""
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]

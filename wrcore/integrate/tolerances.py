@@ -38,23 +38,12 @@ estimates the error of its embedded method and errs less itself; errors of ROS34
 
 
 def step_tolerances(model, rtol, atol=0.0, method=""):
-    """Error of a step that each component of the state is allowed: what it is at any speed, and per 1/s of `pace`.
+    """Errors (2, size) of a step that each component of the state is allowed: what it is at any speed, and per 1/s of
+    `pace`.
 
-    Parameters
-    ----------
-    model : Model
-    rtol : float
-        Part of `LENGTH`.
-    atol : float
-        That comes on top, m.
-    method : str
-        Where its name stands in `SHARE`, that counts.
-
-    Returns
-    -------
-    numpy.ndarray, shape (2, size)
-        m, 1, m/s, rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s
-        for the velocities of a track that gives; its sleeper's roll counts at the rails).
+    ``rtol`` is the part of `LENGTH`, ``atol`` (m) comes on top; a method in `SHARE` counts with that. Units: m, 1, m/s,
+    rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s for the velocities
+    of a track that gives; its sleeper's roll counts at the rails).
     """
     n = len(model.bodies.mass)
     weights, lever = np.ones(STATE_SIZE * n + own_states(model)), gyration(model.bodies)[:, None]

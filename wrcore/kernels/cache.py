@@ -43,15 +43,9 @@ def table_folder():
 
 
 def cache_root():
-    """Folder for everything that can be rebuilt.
-
-    ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's cache folder (``XDG_CACHE_HOME`` or
-    ``~/.cache``); a temporary folder, with one line of warning, where that is no safe place.
-
-    Returns
-    -------
-    pathlib.Path
-    """
+    """Folder for everything that can be rebuilt: ``WRCORE_CACHE`` if set and not empty, else ``wrcore`` in the user's
+    cache folder (``XDG_CACHE_HOME`` or ``~/.cache``); where that is not safe, a temporary one with a line of
+    warning."""
     return _prepared(os.environ.get("WRCORE_CACHE") or _default())
 
 

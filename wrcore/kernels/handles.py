@@ -93,10 +93,8 @@ def _write(value, memory):
 
 
 def _pack(kind, value, begin, memory):
-    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned.
-
-    A kernel that does it has to be compiled for each type, at a second each.
-    """
+    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned. A kernel
+    that does it has to be compiled for each type, at a second each."""
     if isinstance(kind, types.BaseTuple):
         end, coarsest = begin, 1
         for one, part in zip(kind.types, value, strict=True):
@@ -130,13 +128,7 @@ def one_of(_, whole, name, k):
 
 
 class Handle:
-    """A named tuple of arrays and numbers, kept in memory for kernels that allocate nothing.
-
-    Parameters
-    ----------
-    value : NamedTuple
-        Its arrays live as long as the handle.
-    """
+    """A named tuple of arrays and numbers, kept in memory as long as the handle, for kernels that allocate nothing."""
 
     def __init__(self, value):
         self.value = value
@@ -185,14 +177,8 @@ class _KernelModel(models.PrimitiveModel):
 
 
 class Kernel:
-    """A kernel that returns nothing, compiled (or loaded) for some arguments, to be called by its address.
-
-    Parameters
-    ----------
-    function : numba dispatcher
-    *examples
-        Arguments; only their types matter.
-    """
+    """A kernel that returns nothing, compiled (or loaded) for the types of example arguments, to be called by its
+    address."""
 
     def __init__(self, function, *examples):
         signature = tuple(typeof(example) for example in examples)

@@ -28,19 +28,13 @@ it; the search for overlaps, where this showed, goes without the flag so that al
 
 
 def jit(function=None, *, allocates=True, **options):
-    """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch).
+    """Compile a kernel: ``numba.njit``, cached, with C division (no ZeroDivisionError branch); ``options`` are numba's,
+    ``fastmath=FAST`` for scan loops only.
 
     What is not asked for is switched off: numba would hand fast math and inlining on from the first caller that has a
-    kernel compiled, so that its code depended on who came first.
-
-    Parameters
-    ----------
-    function : callable
-    allocates : bool
-        False for kernels that create no arrays (views of their arguments are fine): numba then counts no references,
-        which costs more than the arithmetic where a kernel is handed a tuple of many arrays.
-    **options
-        Passed on to numba; ``fastmath=FAST`` is meant for scan loops only.
+    kernel compiled, so that its code depended on who came first. With ``allocates=False``, for kernels that create no
+    arrays but views, numba counts no references, which costs more than the arithmetic where a kernel is handed a tuple
+    of many arrays.
     """
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)

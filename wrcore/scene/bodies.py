@@ -23,17 +23,9 @@ def check_bodies(bodies, vehicle, source):
 
 
 def put_bodies(bodies, vehicle, state, path):
-    """Write what a scene says of its bodies into a state on a tangent track; all else stays.
-
-    Parameters
-    ----------
-    bodies : dict of str to dict
-        Values by name of the body and key, as channels have them (:mod:`wrcore.run.channels`): m, rad, m/s and rad/s.
-    vehicle : Vehicle
-    state : numpy.ndarray
-        Changed in place: relative to the axes of the track, which turn as they go along the path with the body.
-    path : PathData
-    """
+    """Write what a scene says of its bodies into a state on a tangent track, in place; all else stays. ``bodies`` has
+    values by name of the body and key, as channels have them (:mod:`wrcore.run.channels`): m, rad, m/s and rad/s,
+    relative to the axes of the track, which turn as they go along the path with the body."""
     for name, values in bodies.items():
         at = STATE_SIZE * vehicle.body_names.index(name)
         part = state[at : at + STATE_SIZE]

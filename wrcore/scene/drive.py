@@ -14,25 +14,8 @@ OVER = ("time", "arc_length")
 
 
 def read_drive(spec, vehicle, source):
-    """Motors, brakes and controller from ``drive`` of a scene.
-
-    Parameters
-    ----------
-    spec : dict or None
-        Checked against the schema; None where the scene has none.
-    vehicle : Vehicle
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Drive
-
-    Raises
-    ------
-    InputError
-        That names the motor or brake and the key.
-    """
+    """Drive (motors, brakes, controller) from a scene's checked ``drive``, or from None; an InputError names the motor
+    or brake and the key."""
     if spec is None:
         return no_drive()
     items = [("motors", item) for item in spec["motors"]] + [("brakes", item) for item in spec["brakes"]]

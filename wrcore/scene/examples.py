@@ -49,23 +49,8 @@ def example(name: str) -> Path:
 
 
 def copy_examples(folder: str | os.PathLike[str]) -> Path:
-    """Copy scenes, vehicles, sweeps and wear plans into a folder, to start from.
-
-    Parameters
-    ----------
-    folder : path-like
-        Created if needed.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        Where there is already something of that name: nothing is written over.
-    """
+    """Copy scenes, vehicles, sweeps and wear plans into a folder (returned), to start from; an InputError where there
+    is already something of that name: nothing is written over."""
     folder = Path(folder)
     for place in (folder, *(folder / part for part in PARTS)):
         if place.exists() and (place != folder or not place.is_dir()):

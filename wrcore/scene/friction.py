@@ -23,24 +23,8 @@ class Friction(NamedTuple):
 
 
 def read_friction(spec, source):
-    """Friction from ``contact.friction`` of a scene.
-
-    Parameters
-    ----------
-    spec : float or dict
-        Checked against the schema.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Friction
-
-    Raises
-    ------
-    InputError
-        Where keys do not go together or arc lengths do not rise.
-    """
+    """Friction from a scene's ``contact.friction``, checked against the schema; an InputError where keys do not go
+    together or arc lengths do not rise."""
     field = "contact.friction"
     if not isinstance(spec, dict):
         return Friction(float(spec), pack_schedules([]), 1.0, 0.0)

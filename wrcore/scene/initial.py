@@ -52,23 +52,8 @@ REST_SPEED = 20.0
 
 @np.errstate(all="ignore")  # what overflows is no equilibrium
 def rest(scene, model):
-    """Where the bodies of a scene's vehicle stand in static equilibrium; speed and friction do not matter for it.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-
-    Returns
-    -------
-    Equilibrium
-        Velocities are those of a common motion ahead, without rotation.
-
-    Raises
-    ------
-    InputError
-        If there is none near the nominal position.
-    """
+    """Where the bodies of a scene's vehicle stand in static equilibrium, moving ahead together without rotation; speed
+    and friction do not matter for it. An InputError if there is none near the nominal position."""
     vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
     if unit is not None:
@@ -112,23 +97,11 @@ def _standing(scene, model, aside):
 
 
 def static_equilibrium(scene, model):
-    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction.
+    """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
+    load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
 
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-
-    Returns
-    -------
-    Equilibrium
-        With the load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip. Its state
-        is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`).
-
-    Raises
-    ------
-    InputError
-        If there is none near the nominal position.
+    Its state is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`). An InputError if there is
+    none near the nominal position.
     """
     at_rest = rest(scene, model)
     state = _moving_ahead(model, at_rest)
@@ -182,10 +155,8 @@ def _radii(scene, model, k, state, roll, yaw):
 
 
 def _settled(scene, model, k, y, yaw, load, state):
-    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest.
-
-    Rails that give are where the state has them.
-    """
+    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest. Rails
+    that give are where the state has them."""
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
@@ -208,20 +179,8 @@ def initial_state(scene, model, at_rest=None, shared=None):
 
     Motors and brakes set in then, from steady running without them; the speed controller's integral is zero. Where
     rails are out of line, wheelsets stand on them with their static loads; axle boxes stay on their axles. What
-    ``initial.bodies`` says of single bodies comes last and holds.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-    at_rest : Equilibrium, optional
-        Of the same vehicle, from :func:`rest`.
-    shared : dict, optional
-        Keeps equations of motion for the next scene, see `wrcore.dynamics.series.equations_of`.
-
-    Returns
-    -------
-    numpy.ndarray, shape (state_size(model),)
+    ``initial.bodies`` says of single bodies comes last and holds. ``at_rest`` is the same vehicle's `rest`; ``shared``
+    keeps equations of motion for the next scene (`wrcore.dynamics.series.equations_of`).
     """
     vehicle, data = scene.vehicle, scene.data
     at_rest, driven = at_rest or rest(scene, model), model
@@ -289,10 +248,8 @@ def _with_axle_boxes(vehicle, state):
 
 
 def _steady(vehicle, model, state):
-    """Steady running near a state; the state itself where there is none (no creep force, say).
-
-    The vehicles of a train do not act on each other: the first one's is that of all.
-    """
+    """Steady running near a state; the state itself where there is none (no creep force, say). The vehicles of a train
+    do not act on each other: the first one's is that of all."""
     unit = _unit(vehicle, model)
     if unit is not None:
         size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
@@ -311,10 +268,8 @@ def _steady(vehicle, model, state):
 
 @np.errstate(all="ignore")  # what overflows is no better
 def _balanced(vehicle, model, equations, state):
-    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates.
-
-    Newton's method for all wheelsets at once: as long as the other bodies stay, none of them acts on another.
-    """
+    """The state with all wheelsets at the height, roll and rolling rate at which none of these accelerates. Newton's
+    method for all wheelsets at once: as long as the other bodies stay, none of them acts on another."""
     wheelsets = model.bodies.wheelsets
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
@@ -343,9 +298,7 @@ def _balanced(vehicle, model, equations, state):
 
 def _improved(standing, stands, steps):
     """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
-
-    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding.
-    """
+    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding."""
     own, slopes = slice(len(steps)), None
     left = standing(stands)[1][:, own]
     for _ in range(20):
@@ -370,10 +323,8 @@ def _improved(standing, stands, steps):
 
 
 def _on_path(path, s, speed, part):
-    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here.
-
-    The path's axes at the body move along it with a speed, m/s.
-    """
+    """State of one body from that on a tangent track along x; s (m) there is arc length s of the path here. The path's
+    axes at the body move along it with a speed, m/s."""
     frame = np.empty((3, 3))
     station = track_frame(path, s, frame)
     turn = frame @ np.array(frame_turn(station)) * speed

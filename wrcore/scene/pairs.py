@@ -59,43 +59,13 @@ def digests_of_files(value, folder, key=""):
 
 
 def wheel_and_rail(data, folder, source):
-    """The scene's wheel and rail profile, those of all wheels that are not said to differ.
-
-    Parameters
-    ----------
-    data : dict
-        The scene's content.
-    folder : Path
-        Files count from here.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    wheel, rail : ProfileCurve
-    """
+    """The scene's wheel and rail profile, of all wheels that are not said to differ; files count from ``folder``."""
     wheel, rail = (_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))
     return wheel, rail
 
 
 def own_pairs(data, vehicle, wheel, rail, folder, source):
-    """Wheel, rail and radius of each wheel of a scene.
-
-    Parameters
-    ----------
-    data : dict
-        The scene's content.
-    vehicle : Vehicle
-    wheel, rail : ProfileCurve
-        Of the wheels that are not said to differ.
-    folder : Path
-    source : str
-
-    Returns
-    -------
-    tuple of Pair
-        Left and right of wheelset after wheelset from the front; empty where all are the same.
-    """
+    """Pairs of each wheelset's left and right wheel, from the front; empty where all are ``wheel`` on ``rail``."""
     single = data["wheel"].get("wheelsets", {})
     unknown = sorted(set(single) - set(vehicle.wheelset_names))
     if unknown:
@@ -133,19 +103,8 @@ def _wheel_of(spec, field, pair, folder, source):
 
 
 def pair_geometries(pairs, track, half_distance):
-    """`ContactGeometry` of each pair; equal pairs share one.
-
-    Parameters
-    ----------
-    pairs : sequence of Pair
-    track : Track
-    half_distance : float
-        Tape circle from the wheelset's centre, m.
-
-    Returns
-    -------
-    tuple of ContactGeometry
-    """
+    """`ContactGeometry` of each pair, shared by equal ones; ``half_distance``: tape circle from the wheelset's centre,
+    m."""
     made = {}
     for pair in pairs:
         key = id(pair.wheel), id(pair.rail), pair.rolling_radius

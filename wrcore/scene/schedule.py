@@ -6,29 +6,10 @@ from wrcore.errors import InputError
 
 
 def read_schedule(spec, value, abscissas, source, field):
-    """A number, or a table of two lists, as points.
+    """A number, or a table of two lists, ``{abscissa: [...], value: [...]}``, as the number of its abscissa in
+    ``abscissas`` (0 for a number) and points (q, 2), abscissa strictly rising, and value; one point for a number.
 
-    Parameters
-    ----------
-    spec : float or dict
-        ``{abscissa: [...], value: [...]}``; further keys are left to others.
-    value : str
-        Key of the values.
-    abscissas : sequence of str
-        Keys that may stand for what it is over.
-    source, field : str
-        Named in errors.
-
-    Returns
-    -------
-    over : int
-        Number of the abscissa in ``abscissas``; 0 for a number.
-    points : numpy.ndarray, shape (q, 2)
-        Abscissa, strictly rising, and value; one point for a number.
-
-    Raises
-    ------
-    InputError
+    ``value`` is the key of the values; further keys are left to others. An InputError names ``source`` and ``field``.
     """
     if not isinstance(spec, dict):
         return 0, np.array([[0.0, float(spec)]])

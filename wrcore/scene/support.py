@@ -10,15 +10,7 @@ SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2
 
 
 def check_support(spec, source):
-    """Raise an InputError where the parts of ``track.support`` do not go together.
-
-    Parameters
-    ----------
-    spec : dict or None
-        Checked against the schema.
-    source : str
-        Named in errors.
-    """
+    """Raise an InputError where the parts of ``track.support``, checked against the schema, do not go together."""
     if spec is None or spec["rail"]["mass"] > 0.0:
         return
     if "sleeper" in spec:
@@ -30,21 +22,9 @@ def check_support(spec, source):
 
 
 def track_support(spec, half_distance, elements, wheelsets):
-    """What stands under each wheelset, and force elements that count its states among their own.
-
-    Parameters
-    ----------
-    spec : dict or None
-        As for `check_support`.
-    half_distance : float
-        Of the rails from the track's centre line, m: where the halves of the ballast are taken to carry the sleeper.
-    elements : Elements
-    wheelsets : int
-
-    Returns
-    -------
-    Support, Elements
-    """
+    """What stands under each wheelset, and force elements that count its states among their own. ``half_distance`` is
+    that of the rails from the track's centre line (m), where the halves of the ballast are taken to carry the
+    sleeper."""
     if spec is None:
         return no_support(), elements
     rail, sleeper = spec["rail"], spec.get("sleeper")

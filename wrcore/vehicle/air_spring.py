@@ -35,30 +35,9 @@ SPEEDS = np.concatenate(([0.0], np.geomspace(1e-3, 5.0, 40)))
 
 
 def inflated(items, single_elements, layout, joints, gravity):
-    """Elements with air springs made of what kernels know, each at the pressure that carries its share of the load.
-
-    Parameters
-    ----------
-    items : list of dict
-        Checked elements of a vehicle file.
-    single_elements : callable
-        From :mod:`wrcore.vehicle.element_data`.
-    layout : Layout
-    joints : list of dict
-    gravity : float
-        m/s^2.
-
-    Returns
-    -------
-    items : list of dict
-    found : dict of str to float
-        Preloads, as :func:`wrcore.vehicle.statics.preloads` gives them.
-
-    Raises
-    ------
-    InputError
-        Naming an air spring that carries nothing.
-    """
+    """Checked elements with air springs made of what kernels know, each at the pressure that carries its share of the
+    load, and preloads (N by name) as :func:`wrcore.vehicle.statics.preloads` gives them; ``gravity`` in m/s^2. An
+    InputError names an air spring that carries nothing."""
     springs = {item["name"]: item for item in items if item["kind"] == "air_spring"}
     pressures = {name: FIRST_PRESSURE for name in springs}
     for _ in range(PASSES):

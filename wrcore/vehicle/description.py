@@ -31,37 +31,24 @@ LARGEST_LIFT = 0.02
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle in its nominal position.
-
-    Attributes
-    ----------
-    name, source_file : str
-    body_names : tuple of str
-        In the order of the state vector.
-    positions : numpy.ndarray, shape (n, 3)
-        Nominal centres of mass, m.
-    rolling_radius, half_distance : float
-        Of the wheelsets, m; NaN for a vehicle without wheelsets.
-    bodies : Bodies
-    elements : Elements
-    joints : Joints
-    data : dict
-        The file's content with defaults, for provenance.
-    unit : Vehicle or None
-        The vehicle that a train repeats.
-    """
+    """A vehicle in its nominal position."""
 
     name: str
     source_file: str
     body_names: tuple
+    """In the order of the state vector."""
     positions: np.ndarray
+    """(n, 3): nominal centres of mass, m."""
     rolling_radius: float
     half_distance: float
+    """Of the wheelsets, m; NaN for a vehicle without wheelsets."""
     bodies: Bodies
     elements: Elements
     joints: Joints
     data: dict
+    """The file's content with defaults, for provenance."""
     unit: "Vehicle | None" = None
+    """The vehicle that a train repeats."""
 
     @property
     def wheelset_names(self):
@@ -69,11 +56,9 @@ class Vehicle:
         return tuple(self.body_names[b] for b in self.bodies.wheelsets)
 
     def nominal_wheel_load(self, body):
-        """Rough vertical load of a wheel of a wheelset in nominal position, N.
-
-        All bodies' weight in equal parts where springs carry bodies (without those that joints hold at their height),
-        else the wheelset's own weight less its preloads.
-        """
+        """Rough vertical load of a wheel of a wheelset in nominal position, N. All bodies' weight in equal parts where
+        springs carry bodies (without those that joints hold at their height), else the wheelset's own weight less its
+        preloads."""
         if len(self.bodies.mass) > len(self.bodies.wheelsets):
             joints = [(item["kind"], item.get("axis"), item["bodies"][0]) for item in self.data["joints"]]
             held = {body for kind, axis, body in joints if kind == "coordinate" and axis == "z"}
@@ -84,32 +69,15 @@ class Vehicle:
 
 
 def load_vehicle(path, axle_boxes=True):
-    """Read and check a vehicle file.
-
-    Parameters
-    ----------
-    path : str or Path
-    axle_boxes : bool
-        False: axle boxes become part of their wheelsets.
-
-    Returns
-    -------
-    Vehicle
-
-    Raises
-    ------
-    InputError
-        Naming the file, the element and what was expected.
-    """
+    """Read and check a vehicle file; without ``axle_boxes`` these become part of their wheelsets. An InputError names
+    the file, the element and what was expected."""
     return build_vehicle(read_yaml(path), str(Path(path).name), axle_boxes)
 
 
 def build_vehicle(data, source, axle_boxes=True):
-    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors.
-
-    Without ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and
-    yaw; in pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset.
-    """
+    """Compile a vehicle description (the content of a vehicle file) that ``source`` names in errors. Without
+    ``axle_boxes`` the mass of each box is added to its wheelset, with m y^2 and its own moments in roll and yaw; in
+    pitch the wheelset turns and the box does not, so nothing is added there. Its elements act on the wheelset."""
     data = _validated(data, source)
     _check_bodies(data["bodies"], source)
     _check_names(data, source)

@@ -7,19 +7,8 @@ from wrcore.errors import InputError
 
 
 def single_elements(items, layout):
-    """The elements as the kernels take them: wheelsets first, dampers along one direction each.
-
-    Parameters
-    ----------
-    items : list of dict
-        Checked elements of a vehicle file.
-    layout : Layout
-
-    Returns
-    -------
-    list of dict
-        With a further key ``points`` (q, 2): the whole characteristic, where an element has one.
-    """
+    """The elements as the kernels take them: wheelsets first, dampers along one direction each; a further key
+    ``points`` (q, 2) is the whole characteristic, where an element has one."""
     items = [{**item, "points": _polygon(item)} for item in items]
     return [single for item in items for single in _along_axes(_wheelset_first(item, layout))]
 
@@ -43,11 +32,9 @@ def _along_axes(item):
 
 
 def _wheelset_first(item, layout):
-    """The element with a wheelset as its first body: forces must act at a point of the axle, which does not spin.
-
-    The axes are then those of the other body; preload and characteristic belong to the opposite motion. An element on
-    a line may stay as it is: its line goes through both ends.
-    """
+    """The element with a wheelset as its first body: forces must act at a point of the axle, which does not spin. The
+    axes are then those of the other body; preload and characteristic belong to the opposite motion. An element on a
+    line may stay as it is: its line goes through both ends."""
     field = f"elements.{item['name']}"
     first, second = layout.ends(item, field)
     if on_line(item) or item["kind"] == "anti_roll_bar" or second == FRAME or not layout.spins[second]:
@@ -80,9 +67,7 @@ def end_points(item):
 
 def rotational(item, layout):
     """Stiffness (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) against relative rotation, shape (3, 3).
-
-    A spring that bends does not bend in pitch of a wheelset, nor of an axle box that is part of one.
-    """
+    A spring that bends does not bend in pitch of a wheelset, nor of an axle box that is part of one."""
     zero = [0.0, 0.0, 0.0]
     if item["kind"] == "anti_roll_bar":
         return np.array([[item["stiffness"], 0.0, 0.0], [item.get("damping", 0.0), 0.0, 0.0], zero])

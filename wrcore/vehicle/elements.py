@@ -42,22 +42,8 @@ speed rises this many times faster than at its steepest part."""
 
 
 def compile_elements(items, layout, joints, gravity):
-    """Sort checked elements into what kernels need.
-
-    Parameters
-    ----------
-    items : list of dict
-        Elements of a vehicle file.
-    layout : Layout
-    joints : list of dict
-        Joints of the vehicle: they carry weight, too.
-    gravity : float
-        For the preloads of the elements that state none, m/s^2.
-
-    Returns
-    -------
-    Elements
-    """
+    """Checked elements sorted into what kernels need; joints carry weight, too, and ``gravity`` (m/s^2) makes the
+    preloads of elements that state none."""
     springs, directed, turning, waiting = [], [], [], []
     places: dict[str, tuple[int, int]] = {}
     items, found = inflated(items, single_elements, layout, joints, gravity)

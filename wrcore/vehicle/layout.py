@@ -12,29 +12,19 @@ FRAME_NAME = "frame"
 
 @dataclass(frozen=True)
 class Layout:
-    """Bodies of a vehicle in nominal position, all with their axes along the track's.
-
-    Attributes
-    ----------
-    source : str
-        Named in errors.
-    names : tuple of str
-    positions : numpy.ndarray, shape (n, 3)
-        Centres of mass, m.
-    mass : numpy.ndarray, shape (n,)
-        kg.
-    spins : numpy.ndarray, shape (n,)
-        True for wheelsets, whose frame does not spin with them.
-    aliases : dict of str to str
-        Names of bodies that are part of another one.
-    """
+    """Bodies of a vehicle in nominal position, all with their axes along the track's."""
 
     source: str
+    """Named in errors."""
     names: tuple
     positions: np.ndarray
+    """(n, 3): centres of mass, m."""
     mass: np.ndarray
+    """(n,), kg."""
     spins: np.ndarray
+    """(n,): True for wheelsets, whose frame does not spin with them."""
     aliases: dict
+    """Names of bodies that are part of another one."""
 
     def ends(self, item, field):
         """Body numbers of the two ends of an element or joint; the moving frame can only be the second one."""

@@ -26,29 +26,9 @@ SPRINGS = ("spring_damper", "shear_spring")
 
 @np.errstate(all="ignore")  # numbers that overflow carry nothing
 def preloads(items, layout, joints, gravity):
-    """Vertical preloads of the springs that state none, such that the vehicle rests in nominal position.
-
-    They share what the elements with a stated preload leave over, as linear springs would.
-
-    Parameters
-    ----------
-    items : list of dict
-        From :func:`wrcore.vehicle.element_data.single_elements`.
-    layout : Layout
-    joints : list of dict
-    gravity : float
-        m/s^2.
-
-    Returns
-    -------
-    dict of str to float
-        N on the first body, by name of the element.
-
-    Raises
-    ------
-    InputError
-        Naming a body that neither springs nor joints carry.
-    """
+    """Vertical preloads (N on the first body, by name) of the springs in ``items``, single elements, that state none,
+    such that the vehicle rests in nominal position. They share what the elements with a stated preload leave over, as
+    linear springs would; ``gravity`` in m/s^2. An InputError names a body that neither springs nor joints carry."""
     size = 6 * len(layout.names)
     weight, load = np.zeros(size), np.zeros(size)
     weight[2::6] = -gravity * layout.mass

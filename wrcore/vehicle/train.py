@@ -11,27 +11,11 @@ from wrcore.vehicle.layout import FRAME_NAME
 
 
 def train_of(vehicle, count, spacing, source):
-    """Several equal vehicles, not coupled to one another; what acts between one and the moving frame does so for each.
+    """Several equal vehicles, each ``spacing`` (m) behind the one before, not coupled to one another; what acts between
+    one and the moving frame does so for each.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    count : int
-    spacing : float or None
-        Distance from one vehicle to the next one behind it, m.
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    Vehicle
-        The vehicle itself for one; else the names of bodies, elements and joints begin with ``vehicle_1_`` (the leading
-        one), ``vehicle_2_``, and so on.
-
-    Raises
-    ------
-    InputError
-        Without a spacing, or for one in which vehicles overlap.
+    The vehicle itself for one; else the names of bodies, elements and joints begin with ``vehicle_1_`` (the leading
+    one), ``vehicle_2_``, and so on. InputError without a spacing, or for one in which vehicles overlap.
     """
     if count == 1:
         return vehicle
@@ -47,20 +31,7 @@ def train_of(vehicle, count, spacing, source):
 
 
 def repeated(data, count, spacing):
-    """The content of a vehicle file for a train.
-
-    Parameters
-    ----------
-    data : dict
-        Content of a vehicle file, checked and with defaults.
-    count : int
-    spacing : float
-        m.
-
-    Returns
-    -------
-    dict
-    """
+    """The content of a vehicle file, checked and with defaults, for a train of vehicles ``spacing`` (m) apart."""
     train = {**data, "bodies": {}, "elements": [], "joints": []}
     for k in range(count):
         prefix, shift = f"vehicle_{k + 1}_", -k * spacing
@@ -82,18 +53,7 @@ def repeated(data, count, spacing):
 
 
 def repeated_equilibrium(equilibrium, train):
-    """Static equilibrium of a train from that of one of its vehicles.
-
-    Parameters
-    ----------
-    equilibrium : Equilibrium
-        Of ``train.unit``.
-    train : Vehicle
-
-    Returns
-    -------
-    Equilibrium
-    """
+    """Static equilibrium of a train from that of one of its vehicles, ``train.unit``."""
     bodies = len(train.unit.body_names)
     count = len(train.body_names) // bodies
     end = STATE_SIZE * bodies
