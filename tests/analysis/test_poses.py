@@ -48,7 +48,9 @@ def outcome(row, case):
     x, s = place(row, case)
     extent = row.x_min_m - case.origin[0], row.x_max_m - case.origin[0], math.nan, math.nan
     moment = row.Mz_Nm + x * row.Fy_N - s * row.Fx_N
-    return contact.Outcome(row.N_N, row.p_max_Pa, extent, row.Fx_N, row.Fy_N, moment)
+    cosine, sine = math.cos(row.contact_angle_rad), math.sin(row.contact_angle_rad)
+    track = row.Fx_N, row.Fy_N * cosine - row.N_N * sine, row.Fy_N * sine + row.N_N * cosine
+    return contact.Outcome(row.N_N, row.p_max_Pa, extent, row.Fx_N, row.Fy_N, moment, track=track)
 
 
 def place(row, case):
@@ -118,12 +120,13 @@ def test_still_ellipses_are_what_they_were(tmp_path, benchmark_pair):
 
 
 def test_forces_at_contacts_height(tmp_path):
-    # all 102 cases, 95 %: N 0.07 %, p_max 0.8 %, forces 0.75 % of mu N (Fx 0.28 %) against CONTACT's fx + dfx_D3; with
-    # its lag of the lateral slip taken out 0.41 %
-    cases = single("loaded_partial_slip", 5)
-    found = contact.summary(by_command(tmp_path, cases, "--patch", "exact"))
+    # all 102 cases, 95 %: N 0.07 %, p_max 0.8 %. Track forces against CONTACT's curved contact (D = 4), not its D = 3
+    # with one plane: 0.19 % of mu Fz in the median, x 0.35 % (95 %), total 0.8 % up to the flange root, in it 2.7 %
+    table = by_command(tmp_path, single("loaded_partial_slip", 5), "--patch", "exact")
+    found = contact.summary(table)
     assert found.loc["normal", "max"] < 5e-3 and found.loc["p_max", "q95"] < 0.012
-    assert found.loc["surface_force", "q95"] < 0.01 and found.loc["surface_fx", "q95"] < 5e-3
+    assert found.loc["curved_force", "median"] < 3e-3 and found.loc["curved_x", "q95"] < 5e-3
+    assert table.curved_force[table.y.abs() < 5.3e-3].max() < 0.01 and found.loc["curved_force", "max"] < 0.03
     assert found.loc[["x_min", "x_max"], "max"].max() < 2e-4 and found.loc["width", "max"] < 4e-4
 
 
@@ -214,8 +217,9 @@ def test_a_patch_of_a_scene():
     (one,) = wr.patch(SCENES / "suspended_wheelset.yaml", y=0.003, vy=0.02)
     assert isinstance(one, wr.Patch) and one.side == "left" and one.friction == 0.3
     area = one.cell_area
-    assert (one.pressure * area).sum() == pytest.approx(one.normal, rel=1e-6)
-    assert (one.traction_s * area).sum() == pytest.approx(one.fs, rel=1e-5)
+    # cells lie in one plane; the forces have each strip's own, by the square of the tilts and friction along the normal
+    assert (one.pressure * area).sum() == pytest.approx(one.normal, rel=5e-4)
+    assert (one.traction_s * area).sum() == pytest.approx(one.fs, abs=5e-4 * one.friction * one.normal)
     assert np.all(np.hypot(one.traction_x, one.traction_s) <= one.friction * one.pressure * (1.0 + 1e-4))
     assert 0.0 < one.slip_area < one.area and np.all(one.slip_s[one.stick] == 0.0)
     assert one.pressure.max() <= one.p_max * 1.001 and one.centroid == pytest.approx((0.0, 0.0), abs=1e-5)

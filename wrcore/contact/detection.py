@@ -87,14 +87,18 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
     ``depth`` (along the normal) its deepest strip; m0, m1, m2 are sums of g^2 over its ``nodes`` scan nodes, positions
     counted from ``first``.
     """
-    row = count
     if count == MAX_PATCHES:
-        row = 0
+        shallowest = 0
         for k in range(1, MAX_PATCHES):
-            if patches[k, PENETRATION] < patches[row, PENETRATION]:
-                row = k
-        if depth <= patches[row, PENETRATION]:
+            if patches[k, PENETRATION] < patches[shallowest, PENETRATION]:
+                shallowest = k
+        if depth <= patches[shallowest, PENETRATION]:
             return count
+        count -= 1
+        for k in range(shallowest, count):  # the others stay in order
+            for column in range(PATCH_COLUMNS):
+                patches[k, column] = patches[k + 1, column]
+    row = patches[count]
     if reduction == MOMENT:
         if nodes >= _WIDE:
             middle = first
@@ -108,10 +112,8 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
                 m0, m1, m2 = overlap_moments(geometry, pose, start, end)
-        found = patch_from_moments(geometry, pose, middle, m0, m1, m2, patches[row])
-    else:
-        found = patch_at_maximum(geometry, pose, deepest, outside, beyond, patches[row])
-    return count + found if row == count else count
+        return count + patch_from_moments(geometry, pose, middle, m0, m1, m2, row)
+    return count + patch_at_maximum(geometry, pose, deepest, outside, beyond, row)
 
 
 @jit(allocates=False)

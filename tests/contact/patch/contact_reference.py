@@ -85,6 +85,8 @@ class Case(NamedTuple):
     """The same with the rigid slip of the surfaces (D = 3); NaN where not known."""
     surface_eta: float
     """To be added to the surfaces' lateral slip before comparing with that: see `_SURFACE_LAG`."""
+    curved: tuple
+    """Whole force on the wheel in the track frame with contact in a curved plane (D = 4), x and y, N; NaN likewise."""
     p_max: float
     approach: float
     area: float
@@ -143,6 +145,8 @@ class Outcome(NamedTuple):
     mn: float = math.nan
     z_equal: float = math.nan
     """Height of the wheelset at which the normal force is the case's, m."""
+    track: tuple = (math.nan,) * 3
+    """The force in the track frame, N."""
 
 
 def reference_path(name):
@@ -189,6 +193,7 @@ def _case(row, number):
         -get("creep_x"), get("creep_s"), get("spin_per_m"), row["Fn_N"], *forces,
         *(f + d for f, d in zip(forces, change, strict=True)),
         _SURFACE_LAG * get("spin_per_m") * mm.get("grid_dx_coarsest", math.nan),
+        (-get("Ftot_x_tr_N") - get("dFtot_x_D4_N"), get("Ftot_y_tr_N") + get("dFtot_y_D4_N")),
         1e6 * row["pmax_MPa"], mm["approach"], area,
         (mm["x_min"], mm["x_max"], -mm["s_max"], -mm["s_min"]), (mm["x_pc"], -mm["s_pc"]), mm.get("grid_dx", math.nan),
         get("n_slip_over_n"), get("err_est"), row["flag"],
@@ -273,7 +278,9 @@ def compare(solver, cases, geometry):
     pandas.DataFrame
         Per case: normal and p_max (relative), x_min .. s_max (m), height (m, at equal normal force), fx, fs, force
         (norm of both) and mn over the friction bound of the case (mn over bound times c = sqrt(area/pi)), surface_fx,
-        surface_fs, surface_force, surface_mn against CONTACT's D = 3. Forces of a solver are scaled by its own bound.
+        surface_fs, surface_force, surface_mn against CONTACT's D = 3, all in one plane; in the track frame curved_x,
+        curved_y, curved_force, over vertical load times friction, against its D = 4, where the plane is curved. Forces
+        of a solver are scaled by its own bound.
     """
     rows = []
     for case in cases:
@@ -289,6 +296,10 @@ def compare(solver, cases, geometry):
             errors = found.fx / own - fx, found.fs / own - fs, (found.mn / own - mn) / c
             row |= dict(zip((f"{prefix}fx", f"{prefix}fs", f"{prefix}mn"), errors, strict=True))
             row[f"{prefix}force"] = math.hypot(*errors[:2])
+        x, y, z = found.track
+        errors = (force / z - wanted / case.load for force, wanted in zip((x, y), case.curved, strict=True))
+        row["curved_x"], row["curved_y"] = (error / FRICTION for error in errors)
+        row["curved_force"] = math.hypot(row["curved_x"], row["curved_y"])
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -156,5 +156,5 @@ def test_creepages_of_contact_are_the_slip_of_the_wheels_surface():
     for case in cases:
         wx, ws = np.empty((1, 1)), np.empty((1, 1))
         height = np.full(1, -case.approach)
-        surface_slip(case.pose, case.plane, case.motion, origin, origin, 0.0 * height, height, wx, ws)
+        surface_slip(case.pose, case.plane, case.motion, origin, origin, height, 0.0 * height, wx, ws)
         assert (wx[0, 0], ws[0, 0]) == pytest.approx((case.xi, case.eta), abs=2e-10)

@@ -37,7 +37,7 @@ def forces(contact, poses, warm):
 @pytest.mark.parametrize(("radius", "share"), [(0.4, 0.0025), (0.3, 0.0015), (0.08, 0.0015)])
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
 def test_a_cone_on_a_round_rail_head_is_hertz(radius, share, resolution):
-    # a/b = 1.1 to 3.2; measured with 8 strips: N 0.10 %, p_max 0.2 %
+    # a/b = 1.1 to 3.2; measured with 8 strips: N 0.10 %, p_max 0.2 %, area 0.25 % (also with a/b from 0.25 to 9)
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile(f"circle:{radius}", "rail")
     pair = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
     z = 0.46 + 1e-3
@@ -54,9 +54,7 @@ def test_a_cone_on_a_round_rail_head_is_hertz(radius, share, resolution):
     assert found.p_max == pytest.approx(1.5 * force / (math.pi * a * b * d), rel=0.01)
     assert 0.5 * (found.x_max - found.x_min) == pytest.approx(a * math.sqrt(d), rel=0.01)
     assert 0.5 * (found.s_max - found.s_min) == pytest.approx(b * math.sqrt(d), rel=0.04)
-    assert 2.0 * found.even_length @ found.width == pytest.approx(
-        math.pi * a * b * d, rel=0.16 / RESOLUTIONS[resolution]
-    )
+    assert 2.0 * found.even_length @ found.width == pytest.approx(math.pi * a * b * d, rel=0.005)
     assert found.mean_xx == pytest.approx(0.2 * a * a * d, rel=0.01)
     assert found.mean_ss == pytest.approx(0.2 * b * b * d, rel=0.02)
 
@@ -215,10 +213,10 @@ def test_rigid_slip_against_contact(benchmark_pair, shared_file):
         assert np.average(patch.slip_s_dx, weights=load) == pytest.approx(row.spin_per_m, abs=2e-3)
 
 
-def hollow_pair():
-    """S1002 with 1 mm of hollow on UIC60: two lobes 31 mm apart, their normals 0.19 rad."""
+def hollow_pair(place, reach):
+    """S1002 with 1 mm of hollow on UIC60: two lobes 28 mm apart, their normals 0.17 to 0.19 rad."""
     curve, rail = named_profile("S1002", "wheel"), named_profile("UIC60-MBench", "rail", 1 / 40)
-    rise = 1e-3 * np.exp(-(((curve.u - 5e-3) / 15e-3) ** 2))
+    rise = 1e-3 * np.exp(-(((curve.u - place) / reach) ** 2))
     wheel = ProfileCurve.from_points(curve.u, curve.f + rise - np.interp(0.0, curve.u, rise), "wheel")
     return contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
 
@@ -248,24 +246,24 @@ def alone(patch, window, velocity, place, mu):
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.3])
-def test_two_lobes_roll_each_in_its_own_plane(spin):
-    # one frame's sine for both lobes gave them a spin that is off by 0.2 1/m, 3 to 13 % of mu N; solved alone they miss
-    # what the other's tractions do (0.2 to 1.8 %)
-    pair, mu = hollow_pair(), 0.3
-    contact, worst = NormalContact(pair, MODULUS, "fine"), 0.0
-    for y in (-1e-3, 0.0, 1e-3):
-        z = height(pair, y, 55e3)
-        velocity = [20.0, 0.02, 0.0, 0.0, 20.0 / 0.46 * (1.0 + 5e-4), 20.0 * spin, 20.0]
-        (patch,) = contact.at_height("left", y, z, velocity=velocity)
-        assert patch.window.max() == 1 and np.ptp(patch.tilt) > 0.15
-        strips = patch.centre, patch.width, patch.half_length, patch.middle, patch.peak
-        slip = patch.slip_x, patch.slip_x_dx, patch.slip_s, patch.slip_s_dx
-        force = solve_patch(strips, slip, 8.2e10, mu, "fine").force
-        angle = patch.contact_angle + np.arctan(patch.tilt)
-        joint = np.array([force[0].sum(), force[1] @ np.cos(angle), force[1] @ np.sin(angle)])
-        parts = sum(alone(patch, window, velocity, np.array([0.0, y, z]), mu) for window in (0, 1))
-        worst = max(worst, np.linalg.norm(joint - parts) / (mu * patch.normal_force))
-    assert worst < 0.02
+@pytest.mark.parametrize(("hollow", "y", "bound"), [
+    ((5e-3, 15e-3), -2e-3, 0.003), ((0.0, 10e-3), 1e-4, 0.003), (None, 5e-3, 0.006), (None, 5.1e-3, 0.006),
+])  # fmt: skip
+def test_two_lobes_roll_each_in_its_own_plane(benchmark_pair, hollow, y, bound, spin):
+    # one frame's sine for both lobes gave them a spin that is off by 0.2 1/m; solved alone they miss what the other's
+    # tractions do: 0.2 % of mu N where they are 28 mm apart, 0.4 % at tread and flange root, 10 mm apart
+    pair, mu = hollow_pair(*hollow) if hollow else benchmark_pair, 0.3
+    z = height(pair, y, 55e3)
+    velocity = [20.0, 0.02, 0.0, 0.0, 20.0 / 0.46 * (1.0 + 5e-4), 20.0 * spin, 20.0]
+    (patch,) = NormalContact(pair, MODULUS, "fine").at_height("left", y, z, velocity=velocity)
+    assert patch.window.max() == 1 and np.ptp(patch.tilt) > 0.15
+    strips = patch.centre, patch.width, patch.half_length, patch.middle, patch.peak
+    slip = patch.slip_x, patch.slip_x_dx, patch.slip_s, patch.slip_s_dx
+    force = solve_patch(strips, slip, 8.2e10, mu, "fine").force
+    angle = patch.contact_angle + np.arctan(patch.tilt)
+    joint = np.array([force[0].sum(), force[1] @ np.cos(angle), force[1] @ np.sin(angle)])
+    parts = sum(alone(patch, window, velocity, np.array([0.0, y, z]), mu) for window in (0, 1))
+    assert np.linalg.norm(joint - parts) < bound * mu * patch.normal_force
 
 
 def test_a_load_is_carried(benchmark_pair):

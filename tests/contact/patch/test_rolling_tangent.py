@@ -1,12 +1,13 @@
 """Rolling at small creepage, on strips by every resolvent and on the grid: the force of adhesion everywhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import wrcore as wr
 from tests.contact.patch.test_grid_rolling import MU, NU, G, ellipse_patch
 from wrcore.analysis.contact import pair_geometry
-from wrcore.contact.patch.gap import creepage_slip
 from wrcore.contact.patch.grid_traction import slip_influence, solve_traction
 from wrcore.contact.patch.library import make_library
 from wrcore.contact.patch.normal import NormalContact
@@ -41,8 +42,7 @@ def matrices(patch, method, far):
     size, centre, middle = 2 * n * count, patch.centre - patch.mean_s, patch.middle - patch.mean_x
     found, stuck, unit = np.zeros((3, 3)), np.zeros((3, 3)), far * MU * patch.normal_force / (G * c * c)
     for k, creepage in enumerate(unit * np.diag([1, 1, 1 / c])):
-        slip = np.zeros((4, count))
-        creepage_slip(*creepage, centre, middle, slip)
+        slip = replace(patch, centre=centre, middle=middle).slip_of_creepages(*creepage)
         strips = centre, patch.width, patch.half_length, middle, patch.peak
         *force, residual, _ = rolling_force(*strips, *slip, G, MU, library, work, method)
         found[:, k] = np.array(force) / (G * unit) / [c * c, c * c, c**3]

@@ -26,7 +26,6 @@ from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.solve import (
     CENTRE,
     EXACT,
-    HALF_LENGTH,
     LOAD,
     MIDDLE,
     PEAK,
@@ -38,7 +37,6 @@ from wrcore.contact.patch.solve import (
     WINDOW,
     publish,
     solve_patch,
-    tip,
     wheel_overlaps,
 )
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
@@ -52,6 +50,9 @@ RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}
 
 MODELS = {"exact": EXACT, "strips": STRIPS}
 """``strips``: shape-corrected virtual penetration, without a solution of the half-space."""
+
+TIP_SHARE, TIP_GROWTH = 0.13, 0.04
+"""By which a window's last strips are too long for their area: the share, and its growth with ln(a/width) there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,22 +130,11 @@ class StripPatch:
     def even_length(self):
         """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
 
-        ``half_length`` squared is the mean of the squares over a strip; between the tips of a window it is taken to be
-        that of an ellipse times a number for each strip.
+        Galerkin's strips at the tips of a window are too long, by a share that grows with length over width: what Hertz's ellipses lack in area with a/b from 0.25 to 9, with 8 to 32 strips (within 0.3 %).
         """
-        even, rows = np.empty_like(self.half_length), np.zeros((STRIP_ROWS, len(self.centre)))
-        rows[HALF_LENGTH] = self.half_length
-        for k in np.unique(self.window):
-            at = np.flatnonzero(self.window == k)
-            own, w = rows[:, at], self.width[at[0]]
-            low = self.centre[at[0]] - (0.5 - tip(own, 0, 1)) * w
-            high = self.centre[at[-1]] + (0.5 - tip(own, len(at) - 1, -1)) * w
-            half, edges = 0.5 * (high - low), np.append(self.centre[at] - 0.5 * w, self.centre[at[-1]] + 0.5 * w)
-            t = (edges - low) / half - 1.0  # beyond the tips the squares count as negative, as in the tips' condition
-            square, t = np.diff(t - t**3 / 3.0), np.clip(t, -1.0, 1.0)
-            t[0], t[-1] = -1.0, 1.0
-            root = np.diff(0.5 * (t * np.sqrt(1.0 - t * t) + np.arcsin(t)))
-            even[at] = self.half_length[at] * root * np.sqrt(half / (w * square))
+        even, edge = self.half_length.copy(), np.diff(self.window, prepend=-1, append=-1) != 0
+        at = edge[1:] | edge[:-1]
+        even[at] *= 1.0 - TIP_SHARE - TIP_GROWTH * np.log(even[at] / self.width[at])
         return even
 
     def slip_of_creepages(self, xi, eta, phi):
