@@ -202,8 +202,8 @@ def reference_solver(own_slip):
 @pytest.mark.parametrize("own_slip", [False, True])
 def test_rolling_of_s1002_on_uic60_agrees_with_contact(benchmark_pair, own_slip):
     # all 110 cases, median / 95 % / max of the bound: CONTACT's creepages 0.08 / 0.6 / 0.8 %; its own error is up to
-    # 0.3 %. Slip of the surfaces is that of strips in their own planes, so against CONTACT's curved contact (D = 4), where
-    # the pressure's lateral force counts, too: 0.24 % in the median, 0.8 % up to the flange root, in it 3.1 %
+    # 0.3 %. Slip of the surfaces is that of strips in their own planes, so against CONTACT's curved contact (D = 4),
+    # where the pressure's lateral force counts, too: 0.24 % in the median, 0.8 % up to the flange root, in it 3.1 %
     cases = some_cases("loaded_partial_slip", every=6)
     table = contact.compare(reference_solver(own_slip), cases, benchmark_pair)
     found = contact.summary(table)
