@@ -150,6 +150,12 @@ def test_faults_in_columns_name_the_line(tmp_path, text, spec, says):
     assert "\n" not in str(caught.value)
 
 
+def test_a_header_may_be_in_quotes(tmp_path):
+    lines = "".join(f"{1e3 * u:.6f},{1e3 * f:.6f}\n" for u, f in zip(U, wheel()(U), strict=True))
+    plain, quoted = (str(write(tmp_path, name, name + "\n" + lines)) for name in ("u_mm,f_mm", '"u_mm","f_mm"'))
+    assert np.array_equal(read_profile(plain, "wheel")(U[5:-5]), read_profile(quoted, "wheel")(U[5:-5]))
+
+
 def test_a_unit_mistake_is_noticed(tmp_path):
     path = str(write(tmp_path, "wheel.dat", columns(U, wheel()(U))))
     with pytest.raises(InputError, match="looks like mm, declare unit: mm"):

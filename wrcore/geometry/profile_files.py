@@ -115,7 +115,7 @@ def read_columns(path, text, unit=None):
     points, lines, stated, whole = [], [], False, True
     for number, line in enumerate(text.splitlines(), 1):
         line = line.partition("#")[0].strip()
-        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line)
+        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line.replace('"', ""))
         if header and not points:
             unit, stated = _agreed(path, number, header.groups(), unit), True
         elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
