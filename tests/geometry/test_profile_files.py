@@ -133,6 +133,7 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
         ("u_mm,f_m\n1,2\n", {}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\n", {"unit": "m"}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\nx,2\n", {}, "line 3: expected two numbers, got 'x,2'"),
+        ("x,y\n1,2\n", {}, "line 1: expected two numbers, got 'x,y'; a header is u_m,f_m or u_mm,f_mm"),
         ("u_mm,f_mm\n# c\n1\n", {}, "line 3: expected two numbers, got '1'"),
         ("u_mm,f_mm\n1,2\nu_mm,f_mm\n", {}, "line 3: expected two numbers"),
         ("u_mm,f_mm\n" + "".join(f"{i},nan\n" for i in range(9)), {}, "line 2: expected finite"),
