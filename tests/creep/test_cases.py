@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from wrcore.creep import cases as cases_module
-from wrcore.creep.cases import MODELS, NUMBERS, read_cases, solve_cases
+from wrcore.creep.cases import MODELS, NUMBERS, creep_force, read_cases, solve_cases
 from wrcore.creep.table import CreepTable
 from wrcore.errors import InputError
 
@@ -104,6 +104,19 @@ def test_impossible_material_and_model(table):
         solve_cases(frame(), "kalker")
     with pytest.raises(InputError, match="nu, row 1: expected the table's 0.28, got 0.3"):
         solve_cases(frame(nu=0.3), "table", table)
+
+
+@pytest.mark.parametrize("psi", [-1.0, 1.0, [0.0, 2.0]])
+def test_a_shape_number_beyond_the_patch_is_named(psi):
+    with pytest.raises(InputError, match="creep_force: psi: expected"):
+        creep_force("exact", 6e-3, 4e-3, 5e4, 1e-3, 0.0, 0.0, psi=psi)
+
+
+@pytest.mark.parametrize("model", ["linear", "polach", "exact"])
+@pytest.mark.parametrize("change", [{"xi": 1e300}, {"phi_per_m": -1e300}, {"N_N": 1e-300}, {"a_m": 1e200}])
+def test_what_overflows_is_refused(model, change):
+    with pytest.raises(InputError, match="xi, eta, phi_per_m, row 1: expected creepages times"):
+        solve_cases(frame(**change), model)
 
 
 def test_no_rows():

@@ -133,6 +133,7 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
         ("u_mm,f_m\n1,2\n", {}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\n", {"unit": "m"}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\nx,2\n", {}, "line 3: expected two numbers, got 'x,2'"),
+        ("x,y\n1,2\n", {}, "line 1: expected two numbers, got 'x,y'; a header is u_m,f_m or u_mm,f_mm"),
         ("u_mm,f_mm\n# c\n1\n", {}, "line 3: expected two numbers, got '1'"),
         ("u_mm,f_mm\n1,2\nu_mm,f_mm\n", {}, "line 3: expected two numbers"),
         ("u_mm,f_mm\n" + "".join(f"{i},nan\n" for i in range(9)), {}, "line 2: expected finite"),
@@ -148,6 +149,12 @@ def test_faults_in_columns_name_the_line(tmp_path, text, spec, says):
         read_profile({"points": str(write(tmp_path, "bad.csv", text)), **spec}, "wheel")
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_header_may_be_in_quotes(tmp_path):
+    lines = "".join(f"{1e3 * u:.6f},{1e3 * f:.6f}\n" for u, f in zip(U, wheel()(U), strict=True))
+    plain, quoted = (str(write(tmp_path, name, name + "\n" + lines)) for name in ("u_mm,f_mm", '"u_mm","f_mm"'))
+    assert np.array_equal(read_profile(plain, "wheel")(U[5:-5]), read_profile(quoted, "wheel")(U[5:-5]))
 
 
 def test_a_unit_mistake_is_noticed(tmp_path):

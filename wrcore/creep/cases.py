@@ -22,6 +22,8 @@ OTHER_NAMES = {"ux": "xi", "uy": "eta"}
 """Columns that are read, too, where the usual ones are missing."""
 
 _SAME_NU = 1e-9
+_LARGEST = 1e100
+"""Nondimensional creepages above this are beyond what the laws' squares can hold."""
 
 
 def read_cases(path):
@@ -153,7 +155,11 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
     if model not in MODELS:
         raise InputError(source, "model", one_of(MODELS, model))
     columns = check_cases(frame, source)
-    g, psi, creepages, c = nondimensional(columns)
+    with np.errstate(all="ignore"):  # what overflows is refused
+        g, psi, creepages, c = nondimensional(columns)
+    size = np.abs(creepages).max(axis=1, initial=0.0)
+    expected = f"creepages times G a b/(mu N) of at most {_LARGEST:g}"
+    _refuse(~(size <= _LARGEST), size, "xi, eta, phi_per_m", source, expected)
     if model == "exact":
         forces, counts = _exact(g, psi, columns["nu"], creepages, level, progress)
     else:
@@ -207,7 +213,7 @@ def creep_force(
     shear_modulus: Annotated[ArrayLike, ABOVE_ZERO] = 8.2e10,
     nu: Annotated[ArrayLike, Within(0.0, 0.5)] = 0.28,
     table: CreepTable | str | PathLike[str] | None = None,
-    psi: ArrayLike = 0.0,
+    psi: Annotated[ArrayLike, Within(-1.0 + 1e-6, 1.0 - 1e-6)] = 0.0,
 ) -> tuple[Any, Any, Any]:
     """Creep force of any law in physical units; scalars and arrays broadcast.
 

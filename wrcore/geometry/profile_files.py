@@ -23,6 +23,7 @@ from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 _UNITS = {"m": 1.0, "mm": 1e-3}
 _KEYS = {"points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift"}
 _SEPARATED = "; decimal commas are read beside semicolons only"
+_HEADED = "; a header is u_m,f_m or u_mm,f_mm"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
@@ -105,7 +106,8 @@ def _numbers(path, line, text):
     except ValueError:
         numbers = []
     if len(numbers) < 2 or (mixed and not all(re.search("[.eE]", word) for word in words)):
-        raise InputError(path, f"line {line}", f"expected two numbers, got {text[:40]!r}{_SEPARATED}")
+        hint = _SEPARATED if re.search(r"\d", text) else _HEADED
+        raise InputError(path, f"line {line}", f"expected two numbers, got {text[:40]!r}{hint}")
     return numbers
 
 
@@ -115,7 +117,7 @@ def read_columns(path, text, unit=None):
     points, lines, stated, whole = [], [], False, True
     for number, line in enumerate(text.splitlines(), 1):
         line = line.partition("#")[0].strip()
-        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line)
+        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line.replace('"', ""))
         if header and not points:
             unit, stated = _agreed(path, number, header.groups(), unit), True
         elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
