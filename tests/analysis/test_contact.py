@@ -18,9 +18,9 @@ def test_all_combinations(pair):
     assert len(table.groupby(["y_m", "yaw_rad"])) == 4
 
 
-@pytest.mark.parametrize(("shifts", "yaws", "column"), [
-    ([0.0, math.nan], 0.0, "y_m"), (0.0, [math.nan], "yaw_rad"), (2.0, 0.0, "y_m"), (0.0, -0.6, "yaw_rad"),
+@pytest.mark.parametrize(("shifts", "yaws", "name"), [
+    ([0.0, math.nan], 0.0, "shifts"), (0.0, [math.nan], "yaws"), (2.0, 0.0, "shifts"), (0.0, -0.6, "yaws"),
 ])  # fmt: skip
-def test_a_pose_that_is_none_is_refused(pair, shifts, yaws, column):
-    with pytest.raises(InputError, match=f"contact_table: {column}: expected -"):
+def test_a_pose_that_is_none_is_refused(pair, shifts, yaws, name):
+    with pytest.raises(InputError, match=f"contact_table: {name}: expected a number or an array.*at least -"):
         wr.contact_table(pair, shifts, yaws)

@@ -189,9 +189,9 @@ def test_what_cannot_be_worn_is_refused():
     run.groups["wheelset/left"] = {"Q_N": np.full_like(run.t, 6e4)}
     with pytest.raises(InputError, match="output.channels: expected contact"):
         local_wear(run)
-    for begin in (1.0, np.nan):
-        with pytest.raises(InputError, match="begin: expected 0 to 0"):
+    for begin, says in ((1.0, "0 to 0"), (np.nan, "a number, finite")):
+        with pytest.raises(InputError, match=f"begin: expected {says}"):
             local_wear(worn_run(), begin=begin)
     for width in (-1.0, 0.0, np.nan):
-        with pytest.raises(InputError, match="width: expected 1e-06 to 0.1 m"):
+        with pytest.raises(InputError, match="width: expected a number, at least 1e-06 and at most 0.1 m"):
             local_wear(worn_run(), width=width)

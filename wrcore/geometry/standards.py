@@ -138,7 +138,7 @@ def cone_sections(slope):
 def named_profile(
     spec: str | Path | dict[str, Any],
     kind: Annotated[str, OneOf(("wheel", "rail"))],
-    inclination: Annotated[float | None, Within(-0.2, 0.2)] = None,
+    inclination: Annotated[float | None, Within(-0.2, 0.2), "a ratio like 1/40, as a number within 0.2"] = None,
     window: Annotated[float, Within(1e-6, 0.1, "m")] = WINDOW,
     spacing: Annotated[float, Within(1e-6, 1e-3, "m")] = SPACING,
 ) -> ProfileCurve:

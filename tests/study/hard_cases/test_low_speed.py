@@ -21,8 +21,9 @@ def test_regularisation_does_not_touch_higher_speeds(vehicles, assert_passed):
 
 
 def test_braking_ends_at_rest_without_step_collapse(vehicles, assert_passed):
-    # with differences of 1e-7 m/s in the Jacobian the last one takes 1e7 steps
+    # with differences of 1e-7 m/s in the Jacobian the last one takes 1e7 steps; with tolerances of velocities by the
+    # speed in each step it takes 21 000, by that of the beginning it took 11 000
     found, _ = braking(vehicles, 1.0, 0.5, 1.0, [1e-3, 1e-4])
     assert_passed(found)
-    assert table(found)["steps"].max() < 20_000
+    assert table(found)["steps"].max() < 40_000
     assert np.all(table(found)["status"] == "completed")
