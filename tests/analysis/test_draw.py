@@ -206,7 +206,7 @@ def pose_only():
         (hunting_run(), {"scene": SCENES / "trailer_vehicle.yaml"}, "scene: expected that of the run, with wheelset"),
         (hunting_run(), {}, "draw: scene: expected that of the run, as its files are not here"),
         (hunting_run(), {"scene": SCENES / "wheelset.yaml", "begin": 9.0}, "draw: begin: expected 0 <= begin < end"),
-        (hunting_run(), {"scene": SCENES / "wheelset.yaml", "factor": 0.1}, "draw: factor: expected a number, at least 1 and"),
+        (hunting_run(), {"scene": SCENES / "wheelset.yaml", "factor": 0.1}, "factor: expected a number, at least 1"),
         (pose_only(), {"scene": SCENES / "wheelset.yaml"}, "draw: wheelset: expected a run with the output channels"),
     ],
 )  # fmt: skip

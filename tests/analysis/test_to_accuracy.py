@@ -109,7 +109,7 @@ def test_an_accuracy_below_any_resolution_is_not_reached():
 
 
 @pytest.mark.parametrize(("changes", "accuracy", "of", "field"), [
-    ({}, 0.0, "y", "--accuracy"), ({}, float("nan"), "y", "accuracy: expected a number"), ({}, 1e-6, "x", "--accuracy-of"),
+    ({}, 0.0, "y", "--accuracy"), ({}, float("nan"), "y", "accuracy: expected"), ({}, 1e-6, "x", "--accuracy-of"),
     ({"output.channels": ["pose"]}, 1e-6, "y", "output.channels"),
 ])  # fmt: skip
 def test_bad_requests(changes, accuracy, of, field):
