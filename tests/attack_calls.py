@@ -25,7 +25,7 @@ from tests.conftest import SCENES
 from wrcore.errors.checked_calls import short
 
 SCENE = SCENES / "suspended_wheelset.yaml"
-SHORT = {"integration.duration": 0.02, "output.rate": 1000.0, "contact.creep.model": "linear"}
+SHORT = {"integration.duration": 0.12, "output.rate": 1000.0, "contact.creep.model": "linear"}
 
 
 @cache

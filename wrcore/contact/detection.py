@@ -182,9 +182,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
                                      nodes, patches, count)  # fmt: skip
                 inside = False
             elif 0.0 <= one_back < reserve and one_back <= two_back and one_back <= gap < 0.5:
-                bend = max(two_back - 2.0 * one_back + gap, 1e-12)  # from the vertex of a parabola through the three
-                lowest = one_back_at + 0.5 * min(u - one_back_at, one_back_at - two_back_at) * (two_back - gap) / bend
-                lowest = deepest_point(geometry, pose, lowest, SLOPE_TOLERANCE, two_back_at, u)
+                lowest = deepest_point(geometry, pose, one_back_at, SLOPE_TOLERANCE, two_back_at, u)
                 overlap = -gap_at(geometry, pose, lowest)[0]
                 if overlap > 0.0:
                     none = np.int64(0)
