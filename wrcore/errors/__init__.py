@@ -41,6 +41,16 @@ class UnknownNameError(InputError, KeyError):
     """A name that something looked up by names does not hold."""
 
 
+def short(value):
+    """A value as an error names it."""
+    import reprlib
+
+    try:
+        return reprlib.repr(value)
+    except Exception:  # whole numbers of thousands of digits, objects that cannot say what they are
+        return f"a {type(value).__name__}"
+
+
 def check_number(value, low, high, source, field, unit=""):
     """Refuse what is no number from ``low`` to ``high``: NaN, text, another unit.
 
@@ -59,7 +69,7 @@ def check_number(value, low, high, source, field, unit=""):
     float
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
-        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {value!r}")
+        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {short(value)}")
     return float(value)
 
 
