@@ -22,7 +22,7 @@ import pandas as pd
 import wrcore as wr
 from tests.attacking import attack, tried
 from tests.conftest import SCENES
-from wrcore.errors.checked_calls import short
+from wrcore.errors import short
 
 SCENE = SCENES / "suspended_wheelset.yaml"
 SHORT = {"integration.duration": 0.12, "output.rate": 1000.0, "contact.creep.model": "linear"}

@@ -26,11 +26,14 @@ Eckstein and Bertsekas, Math. Programming 55 (1992) 293 (relaxation rho).
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wrcore.creep.operator import make_operator, panel_counts, resultants
 from wrcore.errors import InputError, check_number
+from wrcore.errors.checked_calls import ABOVE_ZERO, checked, same_shape
 from wrcore.kernels.jit import jit
 
 DEFAULT_LEVEL = 22
@@ -280,6 +283,9 @@ class ContactField:
     """Resultants over mu N and mu N c."""
 
 
+Tolerance = Annotated[float, ABOVE_ZERO]
+
+
 class RollingContact:
     """A patch discretised and factorised once, ready for any number of creepages.
 
@@ -310,7 +316,8 @@ class RollingContact:
     -0.37
     """
 
-    def __init__(self, g, psi=0.0, nu=0.28, level=DEFAULT_LEVEL):
+    @checked
+    def __init__(self, g: float, psi: float = 0.0, nu: float = 0.28, level: int = DEFAULT_LEVEL):
         self.g = check_number(g, 1e-6, 1e6, "RollingContact", "g")
         self.psi = check_number(psi, -_LARGEST_PSI, _LARGEST_PSI, "RollingContact", "psi")
         self.nu = check_number(nu, 0.0, 0.5, "RollingContact", "nu")
@@ -318,7 +325,8 @@ class RollingContact:
         self.n, self.ny = panel_counts(self.g, self.level)
         self.operator = make_operator(self.g, self.psi, self.nu, self.n, self.ny)
 
-    def solve(self, xi, eta, phi, tolerance=TOLERANCE):
+    @checked
+    def solve(self, xi: ArrayLike, eta: ArrayLike, phi: ArrayLike, tolerance: Tolerance = TOLERANCE):
         """Creep forces of one case or of arrays of cases.
 
         Parameters
@@ -337,8 +345,11 @@ class RollingContact:
         shape = np.broadcast_shapes(np.shape(xi), np.shape(eta), np.shape(phi))
         return tuple(column.reshape(shape)[()] for column in results.T)
 
-    def solve_many(self, creepages, tolerance=TOLERANCE):
+    @checked
+    def solve_many(self, creepages: ArrayLike, tolerance: Tolerance = TOLERANCE):
         """Creep forces (K, 3) and iteration counts (K,) for creepages (K, 3); a negative count did not converge."""
+        if np.ndim(creepages) != 2 or np.shape(creepages)[1] != 3:
+            raise InputError("RollingContact", "creepages", f"expected rows of three, got {np.shape(creepages)}")
         creepages = _rows(*np.transpose(creepages))
         results, iterations, empty = np.empty((len(creepages), 3)), np.empty(len(creepages), np.int64), _no_rows()
         solve_rows(self.operator, creepages, tolerance, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
@@ -351,7 +362,8 @@ class RollingContact:
         """
         return resultants(self.operator, self.operator.stuck).T.astype(float)
 
-    def field(self, xi, eta, phi, tolerance=TOLERANCE / 10):
+    @checked
+    def field(self, xi: float, eta: float, phi: float, tolerance: Tolerance = TOLERANCE / 10):
         """Traction and slip over the patch for one case.
 
         Returns
@@ -366,10 +378,8 @@ class RollingContact:
 
 
 def _rows(xi, eta, phi):
-    rows = np.ascontiguousarray(np.stack(np.broadcast_arrays(xi, eta, phi), axis=-1).reshape(-1, 3), dtype=float)
-    if not np.isfinite(rows).all():
-        raise InputError("RollingContact", "creepages", "expected finite numbers")
-    return rows
+    rows = np.stack(same_shape("RollingContact", xi=xi, eta=eta, phi=phi), axis=-1)
+    return np.ascontiguousarray(rows.reshape(-1, 3), dtype=float)
 
 
 def _no_rows():

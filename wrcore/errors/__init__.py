@@ -41,12 +41,22 @@ class UnknownNameError(InputError, KeyError):
     """A name that something looked up by names does not hold."""
 
 
+def short(value):
+    """A value as an error names it."""
+    import reprlib
+
+    try:
+        return reprlib.repr(value)
+    except Exception:  # whole numbers of thousands of digits, objects that cannot say what they are
+        return f"a {type(value).__name__}"
+
+
 def check_number(value, low, high, source, field, unit=""):
     """The number, refused if it is none from ``low`` to ``high`` (both allowed, in ``unit``): NaN, text, another unit;
     ``source`` and ``field`` as for :class:`InputError`.
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
-        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {value!r}")
+        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {short(value)}")
     return float(value)
 
 

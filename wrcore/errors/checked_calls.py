@@ -5,7 +5,6 @@ passes reaches the function as it was given. Wrong call shapes (missing or unkno
 """
 
 import errno
-import reprlib
 import sys
 import types
 import typing
@@ -18,7 +17,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError, one_of, short
 
 LARGEST, LEAST = sys.float_info.max, sys.float_info.min
 
@@ -107,14 +106,6 @@ def checked(thing: Thing) -> Thing:
             raise InputError(thing.__qualname__, short(error.filename), expected) from error
 
     return typing.cast(Thing, front)
-
-
-def short(value):
-    """A value as an error names it."""
-    try:
-        return reprlib.repr(value)
-    except Exception:  # whole numbers of thousands of digits, objects that cannot say what they are
-        return f"a {type(value).__name__}"
 
 
 def same_shape(source, **arrays):

@@ -25,8 +25,8 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
-from wrcore.errors import InputError
-from wrcore.errors.checked_calls import checked, short
+from wrcore.errors import InputError, short
+from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import Track, build_track
