@@ -37,8 +37,7 @@ ROOMS = (
     "analysis.to_accuracy", "analysis.poses", "contact.conicity", "contact.first_touch", "contact.poses",
     "contact.detection", "contact.normal", "creep.cases", "creep.kalker", "creep.laws", "creep.table",
     "geometry.profile", "geometry.standards", "geometry.irregularity", "geometry.track", "run.channels",
-    "run.validity", "scene.description", "sweep.measures", "sweep.plan", "sweep.batch", "plain.wheelset",
-    "plain.contact", "plain.forces",
+    "run.validity", "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",
 )  # fmt: skip
 """Modules that scripts use beside the public names."""
 

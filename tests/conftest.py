@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 from wrcore.scene import description
 
 ROOT = Path(__file__).parent.parent
@@ -33,7 +32,7 @@ def uic60():
 @pytest.fixture(scope="session")
 def benchmark_pair(s1002, uic60):
     """S1002 on UIC60 1:40, gauge 1435 mm, rolling radius 460 mm: the Manchester contact benchmark."""
-    return contact_geometry(s1002, uic60, Track(1.435), 0.46, 0.75)
+    return WheelOnRail(s1002, uic60).geometry
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from tests.conftest import ROOT
 
 ROOMS = (
     "errors", "kernels", "geometry", "contact", "creep", "dynamics", "integrate", "vehicle", "scene", "run", "sweep",
-    "analysis", "plain", "cli",
+    "analysis", "cli",
 )  # fmt: skip
 """In the order of the data; ``wrcore/__init__.py`` is the door to all of them."""
 

@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from wrcore.analysis.wheels import wheel_table as wheel_table
     from wrcore.analysis.wheels import wheelset_channels as wheelset_channels
     from wrcore.contact.conicity import conicity_curve as conicity_curve
-    from wrcore.contact.first_touch import WheelsetOnTrack as WheelsetOnTrack
     from wrcore.contact.first_touch import first_touch as first_touch
     from wrcore.contact.patch.result import Patch as Patch
+    from wrcore.contact.wheel_on_rail import WheelsetOnTrack as WheelsetOnTrack
     from wrcore.creep.cases import creep_force as creep_force
     from wrcore.creep.halfspace import RollingContact as RollingContact
     from wrcore.creep.table import CreepTable as CreepTable
@@ -79,7 +79,7 @@ _PUBLIC = {
     "Scene": "wrcore.scene.description",
     "Settling": "wrcore.analysis.limit_cycles",
     "WheelWear": "wrcore.analysis.local_wear",
-    "WheelsetOnTrack": "wrcore.contact.first_touch",
+    "WheelsetOnTrack": "wrcore.contact.wheel_on_rail",
     "assess": "wrcore.analysis.assess",
     "conicity_curve": "wrcore.contact.conicity",
     "contact_table": "wrcore.analysis.contact",

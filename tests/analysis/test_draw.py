@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 import wrcore as wr
+from study.report.legible import findings
 from tests.conftest import ROOT, SCENES
 from tests.synthetic import hunting_run
-from wrcore.analysis.legible import findings
 from wrcore.analysis.plot_vehicle import box_of
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import _schema

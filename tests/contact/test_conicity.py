@@ -9,7 +9,8 @@ import pytest
 from study.paper.tables import rigid_contact
 from tests.conftest import DATA
 from wrcore.contact.conicity import conicity_curve, en15302_tolerance, equivalent_conicity
-from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack, first_touch
+from wrcore.contact.first_touch import first_touch
+from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile

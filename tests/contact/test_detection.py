@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES
 from wrcore.contact.detection import axle_direction, detect, find_patches, planar_error_bound
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import (
@@ -25,10 +25,10 @@ from wrcore.contact.reduction import (
 )
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import gap_at, make_pose
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.surface import rail_surface, wheel_surface, wheelset_transform
 from wrcore.geometry.track import Track
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
@@ -222,7 +222,7 @@ def test_contact_point_lies_on_both_surfaces(benchmark_pair, s1002, uic60):
 def test_cone_on_circle_has_hertz_curvatures():
     # Cone 1:20 on a rail head of radius 0.3 m: A = cos(delta)/(2 r), B = 1/(2 0.3), contact angle 0.05.
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")
-    geometry = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    geometry = WheelOnRail(wheel, rail).geometry
     z = 0.46 - geometry_table(geometry, [0.0]).lowering_m[0] - 2e-5
     for p in detect(geometry, 0.0, z):
         radius = 0.46 - wheel(p.u_wheel_m)
@@ -266,7 +266,7 @@ def test_no_overlap_of_measured_profiles_counts_twice(reduction):
     # a search for the deepest point that left its overlap found the neighbour's again (4 and 2 of these poses), and the
     # moments of what it then took for the overlap gave 4e19 Pa
     wheel, rail = measured("S1002", "wheel"), measured("60E1", "rail", 1 / 40)
-    pair, hertz = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75), hertz_table()
+    pair, hertz = WheelOnRail(wheel, rail).geometry, hertz_table()
     rows, modulus = np.empty((MAX_PATCHES, PATCH_COLUMNS)), contact_modulus(8.2e10, 0.28)
     several = 0
     for y in np.linspace(-8e-3, 8e-3, 401):
@@ -288,15 +288,15 @@ def test_compiled_search_equals_its_python_source(benchmark_pair):
 
 def test_exchanged_profiles_are_refused(s1002, uic60):
     with pytest.raises(InputError, match="expected a wheel and a rail"):
-        contact_geometry(uic60, s1002, Track(), 0.46, 0.75)
+        WheelOnRail(uic60, s1002)
     with pytest.raises(InputError, match="planar or spatial"):
-        detect(contact_geometry(s1002, uic60, Track(), 0.46, 0.75), 0.0, 0.46, detection="3d")
+        detect(WheelOnRail(s1002, uic60).geometry, 0.0, 0.46, detection="3d")
 
 
 def test_moments_of_an_exact_parabola_give_its_hertz_patch():
     # Cone on a circular rail head: the gap is a parabola to (w/R)^2, and both reductions agree with each other.
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")
-    geometry = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    geometry = WheelOnRail(wheel, rail).geometry
     z = 0.46 - geometry_table(geometry, [0.0]).lowering_m[0] - 4e-5
     by = {r: detect(geometry, 0.0, z, reduction=r)[0] for r in ("maximum", "moment")}
     # half width w = sqrt(d0/B) = 4.9 mm; the circle's fourth-order term is up to 5 (w/R)^2 = 1.4e-3 of the moments

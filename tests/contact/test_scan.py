@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wrcore.contact.geometry import CALM, LANES, RAIL_COSINE, RAIL_RESERVE, STRAY, WHEEL_RESERVE, contact_geometry
+from wrcore.contact.geometry import CALM, LANES, RAIL_COSINE, RAIL_RESERVE, STRAY, WHEEL_RESERVE
 from wrcore.contact.reduction import _arc_sine, _arc_tangent
 from wrcore.contact.scan import (
     blocks_near_misses,
@@ -17,8 +17,8 @@ from wrcore.contact.scan import (
     strip_gap,
 )
 from wrcore.contact.strip import make_pose
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 from wrcore.kernels.jit import jit
 
 
@@ -66,9 +66,7 @@ def random_poses(count, seed, roll=0.012, yaw=0.015):
 @pytest.fixture(scope="module")
 def wide_pair():
     """A cone on a circle of 0.3 m radius: a rail so wide that its blocks must be larger to be bits of one word."""
-    return contact_geometry(
-        named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail"), Track(), 0.46, 0.75
-    )
+    return WheelOnRail(named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")).geometry
 
 
 @pytest.mark.parametrize("pair", ["benchmark_pair", "wide_pair"])

@@ -90,7 +90,7 @@ CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "scene")
 RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/motion", "analysis/wheels")
-STYLE = ("analysis/style", "analysis/legible")
+STYLE = ("analysis/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
@@ -105,7 +105,7 @@ CORE = {
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
     "paper": sources("run", "analysis/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", *STYLE, "study/paper"),
+    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", *STYLE, "study/paper", "study/contact/surface"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

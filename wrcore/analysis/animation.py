@@ -17,8 +17,7 @@ from wrcore.analysis.plot_vehicle import box_of
 from wrcore.analysis.wheels import wheelsets_of
 from wrcore.errors import InputError, check_number
 from wrcore.errors.new_files import appearing
-from wrcore.geometry.surface import SIDES
-from wrcore.scene.pairs import Pair
+from wrcore.geometry.track import SIDES
 
 MOST_FRAMES = 600
 FRAME_RATE = 50.0
@@ -118,19 +117,16 @@ def _body(vehicle, name, pose, frames, factor):
 def _wheelset(run, scene, name, frames):
     pose = run.groups[name]
     at = scene.vehicle.wheelset_names.index(name)
-    alike = Pair(scene.wheel, scene.rail, scene.vehicle.rolling_radius)
-    pairs = scene.pairs[2 * at : 2 * at + 2] or (alike, alike)
-    sides = zip(SIDES, pairs, strict=True)
     return {
         "name": name, "y": _numbers(pose["y_m"][frames], 6), "z": _numbers(pose["z_m"][frames], 6),
         "roll": _numbers(pose["roll_rad"][frames], 7),
-        "wheels": [_wheel(run.groups[f"{name}/{side}"], scene, side, pair, frames) for side, pair in sides],
+        "wheels": [_wheel(run.groups[f"{name}/{side}"], side, scene.pair(side, at), frames) for side in SIDES],
     }  # fmt: skip
 
 
-def _wheel(contact, scene, side, pair, frames):
+def _wheel(contact, side, pair, frames):
     """Profiles (y, z from axle and track, m), where the rail is (its irregularity), and patches over the frames."""
-    sign, distance = SIDES[side], scene.track.rail_distance(pair.rail)
+    sign, distance = SIDES[side], pair.rail_distance
     u_wheel, u_rail = (np.linspace(curve.u[0], curve.u[-1], POINTS) for curve in (pair.wheel, pair.rail))
     rows = np.stack([contact[name][frames] for name in PATCH], axis=-1)  # (frames, patches, columns)
     u = contact["u_rail_m"][frames]
@@ -138,7 +134,7 @@ def _wheel(contact, scene, side, pair, frames):
     height = rows[..., 1] - pair.rail(np.nan_to_num(u))
     return {
         "side": side,
-        "wheel": [_numbers(sign * (scene.vehicle.half_distance + u_wheel), 5),
+        "wheel": [_numbers(sign * (pair.half_distance + u_wheel), 5),
                   _numbers(pair.wheel(u_wheel) - pair.rolling_radius, 6)],
         "rail": [_numbers(sign * (distance + u_rail), 5), _numbers(pair.rail(u_rail), 6)],
         "rail_at": [_numbers(_held(aside), 6), _numbers(_held(height), 6)],

@@ -23,7 +23,7 @@ from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
 from wrcore.analysis.wheels import late_in, wheel_forces, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.derived import quotient
 from wrcore.run.run import Run
 

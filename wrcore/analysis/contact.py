@@ -6,18 +6,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wrcore.contact.first_touch import WheelsetOnTrack
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import REDUCTIONS
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.geometry.track import Track
-
-
-def pair_geometry(pair):
-    """The `ContactGeometry` of a `WheelsetOnTrack` with equal sides, compiled for the contact search."""
-    one = pair.left
-    return contact_geometry(one.wheel, one.rail, Track(pair.gauge), one.rolling_radius, pair.half_distance)
 
 
 @checked
@@ -61,6 +53,6 @@ def contact_table(
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
     poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
-    patches = solve_poses(poses, pair_geometry(pair), wheel_load, detection, patch)
+    patches = solve_poses(poses, pair.left.geometry, wheel_load, detection, patch)
     placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
     return placed.rename(columns={"y_m_contact": "y_contact_m"}).drop(columns="pose_id")

@@ -20,7 +20,7 @@ from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import greatest_pressure, late_in, wear_number, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.run import Run
 
 YIELD_IN_SHEAR = 300e6

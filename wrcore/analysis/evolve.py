@@ -42,14 +42,14 @@ from wrcore.analysis.worn_profiles import (
 )
 from wrcore.analysis.worn_rails import LaidRails, falls_of, keep_rails, laid_rails, lay_rails, to_renewal, wear_rails
 from wrcore.contact.conicity import conicity_curve
-from wrcore.contact.first_touch import WheelsetOnTrack
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
 from wrcore.sweep.plan import digest_of_plan

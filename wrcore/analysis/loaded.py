@@ -23,7 +23,7 @@ from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data, creep_force_at
 from wrcore.creep.table import ensure_table
 from wrcore.errors import InputError, one_of
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 MODELS = (*PATCHES, "grid")
 

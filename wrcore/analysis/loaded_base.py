@@ -19,7 +19,7 @@ from wrcore.contact.patch.surfaces import Motion
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle
 from wrcore.errors import InputError, check_number
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 _CARRIED = 1e-9
 """Relative error of F^(2/3) that ends the search for a height."""

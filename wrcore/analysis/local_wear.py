@@ -24,7 +24,7 @@ from wrcore.analysis.wheels import late_in, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.derived import rolling_speed
 from wrcore.run.run import Run
 from wrcore.scene.friction import read_friction

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
-from wrcore.analysis.contact import pair_geometry
 from wrcore.analysis.loaded import GRIDS, Strips
 from wrcore.analysis.loaded_base import Rolling
-from wrcore.contact.first_touch import WheelsetOnTrack
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.scene.description import Source, as_scene
 from wrcore.scene.friction import read_friction
-from wrcore.scene.pairs import Pair
 
 METHODS = ("exact", "grid")
 
@@ -111,36 +107,14 @@ def patch(
     return [one.patch for one in found]
 
 
-class Placed(NamedTuple):
-    """Profiles of a wheel and its rail, and where they lie, m."""
-
-    wheel: ProfileCurve
-    rail: ProfileCurve
-    rolling_radius: float
-    half_distance: float
-    rail_distance: float
-
-
 def pair_of(source, side="left"):
-    """Wheel and rail of one side (`Placed`) of a source of `patch`: of a scene those of its first wheelset."""
-    if isinstance(source, WheelsetOnTrack):
-        one = getattr(source, side)
-        return Placed(one.wheel, one.rail, one.rolling_radius, source.half_distance, source.rail_distance(one))
-    scene = as_scene(source)
-    own = _own_pair(scene, side)
-    distance = scene.track.rail_distance(own.rail)
-    return Placed(own.wheel, own.rail, own.rolling_radius, scene.vehicle.half_distance, distance)
-
-
-def _own_pair(scene, side):
-    """Wheel and rail of a side of the first wheelset."""
-    alike = Pair(scene.wheel, scene.rail, scene.vehicle.rolling_radius)
-    return dict(zip(SIDES, scene.pairs, strict=False)).get(side, alike)
+    """`WheelOnRail` of one side of a source of `patch`: of a scene that of its first wheelset."""
+    return getattr(source, side) if isinstance(source, WheelsetOnTrack) else as_scene(source).pair(side)
 
 
 def _of_pair(pair):
-    """Geometry, material and usual values of a pair."""
-    return pair_geometry(pair), {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
+    """Geometry, material and usual values of a pair with equal sides."""
+    return pair.left.geometry, {}, {"load": math.nan, "speed": 1.0, "mu": 0.3}
 
 
 def _of_scene(source, side):
@@ -150,10 +124,8 @@ def _of_scene(source, side):
     friction = read_friction(contact["friction"], scene.source).largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
-    own = _own_pair(scene, side)
-    geometry = contact_geometry(own.wheel, own.rail, scene.track, own.rolling_radius, vehicle.half_distance)
     detection = "planar" if scene.detection == "planar" else "spatial"
     load = vehicle.nominal_wheel_load(vehicle.bodies.wheelsets[0])
-    return geometry, {**contact["material"], "detection": detection}, {
+    return scene.pair(side).geometry, {**contact["material"], "detection": detection}, {
         "load": load, "speed": scene.data["speed"] or 1.0, "mu": friction,
     }  # fmt: skip

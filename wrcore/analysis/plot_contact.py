@@ -5,9 +5,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
+from wrcore.contact.first_touch import first_touch
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 LIFT = 0.020
 """Height by which the wheel is drawn above the rail, m."""

@@ -8,10 +8,10 @@ from matplotlib.patches import Polygon
 
 from wrcore.analysis.patch import pair_of, patch
 from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
-from wrcore.contact.first_touch import WheelsetOnTrack
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.scene.description import Source
 
 TALLEST = 12.0

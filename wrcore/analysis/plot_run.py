@@ -13,7 +13,7 @@ from wrcore.analysis.style import styled
 from wrcore.analysis.wheels import wheel_forces, wheelsets_of
 from wrcore.errors import InputError, similar
 from wrcore.errors.checked_calls import checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.channels import UNIT_SUFFIXES, unit_of
 from wrcore.run.run import Run
 

@@ -9,7 +9,7 @@ from wrcore.analysis.loaded_base import Rolling
 from wrcore.contact import reduction as columns
 from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 ROLLING_FIELDS = {
     "xi": columns.XI, "eta": columns.ETA, "phi_per_m": columns.PHI, "Fx_N": columns.FX, "Fy_N": columns.FY,

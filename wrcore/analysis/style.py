@@ -4,13 +4,10 @@ Planar and spatial detection keep their colour, line and marker in every figure;
 grey copy stays readable. Units change in the functions that draw and nowhere before: m to mm, rad to mrad, N to kN.
 """
 
-import warnings
 from functools import wraps
 from pathlib import Path
 
 import matplotlib as mpl
-
-from wrcore.analysis.legible import findings
 
 MM = 1e3
 
@@ -64,14 +61,10 @@ def styled(function):
 
 @styled
 def save_figure(figure, *paths):
-    """Write a figure as ``.png`` and ``.svg`` by the paths' endings, folders created; equal figures give equal bytes.
-    Texts that cannot be read are a UserWarning that begins with "figure" and the first file's name.
-    """
+    """Write a figure as ``.png`` and ``.svg`` by the paths' endings, folders created; equal figures give the same."""
     for path in map(Path, paths):
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-    for finding in findings(figure):
-        warnings.warn(f"figure {Path(paths[0]).name}: {finding}", stacklevel=2)
 
 
 def derailed_at(axes, speeds, color):

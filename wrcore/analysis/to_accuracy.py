@@ -12,7 +12,7 @@ import numpy as np
 from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.checked_calls import checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.run import Run
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Source, as_scene

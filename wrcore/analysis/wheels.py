@@ -12,7 +12,7 @@ import pandas as pd
 
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, checked
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.derived import forces_on_rail, quotient
 from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.run import Run

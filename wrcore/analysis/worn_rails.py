@@ -14,7 +14,7 @@ import numpy as np
 
 from wrcore.analysis.worn_profiles import file_of, onto_points, points_of, read_points, write_points
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 
 class LaidRails(NamedTuple):
@@ -33,7 +33,7 @@ DEPTH = 0.010
 
 
 def _new_rails(scene):
-    return dict(zip(SIDES, [pair.rail for pair in scene.pairs[:2]] or [scene.rail, scene.rail], strict=True))
+    return {side: scene.pair(side).rail for side in SIDES}
 
 
 def lay_rails(folder, scenes):

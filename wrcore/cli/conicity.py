@@ -79,7 +79,7 @@ def run(options):
 
 
 def _wheelset_on_track(options):
-    from wrcore.contact.first_touch import WheelOnRail, WheelsetOnTrack
+    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 
     wheel = profile_of(options, options.wheel, "wheel")
     right_wheel = profile_of(options, options.right_wheel, "wheel") if options.right_wheel else wheel

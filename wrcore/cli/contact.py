@@ -92,19 +92,16 @@ def add(commands):
 def run(options):
     """Do what the options say."""
     from wrcore.analysis.poses import loaded_poses
-    from wrcore.contact.geometry import contact_geometry
     from wrcore.contact.poses import read_poses
-    from wrcore.geometry.track import Track
+    from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 
     out = output(options.out)
     poses = read_poses(options.poses)
     wheel, rail = profile_of(options, options.wheel, "wheel"), profile_of(options, options.rail, "rail")
-    geometry = contact_geometry(
-        wheel, rail, Track(options.gauge), options.rolling_radius, options.tape_circle_half_distance
-    )
+    pair = WheelsetOnTrack.alike(wheel, rail, options.gauge, options.rolling_radius, options.tape_circle_half_distance)
     table = loaded_poses(
-        poses, geometry, options.wheel_load, options.patch, options.resolution, options.slip, options.load_by,
-        options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
+        poses, pair.left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
+        options.load_by, options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
     )  # fmt: skip
     if table.empty:
         raise InputError(options.poses, "", "expected a pose in which a wheel touches its rail, got none")

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
+from wrcore.contact.first_touch import first_touch
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import LEAST, Within, checked
 

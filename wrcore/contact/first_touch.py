@@ -13,17 +13,13 @@ the second kind.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrcore.contact.geometry import HALF_DISTANCES, RADII
-from wrcore.errors import InputError, check_number
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import Within, checked
-from wrcore.geometry.profile import GAUGE_DEPTH, ProfileCurve
-from wrcore.geometry.track import GAUGES
 from wrcore.kernels.jit import FAST, jit
 
 if TYPE_CHECKING:
@@ -38,115 +34,6 @@ _RESERVE = 1e-6
 _ROLL_STEPS = 40
 
 _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
-
-
-@checked
-@dataclass(frozen=True)
-class WheelOnRail:
-    """One side of a pair."""
-
-    wheel: ProfileCurve
-    rail: ProfileCurve
-    rolling_radius: float = 0.46
-    """Radius at the tape circle, m."""
-
-    def __post_init__(self):
-        if (self.wheel.kind, self.rail.kind) != ("wheel", "rail"):
-            got = f"{self.wheel.kind} and {self.rail.kind}"
-            raise InputError(self.wheel.name, "kind", f"expected a wheel and a rail, got {got}")
-        check_number(self.rolling_radius, *RADII, "wheel", "rolling_radius", "m")
-
-
-@checked
-@dataclass(frozen=True)
-class WheelsetOnTrack:
-    """A wheelset and the track under it; the sides may differ in profile and in radius.
-
-    Parameters
-    ----------
-    left, right : WheelOnRail
-    half_distance : float
-        Tape circle from the wheelset's centre, m.
-    gauge : float
-        Distance between the rails' innermost points within ``gauge_depth`` of their tops, m.
-    gauge_depth : float
-        m; 14 mm in the Manchester contact benchmark. The reference rail of UIC 519 is drawn about a point 0.492 mm
-        lower than its top, from which its 14 mm count: 14.492 mm here, or a gauge of 1435.195 mm. That point then lies
-        at 750 mm.
-
-    Examples
-    --------
-    >>> import wrcore as wr
-    >>> pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
-    >>> pair.base, round(pair.rail_distance(pair.left), 4)
-    (1.5, 0.7605)
-    """
-
-    left: WheelOnRail
-    right: WheelOnRail
-    half_distance: float = 0.75
-    gauge: float = 1.435
-    gauge_depth: float = GAUGE_DEPTH
-
-    def __post_init__(self):
-        for name, bounds in (("half_distance", HALF_DISTANCES), ("gauge", GAUGES), ("gauge_depth", (1e-6, 0.1))):
-            check_number(getattr(self, name), *bounds, "track", name, "m")
-        for side in (self.left, self.right):
-            if math.isnan(side.rail.gauge_offset(self.gauge_depth)):
-                raise InputError(side.rail.name, "gauge", f"expected a rail down to {self.gauge_depth} m, got a part")
-
-    @classmethod
-    @checked
-    def alike(
-        cls,
-        wheel: ProfileCurve,
-        rail: ProfileCurve,
-        gauge: float = 1.435,
-        rolling_radius: float = 0.46,
-        half_distance: float = 0.75,
-    ) -> WheelsetOnTrack:
-        """The usual case: the right side is the mirror image of the left one."""
-        side = WheelOnRail(wheel, rail, rolling_radius)
-        return cls(side, side, half_distance, gauge)
-
-    @property
-    def base(self):
-        """Distance of the tape circles, m: the standard's e = 1500 mm at standard gauge."""
-        return 2.0 * self.half_distance
-
-    @property
-    def mean_radius(self):
-        """Mean of both rolling radii, m."""
-        return 0.5 * (self.left.rolling_radius + self.right.rolling_radius)
-
-    def rail_distance(self, side):
-        """Origin of a side's rail from the centre line, m, positive."""
-        return 0.5 * self.gauge + side.rail.gauge_offset(self.gauge_depth)
-
-    def kernel_data(self):
-        """Both sides for the kernels."""
-        return tuple(
-            _Side(
-                np.column_stack([-s.wheel.f, -s.wheel.df]), float(s.wheel.u[0]), float(s.wheel.spacing),
-                np.column_stack([s.rail.f, s.rail.df]), float(s.rail.u[0]), float(s.rail.spacing),
-                float(s.rolling_radius), float(self.half_distance), float(self.rail_distance(s)),
-            )
-            for s in (self.left, self.right)
-        )  # fmt: skip
-
-
-class _Side(NamedTuple):
-    wheel: np.ndarray
-    """(n, 2): R - r0 and R' at equally spaced nodes."""
-    wheel_start: float
-    wheel_step: float
-    rail: np.ndarray
-    """(m, 2): f and f'."""
-    rail_start: float
-    rail_step: float
-    rolling_radius: float
-    half_distance: float
-    rail_distance: float
 
 
 @jit(fastmath=FAST, inline="always")
@@ -290,7 +177,7 @@ def first_touch(
 
     shifts = np.atleast_1d(np.asarray(shifts, dtype=float))
     rolls, found = np.empty(shifts.size), np.empty((shifts.size, 2, 5))
-    _tabulate(*pair.kernel_data(), shifts, bool(roll), rolls, found)
+    _tabulate(pair.left.geometry, pair.right.geometry, shifts, bool(roll), rolls, found)
     table = {"y_m": shifts, "roll_rad": rolls}
     table["rolling_radius_difference_m"] = found[:, 0, _RADIUS] - found[:, 1, _RADIUS]
     for i, (name, sign) in enumerate((("left", 1.0), ("right", -1.0))):

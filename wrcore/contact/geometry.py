@@ -6,12 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from wrcore.errors import InputError, check_number
-from wrcore.geometry.track import GAUGES
-
-RADII, HALF_DISTANCES = (0.05, 2.0), (0.2, 1.5)
-"""Rolling radii, and distances of the tape circles from the wheelset's centre, that are taken for metres, m."""
-
 SCAN_STEP = 0.6e-3
 """Distance of the nodes of the scan for overlaps, m. Where a patch may be narrower, the search looks closer."""
 
@@ -91,15 +85,8 @@ class ContactGeometry(NamedTuple):
     """Rail profile origin from the track's centre line, m."""
 
 
-def contact_geometry(wheel, rail, track, rolling_radius, half_distance):
-    """ContactGeometry of a wheel-rail pair, profiles with equally spaced nodes, and its placement for the contact
-    search; the tape circle has the radius ``rolling_radius`` and the distance ``half_distance`` from the wheelset's
-    centre, m. InputError if wheel and rail are exchanged, or a length is none in m."""
-    if wheel.kind != "wheel" or rail.kind != "rail":
-        raise InputError(wheel.name, "kind", f"expected a wheel and a rail, got {wheel.kind} and {rail.kind}")
-    check_number(rolling_radius, *RADII, "wheel", "rolling_radius", "m")
-    check_number(half_distance, *HALF_DISTANCES, "wheelset", "half_distance", "m")
-    check_number(track.gauge, *GAUGES, "track", "gauge", "m")
+def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
+    """ContactGeometry of the profiles of a `WheelOnRail` and its lengths."""
     scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
     return ContactGeometry(
@@ -111,7 +98,7 @@ def contact_geometry(wheel, rail, track, rolling_radius, half_distance):
         _padded(_strip_rows(rolling_radius - wheel.f, -wheel.df)), _padded(_fine_rail(wheel, rail)),
         float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
-        float(rolling_radius), float(half_distance), float(track.rail_distance(rail)),
+        float(rolling_radius), float(half_distance), rail_distance,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.checked_csv import read_csv_table
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 PATCH_FIELDS = {
     "u_wheel_m": columns.U_WHEEL, "s_wheel_rad": columns.S_WHEEL, "u_rail_m": columns.U_RAIL, "x_m": columns.X,

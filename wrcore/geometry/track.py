@@ -21,6 +21,9 @@ from wrcore.geometry.path import PathData, path_data, tangent_path
 from wrcore.geometry.profile import GAUGE_DEPTH
 from wrcore.geometry.ramps import STEEPEST, incline
 
+SIDES = {"left": 1.0, "right": -1.0}
+"""Sign of a rail's place beside the centre line, along y."""
+
 GAUGES = 0.5, 2.0
 """Gauges of which there are tracks, m; others are taken for another unit."""
 

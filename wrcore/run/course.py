@@ -20,7 +20,7 @@ from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import irregularity_end
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.checkpoints import model_fingerprint

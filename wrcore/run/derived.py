@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 from wrcore.run.wear import creep_work
 
 UNLOADED = 1e3

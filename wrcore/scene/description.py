@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from wrcore.contact.detection import DETECTIONS
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.dynamics.marker import FRAME
@@ -35,7 +36,7 @@ from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.initial import initial_state, rest
 from wrcore.scene.initial import static_equilibrium as static_equilibrium
-from wrcore.scene.pairs import Pair, digests_of_files, find_file, own_pairs, pair_geometries, wheel_and_rail
+from wrcore.scene.pairs import digests_of_files, find_file, own_pairs, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
@@ -54,8 +55,8 @@ class Scene:
     vehicle : Vehicle
     wheel, rail : ProfileCurve
     track : Track
-    pairs : tuple of Pair
-        Wheel, rail and radius of each wheel, left and right of wheelset after wheelset; empty where all are the same.
+    pairs : tuple of WheelOnRail
+        Of each wheel, left and right of wheelset after wheelset; empty where all are alike.
     files : dict
         SHA-256 of all files that were read for it, by path.
 
@@ -75,13 +76,23 @@ class Scene:
     wheel: ProfileCurve
     rail: ProfileCurve
     track: Track
-    pairs: tuple[Pair, ...] = ()
+    pairs: tuple[WheelOnRail, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
 
     @property
     def detection(self) -> str:
         """``planar``, ``spatial`` or ``auto``."""
         return self.data["contact"]["detection"]
+
+    @cached_property
+    def alike(self) -> WheelOnRail:
+        """``wheel`` on ``rail``."""
+        vehicle, distance = self.vehicle, self.track.rail_distance(self.rail)
+        return WheelOnRail(self.wheel, self.rail, vehicle.rolling_radius, vehicle.half_distance, distance)
+
+    def pair(self, side: str = "left", wheelset: int = 0) -> WheelOnRail:
+        """A side of a wheelset, counted from the front."""
+        return self.pairs[2 * wheelset + (side == "right")] if self.pairs else self.alike
 
     def __repr__(self) -> str:
         wheel, rail = (self.data[kind]["profile"] for kind in ("wheel", "rail"))
@@ -155,10 +166,10 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
     wheel, rail = wheel_and_rail(data, folder, source)
-    pairs = own_pairs(data, vehicle, wheel, rail, folder, source)
     _check_creep(data["contact"], source, folder)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
+    pairs = own_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
@@ -295,9 +306,7 @@ def compile_scene(
     contact, integration = data["contact"], data["integration"]
     material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
     friction = read_friction(contact["friction"], scene.source)
-    geometry = _once(shared, "geometry", parts, lambda: contact_geometry(
-        scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance
-    ))  # fmt: skip
+    geometry = _once(shared, "geometry", parts, lambda: scene.alike.geometry)
     support, elements = track_support(
         data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
     )
@@ -312,9 +321,7 @@ def compile_scene(
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"]),
             friction.ratio, friction.decay,
-            _once(shared, "geometries", parts, lambda: pair_geometries(
-                scene.pairs, scene.track, vehicle.half_distance
-            )),
+            tuple(pair.geometry for pair in scene.pairs),
         ),
         elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),

@@ -2,32 +2,21 @@
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
-from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.input_files import digest_of_file
-from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
+from wrcore.geometry.track import SIDES
 
 POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
 
-SIDES = ("left", "right")
-
 LARGEST_WEAR = 0.05
 """Radii that differ by more than this from the vehicle's are taken for a mistake, m."""
-
-
-class Pair(NamedTuple):
-    """A wheel and its rail."""
-
-    wheel: ProfileCurve
-    rail: ProfileCurve
-    rolling_radius: float
-    """At the tape circle, m."""
 
 
 NAMED_BY = ("parameters", "profile", "points", "table")
@@ -64,8 +53,8 @@ def wheel_and_rail(data, folder, source):
     return wheel, rail
 
 
-def own_pairs(data, vehicle, wheel, rail, folder, source):
-    """Pairs of each wheelset's left and right wheel, from the front; empty where all are ``wheel`` on ``rail``."""
+def own_pairs(data, vehicle, wheel, rail, track, folder, source):
+    """Left and right `WheelOnRail` of each wheelset, from the front; empty where all are ``wheel`` on ``rail``."""
     single = data["wheel"].get("wheelsets", {})
     unknown = sorted(set(single) - set(vehicle.wheelset_names))
     if unknown:
@@ -74,7 +63,8 @@ def own_pairs(data, vehicle, wheel, rail, folder, source):
         return ()
     sides = []
     for side in SIDES:
-        pair = Pair(wheel, _rail_of(data["rail"], side, rail, folder, source), vehicle.rolling_radius)
+        own = _rail_of(data["rail"], side, rail, folder, source)
+        pair = WheelOnRail(wheel, own, vehicle.rolling_radius, vehicle.half_distance, track.rail_distance(own))
         sides.append(_wheel_of(data["wheel"].get(side, {}), f"wheel.{side}", pair, folder, source))
     return tuple(
         _wheel_of(single.get(name, {}).get(side, {}), f"wheel.wheelsets.{name}.{side}", pair, folder, source)
@@ -93,24 +83,14 @@ def _rail_of(spec, side, rail, folder, source):
 
 def _wheel_of(spec, field, pair, folder, source):
     """A pair with what is said to differ of its wheel."""
-    if "profile" in spec:
-        pair = pair._replace(wheel=_profile(spec, "wheel", field, folder, source))
+    if not spec:
+        return pair
+    wheel = _profile(spec, "wheel", field, folder, source) if "profile" in spec else pair.wheel
     radius = float(spec.get("rolling_radius", pair.rolling_radius))
     if abs(radius - pair.rolling_radius) > LARGEST_WEAR:
         expected = f"expected a radius within {LARGEST_WEAR:g} m of {pair.rolling_radius:g} m, got {radius:g}"
         raise InputError(source, f"{field}.rolling_radius", expected)
-    return pair._replace(rolling_radius=radius)
-
-
-def pair_geometries(pairs, track, half_distance):
-    """`ContactGeometry` of each pair, shared by equal ones; ``half_distance``: tape circle from the wheelset's centre,
-    m."""
-    made = {}
-    for pair in pairs:
-        key = id(pair.wheel), id(pair.rail), pair.rolling_radius
-        if key not in made:
-            made[key] = contact_geometry(pair.wheel, pair.rail, track, pair.rolling_radius, half_distance)
-    return tuple(made[id(pair.wheel), id(pair.rail), pair.rolling_radius] for pair in pairs)
+    return replace(pair, wheel=wheel, rolling_radius=radius)
 
 
 def _ratio(value, source, field):

@@ -17,13 +17,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.strip import make_pose
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile, read_simpack
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 
 SHEAR_MODULUS, POISSON_RATIO, FRICTION = 8.2e10, 0.28, 0.3
 """Of all cases: Pa, -, -."""
@@ -236,7 +235,7 @@ def profiles(name, from_files=False):
 def geometry(name, from_files=False):
     """ContactGeometry of `profiles`; None where a file is absent."""
     pair = profiles(name, from_files)
-    return pair and contact_geometry(*pair[:2], Track(1.435), *pair[2:])
+    return pair and WheelOnRail(*pair).geometry
 
 
 def height_at_normal(normal_at, case, tolerance=1e-7):

@@ -9,10 +9,9 @@ import sys
 import numpy as np
 
 from tests.contact.patch.test_normal_strips import MODULUS, height
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.normal import NormalContact
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 
 LOADS = (1e4, 3e4, 5.5e4, 8e4)
 BIRTHS = (4.7e-3, 4.77e-3, 4.85e-3, 5.53e-3)
@@ -20,7 +19,7 @@ BIRTHS = (4.7e-3, 4.77e-3, 4.85e-3, 5.53e-3)
 
 def main(resolution="coarse"):
     wheel, rail = named_profile("S1002", "wheel"), named_profile("UIC60-MBench", "rail", 1 / 40)
-    pair = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    pair = WheelOnRail(wheel, rail).geometry
     contact = NormalContact(pair, MODULUS, resolution)
     for yaw in (0.0, 0.005, 0.012, 0.024):
         places = [(y, height(pair, y, load, yaw)) for load in LOADS for y in np.arange(-8e-3, 8e-3, 2e-5)]

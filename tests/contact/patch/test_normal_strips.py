@@ -8,16 +8,15 @@ import pytest
 
 from tests.conftest import DATA
 from wrcore.contact.detection import detect
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch.library import solve_patch
 from wrcore.contact.patch.normal import RESOLUTIONS, NormalContact
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 
 MODULUS = contact_modulus(8.2e10, 0.28)
 
@@ -39,7 +38,7 @@ def forces(contact, poses, warm):
 def test_a_cone_on_a_round_rail_head_is_hertz(radius, share, resolution):
     # a/b = 1.1 to 3.2; measured with 8 strips: N 0.10 %, p_max 0.2 %, area 0.25 % (also with a/b from 0.25 to 9)
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile(f"circle:{radius}", "rail")
-    pair = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    pair = WheelOnRail(wheel, rail).geometry
     z = 0.46 + 1e-3
     while not detect(pair, 0.0, z):
         z -= 1e-5
@@ -218,7 +217,7 @@ def hollow_pair(place, reach):
     curve, rail = named_profile("S1002", "wheel"), named_profile("UIC60-MBench", "rail", 1 / 40)
     rise = 1e-3 * np.exp(-(((curve.u - place) / reach) ** 2))
     wheel = ProfileCurve.from_points(curve.u, curve.f + rise - np.interp(0.0, curve.u, rise), "wheel")
-    return contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    return WheelOnRail(wheel, rail).geometry
 
 
 def alone(patch, window, velocity, place, mu):

@@ -7,7 +7,6 @@ import pytest
 
 import wrcore as wr
 from tests.contact.patch.test_grid_rolling import MU, NU, G, ellipse_patch
-from wrcore.analysis.contact import pair_geometry
 from wrcore.contact.patch.grid_traction import slip_influence, solve_traction
 from wrcore.contact.patch.library import make_library
 from wrcore.contact.patch.normal import NormalContact
@@ -20,7 +19,7 @@ LATERAL = (-6e-3, -3e-3, -1e-3, 0.0, 0.5e-3, 1e-3, 2e-3, 4.5e-3, 5e-3, 6.3e-3)
 @pytest.fixture(scope="module")
 def normal():
     pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
-    return NormalContact(pair_geometry(pair), G / (1 - NU), "coarse")
+    return NormalContact(pair.left.geometry, G / (1 - NU), "coarse")
 
 
 def matrices(patch, method, far):

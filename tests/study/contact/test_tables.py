@@ -11,15 +11,13 @@ from study.contact import tables as study
 from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
 from wrcore.contact.detection import axle_direction, detect
-from wrcore.contact.first_touch import WheelsetOnTrack
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.strip import make_pose
+from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.geometry.standards import named_profile
-from wrcore.geometry.track import Track
 
 SIZES = {"gauge": 1.435, "rolling_radius": 0.46, "half_distance": 0.75}
 
@@ -46,7 +44,7 @@ def rows(table, **values):
 
 def test_pair_of_the_study_is_the_benchmark_pair(benchmark_pair):
     pair = study.study_pair({"wheel": "S1002", "rail": "UIC60-MBench", "inclination": 1 / 40, **SIZES})
-    for mine, other in zip(study.pair_geometry(pair), benchmark_pair, strict=True):
+    for mine, other in zip(pair.left.geometry, benchmark_pair, strict=True):
         np.testing.assert_array_equal(mine, other)
 
 
@@ -69,7 +67,7 @@ def test_first_touch_of_several_pairs_keeps_them_apart(s1002, uic60):
 def test_yawed_cone_touches_ahead_by_the_first_order_law():
     # Cone 1:20 on a circular rail head: x = -(half distance + u) sin(yaw) + r yaw tan(delta), delta = atan(1/20).
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")
-    geometry = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    geometry = WheelOnRail(wheel, rail).geometry
     yaw = 5e-3
     table = study.location_with_yaw(geometry, [0.0], [yaw])
     left = rows(table, side="left").iloc[0]
@@ -234,7 +232,7 @@ def test_no_patch_is_missed_invented_or_split(benchmark_pair, detection, reducti
 def test_dense_search_of_a_cone_on_a_circle_knows_the_overlap():
     # A parabola of depth d and curvature B: half width sqrt(d/B), B = 1/(2 R); a wheel of revolution adds nothing
     wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail")
-    geometry = contact_geometry(wheel, rail, Track(1.435), 0.46, 0.75)
+    geometry = WheelOnRail(wheel, rail).geometry
     axle = axle_direction(0.0, 0.0)
     lowest = search._touching(geometry, 1.0, 0.0, 0.46, axle, True)
     overlaps = np.zeros((4, 4))

@@ -8,8 +8,8 @@ from matplotlib.colors import to_rgb
 from study.creep import figures as figures_creep
 from study.creep.figures import LAW_STYLES, binned_errors, stick_border
 from study.creep.laws import contact_points
+from study.report.legible import save_figure
 from tests.conftest import ROOT
-from wrcore.analysis.style import save_figure
 from wrcore.creep.halfspace import solve_field
 
 DATA = ROOT / "tests" / "data" / "creep"

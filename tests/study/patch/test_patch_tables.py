@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study.contact.tables import pair_geometry, study_pair
+from study.contact.tables import study_pair
 from study.patch import page, reference, tables
 from tests.conftest import ROOT
 from wrcore.analysis.loaded_base import Found, Rolling
@@ -69,7 +69,7 @@ def test_exact_contact_is_nearer_to_contact_than_ellipses():
     cases = pd.read_csv(ROOT / "tests/data/contact/mbench_contact.csv", comment="#")
     some = cases[(cases["set"] == "load10kN") & cases["y_ws_mm"].isin([0, 2])]
     models = {"moment": {"model": "moment"}, "exact": {"model": "exact", "resolution": "fine"}}
-    geometry = pair_geometry(study_pair(PAIR))
+    geometry = study_pair(PAIR).left.geometry
     found = reference.distributions(reference.compare_with_contact(geometry, some, models))
     worst = found.pivot(index="quantity", columns="model", values="worst")
     assert (worst.loc["normal force at CONTACT's height", "exact"]) < 0.3

@@ -7,7 +7,7 @@ import pandas as pd
 from study.accuracy.errors import front_table, recommendation_table
 from study.accuracy.figures import speed_against_error
 from study.accuracy.models import model_table
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 given, titles = snakemake.input, snakemake.params.titles

@@ -6,8 +6,8 @@ import numpy as np
 
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
+from study.report.legible import save_figure
 from wrcore.analysis.plot_contact import fig_contact_location
-from wrcore.analysis.style import save_figure
 from wrcore.contact.first_touch import first_touch
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
@@ -17,7 +17,7 @@ pairs = {label: analysis_contact.study_pair(settings) for label, settings in par
 first = next(iter(pairs.values()))
 touch = analysis_contact.touch_table(pairs, shifts)
 conicity = analysis_contact.conicity_table(pairs, amplitudes)
-yawed = analysis_contact.location_with_yaw(analysis_contact.pair_geometry(first), shifts[shifts >= 0], params.yaws)
+yawed = analysis_contact.location_with_yaw(first.left.geometry, shifts[shifts >= 0], params.yaws)
 for table, path in ((touch, output.touch), (conicity, output.conicity), (yawed, output.yaw)):
     table.to_csv(path, index=False)
 by_pair = dict(iter(touch.groupby("pair", sort=False)))

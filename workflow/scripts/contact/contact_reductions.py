@@ -8,11 +8,11 @@ import pandas as pd
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.contact.reference import compare_with_contact, summarise
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output
-geometry = analysis_contact.pair_geometry(analysis_contact.study_pair(snakemake.params.pair))
+geometry = analysis_contact.study_pair(snakemake.params.pair).left.geometry
 cases = compare_with_contact(geometry, pd.read_csv(snakemake.input.reference, comment="#"))
 cases.to_csv(output.cases, index=False)
 summarise(cases).to_csv(output.summary, index=False)

@@ -4,7 +4,7 @@ import sys
 
 from study.creep.figures import fig_creep_curves
 from study.creep.laws import creep_curves, creep_models
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -5,7 +5,7 @@ import sys
 from study.creep.figures import fig_creep_smoothness
 from study.creep.laws import table_model
 from study.creep.smoothness import smoothness, smoothness_table
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.creep.table import load_table
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -3,7 +3,7 @@
 import sys
 
 from study.creep.figures import fig_creep_traction
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.creep.halfspace import solve_field
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

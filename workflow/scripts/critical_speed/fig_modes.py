@@ -5,7 +5,7 @@ import sys
 import pandas as pd
 
 from study.critical_speed.figures import fig_modes
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 title = f"{snakemake.wildcards.vehicle.replace('_', ' ')}, {snakemake.params.speed:g} m/s"

@@ -3,7 +3,7 @@
 import sys
 
 from study.paper.figures import fig3_detection
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

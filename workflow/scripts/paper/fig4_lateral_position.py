@@ -4,7 +4,7 @@ import sys
 
 from study.paper.figures import fig4_lateral_position
 from study.paper.tables import horizons
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.run.results import load_runs
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

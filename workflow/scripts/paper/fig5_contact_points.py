@@ -4,7 +4,7 @@ import sys
 
 from study.paper.figures import fig5_contact_points
 from study.paper.tables import horizons
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 from wrcore.run.results import load_runs
 from wrcore.scene.description import load_scene
 

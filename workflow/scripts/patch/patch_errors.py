@@ -5,13 +5,13 @@ import sys
 import numpy as np
 import pandas as pd
 
-from study.contact.tables import pair_geometry, study_pair
+from study.contact.tables import study_pair
 from study.patch import figures, tables
-from wrcore.analysis.style import save_figure
+from study.report.legible import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, output = snakemake.params.settings, snakemake.output
-geometry = pair_geometry(study_pair(snakemake.params.pair))
+geometry = study_pair(snakemake.params.pair).left.geometry
 models, rolling, shown = settings["models"], settings["rolling"], settings["shown"]
 shifts = np.linspace(**settings["shifts"])
 places, forces = tables.pose_errors(geometry, models, settings["loads"], shifts, rolling)

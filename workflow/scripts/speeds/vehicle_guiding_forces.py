@@ -4,8 +4,8 @@ import sys
 
 import pandas as pd
 
+from study.report.legible import save_figure
 from study.speeds.figures import guiding_forces
-from wrcore.analysis.style import save_figure
 from wrcore.analysis.wheels import wheel_table
 from wrcore.run.results import load_run
 

@@ -2,8 +2,8 @@
 
 import sys
 
+from study.report.legible import save_figure
 from study.speeds.figures import lateral_motion
-from wrcore.analysis.style import save_figure
 from wrcore.run.results import load_run
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

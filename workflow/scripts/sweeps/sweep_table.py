@@ -2,8 +2,8 @@
 
 import sys
 
+from study.report.legible import save_figure
 from study.sweeps.figures import sweep_scatter
-from wrcore.analysis.style import save_figure
 from wrcore.sweep.batch import gather, load_table
 from wrcore.sweep.plan import load_sweep
 

@@ -4,9 +4,9 @@ import os
 import sys
 from pathlib import Path
 
+from study.report.legible import save_figure
 from wrcore.analysis.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
 from wrcore.analysis.plot_wear import plot_evolution
-from wrcore.analysis.style import save_figure
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 plan, changes = snakemake.input.plan, dict(snakemake.params.settings)

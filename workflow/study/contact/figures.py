@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter
 from study.contact.tables import first_order_law, over_contact_angle
 from wrcore.analysis.style import MM, styled
 from wrcore.contact.conicity import en15302_tolerance
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 STYLES = (
     {"color": "#0072B2", "linestyle": "-"},

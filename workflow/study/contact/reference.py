@@ -21,7 +21,7 @@ from wrcore.contact.reduction import (
     Y,
 )  # fmt: skip
 from wrcore.contact.statics import height_at_load, wheel_at_rest
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 ERRORS = {
     "lateral_m": "lateral offset from the pressure centroid",

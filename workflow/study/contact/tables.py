@@ -8,10 +8,9 @@ import math
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.contact import pair_geometry as pair_geometry
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.detection import planar_error_bound
-from wrcore.contact.first_touch import WheelsetOnTrack, first_touch
+from wrcore.contact.first_touch import first_touch
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import (
@@ -26,6 +25,7 @@ from wrcore.contact.reduction import (
 )  # fmt: skip
 from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
 from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.jit import jit
 

@@ -13,6 +13,7 @@ import time
 import numpy as np
 import pandas as pd
 
+from study.cost.plain.wheelset import plain_wheelset
 from study.cost.recorded import evaluation, record
 from study.cost.search import search_costs
 from study.cost.timing import Bar, Contender, compare, summary, take_turns
@@ -21,7 +22,6 @@ from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
-from wrcore.plain.wheelset import plain_wheelset
 from wrcore.run.simulate import output_times
 from wrcore.scene.description import compile_scene, load_scene
 

@@ -22,7 +22,6 @@ from study.hard_cases.cases import (
     wheel_forces,
     with_forces,
 )
-from wrcore.analysis.contact import pair_geometry
 from wrcore.contact import reduction
 from wrcore.contact.normal import damping_factor
 from wrcore.contact.poses import solve_poses
@@ -206,7 +205,7 @@ def pose_sweeps(pairs, load, step, reach, far_step, far):
     """
     found, curve = [], []
     for pair, settings in pairs.items():
-        geometry = pair_geometry(study_pair(settings))
+        geometry = study_pair(settings).left.geometry
         for detection in ("planar", "spatial"):
             label = {"vehicle": "wheelset", "detection": detection, "integrator": "statics"}
             jumps = sweep_jumps(lateral_sweep(geometry, reach, step, load, detection), [reach])

@@ -7,13 +7,13 @@ import numpy as np
 from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
+from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from wrcore.analysis.style import ACCENT, LINES, MARKERS, MM, RAIL, WHEEL, shared_legend, styled
 from wrcore.contact.detection import detect
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import MAXIMUM
 from wrcore.contact.statics import settle
-from wrcore.geometry.surface import SIDES, rail_surface, wheel_surface, wheelset_transform
+from wrcore.geometry.track import SIDES
 
 
 def _wheel_points(scene, side, u, s, **pose):
@@ -144,8 +144,7 @@ def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
     make the overlap visible; ``window`` is the half width of the view about the deepest contact points (m). ValueError
     if there is no contact on this side.
     """
-    vehicle = scene.vehicle
-    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
+    geometry = scene.alike.geometry
     pose = _resting_pose(scene, geometry, y, yaw, load, lowered)
     found = {}
     for detection in LINES:

@@ -11,10 +11,9 @@ from wrcore.analysis.motion import (
     mirror_defect,
     prediction_horizon,
 )
-from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.poses import solve_poses
 from wrcore.contact.strip import cubic_at
-from wrcore.geometry.surface import SIDES as SIGNS
+from wrcore.geometry.track import SIDES as SIGNS
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 from wrcore.run.simulate import simulate
 
@@ -122,9 +121,7 @@ def rigid_contact(geometry, shifts, detection="planar"):
 
 def geometry_table(scene, y):
     """Rigid contact geometry (:func:`rigid_contact`) of a scene's wheelset at lateral positions y (m)."""
-    vehicle = scene.vehicle
-    geometry = contact_geometry(scene.wheel, scene.rail, scene.track, vehicle.rolling_radius, vehicle.half_distance)
-    return rigid_contact(geometry, y, scene.detection)
+    return rigid_contact(scene.alike.geometry, y, scene.detection)
 
 
 def timing_table(samples):

@@ -43,7 +43,7 @@ from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError, one_of
-from wrcore.geometry.surface import SIDES
+from wrcore.geometry.track import SIDES
 
 RESOLUTIONS = {"coarse": 8, "middle": 12, "fine": 16}
 """Strips of a window; slender windows have 8, wide ones more."""

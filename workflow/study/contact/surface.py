@@ -8,9 +8,7 @@ import numpy as np
 
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import track_frame
-from wrcore.geometry.track import rotation
-
-SIDES = {"left": 1.0, "right": -1.0}
+from wrcore.geometry.track import SIDES, rotation
 
 
 def wheel_surface(wheel, r0, half_distance, side, u, s):

@@ -3,6 +3,10 @@
 import numpy as np
 import pytest
 
+from study.cost.plain.contact import cut_strips, find_patches
+from study.cost.plain.forces import creep_force as plain_creep_force
+from study.cost.plain.forces import hertz
+from study.cost.plain.wheelset import plain_wheelset
 from tests.conftest import SCENES
 from wrcore.contact.normal import contact_modulus, hertz_shape
 from wrcore.contact.statics import settle
@@ -14,10 +18,6 @@ from wrcore.errors import InputError
 from wrcore.geometry.track import rotation
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.reference import integrate_function
-from wrcore.plain.contact import cut_strips, find_patches
-from wrcore.plain.forces import creep_force as plain_creep_force
-from wrcore.plain.forces import hertz
-from wrcore.plain.wheelset import plain_wheelset
 from wrcore.scene.description import compile_scene, load_scene
 
 LOAD, LEVER = 54546.0, 0.75

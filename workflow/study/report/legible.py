@@ -1,11 +1,22 @@
 """What a reader of a figure stumbles over: texts that overlap, leave the page or lie on a line."""
 
+import warnings
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
+from wrcore.analysis import style
+
 BORDER = 1.0
 """Texts may touch each other, and reach over the page's edge, by this much, points."""
+
+
+def save_figure(figure, *paths):
+    """Write a figure as `style.save_figure` does; texts that cannot be read are a UserWarning."""
+    style.save_figure(figure, *paths)
+    for finding in findings(figure):
+        warnings.warn(f"figure {Path(paths[0]).name}: {finding}", stacklevel=2)
 
 
 def findings(figure):
