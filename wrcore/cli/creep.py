@@ -32,8 +32,8 @@ def add(commands):
     )
     command.add_argument("--cases", required=True, metavar="IN.csv", help="a case per row")
     command.add_argument(
-        "--model", default="table", choices=("table", "exact", "fastsim", "polach", "she", "linear"),
-        help="creep law: a table of exact solutions, exact rolling contact itself, or a formula",
+        "--model", default="table", metavar="NAME",
+        help="a creep law as in a scene: a table of exact solutions or a formula; or exact, rolling contact itself",
     )  # fmt: skip
     command.add_argument("--table", metavar="FILE", help="creep table; left out, one is built or found in the cache")
     command.add_argument("--out", required=True, metavar="OUT.csv", help="a row per case")

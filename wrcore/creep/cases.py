@@ -15,7 +15,7 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked, same_shape
 from wrcore.errors.checked_csv import read_csv_table
 
-MODELS = ("table", "exact", "fastsim", "polach", "she", "linear")
+MODELS = (*LAWS, "exact")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
 NUMBERS = (*POSITIVE, "nu", "xi", "eta", "phi_per_m")
 OTHER_NAMES = {"ux": "xi", "uy": "eta"}
@@ -128,7 +128,8 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
     ----------
     frame : pandas.DataFrame
         See `check_cases`.
-    model : {"table", "exact", "fastsim", "polach", "she", "linear"}
+    model : str
+        Of MODELS: a law of `wrcore.creep.laws`, or "exact".
     table : CreepTable or path, optional
         Table for the model "table"; without it the cached table for each nu is used, built first if need be.
     level : int
@@ -219,7 +220,7 @@ def creep_force(
 
     Parameters
     ----------
-    model : {"table", "exact", "fastsim", "polach", "she", "linear"}
+    model : {"table", "linear", "she", "polach", "fastsim", "exact"}
     a, b : float or array_like
         Semi-axes along and across rolling, m.
     normal_force : float or array_like

@@ -26,7 +26,7 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
-from wrcore.errors import InputError, short
+from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
@@ -232,6 +232,8 @@ def _check_creep(contact, source, folder):
     """Complete what a scene says of its creep law, and refuse what does not belong to the law."""
     creep = contact["creep"]
     creep.setdefault("tolerance", DEFAULT_TOLERANCE)
+    if creep["model"] not in LAWS:
+        raise InputError(source, "contact.creep.model", one_of(LAWS, creep["model"]))
     if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     for key in ("k_A", "k_S"):
