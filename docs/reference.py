@@ -34,7 +34,8 @@ GROUPS = {
 
 ROOMS = (
     "analysis.modes", "analysis.motion", "analysis.ride", "analysis.stability", "analysis.limit_cycles",
-    "analysis.to_accuracy", "analysis.poses", "contact.conicity", "contact.first_touch", "contact.poses",
+    "analysis.to_accuracy", "analysis.poses", "analysis.loaded", "contact.wheel_on_rail", "contact.conicity",
+    "contact.first_touch", "contact.poses",
     "contact.detection", "contact.normal", "creep.cases", "creep.kalker", "creep.laws", "creep.table",
     "geometry.profile", "geometry.standards", "geometry.irregularity", "geometry.track", "run.channels",
     "run.validity", "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",

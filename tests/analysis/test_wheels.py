@@ -83,7 +83,7 @@ def test_creep_power_is_what_the_energy_loses_by_creep():
     assert lost.max() > 100.0
 
 
-def test_quotient_leaves_out_unloaded_wheels():
+def test_quotient_leaves_out_unLoadedWheels():
     ratio = av.quotient(np.array([5e4, 10.0, 0.0]), np.array([2e4, 5.0, 1.0]))
     assert ratio[0] == pytest.approx(0.4)
     assert np.isnan(ratio[1:]).all()

@@ -9,9 +9,9 @@ import pytest
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES
+from wrcore.analysis.poses import loaded_poses
 from wrcore.contact.detection import axle_direction, detect, find_patches, planar_error_bound
 from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import (
     MAX_PATCHES,
     MAXIMUM,
@@ -63,7 +63,7 @@ def solved(table, geometry, load, detection, reduction="maximum"):
             "z_m": np.nan,
         }
     )
-    return solve_poses(poses, geometry, load, detection, reduction)
+    return loaded_poses(poses, geometry, load, reduction, detection=detection)
 
 
 def nearest(ours, row):

@@ -90,14 +90,15 @@ CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "scene")
 RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/motion", "analysis/wheels")
+LOADED = (*CONTACT, "creep", "dynamics", "analysis/loaded", "analysis/poses")
 STYLE = ("analysis/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
     "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
-    "geometry": sources(*CONTACT, *SCENE, "study/paper/tables"),
-    "contact_search": sources(*CONTACT, "analysis/contact", "study/contact/tables", "study/contact/search"),
-    "contact_figures": sources(*CONTACT, "analysis/contact", "analysis/plot_contact", *STYLE, "study/contact"),
+    "geometry": sources(*LOADED, *SCENE, "study/paper/tables"),
+    "contact_search": sources(*LOADED, "analysis/contact", "study/contact/tables", "study/contact/search"),
+    "contact_figures": sources(*LOADED, "analysis/contact", "analysis/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN),
     "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
     "vehicle_figures": sources("run", *VEHICLE, *STYLE, "study/speeds"),

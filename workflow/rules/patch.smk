@@ -1,7 +1,7 @@
 # Patch models against exact contact: one pose at a time, in runs, and exact contact against CONTACT.
 
 PATCH = config["patch"]
-CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/contact", *STYLE, "study/contact", "study/patch")
+CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/poses", *STYLE, "study/contact", "study/patch")
 
 
 rule patch_costs:

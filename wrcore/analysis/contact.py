@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wrcore.contact.poses import solve_poses
+from wrcore.analysis.poses import AT_REST, loaded_poses
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import OneOf, Within, checked
@@ -37,7 +37,7 @@ def contact_table(
     Returns
     -------
     pandas.DataFrame
-        y_m, yaw_rad and the columns of :func:`wrcore.contact.poses.solve_poses`, a row per patch.
+        y_m, yaw_rad and the columns of ``wrcore contact``, a row per patch.
 
     Raises
     ------
@@ -53,6 +53,6 @@ def contact_table(
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
     poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
-    patches = solve_poses(poses, pair.left.geometry, wheel_load, detection, patch)
+    patches = loaded_poses(poses, pair.left.geometry, wheel_load, patch, detection=detection)[list(AT_REST)]
     placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
     return placed.rename(columns={"y_m_contact": "y_contact_m"}).drop(columns="pose_id")

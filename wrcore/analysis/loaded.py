@@ -1,282 +1,328 @@
-"""A loaded wheel on its rail, at a height or under a load, by any patch model: ellipses, strips or a grid."""
+"""A loaded wheel on its rail, at a height or under a load: the contact of a run in a given pose and motion.
+
+A wheelset rolls with the speed V along the track and omega about its axle, moves sideways and turns; all of it is
+optional. Without a motion a patch carries its normal force alone. Without omega the wheel rolls freely: the mean of its
+longitudinal creepage over the normal forces of its patches vanishes.
+"""
 
 import math
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.analysis.loaded_base import Found, LoadedWheels, free_creepages, free_rate
 from wrcore.contact import reduction as columns
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import axle_direction, find_patches
-from wrcore.contact.patch.gap import group_end
-from wrcore.contact.patch.library import make_library, solve_patch
-from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS
-from wrcore.contact.patch.normal import NormalContact
+from wrcore.contact.detection import DETECTIONS, axle_direction, find_patches
+from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.patch.gap import frame_of_overlaps, group_end
+from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
+from wrcore.contact.patch.normal import even_length, height_of_zero
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
-from wrcore.contact.patch.surfaces import contact_plane
+from wrcore.contact.patch.rolling import read_field
+from wrcore.contact.patch.solve import (
+    CENTRE,
+    HALF_LENGTH,
+    LOAD,
+    MEAN_S,
+    MEAN_X,
+    MIDDLE,
+    S_MAX,
+    S_MIN,
+    WIDTH,
+    WINDOW,
+    X_MAX,
+    X_MIN,
+)
+from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
-from wrcore.contact.statics import wheel_at_rest
+from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle
 from wrcore.contact.strip import make_pose
-from wrcore.creep.laws import LAWS, creep_data, creep_force_at
+from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
-from wrcore.errors import InputError, one_of
+from wrcore.dynamics.strip_wheel import FELL_BACK, group_wrench, mirror
+from wrcore.dynamics.system import with_fallback
+from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
+from wrcore.kernels.handles import Handle
 
 MODELS = (*PATCHES, "grid")
 
 GRIDS = {"coarse": ((32, 24),), "middle": ((32, 24), (40, 32)), "fine": FINE}
 """Grids of each resolution (elements along x, across)."""
 
-SLENDER = 3.0
-"""Length over width from which strips get more panels along rolling, as in runs."""
+DEEPEST = 1e-3
+"""Overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread."""
+
+LOWEST = 0.1
+"""A wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot."""
+
+SMOOTH = 1e-9
+"""Coefficient of friction where the normal forces alone are looked at."""
+
+_CARRIED = 1e-9
+"""Relative error of F^(2/3) that ends the search for a height."""
+
+_LEVEL = 1e-10
+"""Step in roll that ends the search for it, rad."""
+
+_MOST_ROLLS = 25
 
 
-class Ellipses(LoadedWheels):
-    """Overlaps reduced to ellipses, and the creep table."""
+class Rolling(NamedTuple):
+    """Motion of a wheelset: speed V > 0 and lateral velocity (m/s), rates of rolling (NaN: free) and yaw (rad/s)."""
 
-    def __init__(self, geometry, reduction="moment", **options):
-        super().__init__(geometry, **options)
-        self.reduction = REDUCTIONS[reduction]
+    speed: float
+    rate: float = math.nan
+    vy: float = 0.0
+    yaw_rate: float = 0.0
+
+    def motion(self, roll, yaw, rate):
+        """`Motion` of a wheelset in a pose at a rate of rolling."""
+        wx, wy, wz = (rate * c for c in axle_direction(roll, yaw))
+        return Motion(self.speed, self.vy, 0.0, wx, wy, wz + self.yaw_rate, self.speed)
+
+
+class Found(NamedTuple):
+    """One patch of a wheel."""
+
+    row: np.ndarray
+    """(PATCH_COLUMNS,) as in runs; creepages are NaN without a motion."""
+    extent: tuple
+    """x_min, x_max (from the wheelset's cross-section) and width in the contact plane, m."""
+    patch: Patch = None
+    """With its fields, where the model has them and they were asked for."""
+    on_grid: bool = False
+
+    @property
+    def vertical(self):
+        """Force upwards on the wheel, N."""
+        angle = self.row[columns.ANGLE]
+        return self.row[columns.NORMAL] * math.cos(angle) + self.row[columns.FY] * math.sin(angle)
+
+
+class LoadedWheels:
+    """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
+
+    Strips and grids have a ``resolution`` (coarse, middle, fine) and a rigid ``slip`` (of the real surfaces, or one set
+    of creepages); where exact strips find no solution a grid takes over.
+    """
+
+    def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
+                 poisson_ratio=0.28, detection="spatial"):  # fmt: skip
+        known = {"patch": (model, MODELS), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS),
+                 "detection": (detection, ("planar", "spatial"))}  # fmt: skip
+        for name, (value, names) in known.items():
+            if value not in names:
+                raise InputError("contact", name, one_of(names, value))
+        check_number(shear_modulus, 1e9, 1e12, "contact", "shear_modulus", "Pa")
+        check_number(poisson_ratio, 0.0, 0.5, "contact", "poisson_ratio")
+        self.geometry, self.spatial, self.always = geometry, detection == "spatial", model == "grid"
+        self.shear_modulus, self.poisson_ratio = float(shear_modulus), float(poisson_ratio)
+        self.modulus, self.surfaces = contact_modulus(self.shear_modulus, self.poisson_ratio), slip == "surfaces"
+        self.grids = GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
+        strips = strip_model("exact" if self.always else model, resolution, slip, self.poisson_ratio)
+        self._work = strip_work(strips, 1)
+        contact = ContactModel(
+            geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
+            REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, 1e-3, strips,
+        )  # fmt: skip
+        contact = with_fallback(contact, np.zeros(MOTION_COLUMNS), self._work)
+        self._still = contact._replace(strips=contact.strips._replace(rolling=0))
+        self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), None
+        self._exact = contact if strips.rolling else None
+        self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(3, np.int64)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
-        """See `LoadedWheels.at_height`; there are no fields."""
-        rows = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
-        count, _ = wheel_at_rest(self.geometry, self._hertz, self.modulus, SIDES[side], y, z, roll, yaw, self.spatial,
-                                 self.reduction, rows)  # fmt: skip
-        rows = rows[:count]
-        rows[:, columns.XI : columns.PHI + 1] = np.nan
-        if rolling is not None and count:
-            self._roll(rows, y, z, roll, yaw, rolling, friction)
-        for row in rows:
-            row[columns.P_MAX] = 1.5 * row[columns.NORMAL] / (math.pi * row[columns.SEMI_A] * row[columns.SEMI_B])
-        ends = ((r[columns.X] - r[columns.SEMI_A], r[columns.X] + r[columns.SEMI_A], 2 * r[columns.SEMI_B])
-                for r in rows)  # fmt: skip
-        return [Found(row, tuple(map(float, end))) for row, end in zip(rows, ends, strict=True)]
-
-    def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
-        """See `LoadedWheels.height`."""
-        if rolling is None and vertical:
-            return self._still_height(side, y, load, roll, yaw)
-        return super().height(side, y, load, roll, yaw, rolling, friction, vertical, guess)
-
-    def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
-        """See `LoadedWheels.settled`."""
-        if rolling is None and vertical:
-            return self._still_settled(y, load, yaw)
-        return super().settled(y, load, yaw, rolling, friction, vertical)
-
-    def _roll(self, rows, y, z, roll, yaw, rolling, friction):
-        """Creepages and creep forces of ellipses."""
-        places = [(r[columns.X], r[columns.Y] - y, r[columns.Z] - z, math.cos(r[columns.ANGLE]),
-                   math.sin(r[columns.ANGLE])) for r in rows]  # fmt: skip
-
-        def at(motion):
-            return np.array([creepages(*motion[:6], *place, motion.speed)[:3] for place in places])
-
-        found = free_creepages(at, rolling, roll, yaw, lambda creeps: rows[:, columns.NORMAL] @ creeps[:, 0])
-        for row, creep in zip(rows, found, strict=True):
-            row[columns.XI : columns.PHI + 1] = creep
-            row[columns.FX : columns.MZ + 1] = creep_by_table(
-                row[columns.SEMI_A], row[columns.SEMI_B], row[columns.NORMAL], *creep, friction, self.shear_modulus,
-                self.poisson_ratio,
-            )  # fmt: skip
-
-
-class Strips(LoadedWheels):
-    """Strips, exact or by virtual penetration with the creep table; a grid where strips find no solution, or always."""
-
-    def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", **options):
-        super().__init__(geometry, **options)
-        for name, value, known in (("resolution", resolution, RESOLUTIONS), ("slip", slip, SLIPS)):
-            if value not in known:
-                raise InputError("contact", name, one_of(known, value))
-        self.resolution, self.surfaces, self.always = resolution, slip == "surfaces", model == "grid"
-        self.exact, self.grids = model != "strips", GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
-        arguments = geometry, self.modulus, resolution
-        self._contact = NormalContact(*arguments, "exact" if self.exact else "strips", self.detection)
-        self._rough = NormalContact(*arguments, "strips", self.detection)
-
-    def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
-        """See `LoadedWheels.at_height`."""
-        pose = side, y, z, roll, yaw
-        shapes = self._contact.at_height(*pose)
-        if not shapes:
-            return []
-        solved = [shape.converged for shape in shapes]
-        if not all(solved):  # these stand in for the pressure in the mean slip
-            rough = self._rough.at_height(*pose)
-            shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
-        motion, slips = None, [np.zeros((4, len(shape.centre))) for shape in shapes]
-        rows = self._overlaps(*pose)
+        """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),
+        roll, then yaw about the vertical (rad); without ``rolling`` it stands and there are no creep forces.
+        """
+        pose, motion, contact = (side, y, z, roll, yaw), None, self._still_handle
         if rolling is not None:
-            at = lambda motion: self._slips(pose, motion, solved, rows)  # noqa: E731
-            loads = [_loads(shape) for shape in shapes]
-            mean = lambda slips: sum(load @ slip[0] for load, slip in zip(loads, slips, strict=True))  # noqa: E731
-            slips, rate = free_rate(at, rolling, roll, yaw, mean)
-            motion = rolling.motion(roll, yaw, rate)
-        found = []
-        for shape, slip, row, good in zip(shapes, slips, rows, solved, strict=True):
-            if self.always or not good:
-                found.append(self._on_grid(shape, slip, row, pose, motion, friction))
-            else:
-                found.append(self._on_strips(shape, slip, row, pose, rolling is not None, friction, fields))
+            motion = rolling.motion(roll, yaw, self._free_rate(pose, rolling))
+            contact = self._at_work()
+        elif fields and self._exact:
+            contact, friction = self._at_work(), SMOOTH
+        else:
+            friction = SMOOTH
+        found = list(self._patches(contact, pose, motion, friction, fields))
+        if rolling is None:
+            for one in found:
+                one.row[columns.FX : columns.MZ + 1], one.row[columns.XI : columns.PHI + 1] = 0.0, math.nan
         return found
 
-    def _slips(self, pose, motion, solved, rows):
-        """Rigid slip of every patch, (4, strips) each."""
-        shapes = self._contact.at_height(*pose, motion)
-        if not all(solved):
-            rough = self._rough.at_height(*pose, motion)
-            shapes = [shape if good else other for shape, good, other in zip(shapes, solved, rough, strict=True)]
-        if self.surfaces:
-            return [np.array([s.slip_x, s.slip_x_dx, s.slip_s, s.slip_s_dx]) for s in shapes]
-        return [
-            shape.slip_of_creepages(*self._creepages(shape, row, pose, motion))
-            for shape, row in zip(shapes, rows, strict=True)
-        ]
+    def _at_work(self):
+        """The contact that rolls: exact, or by the creep table."""
+        if self._rolling is None:
+            table = {} if self._exact else {"law": LAWS["table"], "creep": _table(self.poisson_ratio)}
+            self._rolling = Handle((self._exact or self._still)._replace(**table))
+        return self._rolling
 
-    @staticmethod
-    def _creepages(shape, row, pose, motion):
-        """Of the undeformed wheel's material point above the frame's origin."""
-        (x, y, z), angle, depth = shape.origin, shape.contact_angle, row[PENETRATION]
-        cosine, sine = math.cos(angle), math.sin(angle)
-        y, z = y + depth * sine - pose[1], z - depth * cosine - pose[2]
-        return creepages(*motion[:6], x, y, z, cosine, sine, motion.speed)[:3]
+    def _free_rate(self, pose, rolling):
+        """The rate of rolling, or where none is given that of free rolling: the creepage is linear in it."""
+        if not math.isnan(rolling.rate):
+            return rolling.rate
+        usual, means = rolling.speed / self.geometry.rolling_radius, []
+        for rate in (usual, 1.001 * usual):
+            motion = rolling.motion(*pose[3:], rate)
+            rows = [one.row for one in self._patches(self._still_handle, pose, motion, SMOOTH, None)]
+            means.append(sum(row[columns.NORMAL] * row[columns.XI] for row in rows))
+        return usual + 1e-3 * usual * means[0] / (means[0] - means[1]) if means[0] != means[1] else usual
 
-    def _overlaps(self, side, y, z, roll, yaw):
-        """Row of the deepest overlap of each group of them that is one patch."""
-        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
-        count = find_patches(self.geometry, SIDES[side], y, z, *axle, self.spatial, MOMENT, self._rows)
-        first, deepest = 0, []
-        while first < count:
-            last = group_end(self._rows, count, first)
-            deepest.append(max(self._rows[first:last], key=lambda row: row[PENETRATION]).copy())
-            first = last
-        return deepest
-
-    def _on_strips(self, shape, slip, row, pose, rolls, friction, fields):
-        """`Found` of a patch that strips have solved."""
-        mean_x, mean_s, creep = shape.mean_x, shape.mean_s, _mean_creepages(shape, slip)
-        a, b = (math.sqrt(5.0 * max(square - mean * mean, 1e-14))
-                for square, mean in ((shape.mean_xx, mean_x), (shape.mean_ss, mean_s)))  # fmt: skip
-        field, forces = None, np.zeros((3, len(shape.centre)))
-        level = "slender" if a > SLENDER * b else self.resolution
-        if self.exact and (rolls or fields):
-            field = solve_patch(
-                (shape.centre, shape.width, shape.half_length, shape.middle, shape.peak), slip, self.shear_modulus,
-                friction, level, self.poisson_ratio,
-            )  # fmt: skip
-            forces = field.force
-        elif rolls:
-            fx, fs, mz = creep_by_table(a, b, shape.normal_force, *creep, friction, self.shear_modulus,
-                                        self.poisson_ratio)  # fmt: skip
-            share = _loads(shape) / shape.normal_force
-            forces = share * np.stack([0.0 * share + fx, 0.0 * share + fs, mz + (mean_x - shape.middle) * fs])
-        if not self.surfaces:  # creepages are the slip of one plane
-            tilt = 0.0 * shape.tilt + _loads(shape) @ shape.tilt / shape.normal_force
-            shape = replace(shape, tilt=tilt, height=tilt * (shape.centre - mean_s) - row[PENETRATION])
-        angle, normal, *force = shape.resultant(forces)
-        plane, (x, y, z) = shape.contact_angle, shape.origin
-        point = x + mean_x, y + mean_s * math.cos(plane), z + mean_s * math.sin(plane)
-        _fill(row, point, angle, (a, b), normal, force, creep if rolls else (math.nan,) * 3, shape.p_max)
-        extent = shape.origin[0] + shape.x_min, shape.origin[0] + shape.x_max, shape.s_max - shape.s_min
-        patch = None
-        if fields and field is not None:
-            panels = make_library(level, self.poisson_ratio).panels
-            patch = _patch_of_strips(shape, field, panels, row, friction, pose)
-        return Found(row, extent, patch)
-
-    def _on_grid(self, shape, slip, row, pose, motion, friction):
-        """`Found` of a patch on grids, in the plane of its strips."""
+    def _patches(self, contact, pose, motion, friction, fields):
+        """`Found` of each patch by the kernels of runs; without fields (None) not even on grids of this class."""
         side, y, z, roll, yaw = pose
-        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
-        rigid = (0.0, 0.0, 0.0)
-        if motion is not None:
-            rigid = motion if self.surfaces else self._creepages(shape, row, pose, motion)
+        velocity = motion[:6] if motion else (0.0,) * 6
+        row = np.array([SIDES[side], y, z, *axle_direction(roll, yaw), *velocity, 0.0, 0.0, friction])
+        if self._still.strips.strips:
+            yield from self._on_strips(contact, row, pose, motion, friction, fields)
+            return
+        motions, counts = np.stack([row, row])[None], np.zeros((1, 2), np.int64)
+        rows, wheel = np.zeros((1, 2, MAX_PATCHES, PATCH_COLUMNS)), int(SIDES[side] < 0.0)
+        motions[0, 1 - wheel, 2] += 1.0  # the other wheel is out of reach
+        wheel_wrenches(contact, motions, rows, counts, np.zeros((1, 2)), np.zeros((1, 2, 6)), self._counters,
+                       self._work_handle)  # fmt: skip
+        for one in rows[0, wheel, : counts[0, wheel]]:
+            a, b, x = float(one[columns.SEMI_A]), float(one[columns.SEMI_B]), float(one[columns.X])
+            one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
+            yield Found(one, (x - a, x + a, 2.0 * b))
+
+    def _on_strips(self, contact, row, pose, motion, friction, fields):
+        """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
+        sign, work, overlaps = SIDES[pose[0]], self._work, self._rows
+        row[[0, 1, 3, 5, 7, 9, 11]] *= sign
+        count = find_patches(self.geometry, *row[:6], self.spatial, MOMENT, overlaps)
+        out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
+        while first < count:
+            last, before = group_end(overlaps, count, first), self._counters[FELL_BACK]
+            work.spare[0] = 0.0
+            group_wrench(contact, row, self.spatial, overlaps, first, last, out[0], wrench, self._counters, work.spare,
+                         self._work_handle)  # fmt: skip
+            x, sums = out[0, columns.X] - work.sums[MEAN_X], work.sums
+            extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
+            if sign < 0.0:
+                mirror(out, 1, wrench)
+            if fields is not None and (self.always or self._counters[FELL_BACK] > before):
+                yield self._on_grid(out[0].copy(), row, first, last, pose, motion, friction)
+            else:
+                patch = self._fields(out[0], pose, friction) if fields and self._exact else None
+                yield Found(out[0].copy(), tuple(map(float, extent)), patch)
+            first = last
+
+    def _fields(self, row, pose, friction):
+        """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid."""
+        work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
+        count, slender = work.solved
+        rolling, library = (work.slender, settings.slender) if slender else (work.rolling, settings.library)
+        field = np.empty((9, count * library.panels.n))
+        read_field(library.panels, count, rolling, field)
+        tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
+        centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, WIDTH, HALF_LENGTH, MIDDLE))
+        even = even_length(half, width, work.strips[WINDOW, :count])  # strips as rectangles with the areas they have
+        longer = work.force[3] / work.sums[LOAD] * (half / even)[:, None]
+        edges = middle[:, None] + even[:, None] * library.panels.edges
+        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[MEAN_X], work.sums[MEAN_S]
+        slips = slides > 0.0
+        cells = (
+            0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, sign * like * (centre - mean_s)[:, None],
+            edges[:, :-1] - edges[:, 1:], like * width[:, None], pressure * longer, tx * longer, sign * ts * longer,
+            np.where(slips, sx, 0.0), np.where(slips, sign * ss, 0.0), ~slips,
+        )  # fmt: skip
+        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (S_MIN, S_MAX))
+        ends = (*(work.sums[k] - mean_x for k in (X_MIN, X_MAX)), *s_ends)
+        return Patch(
+            *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
+            *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
+            tuple(map(float, row[[columns.X, columns.Y, columns.Z]])), friction, pose[0], float(row[columns.P_MAX]),
+            tuple(map(float, ends)), pose[1:],
+        )  # fmt: skip
+
+    def _on_grid(self, row, left, first, last, pose, motion, friction):
+        """`Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""
+        side, y, z, roll, yaw = pose
+        sign, depth = SIDES[side], self._rows[first:last, PENETRATION].max()
+        frame = frame_of_overlaps(self.geometry, make_pose(*left[:6], self.spatial), self._rows, first, last)
+        angle = sign * math.atan2(frame.sine, frame.cosine)
+        origin = frame.x, sign * (frame.ur + self.geometry.rail_distance), frame.z
+        rigid, (cosine, sine) = (0.0, 0.0, 0.0), (math.cos(angle), math.sin(angle))
+        if motion is not None and self.surfaces:
+            rigid = motion
+        elif motion is not None:  # of the undeformed wheel's material point above the frame's origin
+            place = origin[0], origin[1] + depth * sine - y, origin[2] - depth * cosine - z
+            rigid = creepages(*motion[:6], *place, cosine, sine, motion.speed)[:3]
+        axle = (sign * c for c in axle_direction(roll, yaw))
         solved = solve_on_grids(
-            self.geometry, make_pose(SIDES[side], y, z, *axle, self.spatial),
-            contact_plane(*shape.origin, shape.contact_angle), rigid, friction, self.shear_modulus, self.poisson_ratio,
-            self.grids,
+            self.geometry, make_pose(sign, y, z, *axle, self.spatial), contact_plane(*origin, angle), rigid, friction,
+            self.shear_modulus, self.poisson_ratio, self.grids,
         )  # fmt: skip
         patch = replace(solved, pose=(y, z, roll, yaw))
         mean_x, mean_s = patch.centroid
         load = patch.pressure * patch.cell_area
-        axes = (math.sqrt(5.0 * max(load @ (q - mean) ** 2 / max(load.sum(), 1e-30), 1e-14))
-                for q, mean in ((patch.x, mean_x), (patch.s, mean_s)))  # fmt: skip
-        cosine, sine = math.cos(shape.contact_angle), math.sin(shape.contact_angle)
-        point = shape.origin[0] + mean_x, shape.origin[1] + mean_s * cosine, shape.origin[2] + mean_s * sine
-        force = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
-        _fill(row, point, patch.contact_angle, tuple(axes), patch.normal, force,
-              (math.nan,) * 3 if motion is None else _mean_creepages(shape, slip), patch.p_max)  # fmt: skip
+        row[[columns.SEMI_A, columns.SEMI_B]] = [
+            math.sqrt(5.0 * max(load @ (q - mean) ** 2 / max(load.sum(), 1e-30), 1e-14))
+            for q, mean in ((patch.x, mean_x), (patch.s, mean_s))
+        ]
+        row[[columns.X, columns.Y, columns.Z]] = np.array(origin) + [mean_x, mean_s * cosine, mean_s * sine]
+        row[[columns.ANGLE, columns.NORMAL, columns.P_MAX]] = patch.contact_angle, patch.normal, patch.p_max
+        row[columns.FX : columns.MZ + 1] = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
         x_min, x_max, s_min, s_max = patch.extent
-        return Found(row, (shape.origin[0] + x_min, shape.origin[0] + x_max, s_max - s_min), patch, True)
+        return Found(row, (origin[0] + x_min, origin[0] + x_max, s_max - s_min), patch, True)
 
+    def check_depth(self, side, y, z, roll, yaw, source, field):
+        """Refuse a height at which a wheel lies deeper in its rail than `DEEPEST`."""
+        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+        lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
+        if find_patches(self.geometry, *lifted, MOMENT, self._rows) or z < self.geometry.rolling_radius - LOWEST:
+            raise InputError(source, field, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
 
-def loaded_wheels(geometry, model="exact", resolution="middle", slip="surfaces", **options):
-    """`LoadedWheels` of a geometry by a patch model (maximum, moment, strips, exact or grid); of strips and grids
-    ``resolution`` (coarse, middle, fine) and rigid ``slip`` (of the real surfaces, or one set of creepages); options
-    are shear_modulus (Pa), poisson_ratio and detection.
-    """
-    if model not in MODELS:
-        raise InputError("patch", "", one_of(MODELS, model))
-    if model in REDUCTIONS:
-        return Ellipses(geometry, model, **options)
-    return Strips(geometry, model, resolution, slip, **options)
+    def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
+        """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal
+        forces), sought near ``guess`` (m); NaN where there is none.
+        """
+        goal, ellipse = load ** (2.0 / 3.0), not self._still.strips.strips
 
+        def excess(z):
+            found = self.at_height(side, y, z, roll, yaw, rolling, friction)
+            force = sum(f.vertical if vertical else f.row[columns.NORMAL] for f in found)
+            rest = max(force, 0.0) ** (2.0 / 3.0) - goal
+            return 0.0 if abs(rest) < _CARRIED * goal else rest
 
-def creep_by_table(a, b, normal, xi, eta, phi, friction, shear_modulus, poisson_ratio):
-    """Fx, Fy (N) and Mz (N m) on the wheel of an ellipse, by the default creep table."""
-    limit, c = friction * normal, math.sqrt(a * b)
-    if not limit > 0.0:
-        return 0.0, 0.0, 0.0
-    scale = shear_modulus * c * c / limit
-    fx, fy, mz, _ = creep_force_at(LAWS["table"], _table(poisson_ratio), math.log(a / b), a / b, 0.0, xi * scale,
-                                   eta * scale, phi * scale * c)  # fmt: skip
-    return limit * fx, limit * fy, limit * c * mz
+        if math.isnan(guess) or (ellipse and rolling is None and vertical):
+            guess = height_at_load(
+                self.geometry, self._still.hertz, self.modulus, SIDES[side], y, roll, yaw, self.spatial,
+                self._still.reduction, load, self.geometry.rolling_radius, self._rows,
+            )  # fmt: skip
+        if math.isnan(guess) or (ellipse and rolling is None and vertical):
+            return guess
+        return height_of_zero(excess, guess)
+
+    def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
+        """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
+        roll, z = settle(self.geometry, self._still.hertz, self.modulus, y, yaw, self.spatial, self._still.reduction,
+                         load, self.geometry.rolling_radius)  # fmt: skip
+        if math.isnan(z) or (not self._still.strips.strips and rolling is None and vertical):
+            return roll if not math.isnan(z) else math.nan, z
+        before = difference = math.nan
+        slope, left, right = ROLL_SLOPE, z, z
+        for _ in range(_MOST_ROLLS):
+            left = self.height("left", y, load, roll, yaw, rolling, friction, vertical, left)
+            right = self.height("right", y, load, roll, yaw, rolling, friction, vertical, right)
+            if roll != before and not math.isnan(before):
+                slope = (left - right - difference) / (roll - before)
+            difference, before = left - right, roll
+            step = difference / slope
+            if not abs(step) < 0.02:
+                break
+            if abs(step) < _LEVEL:
+                return roll, 0.5 * (left + right)
+            roll -= step
+            left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
+        return math.nan, math.nan
 
 
 @lru_cache(maxsize=4)
 def _table(nu):
     return creep_data(nu, ensure_table(nu).kernel_data())
-
-
-def _loads(shape):
-    """Normal force of each strip, N."""
-    return 0.5 * math.pi * shape.peak * shape.half_length * shape.width
-
-
-def _mean_creepages(shape, slip):
-    """Longitudinal, lateral and spin creepage at the pressure's centroid: means of the rigid slip."""
-    share = _loads(shape) / _loads(shape).sum()
-    return share @ slip[0], share @ (slip[2] + slip[3] * (shape.mean_x - shape.middle)), share @ slip[3]
-
-
-def _fill(row, point, angle, axes, normal, force, creep, p_max):
-    """Put a patch's results into its row."""
-    row[columns.X], row[columns.Y], row[columns.Z] = point
-    row[columns.ANGLE], row[columns.NORMAL], row[columns.P_MAX] = angle, normal, p_max
-    row[columns.SEMI_A], row[columns.SEMI_B] = axes
-    row[columns.FX : columns.MZ + 1], row[columns.XI : columns.PHI + 1] = force, creep
-
-
-def _patch_of_strips(shape, field, panels, row, friction, pose):
-    """`Patch` of strips, their panels as cells, about the pressure's centroid."""
-    shorter = shape.even_length / shape.half_length  # strips as rectangles with the areas that they have
-    edges = shape.middle[:, None] + shape.even_length[:, None] * panels.edges
-    like = np.ones(edges[:, 1:].shape)
-    mean_x, mean_s = shape.mean_x, shape.mean_s
-    cells = (
-        0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, like * (shape.centre - mean_s)[:, None],
-        edges[:, :-1] - edges[:, 1:], like * shape.width[:, None],
-        *(one / shorter[:, None] for one in (field.pressure, field.traction_x, field.traction_s)),
-        np.where(field.slides, field.slip_x, 0.0), np.where(field.slides, field.slip_s, 0.0), ~field.slides,
-    )  # fmt: skip
-    ends = shape.x_min - mean_x, shape.x_max - mean_x, shape.s_min - mean_s, shape.s_max - mean_s
-    return Patch(
-        *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
-        *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
-        tuple(map(float, row[[columns.X, columns.Y, columns.Z]])), friction, pose[0], shape.p_max, ends, pose[1:],
-    )  # fmt: skip

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from wrcore.analysis.loaded import GRIDS, Strips
-from wrcore.analysis.loaded_base import Rolling
+from wrcore.analysis.loaded import GRIDS, LoadedWheels, Rolling
 from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
@@ -90,7 +89,7 @@ def patch(
     """
     geometry, options, usual = _of_pair(source) if isinstance(source, WheelsetOnTrack) else _of_scene(source, side)
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
-    wheels = Strips(geometry, method, resolution, slip, **options)
+    wheels = LoadedWheels(geometry, method, resolution, slip, **options)
     rolling = Rolling(float(speed), math.nan if omega is None else float(omega), float(vy), float(yaw_rate))
     how, vertical = {"rolling": rolling, "friction": float(mu)}, load_by == "vertical"
     if z is not None:

@@ -4,8 +4,7 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.loaded import loaded_wheels
-from wrcore.analysis.loaded_base import Rolling
+from wrcore.analysis.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number
@@ -17,10 +16,8 @@ ROLLING_FIELDS = {
 }  # fmt: skip
 """Columns of rolling, empty where the wheelset does not move."""
 
-FIELDS = (
-    "pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m", "x_min_m", "x_max_m", "width_m",
-    *ROLLING_FIELDS,
-)  # fmt: skip
+AT_REST = ("pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m")
+FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING_FIELDS)
 
 
 def loaded_poses(
@@ -40,7 +37,7 @@ def loaded_poses(
         N per wheel, above 0 and up to 1e6.
     patch : {"maximum", "moment", "strips", "exact", "grid"}
     resolution, slip : str
-        See `loaded_wheels`.
+        See `LoadedWheels`.
     load_by : {"vertical", "normal"}
         The load is the vertical sum of all forces on the wheel, creep forces included, or that of its normal forces.
     friction : float
@@ -64,8 +61,7 @@ def loaded_poses(
     check_number(friction, 0.0, 2.0, "contact", "friction")
     if load_by not in ("vertical", "normal"):
         raise InputError("load_by", "", f"expected vertical or normal, got {load_by!r}")
-    wheels = loaded_wheels(geometry, patch, resolution, slip, detection=detection, shear_modulus=shear_modulus,
-                           poisson_ratio=poisson_ratio)  # fmt: skip
+    wheels = LoadedWheels(geometry, patch, resolution, slip, shear_modulus, poisson_ratio, detection)
     rows, on_grid = [], 0
     for pose in poses.itertuples():
         y, yaw, mu = pose.y_m, pose.yaw_rad, _given(pose, "mu", friction)

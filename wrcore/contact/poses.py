@@ -1,15 +1,10 @@
-"""Contact of a wheelset at rest in given poses: the table behind ``wrcore contact``."""
-
-import math
+"""Poses of a wheelset from a file, and the columns of patches: for ``wrcore contact``."""
 
 import numpy as np
 
 from wrcore.contact import reduction as columns
-from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.statics import height_at_load, settle, wheel_at_rest
-from wrcore.errors import InputError, check_number, one_of
+from wrcore.errors import InputError
 from wrcore.errors.checked_csv import read_csv_table
-from wrcore.geometry.track import SIDES
 
 PATCH_FIELDS = {
     "u_wheel_m": columns.U_WHEEL, "s_wheel_rad": columns.S_WHEEL, "u_rail_m": columns.U_RAIL, "x_m": columns.X,
@@ -83,73 +78,3 @@ def _refuse(path, frame, name, bad, expected):
     if bad.any():
         row = int(np.argmax(bad.to_numpy()))
         raise InputError(path, f"{name}, row {row + 1}", f"expected {expected}, got {str(frame[name].iloc[row])!r}")
-
-
-def solve_poses(
-    poses, geometry, wheel_load, detection="spatial", reduction="moment", shear_modulus=8.2e10, poisson_ratio=0.28
-):
-    """Patches of both wheels for every pose, statically (damping factor 1: plain Hertz).
-
-    Parameters
-    ----------
-    poses : pandas.DataFrame
-        As from :func:`read_poses`. Neither roll nor z given: both are solved so that each wheel carries
-        ``wheel_load`` vertically. Roll given, z not: each side is solved by itself. z given, roll not: roll is zero.
-    geometry : ContactGeometry
-    wheel_load : float
-        Vertical load per wheel, N, above 0 and up to 1e6.
-    detection : {"planar", "spatial"}
-    reduction : {"maximum", "moment"}
-    shear_modulus, poisson_ratio : float
-        Material of both bodies, Pa and -.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per patch; a wheel without contact has none. A pose without equilibrium gives no rows.
-
-    Raises
-    ------
-    InputError
-        For an unknown choice, or a number in another unit.
-    """
-    import pandas as pd
-
-    check_number(wheel_load, 1e-9, 1e6, "contact", "wheel_load", "N")
-    check_number(shear_modulus, 1e9, 1e12, "contact", "shear_modulus", "Pa")
-    check_number(poisson_ratio, 0.0, 0.5, "contact", "poisson_ratio")
-    hertz, modulus, spatial = hertz_table(), contact_modulus(shear_modulus, poisson_ratio), detection == "spatial"
-    if detection not in ("planar", "spatial"):
-        raise InputError("detection", "", f"expected planar or spatial, got {detection!r}")
-    if reduction not in columns.REDUCTIONS:
-        raise InputError("patch", "", one_of(columns.REDUCTIONS, reduction))
-    rule = columns.REDUCTIONS[reduction]
-    rows = []
-    patches = np.zeros((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
-    nominal = geometry.rolling_radius
-    for pose in poses.itertuples():
-        y, yaw, roll, heights = pose.y_m, pose.yaw_rad, pose.roll_rad, {side: pose.z_m for side in SIDES}
-        if math.isnan(roll) and math.isnan(pose.z_m):
-            roll, z = settle(geometry, hertz, modulus, y, yaw, spatial, rule, wheel_load, nominal)
-            heights = {side: z for side in SIDES}
-        elif math.isnan(pose.z_m):
-            heights = {
-                side: height_at_load(
-                    geometry, hertz, modulus, sign, y, roll, yaw, spatial, rule, wheel_load, nominal, patches
-                )
-                for side, sign in SIDES.items()
-            }
-        elif math.isnan(roll):
-            roll = 0.0
-        for side, sign in SIDES.items():
-            z = heights[side]
-            if math.isnan(z):
-                continue
-            count, _ = wheel_at_rest(geometry, hertz, modulus, sign, y, z, roll, yaw, spatial, rule, patches)
-            for number, row in enumerate(patches[:count], start=1):
-                values = {name: row[column] for name, column in PATCH_FIELDS.items()}
-                p_max = 1.5 * values["N_N"] / (math.pi * values["a_m"] * values["b_m"])
-                rows.append({"pose_id": pose.pose_id, "side": side, "patch": number, **values, "p_max_Pa": p_max,
-                             "roll_rad": roll, "z_wheelset_m": z})  # fmt: skip
-    names = ["pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m"]
-    return pd.DataFrame(rows, columns=names)

@@ -250,7 +250,8 @@ def _roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, c
     if settings.rolling == 0:
         counters[1] += _creep_by_law(model, friction * f[3], f, strips, slip, work.friction, count)
     else:
-        _roll(model, friction, settings, strips, slip, work.friction, count, f[6] > SLENDER * f[7], windows, work)
+        work.solved[0], work.solved[1] = count, f[6] > SLENDER * f[7]
+        _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work)
     if m[6] < 0.0:
         _turn_round(strips, slip, work.friction, f, count)
     _add_wrenches(model.geometry, pose, frame, count, share, work)
@@ -274,7 +275,7 @@ def _roll_on_grid(model, m, pose, frame, spatial, depth, creepage, friction, wor
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
+def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """Solve the overlaps from ``first`` to before ``last`` as one patch: its row, its share of the wrench."""
     settings, y, z = model.strips, m[1], m[2]
     speed = max(abs(m[6]), model.least_speed)
@@ -377,7 +378,7 @@ def _as_left(motion, left):
 
 
 @jit(allocates=False)
-def _mirror(rows, count, wrench):
+def mirror(rows, count, wrench):
     """Patches and wrench of a left wheel as those of a right one."""
     for k in (1, 3, 5):
         wrench[k] = -wrench[k]
@@ -413,7 +414,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 last = group_end(rows, count, first)
                 memory = work.memory[i, wheel, group] if work.warm[0] else work.spare
                 work.spare[0] = 0.0
-                _group_wrench(own, m, spatial, rows, first, last, work.out, w, counters, memory, work)
+                group_wrench(own, m, spatial, rows, first, last, work.out, w, counters, memory, work)
                 group += 1
                 if work.out[NORMAL] > 0.0:
                     for column in range(PATCH_COLUMNS):
@@ -421,5 +422,5 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                     kept += 1
                 first = last
             if motions[i, wheel, 0] < 0.0:
-                _mirror(rows, kept, w)
+                mirror(rows, kept, w)
             counts[i, wheel], bounds[i, wheel] = kept, bound

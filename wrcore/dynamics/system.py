@@ -287,14 +287,22 @@ def with_wheels(contact):
     return alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
 
 
+def with_fallback(contact, motion, strips):
+    """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
+    if not contact.strips.strips:
+        return contact
+    from wrcore.dynamics.strip_wheel import solve_on_grid
+
+    fallback = Kernel(solve_on_grid, Kind(contact._replace(geometries=())), motion, strips.force)
+    return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
+
+
 def with_kernels(model, work):
     """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
-    wrenches, contact = wheel_wrenches, model.contact
+    wrenches, contact = wheel_wrenches, with_fallback(model.contact, work.motions[0, 0], work.strips)
     if contact.strips.strips:
-        from wrcore.dynamics.strip_wheel import solve_on_grid, strip_wrenches
+        from wrcore.dynamics.strip_wheel import strip_wrenches
 
-        fallback = Kernel(solve_on_grid, Kind(contact._replace(geometries=())), work.motions[0, 0], work.strips.force)
-        contact = contact._replace(strips=contact.strips._replace(fallback=fallback.address))
         wrenches = strip_wrenches
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches

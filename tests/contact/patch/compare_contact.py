@@ -15,8 +15,7 @@ import pandas as pd
 
 from tests.analysis.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
-from wrcore.analysis.loaded import loaded_wheels
-from wrcore.analysis.loaded_base import Rolling
+from wrcore.analysis.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 
 QUANTITIES = {
@@ -52,7 +51,7 @@ def whole_model(wheels, lag=False):
 def errors(name, resolution):
     """Columns of QUANTITIES per case of a set."""
     geometry, cases = contact.geometry(name), comparable(name)
-    surfaces, creepages = (loaded_wheels(geometry, "exact", resolution, slip) for slip in ("surfaces", "creepages"))
+    surfaces, creepages = (LoadedWheels(geometry, "exact", resolution, slip) for slip in ("surfaces", "creepages"))
     table = contact.compare(whole_model(surfaces), cases, geometry)
     table["force"] = math.nan
     if not math.isnan(sum(case.xi * case.fx for case in cases)):  # none in the file that is distributed

@@ -10,9 +10,9 @@ from study.contact import search
 from study.contact import tables as study
 from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
+from wrcore.analysis.poses import loaded_poses
 from wrcore.contact.detection import axle_direction, detect
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
-from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.strip import make_pose
@@ -198,7 +198,7 @@ def test_coexisting_patches_share_the_force_until_they_merge(benchmark_pair):
 def test_of_two_patches_the_most_loaded_is_taken(benchmark_pair, monkeypatch):
     monkeypatch.setattr(study, "TOUCH", 2e4)  # at 5.1 mm tread and flange root touch under load
     poses = pd.DataFrame({"pose_id": [0], "y_m": [5.1e-3], "yaw_rad": [0.0], "roll_rad": [np.nan], "z_m": [np.nan]})
-    both = solve_poses(poses, benchmark_pair, 2e4, "spatial", "maximum").query("side == 'left'")
+    both = loaded_poses(poses, benchmark_pair, 2e4, "maximum", detection="spatial").query("side == 'left'")
     taken = rows(study.location_with_yaw(benchmark_pair, [5.1e-3], [0.0]), side="left")
     assert len(both) == 2
     assert taken.u_wheel_m.tolist() == [both.loc[both.N_N.idxmax(), "u_wheel_m"]]

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pandas as pd
 
+from wrcore.analysis.poses import loaded_poses
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.detection import planar_error_bound
 from wrcore.contact.first_touch import first_touch
 from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.poses import solve_poses
 from wrcore.contact.reduction import (
     ANGLE,
     MAX_PATCHES,
@@ -74,7 +74,7 @@ def location_with_yaw(geometry, shifts, yaws, detection="spatial"):
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(yaws, shifts, indexing="ij"))
     poses = pd.DataFrame({"pose_id": np.arange(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
-    patches = solve_poses(poses, geometry, TOUCH, detection, "maximum")
+    patches = loaded_poses(poses, geometry, TOUCH, "maximum", detection=detection)
     patches = patches.sort_values("N_N").groupby(["pose_id", "side"], sort=True).last().reset_index()
     table = poses[["pose_id", "yaw_rad", "y_m"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
     radius = [_radius(geometry, u) for u in table.u_wheel_m]

@@ -22,9 +22,9 @@ from study.hard_cases.cases import (
     wheel_forces,
     with_forces,
 )
+from wrcore.analysis.poses import loaded_poses
 from wrcore.contact import reduction
 from wrcore.contact.normal import damping_factor
-from wrcore.contact.poses import solve_poses
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.geometry.irregularity import irregularity_data
 from wrcore.integrate.tolerances import LENGTH
@@ -236,7 +236,7 @@ def _there_and_back(far, step):
 def _at_load(geometry, detection, load, y):
     """Lateral force and the left wheel's most loaded patch of a wheelset under load at lateral positions."""
     poses = pd.DataFrame({"pose_id": np.arange(len(y)), "y_m": y, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan})
-    patches = solve_poses(poses, geometry, load, detection, "moment")
+    patches = loaded_poses(poses, geometry, load, "moment", detection=detection)
     lateral = (-patches.N_N * np.sin(patches.contact_angle_rad)).groupby(patches.pose_id).sum()
     left = patches[patches.side == "left"].sort_values("N_N").groupby("pose_id").last()
     table = pd.DataFrame({"y_m": y}).assign(force_N=lateral, u_wheel_m=left.u_wheel_m)

@@ -11,7 +11,7 @@ from wrcore.analysis.motion import (
     mirror_defect,
     prediction_horizon,
 )
-from wrcore.contact.poses import solve_poses
+from wrcore.analysis.poses import loaded_poses
 from wrcore.contact.strip import cubic_at
 from wrcore.geometry.track import SIDES as SIGNS
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
@@ -97,7 +97,7 @@ def rigid_contact(geometry, shifts, detection="planar"):
     poses = pd.DataFrame(
         {"pose_id": range(len(shifts)), "y_m": shifts, "yaw_rad": 0.0, "roll_rad": np.nan, "z_m": np.nan}
     )
-    touching = solve_poses(poses, geometry, RIGID_LOAD, detection, "maximum")
+    touching = loaded_poses(poses, geometry, RIGID_LOAD, "maximum", detection=detection)
     patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
     table = pd.DataFrame({"y_m": shifts})
     for side in SIGNS:

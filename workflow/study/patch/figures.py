@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from study.patch.tables import REFERENCE, radius_differences
-from wrcore.analysis.loaded import loaded_wheels
-from wrcore.analysis.loaded_base import Rolling
+from wrcore.analysis.loaded import LoadedWheels, Rolling
 from wrcore.analysis.style import MM, shared_legend, styled
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch
@@ -62,7 +61,7 @@ def fig_patch_errors(places, load):
 @styled
 def fig_patches(geometry, models, load, shifts, rolling):
     """Pressure, traction and slip of exact contact beside the ellipse of another model (title and arguments of
-    `wrcore.analysis.loaded.loaded_wheels` of both), for the left wheel under a load (N), a row per lateral shift (m);
+    `wrcore.analysis.loaded.LoadedWheels` of both), for the left wheel under a load (N), a row per lateral shift (m);
     ``rolling`` is speed (m/s), friction, and creepage (longitudinal, lateral) of a wheel that otherwise rolls freely.
     """
     figure = Figure(figsize=(9.0, 4.6 * len(shifts)), layout="constrained")
@@ -85,7 +84,7 @@ def patches_of_models(geometry, models, load, y, rolling):
     """Patches, the most loaded in front, of exact contact and of an ellipse under the same load and in the same motion,
     about the same origin; arguments as for `fig_patches`.
     """
-    exact, ellipse = (loaded_wheels(geometry, **settings) for settings in models)
+    exact, ellipse = (LoadedWheels(geometry, **settings) for settings in models)
     speed, (xi, eta) = rolling["speed"], rolling["creepage"]
     roll, z = exact.settled(y, load)
     free = Rolling(speed, speed / geometry.rolling_radius)

@@ -4,7 +4,7 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.loaded import loaded_wheels
+from wrcore.analysis.loaded import LoadedWheels
 from wrcore.contact import reduction as columns
 
 LOAD = 1e3
@@ -13,10 +13,10 @@ LOAD = 1e3
 
 def compare_with_contact(geometry, reference, models):
     """Each loaded case of CONTACT (in its axes) that is one patch beside every model (arguments of
-    `wrcore.analysis.loaded.loaded_wheels` by name) at the same height: errors of the wheel's normal force (relative),
+    `wrcore.analysis.loaded.LoadedWheels` by name) at the same height: errors of the wheel's normal force (relative),
     greatest pressure (relative), length along and width across of the nearest patch (m).
     """
-    wheels = {name: loaded_wheels(geometry, **settings) for name, settings in models.items()}
+    wheels = {name: LoadedWheels(geometry, **settings) for name, settings in models.items()}
     rows = []
     for case in reference[(reference["Fz_wheel_N"] > LOAD) & (reference["n_patches"] == 1)].itertuples():
         roll, yaw = angles_of_contact(case.roll_rad, -case.yaw_rad)

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.loaded import loaded_wheels
-from wrcore.analysis.loaded_base import Rolling
+from wrcore.analysis.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 
 REFERENCE = "exact, fine"
@@ -57,7 +56,7 @@ def pose_errors(geometry, models, loads, shifts, rolling):
     reference's mu N under equal load: at equal motion of the wheelset, and at equal creepage, where each model rolls on
     its own radius.
     """
-    wheels = {name: loaded_wheels(geometry, **settings) for name, settings in models.items()}
+    wheels = {name: LoadedWheels(geometry, **settings) for name, settings in models.items()}
     places, forces = [], []
     for load in loads:
         roll, z = wheels[REFERENCE].settled(0.0, load)

@@ -75,6 +75,8 @@ class StripWork(NamedTuple):
     """(2, 6): of pressure and of friction."""
     sums: np.ndarray
     force: np.ndarray
+    solved: np.ndarray
+    """(2,) int: strips of the last solution, and 1 if they are slender."""
     normal: normal_strips.Workspace
     rolling: RollingWork
     slender: RollingWork
@@ -148,7 +150,7 @@ def strip_work(model, wheelsets):
         *(np.zeros(1, np.int64) for _ in range(3)), np.zeros((*wheels, normal_strips.MEMORY)),
         np.zeros(normal_strips.MEMORY), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros(MOTION), np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
-        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(FORCE_ROWS),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(FORCE_ROWS), np.zeros(2, np.int64),
         normal,
         *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip
