@@ -45,7 +45,7 @@ def test_a_wheel_feels_what_the_patch_alone_gives(exact):
     contact = NormalContact(model.contact.geometry, 8.2e10 / 0.72, "coarse")
     (patch,) = contact.at_height("left", y, z, roll, yaw, (*velocity, velocity[0]))
     assert row[columns.P_MAX] == pytest.approx(patch.p_max, rel=1e-9)
-    strips = (patch.centre, patch.width, patch.half_length, patch.middle, patch.peak)
+    strips = (patch.place, patch.own_width, patch.half_length, patch.middle, patch.peak)
     slip = (patch.slip_x, patch.slip_x_dx, patch.slip_s, patch.slip_s_dx)
     rolling = solve_patch(strips, slip, 8.2e10, model.contact.friction, "coarse")
     limit = model.contact.friction * patch.normal_force

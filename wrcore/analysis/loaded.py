@@ -166,7 +166,7 @@ class Strips(LoadedWheels):
         level = "slender" if a > SLENDER * b else self.resolution
         if self.exact and (rolls or fields):
             field = solve_patch(
-                (shape.centre, shape.width, shape.half_length, shape.middle, shape.peak), slip, self.shear_modulus,
+                (shape.place, shape.own_width, shape.half_length, shape.middle, shape.peak), slip, self.shear_modulus,
                 friction, level, self.poisson_ratio,
             )  # fmt: skip
             forces = field.force
@@ -270,7 +270,7 @@ def _patch_of_strips(shape, field, panels, row, friction, pose):
     mean_x, mean_s = shape.mean_x, shape.mean_s
     cells = (
         0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, like * (shape.centre - mean_s)[:, None],
-        edges[:, :-1] - edges[:, 1:], like * shape.width[:, None],
+        edges[:, :-1] - edges[:, 1:], like * shape.own_width[:, None],
         *(one / shorter[:, None] for one in (field.pressure, field.traction_x, field.traction_s)),
         np.where(field.slides, field.slip_x, 0.0), np.where(field.slides, field.slip_s, 0.0), ~field.slides,
     )  # fmt: skip

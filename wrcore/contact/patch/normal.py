@@ -28,6 +28,8 @@ from wrcore.contact.patch.solve import (
     EXACT,
     LOAD,
     MIDDLE,
+    OWN_PLACE,
+    OWN_WIDTH,
     PEAK,
     STRIP_ROWS,
     STRIP_TILT,
@@ -81,6 +83,9 @@ class StripPatch:
     """Of the wheel's extreme point in a strip along n, m."""
     tilt: np.ndarray
     """Slope over s of a strip's own contact plane, in which it slips."""
+    place: np.ndarray
+    own_width: np.ndarray
+    """``centre`` and ``width`` along these planes, where strips carry and roll."""
     normal_force: float
     p_max: float
     mean_x: float
@@ -248,7 +253,8 @@ class NormalContact:
         origin = (frame.x, frame.ur + self.geometry.rail_distance, frame.z)
         found = StripPatch(
             side, windows > 0, math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
-            strips[WINDOW].astype(int), strips[WHEEL_HEIGHT], strips[STRIP_TILT], *map(float, sums), *slips,
+            strips[WINDOW].astype(int), strips[WHEEL_HEIGHT], strips[STRIP_TILT], strips[OWN_PLACE], strips[OWN_WIDTH],
+            *map(float, sums), *slips,
         )  # fmt: skip
         return found if side == "left" else _mirrored(found)
 
@@ -294,7 +300,7 @@ class NormalContact:
 def _mirrored(patch):
     """A patch of a left wheel as that of a right one, or the other way round."""
     arrays = {name: part[::-1] for name, part in vars(patch).items() if isinstance(part, np.ndarray)}
-    for name in {"centre", "tilt", "slip_s", "slip_s_dx"} & arrays.keys():
+    for name in {"centre", "tilt", "place", "slip_s", "slip_s_dx"} & arrays.keys():
         arrays[name] = -arrays[name]
     arrays["window"] = arrays["window"].max(initial=0) - arrays["window"]
     x, y, z = patch.origin
