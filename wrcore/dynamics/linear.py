@@ -105,9 +105,9 @@ def steady_running(model, state, iterations=10):
 
 
 def cleared(state):
-    """The state without what is below the rounding of a balance (1e-12): single precision in rolling contact would make
+    """The state without what is below the rounding of a balance (1e-13): single precision in rolling contact would make
     millinewtons of it, between wheels that are mirror images."""
-    return np.where(np.abs(state) < 1e-12, 0.0, state)
+    return np.where(np.abs(state) < 1e-13, 0.0, state)
 
 
 def moved_states(model, state, moves):
