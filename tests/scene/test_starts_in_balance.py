@@ -78,6 +78,15 @@ def test_symmetric_vehicles_begin_symmetric_and_in_balance(name, contact, tmp_pa
     assert np.abs(rates).max(initial=0.0) < 1e-9
 
 
+@pytest.mark.parametrize("name", ["suspended_wheelset", "trailer_vehicle"])
+def test_exact_contact_begins_symmetric_too(name):
+    # single precision in rolling made 1e-10 m and 2e-4 N of a yaw of 1e-16; it leaves accelerations of 1e-6 to all
+    aside, apart, accelerations, rates = beginning(smooth(name, {"contact.patch": "exact"}))
+    assert np.abs(aside).max() < 1e-12
+    assert np.abs(apart).max() < 1e-6
+    assert np.abs(accelerations).max() < 5e-6 and np.abs(rates).max(initial=0.0) < 1e-9
+
+
 def test_a_vehicle_that_does_not_begin_symmetric_keeps_its_place(tmp_path):
     # traction rods off the middle: the car of the file stands 0.3 um aside, in balance
     scene = smooth("metro_car", {})

@@ -29,9 +29,9 @@ from wrcore.contact.patch.solve import (
     MEAN_S,
     MEAN_X,
     MIDDLE,
+    OWN_WIDTH,
     S_MAX,
     S_MIN,
-    WIDTH,
     WINDOW,
     X_MAX,
     X_MIN,
@@ -220,7 +220,7 @@ class LoadedWheels:
         field = np.empty((9, count * library.panels.n))
         read_field(library.panels, count, rolling, field)
         tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
-        centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, WIDTH, HALF_LENGTH, MIDDLE))
+        centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, OWN_WIDTH, HALF_LENGTH, MIDDLE))
         even = even_length(half, width, work.strips[WINDOW, :count])  # strips as rectangles with the areas they have
         longer = work.force[3] / work.sums[LOAD] * (half / even)[:, None]
         edges = middle[:, None] + even[:, None] * library.panels.edges

@@ -100,10 +100,15 @@ def _edge_by_newton(geometry, pose, u, low, high):
 
 @jit(allocates=False)
 def _edge_by_bracket(geometry, pose, outside, inside):
-    """Zero of the gap between a point outside and one inside an overlap (Illinois steps)."""
+    """Zero of the gap between a point outside and one inside an overlap (Illinois steps), or the rail's end."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
-    if high >= 0.5:  # the rail ends here
-        return inside
+    while high >= 0.5 and abs(outside - inside) > _EDGE_TOLERANCE:  # the rail ends between the two
+        new = 0.5 * (outside + inside)
+        value = gap_at(geometry, pose, new)[0]
+        if value < 0.0:
+            inside, low = new, value
+        else:
+            outside, high = new, value
     kept = 0
     for _ in range(30):
         if abs(outside - inside) < _EDGE_TOLERANCE or high - low <= 0.0:

@@ -36,11 +36,12 @@ from wrcore.contact.patch.solve import (
     MEAN_X,
     MEAN_XX,
     MIDDLE,
+    OWN_PLACE,
+    OWN_WIDTH,
     PEAK,
     STRIP_LOAD,
     STRIP_TILT,
     WHEEL_HEIGHT,
-    WIDTH,
     publish,
     solve_patch,
 )  # fmt: skip
@@ -170,7 +171,7 @@ def _creep_by_law(model, limit, f, strips, slip, force, count):
 def _roll_at(model, friction, library, work, strips, slip, force, count):
     """Creep force on the strips at a library's resolution."""
     rolling_force(
-        strips[CENTRE, :count], strips[WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
+        strips[OWN_PLACE, :count], strips[OWN_WIDTH, :count], strips[HALF_LENGTH, :count], strips[MIDDLE, :count],
         strips[PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count], slip[3, :count],
         model.shear_modulus, friction, library, work, ANY_METHOD,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from wrcore.contact.statics import settle, settle_apart
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, euler_parameters, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
-from wrcore.dynamics.linear import steady_running
+from wrcore.dynamics.linear import cleared, steady_running
 from wrcore.dynamics.series import equations_of
 from wrcore.dynamics.support import rails_at
 from wrcore.dynamics.system import independent_at, own_states, state_size
@@ -293,7 +293,7 @@ def _balanced(vehicle, model, equations, state):
         found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
         if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
-    return standing(found)[0]
+    return cleared(standing(found)[0])
 
 
 def _improved(standing, stands, steps):

@@ -10,7 +10,9 @@ from tests.conftest import DATA
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch.library import solve_patch
-from wrcore.contact.patch.normal import RESOLUTIONS, NormalContact
+from wrcore.contact.patch.normal import RESOLUTIONS, NormalContact, even_length
+from wrcore.contact.patch.solve import wheel_overlaps
+from wrcore.contact.patch.strips import MEMORY
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.wheel_on_rail import WheelOnRail
@@ -53,7 +55,9 @@ def test_a_cone_on_a_round_rail_head_is_hertz(radius, share, resolution):
     assert found.p_max == pytest.approx(1.5 * force / (math.pi * a * b * d), rel=0.01)
     assert 0.5 * (found.x_max - found.x_min) == pytest.approx(a * math.sqrt(d), rel=0.01)
     assert 0.5 * (found.s_max - found.s_min) == pytest.approx(b * math.sqrt(d), rel=0.04)
-    assert 2.0 * found.even_length @ found.width == pytest.approx(math.pi * a * b * d, rel=0.005)
+    assert 2.0 * even_length(found.half_length, found.width, found.window) @ found.width == pytest.approx(
+        math.pi * a * b * d, rel=0.005
+    )
     assert found.mean_xx == pytest.approx(0.2 * a * a * d, rel=0.01)
     assert found.mean_ss == pytest.approx(0.2 * b * b * d, rel=0.02)
 
@@ -182,15 +186,29 @@ def test_ten_kilonewton_against_contact(benchmark_pair):
 
 
 def test_wheel_loads_against_contact(benchmark_pair, shared_file):
-    # 30 to 80 kN, y = -6 to 8 mm, yaw 0 and 5 mrad. Measured: N 0.02 % in the median, 0.19 % at most; p_max of
-    # CONTACT's own cells is up to 1 % too low around the centred position.
+    # 30 to 80 kN, y = -6 to 8 mm, yaw 0 and 5 mrad. Measured: N 0.03 % in the median, 0.15 % at most; p_max of
+    # CONTACT's own cells is up to 1 % too low around the centred position. Pressures are those of contact in a curved
+    # plane (D = 4). Heights are there in one plane only: in the flange root, which is curved, N is 0.56 % less at most.
     cases = contact_cases(pd.read_csv(shared_file("reference", "loaded_partial_slip.csv"), comment="#"))
+    cases = cases.assign(pmax_MPa=cases.pmax_MPa + cases.dpmax_D4_MPa)
     contact = NormalContact(benchmark_pair, MODULUS, "fine")
     errors = pd.DataFrame([against_contact(contact, row) for row in cases.itertuples()]).abs()
-    assert errors.force.max() < 3e-3 and errors.force.median() < 5e-4
-    assert errors.height.max() < 2e-7
+    plane = errors[(cases.y_ws_mm > -5.0).to_numpy()]
+    assert plane.force.max() < 3e-3 and errors.force.median() < 5e-4 and errors.force.max() < 7e-3
+    assert plane.height.max() < 2e-7
     assert errors.p_max.quantile(0.95) < 0.01 and errors.p_max.median() < 1.5e-3
     assert errors.width.quantile(0.95) < 0.4e-3 and errors.length.quantile(0.95) < 0.2e-3
+
+
+def test_pressure_of_tread_and_root_against_curved_contact(benchmark_pair, shared_file):
+    # CONTACT's contact in a curved plane (D = 4) has 1.5 to 2 % less pressure than in one plane (D = 3) where a patch
+    # holds tread and root, 10 mm apart and 0.3 rad from each other; so do strips, which erred by 2.7 % in one plane
+    table = pd.read_csv(shared_file("reference", "loaded_partial_slip.csv"), comment="#")
+    table = table[(table.n_patches == 1) & table.y_ws_mm.between(-5.3, -4.7)]
+    table["pmax_MPa"] += table.dpmax_D4_MPa
+    contact = NormalContact(benchmark_pair, MODULUS, "fine")
+    errors = pd.DataFrame([against_contact(contact, row) for row in table.itertuples()]).abs()
+    assert len(errors) == 8 and errors.p_max.max() < 0.02 and errors.p_max.median() < 0.01
 
 
 def test_rigid_slip_against_contact(benchmark_pair, shared_file):
@@ -256,13 +274,60 @@ def test_two_lobes_roll_each_in_its_own_plane(benchmark_pair, hollow, y, bound, 
     velocity = [20.0, 0.02, 0.0, 0.0, 20.0 / 0.46 * (1.0 + 5e-4), 20.0 * spin, 20.0]
     (patch,) = NormalContact(pair, MODULUS, "fine").at_height("left", y, z, velocity=velocity)
     assert patch.window.max() == 1 and np.ptp(patch.tilt) > 0.15
-    strips = patch.centre, patch.width, patch.half_length, patch.middle, patch.peak
+    strips = patch.place, patch.own_width, patch.half_length, patch.middle, patch.peak
     slip = patch.slip_x, patch.slip_x_dx, patch.slip_s, patch.slip_s_dx
     force = solve_patch(strips, slip, 8.2e10, mu, "fine").force
     angle = patch.contact_angle + np.arctan(patch.tilt)
     joint = np.array([force[0].sum(), force[1] @ np.cos(angle), force[1] @ np.sin(angle)])
     parts = sum(alone(patch, window, velocity, np.array([0.0, y, z]), mu) for window in (0, 1))
     assert np.linalg.norm(joint - parts) < bound * mu * patch.normal_force
+
+
+def strip_loads(patch):
+    """Normal forces of the strips along their own normals, N, and their places across the track, (strips, 2)."""
+    load = 0.5 * np.pi * patch.peak * patch.half_length * patch.own_width
+    across, up = patch.centre, patch.height
+    cosine, sine = math.cos(patch.contact_angle), math.sin(patch.contact_angle)
+    _, y, z = patch.origin
+    return load, np.stack([y + across * cosine - up * sine, z + across * sine + up * cosine], axis=1)
+
+
+def lobes_alone(contact, y, heights):
+    """The overlaps of a left wheel, each solved by itself at a height of its own."""
+    found = []
+    for k, z in enumerate(heights):
+        count, pose = wheel_overlaps(contact.geometry, 1.0, y, z, 0.0, 1.0, 0.0, True, contact._patches)
+        assert count == len(heights)
+        found.append(contact._solve("left", pose, k, k + 1, None, np.zeros(MEMORY)))
+    return found
+
+
+@pytest.mark.parametrize(("hollow", "y", "load", "lighter"), [
+    ((5e-3, 15e-3), -2e-3, 55e3, 0.3), ((0.0, 10e-3), 1e-4, 55e3, 0.4), (None, 5e-3, 10e3, 0.2),
+])  # fmt: skip
+def test_lobes_press_each_other_down_as_point_loads_do_and_have_planes_of_their_own(
+    benchmark_pair, hollow, y, load, lighter
+):
+    # Boussinesq: N/(pi E* distance), 0.5 to 4.7 um. Without that the lighter lobe carries 31, 42 or 23 % more, at 7 to
+    # 12 % more pressure: what separating tread and root, 10 mm apart, gives. With gaps along one normal for both lobes,
+    # 0.17 rad from each one's own, it carried 2.6 to 2.9 % too much
+    pair = hollow_pair(*hollow) if hollow else benchmark_pair
+    z, contact = height(pair, y, load), NormalContact(pair, MODULUS, "fine")
+    (joint,) = contact.at_height("left", y, z)
+    heights = [z, z]
+    for _ in range(12):
+        alone = lobes_alone(contact, y, heights)
+        loads, places = zip(*map(strip_loads, alone), strict=True)
+        for k in range(2):
+            away = np.linalg.norm(places[1 - k] - loads[k] @ places[k] / loads[k].sum(), axis=1)
+            down = (loads[1 - k] / away).sum() / (np.pi * MODULUS)
+            heights[k] = 0.5 * (heights[k] + z + down / math.cos(alone[k].contact_angle))
+    together, _ = strip_loads(joint)
+    for k in range(2):
+        assert together[joint.window == k].sum() == pytest.approx(loads[k].sum(), rel=6e-3)
+        assert joint.peak[joint.window == k].max() == pytest.approx(alone[k].peak.max(), rel=3e-3)
+    apart = [strip_loads(one)[0].sum() for one in lobes_alone(contact, y, [z, z])]
+    assert max(one / two.sum() for one, two in zip(apart, loads, strict=True)) > 1.0 + lighter
 
 
 def test_a_load_is_carried(benchmark_pair):
@@ -279,7 +344,7 @@ def test_virtual_penetration_is_near_on_the_tread(benchmark_pair):
     for y in (-0.005, -0.003, 0.003, 0.004):
         z = height(benchmark_pair, y, 55e3)
         (reference,), (cheap,) = (model.at_height("left", y, z) for model in (exact, strips))
-        assert cheap.normal_force == pytest.approx(reference.normal_force, rel=0.005)
+        assert cheap.normal_force == pytest.approx(reference.normal_force, rel=0.006)  # at 4 mm 0.50 %
         assert cheap.p_max == pytest.approx(reference.p_max, rel=0.05)
 
 

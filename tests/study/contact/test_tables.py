@@ -287,10 +287,10 @@ def test_search_table_counts_every_wheel(benchmark_pair):
 
 def test_search_finds_nearly_everything_at_angles_beyond_its_cells(benchmark_pair):
     # up to 100 mrad of yaw: where the search saw only the window over the rail, 70 of these wheels and 190 shallow ones
-    # missed an overlap, up to 5 mm deep; what is left are lobes of one overlap, closer than the scan can tell,
-    # one of them (yaw 69 mrad, roll -15 mrad) since a point of contact is sought within its own overlap only
+    # missed an overlap, up to 5 mm deep; what is left are slivers of a wheel that turns back over the rail's very end,
+    # narrower than 0.16 mm
     poses = search.random_poses(1500, 7, ranges={"yaw": 0.1, "roll": 0.02})
     depths = 10.0 ** np.random.default_rng(8).uniform(-6.0, -3.3, len(poses))
     deep, shallow = (search.compare_with_dense(benchmark_pair, poses, depths=lowered) for lowered in (None, depths))
-    assert (deep.outcome == "missed").sum() <= 7 and (shallow.outcome == "missed").sum() == 0
+    assert (deep.outcome == "missed").sum() <= 3 and (shallow.outcome == "missed").sum() == 0
     assert (pd.concat([deep, shallow]).outcome == "split").sum() <= 3

@@ -144,9 +144,9 @@ def strip_gap(geometry, pose, frame, s, u, ur):
     Returns
     -------
     gap, gap_slope : float
-        g0 (m) and its slope over s.
+        g0 (m) along the normal of the strip's own plane, and its slope over s.
     shape, crest : float
-        A (1/m) and x_c (m).
+        A (1/m), likewise, and x_c (m).
     shape_rate, crest_rate : float
         Their slopes over s (1/m^2 and -).
     height : float
@@ -189,8 +189,10 @@ def strip_gap(geometry, pose, frame, s, u, ur):
         if abs(s - here) < 1e-8:
             break
         ur += (s - here) / (frame.cosine + m * frame.sine)
-    gap = top - normal - (s - here) * fall
-    return gap, rise - fall, shape, crest, shape_rate, crest_rate, top, 0.5 * (rise + fall), u, ur
+    tilt = 0.5 * (rise + fall)
+    lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
+    gap, slope = (top - normal - (s - here) * fall) * lean, (rise - fall) * lean
+    return gap, slope, shape * lean, crest, shape_rate * lean, crest_rate, top, tilt, u, ur
 
 
 @jit(allocates=False)
@@ -246,10 +248,22 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
     nodes[0, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
     tangent = frame.sine / frame.cosine
     fall = (df - tangent) / (1.0 + df * tangent)
-    nodes[1, k] = gap * (frame.cosine - frame.sine * fall)
     m = wheel_slope(pose, slope, along)
     rise = (m - tangent) / (1.0 + m * tangent)
-    nodes[2, k] = 0.5 * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+    tilt = 0.5 * (rise + fall)
+    lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
+    nodes[1, k] = gap * (frame.cosine - frame.sine * fall) * lean
+    nodes[2, k] = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+
+
+@jit(allocates=False, fastmath=FUSED)
+def unroll(centre, width, tilt, place, own):
+    """Fill the places and widths (m) that strips have along their own planes, where they carry and roll."""
+    for i in range(len(centre)):
+        own[i] = width[i] * math.sqrt(1.0 + tilt[i] * tilt[i])
+        place[i] = centre[0]
+        if i > 0:
+            place[i] = place[i - 1] + centre[i] - centre[i - 1] + 0.5 * (own[i] - width[i] + own[i - 1] - width[i - 1])
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

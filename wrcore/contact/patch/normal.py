@@ -28,6 +28,8 @@ from wrcore.contact.patch.solve import (
     EXACT,
     LOAD,
     MIDDLE,
+    OWN_PLACE,
+    OWN_WIDTH,
     PEAK,
     STRIP_ROWS,
     STRIP_TILT,
@@ -81,6 +83,9 @@ class StripPatch:
     """Of the wheel's extreme point in a strip along n, m."""
     tilt: np.ndarray
     """Slope over s of a strip's own contact plane, in which it slips."""
+    place: np.ndarray
+    own_width: np.ndarray
+    """``centre`` and ``width`` along these planes, where strips carry and roll."""
     normal_force: float
     p_max: float
     mean_x: float
@@ -99,60 +104,17 @@ class StripPatch:
     """Rigid slip over V at the middle of the strips, across in their own planes, and its slope along x; None unless a
     velocity was given."""
 
-    def resultant(self, force):
-        """What pressure and friction on the strips are together, as in runs.
 
-        Parameters
-        ----------
-        force : numpy.ndarray, shape (3, strips)
-            Along x and across in the strips' own planes, N, and the moment of the latter about the middle, N m.
+def even_length(half_length, width, window):
+    """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
 
-        Returns
-        -------
-        angle : float
-            Of the pressure's resultant, the patch's normal, rad.
-        normal, fx, fy, mz : float
-            Forces along and across that normal, N, and friction's moment about it at the pressure's centroid, N m.
-        """
-        load = 0.5 * math.pi * self.peak * self.half_length * self.width
-        turn, cosine = math.atan2(load @ self.tilt, load.sum()), 1.0 / np.sqrt(1.0 + self.tilt**2)
-        fx, fs, fn = force[0], cosine * force[1], cosine * self.tilt * force[1]
-        x, s = self.middle - self.mean_x, self.centre - self.mean_s
-        about_s, about_n = (
-            self.height @ fx - x @ fn - (cosine * self.tilt) @ force[2],
-            x @ fs - s @ fx + cosine @ force[2],
-        )
-        c, q = math.cos(turn), math.sin(turn)
-        normal = load.sum() / c + fn.sum() * c - fs.sum() * q
-        return self.contact_angle + turn, normal, fx.sum(), fs.sum() * c + fn.sum() * q, about_n * c - about_s * q
-
-    @property
-    def even_length(self):
-        """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
-
-        Galerkin's strips at the tips of a window are too long, by a share that grows with length over width: fitted to
-        the area of Hertz's ellipses with a/b from 0.25 to 9 and 8 to 32 strips (within 0.3 %).
-        """
-        even, edge = self.half_length.copy(), np.diff(self.window, prepend=-1, append=-1) != 0
-        at = edge[1:] | edge[:-1]
-        even[at] *= 1.0 - TIP_SHARE - TIP_GROWTH * np.log(even[at] / self.width[at])
-        return even
-
-    def slip_of_creepages(self, xi, eta, phi):
-        """Rigid slip of one set of creepages at the frame's origin: xi - phi s along x, eta + phi x along s.
-
-        Parameters
-        ----------
-        xi, eta, phi : float
-            Wheel relative to rail, - and 1/m.
-
-        Returns
-        -------
-        numpy.ndarray, shape (4, strips)
-            slip_x, slip_x_dx, slip_s, slip_s_dx.
-        """
-        none = np.zeros(len(self.centre))
-        return np.stack([xi - phi * self.centre, none, eta + phi * self.middle, none + phi])
+    Galerkin's strips at the tips of a window are too long, by a share that grows with length over width: fitted to
+    the area of Hertz's ellipses with a/b from 0.25 to 9 and 8 to 32 strips (within 0.3 %).
+    """
+    even, edge = half_length.copy(), np.diff(window, prepend=-1, append=-1) != 0
+    at = edge[1:] | edge[:-1]
+    even[at] *= 1.0 - TIP_SHARE - TIP_GROWTH * np.log(even[at] / width[at])
+    return even
 
 
 class NormalContact:
@@ -248,7 +210,8 @@ class NormalContact:
         origin = (frame.x, frame.ur + self.geometry.rail_distance, frame.z)
         found = StripPatch(
             side, windows > 0, math.atan2(frame.sine, frame.cosine), origin, *strips[CENTRE : PEAK + 1],
-            strips[WINDOW].astype(int), strips[WHEEL_HEIGHT], strips[STRIP_TILT], *map(float, sums), *slips,
+            strips[WINDOW].astype(int), strips[WHEEL_HEIGHT], strips[STRIP_TILT], strips[OWN_PLACE], strips[OWN_WIDTH],
+            *map(float, sums), *slips,
         )  # fmt: skip
         return found if side == "left" else _mirrored(found)
 
@@ -294,7 +257,7 @@ class NormalContact:
 def _mirrored(patch):
     """A patch of a left wheel as that of a right one, or the other way round."""
     arrays = {name: part[::-1] for name, part in vars(patch).items() if isinstance(part, np.ndarray)}
-    for name in {"centre", "tilt", "slip_s", "slip_s_dx"} & arrays.keys():
+    for name in {"centre", "tilt", "place", "slip_s", "slip_s_dx"} & arrays.keys():
         arrays[name] = -arrays[name]
     arrays["window"] = arrays["window"].max(initial=0) - arrays["window"]
     x, y, z = patch.origin

@@ -4,7 +4,7 @@ import math
 
 from wrcore.contact.detection import find_patches
 from wrcore.contact.patch.fixed import windows_from_fixed
-from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps
+from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps, unroll
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
 from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
 from wrcore.contact.patch.windows import (
@@ -39,8 +39,8 @@ _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
 
 # Rows of the strip array, and of the sums over a patch.
-CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WINDOW, WHEEL_HEIGHT, STRIP_TILT, STRIP_LOAD = range(9)
-STRIP_ROWS = 9
+CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WINDOW, WHEEL_HEIGHT, STRIP_TILT, STRIP_LOAD, OWN_PLACE, OWN_WIDTH = range(11)
+STRIP_ROWS = 11
 LOAD, LARGEST, MEAN_X, MEAN_S, MEAN_XX, MEAN_SS, X_MIN, X_MAX, S_MIN, S_MAX = range(10)
 SUMS = 10
 
@@ -202,7 +202,7 @@ def publish(modulus, work, windows, strips, sums):
     modulus : float
         E*, Pa.
     strips : numpy.ndarray, shape (STRIP_ROWS, MAX_STRIPS)
-        Filled: rows CENTRE to STRIP_LOAD, by increasing s.
+        Filled: rows CENTRE to OWN_WIDTH, by increasing s.
     sums : numpy.ndarray, shape (SUMS,)
         Filled: normal force, largest pressure, means over the pressure of x, s, x^2, s^2, and extents.
 
@@ -231,6 +231,7 @@ def publish(modulus, work, windows, strips, sums):
         sums[X_MIN], sums[X_MAX] = min(sums[X_MIN], x - a), max(sums[X_MAX], x + a)
         if peak > strips[PEAK, best]:
             best = i
+    unroll(strips[CENTRE, :count], strips[WIDTH], strips[STRIP_TILT], strips[OWN_PLACE], strips[OWN_WIDTH])
     for q in range(MEAN_X, MEAN_SS + 1):
         sums[q] /= sums[LOAD]
     low, high = tip(strips, 0, 1), tip(strips, count - 1, -1)

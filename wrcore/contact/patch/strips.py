@@ -15,6 +15,7 @@ from wrcore.contact.patch.gap import (
     NODES,
     SHAPE,
     SHAPE_RATE,
+    TILT,
     UR,
     U,
     strip_gap,
@@ -66,6 +67,8 @@ class Workspace(NamedTuple):
     """(2, MAX_WINDOWS + 1): tips of windows to be, m."""
     tops: np.ndarray
     """(MAX_WINDOWS,): largest c of each window, m^2."""
+    stretch: np.ndarray
+    """(MAX_WINDOWS,): mean width of each window's strips along their own planes, over that in the frame."""
     stride: np.ndarray
     """(2, MAX_WINDOWS): last step of the tips, m."""
     window: np.ndarray
@@ -107,7 +110,7 @@ def workspace():
     n, m = MAX_STRIPS, MAX_WINDOWS
     return Workspace(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
-        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), np.zeros(m), np.zeros((2, m)),
+        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), *np.zeros((2, m)), np.zeros((2, m)),
         np.zeros(n, np.int64),
         *(np.zeros(n) for _ in range(5)), np.zeros((n, GAP_ROWS)),
         np.stack([np.log(np.arange(n) + 0.5), np.zeros(n), np.zeros(n)]), np.zeros((4, 4)),
@@ -122,7 +125,7 @@ def place_strips(geometry, pose, frame, work, windows):
     u, ur = work.gap[0, U], work.gap[0, UR]
     for k in range(windows):
         first, last = work.start[k], work.start[k + 1]
-        w = (work.high[k] - work.low[k]) / (last - first)
+        w, stretch = (work.high[k] - work.low[k]) / (last - first), 0.0
         for i in range(first, last):
             s = work.low[k] + (i - first + 0.5) * w
             work.centre[i], work.width[i], work.window[i] = s, w, k
@@ -130,7 +133,8 @@ def place_strips(geometry, pose, frame, work, windows):
             found = strip_gap(geometry, pose, frame, s, u, ur)
             for q in range(GAP_ROWS):
                 row[q] = found[q]
-            u, ur = row[U], row[UR]
+            u, ur, stretch = row[U], row[UR], stretch + math.sqrt(1.0 + row[TILT] * row[TILT])
+        work.stretch[k] = stretch / (last - first)
         for column in (GAP, GAP_SLOPE):
             _compensate(work.gap, column, first, last)
 
@@ -162,8 +166,7 @@ def assemble(values, work, windows, kinds):
         work.logs[1, j], work.logs[2, j] = math.log(work.square[j]), 1.0 / math.sqrt(work.square[j])
     for i in range(strips):
         own, k, row = work.window[i], kinds * i, work.gap[i]
-        a, w = math.sqrt(work.square[i]), work.width[i]
-        log_w = math.log(w)
+        a, log_w = math.sqrt(work.square[i]), math.log(work.width[i] * work.stretch[own])
         for m in range(points):
             d = work.middle[i] + a * POINTS[m] - row[CREST]
             sums[0, m], sums[1, m] = row[GAP] + row[SHAPE] * d * d, 2.0 * row[SHAPE] * d
@@ -171,9 +174,11 @@ def assemble(values, work, windows, kinds):
         for j in range(strips):
             c, p = work.square[j], work.share[j]
             inverse, load = work.logs[2, j], p * c
-            distance, wj = abs(work.centre[i] - work.centre[j]), work.width[j]
-            low, high = (distance - 0.5 * wj) * inverse, (distance + 0.5 * wj) * inverse
-            together = work.window[j] == own
+            together, stretch = work.window[j] == own, work.stretch[work.window[j]]
+            distance, half = abs(work.centre[i] - work.centre[j]), 0.5 * work.width[j] * stretch
+            if together:
+                distance *= stretch
+            low, high = (distance - half) * inverse, (distance + half) * inverse
             offset_s = aside = part = part_w = 0.0
             if together:
                 apart, shift = abs(i - j), log_w - 0.5 * work.logs[1, j]
@@ -183,7 +188,7 @@ def assemble(values, work, windows, kinds):
                 offset_s = work.centre[i] - work.centre[j]
                 aside = inverse if offset_s > 0.0 else -inverse
                 begin, end = work.start[work.window[j]], work.start[work.window[j] + 1]
-                part_w = 1.0 / ((end - begin) * wj)
+                part_w = 1.0 / ((end - begin) * work.width[j])
                 part = (j - begin + 0.5) / (end - begin)
             if i == j:
                 low = -1.0
@@ -291,7 +296,8 @@ def gap_under_load(values, work, windows, s, x, gap):
     """Gap (m) between the loaded surfaces at (x, s) where the undeformed one is ``gap``."""
     for j in range(work.start[windows]):
         inverse = 1.0 / math.sqrt(work.square[j])
-        distance, w = abs(s - work.centre[j]), work.width[j]
+        stretch = work.stretch[work.window[j]]
+        distance, w = abs(s - work.centre[j]) * stretch, work.width[j] * stretch
         low, high = (distance - 0.5 * w) * inverse, (distance + 0.5 * w) * inverse
         xi = abs(x - work.middle[j]) * inverse
         if low > 1e-9:
