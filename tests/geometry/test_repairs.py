@@ -37,15 +37,16 @@ def rows_of(separator, decimal=".", header="u_mm{0}f_mm", more=""):
     rows_of(";", ","), rows_of(" ; ", ","), rows_of(";"), rows_of(","), rows_of(", "), rows_of("\t"), rows_of("  "),
     rows_of(";", ",", "", "; 1,5"), rows_of(",", ".", "", ",1"), rows_of(",", ".", "", " 1.0"),
     rows_of(";", ",", more=";"),
+    rows_of("\t", ","), rows_of("\t", ",", "", "\t1,5"), rows_of(",\t"), rows_of("\t\t", ","),
 ])  # fmt: skip
 def test_every_way_to_write_the_same_points(tmp_path, rows, said):
-    """Decimal commas beside semicolons are read: their decimals were dropped, without a word."""
+    """Decimal commas beside semicolons and tabs are read: their decimals were dropped, without a word."""
     curve = read_profile({"points": written(tmp_path, rows), "unit": "mm"}, "wheel")
     assert np.abs(curve(U[5:-5]) - 1e-3 * POINTS[1][5:-5]).max() < 1e-8 and said() == ""
 
 
 @pytest.mark.parametrize("rows", [
-    rows_of(",", ","), rows_of(" ", ","), rows_of("\t", ","), rows_of(",", ",", ""), rows_of(" ", ",", ""),
+    rows_of(",", ","), rows_of(" ", ","), rows_of("\t", ",", "", ",5"), rows_of(",", ",", ""), rows_of(" ", ",", ""),
     rows_of(";", ".")[:5] + ["-59.6;1.234,5"] + rows_of(";")[6:], rows_of(",")[:3] + ["-59.8,26,7"],
     ["-60,5,-26,9", "-50,2,-20,1", "-40,3,-10,2"],
 ], ids=["commas", "blanks", "tabs", "no header", "blanks, no header", "thousands", "one row", "whole"])  # fmt: skip
