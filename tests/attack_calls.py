@@ -170,7 +170,7 @@ def excluded(kind, value):
         if re.match(rf"{word}(,|$)", kind):
             return not isinstance(value, one)
     if re.match(r"(str|path-like)(,|$)", kind):
-        return not isinstance(value, str | Path)
+        return not isinstance(value, str | Path) and type(value).__name__ not in kind
     return bool(re.match(r"bool(,|$)", kind)) and not isinstance(value, bool | np.bool_)
 
 
