@@ -66,7 +66,7 @@ def similar(word, known):
     from difflib import get_close_matches
 
     words = {name.lower(): name for name in map(str, known)}
-    word = str(word).lower()
+    word = word.lower() if isinstance(word, str) else ""
     near = [name for name in words if word.startswith(name + "_")] or get_close_matches(word, words, n=1)
     return f"; did you mean {words[near[0]]!r}?" if near else ""
 
@@ -74,4 +74,4 @@ def similar(word, known):
 def one_of(known, word):
     """What to say of a word that is none of the known ones: these, and the closest."""
     known = [str(name) for name in known]
-    return f"expected one of {', '.join(known)}, got {word!r}{similar(word, known)}"
+    return f"expected one of {', '.join(known)}, got {short(word)}{similar(word, known)}"

@@ -133,7 +133,7 @@ def read_columns(path, text, unit=None):
             count = stated or len(points[0])
             if len(points[-1]) != count:
                 raise InputError(path, f"line {number}", f"expected {count} numbers, got {line[:40]!r}{_SEPARATED}")
-            whole = whole and "," in line and not re.search("[.;\teE]", line)
+            whole = whole and "," in line and not re.search("[.;\t]", line)
     if points and whole and not stated and len(points[0]) > 2:
         raise InputError(path, f"line {lines[0]}", f"expected numbers with decimal points{_SEPARATED}")
     if unit is None:
