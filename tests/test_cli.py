@@ -68,6 +68,8 @@ def test_columns_of_tables_are_those_that_the_help_names(tmp_path, monkeypatch):
     (["simulate", SCENE, "--set", "sped=30"], "--set: sped: unknown key"),
     (["simulate", SCENE, "--set", "contact.crep.model=table"], "--set: contact.crep: unknown key"),
     (["simulate", SCENE, "--set", "contact.crep.model=table"], "did you mean 'creep'?"),
+    (["simulate", SCENE, "--set", "initial.bodies.wheelset.vx_m_per_s=20"], "did you mean 'vx'?"),
+    (["simulate", SCENE, "--set", "speed_m_per_s=20"], "did you mean 'speed'?"),
     (["simulate", SCENE, "--set", "contact.creep.model=polak"], "did you mean 'polach'?"),
     (["simulate", SCENE, "--set", "integration.method=rk5"], "did you mean 'rk4"),
     (["simulate", SCENE, "--set", "wheel.profile=s1003"], "--set: wheel.profile"),

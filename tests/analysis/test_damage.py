@@ -5,6 +5,7 @@ import pytest
 
 from tests.analysis.test_assess import synthetic
 from wrcore.analysis.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
+from wrcore.analysis.wheels import wheel_table
 from wrcore.errors import InputError
 from wrcore.run.run import Run
 
@@ -65,6 +66,21 @@ def test_table_of_a_run(run):
         damage_table(run, begin=1.0)
     with pytest.raises(InputError, match="channels of wheels"):
         damage_table(Run(run.scene, "completed", "", run.t, {}))
+
+
+def test_means_are_over_the_way(run):
+    """Braked to a quarter of the speed half-way through the time: the second half's share of the way is a fifth."""
+    late = run.t >= 0.05
+    run.groups["wheelset"]["vx_m_per_s"] = np.where(late, 5.0, 20.0)
+    fifth = np.count_nonzero(late) * 5.0 / (np.count_nonzero(late) * 5.0 + np.count_nonzero(~late) * 20.0)
+    assert fifth == pytest.approx(0.2, abs=0.01)
+    row, wheel = (table(run).set_index("side").loc["left"] for table in (damage_table, wheel_table))
+    assert row["T_gamma_mean_N"] == pytest.approx((1.0 - fifth) * 65.0 + fifth * 65.0 / 12.0, rel=1e-12)
+    assert wheel["T_gamma_mean_N"] == row["T_gamma_mean_N"] == wheel["T_gamma_spin_mean_N"]
+    assert row["rcf_damage_mean"] == pytest.approx((1.0 - fifth) * 1e-5, rel=1e-12)
+    assert row["share_above_shakedown"] == pytest.approx(1.0 - fifth, rel=1e-12)
+    power = (np.count_nonzero(~late) * 65.0 * 20.0 + np.count_nonzero(late) * 65.0 / 12.0 * 5.0) / len(run.t)
+    assert wheel["creep_power_mean_W"] == pytest.approx(power, rel=1e-12)  # a mean over time
 
 
 def test_map_holds_all_wheels_and_the_limit(run):

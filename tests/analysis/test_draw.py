@@ -16,6 +16,7 @@ from study.report.legible import findings
 from tests.conftest import ROOT, SCENES
 from tests.synthetic import hunting_run
 from wrcore.analysis.plot_vehicle import box_of
+from wrcore.analysis.wear_folder import claim, write_rows
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import _schema
 
@@ -184,6 +185,12 @@ def test_profiles_over_distance(tmp_path):
         {"step": 1, "distance_m": 1e6, "step_m": 0.0, **zero},
     ]
     pd.DataFrame(rows).to_csv(tmp_path / "steps.csv", index=False)
+    for use in (wr.draw, lambda folder: claim(folder, "mark", {})):
+        with pytest.raises(wr.InputError, match=r"plan.json: expected the plan of this folder"):  # anybody's numbers
+            use(tmp_path)
+    (tmp_path / "steps.csv").unlink()
+    claim(tmp_path, "mark", {})
+    write_rows(tmp_path, rows)
     figure = wr.draw(tmp_path)
     assert findings(figure) == [] and len(figure.axes) == 6
     assert figure.axes[1].lines[1].get_ydata().max() == pytest.approx(0.1)

@@ -141,6 +141,7 @@ DAMAGE = {
     "no profile": ("profile_001.csv", lambda p: p.unlink()),
     "a pipe": ("profile_001.csv", lambda p: (p.unlink(), os.mkfifo(p))),
     "edited rails": ("rails_000.csv", lambda p: text(p, lambda t: t.replace("0.75", "0.25"))),
+    "no plan": ("plan.json", lambda p: p.unlink()),
     "no digests": ("plan.json", lambda p: text(p, lambda t: t.replace('"files"', '"others"'))),
 }
 

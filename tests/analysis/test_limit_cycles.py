@@ -100,6 +100,25 @@ def test_motions_that_do_not_settle_say_so(oscillator, suspended):
         assert row["simulated_s"] == pytest.approx(60.0)
 
 
+@pytest.mark.parametrize(
+    ("amplitudes", "found"),
+    [
+        ([1.0, 1.001, 1.3, 1.301, 0.8], ("irregular", 0.8)),  # two by two they agree by chance
+        ([1.0, 1.0015, 1.003, 1.3, 1.2], ("irregular", 1.2)),  # two by two, but the three do not
+        ([1.5, 1.0, 1.001, 1.0005, 1.0], ("limit cycle", 1.0005)),
+    ],
+)
+def test_three_windows_agree_on_a_limit_cycle(suspended, monkeypatch, amplitudes, found):
+    sizes, t = iter(amplitudes), np.linspace(0.0, 1.0, 401)
+
+    def run(model, state, settling):
+        return t, 1e-3 * next(sizes) * np.cos(8.0 * np.pi * t)[:, None], state, True
+
+    monkeypatch.setattr(analysis_limit_cycles, "_run", run)
+    row, _ = settle_motion(*suspended, Settling(window=1.0, longest=5.0))
+    assert (row["status"], row["amplitude_m"]) == (found[0], pytest.approx(1e-3 * found[1]))
+
+
 def test_limit_cycle_of_a_wheelset_equals_that_of_a_plain_run():
     """From another start and in one go, `simulate` ends on the same limit cycle, within a per cent.
 

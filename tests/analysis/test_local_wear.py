@@ -158,6 +158,26 @@ def test_volume_is_the_sum_of_the_depths(law):
         assert width == pytest.approx(2 * 3e-3 * np.cos(0.5), abs=3 * BIN)  # the patch, seen from above
 
 
+def test_a_metre_counts_as_one_whether_it_is_run_fast_or_slowly():
+    """Half of the time at 30 m/s with a patch at one place, half at 10 m/s with three times the creepage elsewhere."""
+    run = worn_run()
+    body, late = run.groups["wheelset"], run.t > 0.5 * run.t[-1]
+    body["vx_m_per_s"] = np.where(late, 10.0, 30.0)
+    slow = np.count_nonzero(late) * 10.0
+    way = slow + np.count_nonzero(~late) * 30.0
+    for side in ("left", "right"):
+        channels = run.groups[f"wheelset/{side}"]
+        channels["xi"][late, 0] *= 3.0
+        channels["u_wheel_m"][:, 0] = channels["u_rail_m"][:, 0] = np.where(late, 0.02, -0.02)
+    work = 1.2e4 * 4e-3 * (3.0 * slow + (way - slow)) / way
+    share = 3.0 * slow / (3.0 * slow + (way - slow))
+    for wear in local_wear(run, law="energy").values():
+        assert wear.work == pytest.approx(work, rel=1e-9)
+        assert wear.volume == pytest.approx(5.3e-9 * work / 7850.0, rel=1e-9)
+        for edges, depth in ((wear.wheel_edges, wear.wheel_depth), (wear.rail_edges, wear.rail_depth)):
+            assert depth[edges[1:] > 0.0].sum() / depth.sum() == pytest.approx(share, rel=1e-9)
+
+
 @pytest.mark.parametrize("law", ["sheffield", MAP, TABLE])
 def test_mirrored_wheels_wear_alike(law):
     found = local_wear(worn_run(), law=law)

@@ -53,6 +53,7 @@ def test_what_is_refused_and_how():
     assert drawn(value, "a", "b", side="x", other=None)[0] is value and drawn() == (1.0, (), "left", {})
     for call, says in ((lambda: drawn("1"), "drawn: length: expected a number, at least 0 and at most 2 m, got '1'"),
                        (lambda: drawn(1.0, "a", 2), "drawn: names: expected text, got 2"),
+                       (lambda: wr.ensure_table(planes=10**5000), "ensure_table: planes: expected one of .* got a int"),
                        (lambda: drawn(side=None), "drawn: side: expected text, got None"),
                        (lambda: drawn(-(10**5000)), "drawn: length: expected a number, .* got a int")):  # fmt: skip
         with pytest.raises(InputError, match=says):

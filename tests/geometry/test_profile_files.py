@@ -68,6 +68,8 @@ def deviation(curve):
         ("u_mm,f_mm\n", None, 1e3, ","),
         ("u_m,f_m\n", None, 1.0, ","),
         ("# S1002\nu_mm; f_mm\n", "mm", 1e3, ";"),
+        ("U_mm,F_mm\n", None, 1e3, ","),
+        ("% MATLAB's\n! or SIMPACK's\nu_mm\tf_mm % head\n", None, 1e3, "\t"),
         ("", "mm", 1e3, "   "),
         ("", "m", 1.0, "\t"),
         ("\ufeffu_mm,f_mm\n", None, 1e3, " , "),
@@ -133,8 +135,11 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
         ("u_mm,f_m\n1,2\n", {}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\n", {"unit": "m"}, "line 1: expected one unit"),
         ("u_mm,f_mm\n1,2\nx,2\n", {}, "line 3: expected two numbers, got 'x,2'"),
-        ("x,y\n1,2\n", {}, "line 1: expected two numbers, got 'x,y'; a header is u_m,f_m or u_mm,f_mm"),
-        ("u_mm,f_mm\n# c\n1\n", {}, "line 3: expected two numbers, got '1'"),
+        ("x,y\n1,2\n", {}, "line 1: expected two numbers, got 'x,y'; a header above them is u_m,f_m or u_mm,f_mm"),
+        ("x1_mm;y1_mm\n1;2\n", {}, "got 'x1_mm;y1_mm'; a header above them is u_m,f_m or u_mm,f_mm: u to"),
+        ("u,f\nmm,mm\n1,2\n", {"unit": "mm"}, "line 1: expected two numbers, got 'u,f'; a header above them"),
+        ("u_mm,f_mm,w\n1,2\n", {}, "line 2: expected 3 numbers, got '1,2'"),
+        ("u_mm,f_mm\n# c\n1\n", {}, "line 3: expected two numbers, got '1'\n"),
         ("u_mm,f_mm\n1,2\nu_mm,f_mm\n", {}, "line 3: expected two numbers"),
         ("u_mm,f_mm\n" + "".join(f"{i},nan\n" for i in range(9)), {}, "line 2: expected finite"),
         ("u_mm,f_mm\n#\n" + "".join(f"{i % 7},0\n" for i in range(9)), {}, "line 10: expected strictly monotone"),
@@ -147,8 +152,32 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
 def test_faults_in_columns_name_the_line(tmp_path, text, spec, says):
     with pytest.raises(InputError) as caught:
         read_profile({"points": str(write(tmp_path, "bad.csv", text)), **spec}, "wheel")
-    assert says in str(caught.value)
+    assert says in str(caught.value) + "\n"
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("header", "more"), [("u_mm,f_mm,weight", ",1"), ('"U_MM","F_MM","w","n"', ",0.5,7")])
+def test_a_header_names_further_columns(tmp_path, header, more):
+    rows = [row + more for row in columns(U, wheel()(U)).splitlines()]
+    assert deviation(read_profile(str(write(tmp_path, "wheel.csv", "\n".join([header, *rows]))), "wheel")) < 0.2e-6
+
+
+def test_a_point_that_is_there_twice_counts_once(tmp_path):
+    rows = columns(U, wheel()(U)).splitlines()
+    for name, change in (("one.csv", rows), ("two.csv", [*rows[:200], rows[199], *rows[200:], rows[-1]])):
+        write(tmp_path, name, "\n".join(["u_mm,f_mm", *change]))
+    one, two = (read_profile(str(tmp_path / name), "wheel") for name in ("one.csv", "two.csv"))
+    assert np.array_equal(one.f, two.f)
+    write(tmp_path, "two.csv", "\n".join(["u_mm,f_mm", *rows[:200], rows[199] + "1", *rows[200:]]))
+    with pytest.raises(InputError, match="line 202: expected strictly monotone u"):  # the same u at another height
+        read_profile(str(tmp_path / "two.csv"), "wheel")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be", "utf-16-le", "latin-1"])
+def test_encodings_of_text(tmp_path, encoding):
+    mark = "\ufeff" if encoding in ("utf-16-be", "utf-16-le") else ""
+    (tmp_path / "wheel.txt").write_bytes(f"{mark}# gemessen für\nu_mm\tf_mm\n{columns(U, wheel()(U))}".encode(encoding))
+    assert deviation(read_profile(str(tmp_path / "wheel.txt"), "wheel")) < 0.2e-6
 
 
 def test_a_header_may_be_in_quotes(tmp_path):

@@ -273,10 +273,20 @@ def test_every_listed_profile_can_be_built():
         assert np.all(np.isfinite([curve.f, curve.df, curve.d2f]))
 
 
+def test_a_path_may_hold_a_name(tmp_path, monkeypatch):
+    assert np.array_equal(named_profile(Path("S1002"), "wheel").f, named_profile("S1002", "wheel").f)
+    with pytest.raises(InputError, match="inclination: expected a ratio for 60E1"):
+        named_profile(Path("60E1"), "rail")
+    monkeypatch.chdir(tmp_path)
+    Path("worn").write_text("u_m,f_m\n" + "".join(f"{u},{0.05 * u}\n" for u in np.linspace(-0.03, 0.03, 61)))
+    assert named_profile(Path("worn"), "wheel").source == "measured points, worn"
+
+
 @pytest.mark.parametrize(
     ("spec", "kind", "says"),
     [
         ("S1003", "wheel", "one of S1002"),
+        (Path("S1003"), "wheel", "a point file or one of S1002, cone:1/20, got 'S1003'; did you mean 'S1002'?"),
         ("60E9", "rail", "UIC60-MBench, 60E1"),
         ("S1002", "rail", "which is a wheel"),
         ("60E1", "wheel", "which is a rail"),

@@ -51,6 +51,15 @@ def test_every_dataset_states_unit_and_description(written):
         assert file.attrs["wrcore_version"] == __version__
 
 
+def test_a_run_is_stored_under_a_name_that_says_so(tmp_path):
+    for name in ("run.csv", "run", "run.h5.txt"):
+        with pytest.raises(InputError, match=f"{name}: expected a name that ends in .h5 or .hdf5"):
+            hunting_run().save(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+    hunting_run().save(tmp_path / "run.HDF5")
+    assert load_run(tmp_path / "run.HDF5").status == "completed"
+
+
 @pytest.mark.parametrize(
     ("channel", "unit"),
     [("t", "s"), ("y_m", "m"), ("vy_m_per_s", "m/s"), ("wz_rad_per_s", "rad/s"), ("phi_per_m", "1/m"), ("N_N", "N")]

@@ -17,7 +17,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.style import styled
-from wrcore.analysis.wheels import greatest_pressure, late_in, wear_number, wheelsets_of
+from wrcore.analysis.wheels import greatest_pressure, late_in, way_shares, wear_number, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.track import SIDES
@@ -70,8 +70,9 @@ def damage_table(
     Returns
     -------
     pandas.DataFrame
-        A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share of the time with
+        A row per wheel: wheelset, side, T_gamma_mean_N, rcf_damage_mean (per passage), FI_max, share of the way with
         FI above 0, p_max_Pa. Damage and FI are those of the worst patch at each time; T gamma is the sum over patches.
+        Means are over the way: those of the rail's places.
 
     Raises
     ------
@@ -89,12 +90,13 @@ def damage_table(
         raise InputError("damage_table", "run", "expected the channels of wheels")
     late, rows = late_in(run, begin, "damage_table"), []
     for wheelset in wheelsets_of(run):
+        share = way_shares(run, wheelset, late)
         for side in SIDES:
             index = fatigue_index(run, wheelset, side, shear_yield)[late]
             rows.append({
-                "wheelset": wheelset, "side": side, "T_gamma_mean_N": wear_number(run, wheelset, side)[late].mean(),
-                "rcf_damage_mean": passage_damage(run, wheelset, side)[late].mean(), "FI_max": index.max(),
-                "share_above_shakedown": np.mean(index > 0.0),
+                "wheelset": wheelset, "side": side, "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
+                "rcf_damage_mean": share @ passage_damage(run, wheelset, side)[late], "FI_max": index.max(),
+                "share_above_shakedown": share @ (index > 0.0),
                 "p_max_Pa": greatest_pressure(run, wheelset, side)[late].max(),
             })  # fmt: skip
     return pd.DataFrame(rows)

@@ -40,7 +40,7 @@ class Settling:
         A motion that still changes after this time is taken as it is, s: growing or decaying in each window since
         half-way, or irregular.
     change : float
-        Amplitudes of two windows in a row that differ by less than this part count as settled.
+        Amplitudes of three windows in a row that differ by less than this part count as settled.
     rest : float
         A smaller amplitude than this is no limit cycle, m.
     disturbance : float
@@ -91,8 +91,9 @@ def settle_motion(model, state, settling):
     row : dict
         speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN
         if it derails), frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``,
-        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``. Two windows
-        of a chaotic motion may agree by chance: whether it is irregular or a limit cycle then depends on the last bits.
+        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``. Windows
+        of a chaotic motion seldom agree, but may: whether it is irregular or a limit cycle then depends on the last
+        bits.
     state : numpy.ndarray
         At the end.
     """
@@ -119,7 +120,7 @@ def _status(amplitudes, elapsed, settling):
     last = amplitudes[-1]
     if last < settling.rest:
         return "at rest"
-    if len(amplitudes) > 1 and abs(last - amplitudes[-2]) < settling.change * last:
+    if len(amplitudes) > 2 and np.ptp(amplitudes[-3:]) < settling.change * last:
         return "limit cycle"
     if elapsed < settling.longest - 1e-9:
         return ""

@@ -9,7 +9,8 @@ A wheel meets a patch once a revolution, a rail once a passage. A strip of the p
 
     I = integral of (volume lost) dx: depth per passage of a rail;   I/(2 pi r): depth per metre run of a wheel
 
-and leaves it spread over the width of the strip. Depths are those of the profile's ordinate, volumes exact sums.
+and leaves it spread over the width of the strip. Means are over the way that is run. Depths are those of the profile's
+ordinate, volumes exact sums.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
-from wrcore.analysis.wheels import late_in, wheelsets_of
+from wrcore.analysis.wheels import late_in, way_shares, wheelsets_of
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
@@ -112,13 +113,11 @@ def local_wear(
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")
     check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
-    return {
-        (name, side): _wheel_wear(run[f"{name}/{side}"], late, run[name], SIDES[side], run.scene, loss, width)
-        for name, side in wheels
-    }
+    return {(name, side): _wheel_wear(run, name, side, late, loss, width) for name, side in wheels}
 
 
-def _wheel_wear(contact, late, body, outwards, scene, loss, width):
+def _wheel_wear(run, name, side, late, loss, width):
+    contact, body, outwards, scene = run[f"{name}/{side}"], run[name], SIDES[side], run.scene
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
     times = np.nonzero(there)[0]
@@ -127,9 +126,9 @@ def _wheel_wear(contact, late, body, outwards, scene, loss, width):
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
     places, dy, dx, work = friction_work(rows, friction, *_material(scene))
-    share = 1.0 / np.count_nonzero(late)
+    share = way_shares(run, name, late)[times][:, None]
     taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
-    across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the run
+    across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the way
     volume = float(np.sum(across * dy))
     slope = np.cos(rows["contact_angle_rad"])[:, None]
     low, high = (outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0))
@@ -139,7 +138,7 @@ def _wheel_wear(contact, late, body, outwards, scene, loss, width):
         # the volume of a strip, spread evenly over its width on the profile; the ordinate's change holds for du
         edges, area = _gathered(u[:, None] + low, u[:, None] + high, across * dy * factor[:, None], width)
         found += [edges, area / width]
-    return WheelWear(*found, volume, float(np.sum(work * (dx * dy)[..., None]) * share))
+    return WheelWear(*found, volume, float(np.sum(work * (dx * dy * share)[..., None])))
 
 
 _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",

@@ -15,7 +15,7 @@ TABLE, PLAN = "steps.csv", "plan.json"
 
 def claim(folder, mark, plan):
     """Take a folder for a plan of a mark, or refuse one that holds another."""
-    if not (folder / PLAN).exists():
+    if not any((folder / name).exists() for name in (PLAN, TABLE)):
         _write_plan(folder, {"digest": mark, "plan": plan, "files": {}})
     elif _read_plan(folder)["digest"] != mark:
         expected = "expected a folder of this plan, of the same input files and version, or an empty one; remove it"
@@ -39,24 +39,20 @@ def _write_plan(folder, plan):
 
 
 def rows_of(folder):
-    """Rows of the steps that count; InputError where a file is no longer what was written. A folder without a plan, as
-    versions before digests or others have made it, is believed.
-    """
-    path = folder / TABLE
-    files = _read_plan(folder)["files"] if (folder / PLAN).exists() else None
-    if files == {}:
+    """Rows of the steps that count; InputError where a file is no longer what was written, or nobody knows."""
+    path, files = folder / TABLE, _read_plan(folder)["files"]
+    if not files:
         return []
     changed = "expected what an earlier step has written; it was changed since"
     try:
         check_regular(path)
         table = path.read_text(encoding="utf-8")
-        if files is not None:
-            before = table[: table.rfind("\n", 0, -1) + 1]  # the last row may have been written, and not count yet
-            table = next(text for text in (table, before) if _digest(text) == files[TABLE])
+        before = table[: table.rfind("\n", 0, -1) + 1]  # the last row may have been written, and not count yet
+        table = next(text for text in (table, before) if _digest(text) == files[TABLE])
         rows = pd.read_csv(io.StringIO(table)).to_dict("records")
     except (OSError, ValueError, KeyError, StopIteration):
         raise InputError(path, "", changed) from None
-    for name, digest in (files or {}).items():
+    for name, digest in files.items():
         if name != TABLE and digest_of_file(folder / name) != digest:
             raise InputError(folder / name, "", changed)
     return rows

@@ -13,7 +13,7 @@ import pandas as pd
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.derived import forces_on_rail, quotient
+from wrcore.run.derived import forces_on_rail, quotient, rolling_speed
 from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.run import Run
 
@@ -34,6 +34,12 @@ def late_in(run, begin, what):
         raise InputError(what, "run", "expected output times, but it ended before the first")
     check_number(begin, min(0.0, run.t[0]), run.t[-1], what, "begin", "s")
     return run.t >= begin
+
+
+def way_shares(run, wheelset, late):
+    """Shares of the way of a wheelset in the output times that count, shape (m,): weights of means per metre."""
+    speed = np.broadcast_to(rolling_speed(run[wheelset], run.scene["speed"]), late.shape)[late]
+    return speed / speed.sum()
 
 
 @checked
@@ -174,7 +180,7 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     -------
     pandas.DataFrame
         A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
-        without and with spin (N) and mean creep power (W).
+        without and with spin (N, over the way) and mean creep power (W, over time).
 
     Examples
     --------
@@ -187,6 +193,7 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
         raise InputError("wheel_table", "run", "expected the channels of wheels")
     late, rows = late_in(run, begin, "wheel_table"), []
     for wheelset in wheelsets_of(run):
+        share = way_shares(run, wheelset, late)
         for side in SIDES:
             vertical, lateral = (force[late] for force in wheel_forces(run, wheelset, side))
             ratio = np.abs(quotient(vertical, lateral))
@@ -199,8 +206,8 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
                     "Q_max_N": np.max(vertical),
                     "Y_max_N": np.max(np.abs(lateral)),
                     "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
-                    "T_gamma_mean_N": np.mean(wear_number(run, wheelset, side)[late]),
-                    "T_gamma_spin_mean_N": np.mean(wear_number(run, wheelset, side, spin=True)[late]),
+                    "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
+                    "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
                     "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
                 }
             )

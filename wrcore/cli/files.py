@@ -5,15 +5,12 @@ import os
 from pathlib import Path
 
 from wrcore.errors import InputError
-from wrcore.errors.new_files import appearing, try_out
-
-HDF5 = (".h5", ".hdf5")
+from wrcore.errors.new_files import HDF5, appearing, named, try_out
 
 
 def output(path, endings=(".csv",), option="--out"):
     """Refuse an output path that cannot be written, or is of another kind, before any work starts."""
-    if Path(path).suffix.lower() not in endings:
-        raise InputError(option, path, f"expected a name that ends in {' or '.join(endings)}")
+    named(path, endings, option)
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))) or (os.path.exists(path) and not os.path.isfile(path)):
         raise InputError(option, path, "expected a file in an existing folder")
     try:  # permissions do not tell whether a disk is full or a name is too long

@@ -61,15 +61,17 @@ def check_number(value, low, high, source, field, unit=""):
 
 
 def similar(word, known):
-    """``; did you mean 'speed'?`` where one of the known words is close to a word, else nothing."""
+    """``; did you mean 'speed'?`` where one of the known words is close to a word, or is it but for a unit; else
+    nothing."""
     from difflib import get_close_matches
 
     words = {name.lower(): name for name in map(str, known)}
-    near = get_close_matches(str(word).lower(), words, n=1)
+    word = word.lower() if isinstance(word, str) else ""
+    near = [name for name in words if word.startswith(name + "_")] or get_close_matches(word, words, n=1)
     return f"; did you mean {words[near[0]]!r}?" if near else ""
 
 
 def one_of(known, word):
     """What to say of a word that is none of the known ones: these, and the closest."""
     known = [str(name) for name in known]
-    return f"expected one of {', '.join(known)}, got {word!r}{similar(word, known)}"
+    return f"expected one of {', '.join(known)}, got {short(word)}{similar(word, known)}"

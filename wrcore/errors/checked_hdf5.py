@@ -15,7 +15,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.input_files import check_regular
-from wrcore.errors.new_files import appearing
+from wrcore.errors.new_files import HDF5, appearing, named
 
 BLOCK = 512
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -31,7 +31,9 @@ LARGEST_CHUNK = 2**26
 
 @contextmanager
 def new_hdf5(path: str | os.PathLike[str], **options: bool) -> Iterator[h5py.File]:
-    """A new HDF5 file (:class:`h5py.File` with options) with its digest, which appears when it is complete."""
+    """A new HDF5 file (:class:`h5py.File` with options) with its digest, which appears when it is complete; its name
+    says what it is."""
+    named(path, HDF5, "file")
     with appearing(path) as whole:
         patient = _Patient(whole.raw)
         try:

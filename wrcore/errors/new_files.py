@@ -5,7 +5,7 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from io import BufferedRandom
 from pathlib import Path
@@ -16,6 +16,16 @@ try:
     import fcntl
 except ImportError:  # a system without such locks
     fcntl = None  # type: ignore[assignment]
+
+
+HDF5 = (".h5", ".hdf5")
+"""Endings of our binary files."""
+
+
+def named(path: str | os.PathLike[str], endings: Iterable[str], source: str) -> None:
+    """InputError of a source for a path that does not end as it should."""
+    if Path(path).suffix.lower() not in endings:
+        raise InputError(source, path, f"expected a name that ends in {' or '.join(endings)}")
 
 
 @contextmanager

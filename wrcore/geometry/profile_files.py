@@ -1,10 +1,10 @@
 """Profile files: CSV or columns of points, SIMPACK .prw/.prr. All conversions to the package's axes happen here.
 
-Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#`` starts a
-comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns may be
-separated by commas, semicolons or blanks; beside semicolons numbers may have decimal commas. Without a header further
-columns are not read. The UIC 519 / EN 15302 reference profiles
-(``*.dat``) follow this convention without a header: declare ``unit: mm``. Files of profile meters (MiniProf) begin with
+Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#``, ``%`` or ``!``
+starts a comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns
+may be separated by commas, semicolons, tabs or blanks; beside semicolons and tabs numbers may have decimal commas.
+Further columns are not read; a header names them all. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
+convention without a header: declare ``unit: mm``. Files of profile meters (MiniProf) begin with
 lines ``Name=value``, which are passed over; in which directions their columns count, and from where, is declared beside
 the path: ``mirrored``, ``downwards``, ``shift``.
 
@@ -22,8 +22,8 @@ from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
 
 _UNITS = {"m": 1.0, "mm": 1e-3}
 _KEYS = {"points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift"}
-_SEPARATED = "; decimal commas are read beside semicolons only"
-_HEADED = "; a header is u_m,f_m or u_mm,f_mm"
+_SEPARATED = "; decimal commas are read beside semicolons and tabs only"
+_HEADED = "; a header above them is u_m,f_m or u_mm,f_mm: u to the field side, f up"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
@@ -89,7 +89,9 @@ def _is_distance(value):
 def _text(path):
     try:
         check_regular(path)
-        return path.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff")
+        data = path.read_bytes()
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        return data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:
         raise InputError(
             path, "", f"expected a readable profile file: {getattr(error, 'strerror', None) or error}"
@@ -97,16 +99,18 @@ def _text(path):
 
 
 def _numbers(path, line, text):
-    """Two numbers or more of one line; a comma is a decimal one beside semicolons, and separates elsewhere."""
+    """Two numbers or more of one line; a comma within is a decimal one beside semicolons and tabs, elsewhere it
+    separates."""
     text = text.strip(" \t,;")
-    words = text.replace(",", ".").split(";") if ";" in text else re.split(r"\s*,\s*|\s+", text)
-    mixed = ";" not in text and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
+    apart = re.split(r"[\s,]*[;\t]\s*", text)
+    words = [word.replace(",", ".") for word in apart] if len(apart) > 1 else re.split(r"\s*,\s*|\s+", text)
+    mixed = len(apart) == 1 and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
     try:
         numbers = [float(word) for word in words]
     except ValueError:
         numbers = []
     if len(numbers) < 2 or (mixed and not all(re.search("[.eE]", word) for word in words)):
-        hint = _SEPARATED if re.search(r"\d", text) else _HEADED
+        hint = _HEADED if re.search(r"[^\W\d_eE]", text) else _SEPARATED if "," in text else ""
         raise InputError(path, f"line {line}", f"expected two numbers, got {text[:40]!r}{hint}")
     return numbers
 
@@ -114,22 +118,23 @@ def _numbers(path, line, text):
 def read_columns(path, text, unit=None):
     """Points u, f (n,) in m of a CSV or blank-separated file and the line number of each; a header line may state the
     ``unit``, or must agree with it."""
-    points, lines, stated, whole = [], [], False, True
+    points, lines, stated, whole = [], [], 0, True
     for number, line in enumerate(text.splitlines(), 1):
-        line = line.partition("#")[0].strip()
-        header = re.fullmatch(r"u_(m|mm)\s*[,;\s]\s*f_(m|mm)", line.replace('"', ""))
+        line = re.split("[#%!]", line)[0].strip()
+        names = re.findall(r"[^\s,;]+", line.replace('"', "").lower())
+        header = re.fullmatch(r"u_(m|mm) f_(m|mm)", " ".join(names[:2]))
         if header and not points:
-            unit, stated = _agreed(path, number, header.groups(), unit), True
+            unit, stated = _agreed(path, number, header.groups(), unit), len(names)
         elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
             continue
         elif line:
             points.append(_numbers(path, number, line))
             lines.append(number)
-            count = 2 if stated else len(points[0])
+            count = stated or len(points[0])
             if len(points[-1]) != count:
                 raise InputError(path, f"line {number}", f"expected {count} numbers, got {line[:40]!r}{_SEPARATED}")
-            whole = whole and "," in line and not re.search("[.;eE]", line)
-    if points and whole and len(points[0]) > 2:
+            whole = whole and "," in line and not re.search("[.;\t]", line)
+    if points and whole and not stated and len(points[0]) > 2:
         raise InputError(path, f"line {lines[0]}", f"expected numbers with decimal points{_SEPARATED}")
     if unit is None:
         raise InputError(path, "unit", "expected a header u_m,f_m or u_mm,f_mm, or unit: m or mm beside the path")

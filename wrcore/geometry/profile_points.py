@@ -121,6 +121,8 @@ def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0
     _check_numbers(u, f, name, lines)
     if not 0.0 <= smoothing < 1e-3:
         raise InputError(name, "smoothing", f"expected a distance in m, 0 to 0.001, got {smoothing:g}")
+    new = np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0))  # the same point twice says nothing more
+    u, f, lines = u[new], f[new], lines[new]
     if u[-1] < u[0]:
         u, f, lines = u[::-1], f[::-1], lines[::-1]
     if not trim:

@@ -176,13 +176,14 @@ def named_profile(
     >>> round(1e3 * float(wheel(-0.035)), 2), rail.name
     (-6.87, '60E1')
     """
+    spec = str(spec) if isinstance(spec, Path) else spec
     upright = isinstance(spec, dict) and spec.get("inclined") is False
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
         name = spec["points"] if upright and "points" in spec else spec
         raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
     inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}
-    if isinstance(spec, (dict, Path)) or _is_file(spec):
+    if isinstance(spec, dict) or _is_file(spec):
         return profile_files.read_profile(spec, kind, inclination, **options)
     sections, source = _sections(spec, kind)
     if kind == "rail":

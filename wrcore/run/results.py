@@ -46,7 +46,7 @@ def write_run(
     Parameters
     ----------
     path : path-like
-        File to write (HDF5); its folder is created if needed.
+        File to write (HDF5, its name ends in ``.h5`` or ``.hdf5``); its folder is created if needed.
     run : Run
         What to write.
     also : callable, optional

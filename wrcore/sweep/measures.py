@@ -9,8 +9,8 @@
 ``Q_min_N``, ``Q_max_N``      least and largest vertical force of a wheel
 ``Y_max_N``                   largest lateral force of a wheel on its rail, by amount
 ``Y_over_Q_max``              their largest quotient, by amount, where the wheel carries more than 1 kN
-``T_gamma_mean_N``            mean of T gamma = |Fx xi + Fy eta|, summed over a wheel's patches; ``T_gamma_spin_mean_N``
-                              with the spin's part, |Fx xi + Fy eta + Mz phi|
+``T_gamma_mean_N``            mean over the way of T gamma = |Fx xi + Fy eta|, summed over a wheel's patches;
+                              ``T_gamma_spin_mean_N`` with the spin's part, |Fx xi + Fy eta + Mz phi|
 ``creep_power_mean_W``        mean power that a wheel's creep dissipates, -V (Fx xi + Fy eta + Mz phi)
 ``simulated_s``               time reached
 ``steps``, ``rejected``       accepted and rejected steps; likewise ``rhs_evaluations``, ``jacobians``,
@@ -54,7 +54,7 @@ class Motions:
     yaw: np.ndarray
     """(runs, n, wheelsets), rad."""
     forces: np.ndarray | None
-    """(runs, n, wheelsets, 2, 5): of each wheel, as `wheel_forces` gives them; None where no measure needs them."""
+    """(runs, n, wheelsets, 2, 6): of each wheel, as `wheel_forces` gives them; None where no measure needs them."""
     window: float
     """Length of the last part of a run, s."""
 
@@ -86,6 +86,11 @@ def _quotient(m: Motions) -> np.ndarray:
     return _worst(ratios)
 
 
+def _over_way(m: Motions, column: int) -> np.ndarray:
+    assert m.forces is not None
+    return np.nansum(m.forces[..., column] * m.forces[..., 5], axis=1) / np.nansum(m.forces[..., 5], axis=1)
+
+
 MOTION: dict[str, Callable[[Motions], np.ndarray]] = {
     "y_rms_m": lambda m: _worst(np.sqrt(np.nanmean(m.y**2, axis=1))),
     "y_max_m": lambda m: _worst(np.abs(m.y)),
@@ -100,8 +105,8 @@ FORCES: dict[str, Callable[[Any], np.ndarray]] = {
     "Q_max_N": lambda m: _worst(m.forces[..., 0]),
     "Y_max_N": lambda m: _worst(np.abs(m.forces[..., 1])),
     "Y_over_Q_max": _quotient,
-    "T_gamma_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 2], axis=1)),
-    "T_gamma_spin_mean_N": lambda m: _worst(np.nanmean(m.forces[..., 3], axis=1)),
+    "T_gamma_mean_N": lambda m: _worst(_over_way(m, 2)),
+    "T_gamma_spin_mean_N": lambda m: _worst(_over_way(m, 3)),
     "creep_power_mean_W": lambda m: _worst(np.nanmean(m.forces[..., 4], axis=1)),
 }
 """Measures of the wheels' forces, shape (runs,)."""
@@ -159,15 +164,16 @@ def lateral_and_yaw(motion: np.ndarray, tangent: bool) -> tuple[np.ndarray, np.n
 
 
 def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:
-    """Q, Y, T gamma without and with spin (N) and creep power (W) of each wheel, shape (n, wheelsets, 2, 5)."""
+    """Q, Y, T gamma without and with spin (N), creep power (W) and speed (m/s) of wheels, (n, wheelsets, 2, 6)."""
     patches, _, _ = evaluated(model, trajectory)
     angle, normal, lateral = (patches[..., k] for k in (reduction.ANGLE, reduction.NORMAL, reduction.FY))
     cosine, sine = np.cos(angle), np.sin(angle)
-    out = np.empty((*patches.shape[:3], 5))
+    out = np.empty((*patches.shape[:3], 6))
     out[..., 0] = np.nansum(normal * cosine + lateral * sine, axis=-1)
     out[..., 1] = np.nansum(lateral * cosine - normal * sine, axis=-1)
     columns = (reduction.FX, reduction.FY, reduction.MZ, reduction.XI, reduction.ETA, reduction.PHI)
     out[..., 2], out[..., 3], work = creep_work(*(patches[..., column] for column in columns))
     velocities = trajectory.states[:, STATE_SIZE * model.bodies.wheelsets[:, None] + [7, 8, 9]]
-    out[..., 4] = work * np.linalg.norm(velocities, axis=-1)[..., None]
+    out[..., 5] = np.linalg.norm(velocities, axis=-1)[..., None]
+    out[..., 4] = work * out[..., 5]
     return out
