@@ -126,7 +126,10 @@ def checkout(smoke, tmp_path_factory):
     ("edited", "again", "kept"),
     [
         ("wrcore/creep/laws.py", {"creep_table", "creep_laws", "simulate"}, {"contact_pairs", "fig_ivp"}),
-        ("wrcore/analysis/motion.py", {"motion_table", "sweep_speeds", "accuracy_study"}, {"simulate", "creep_table"}),
+        (
+            "wrcore/analysis/assessment/motion.py", {"motion_table", "sweep_speeds", "accuracy_study"},
+            {"simulate", "creep_table"},
+        ),
         ("workflow/study/paper/figures.py", {"fig1_parametrisation", "fig4_lateral_position"}, {"simulate", "fig_ivp"}),
     ],
 )  # fmt: skip

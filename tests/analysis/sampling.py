@@ -19,7 +19,7 @@ def main():
         for rate in (200, 500, 1000, 4000):
             changes |= {"integration.duration": 20.0, "output.rate": rate}
             run = wr.simulate(wr.load_scene("config/scenes/trailer_vehicle.yaml", changes))
-            with mock.patch("wrcore.analysis.assess.LEAST_RATE", 1.0):
+            with mock.patch("wrcore.analysis.assessment.assess.LEAST_RATE", 1.0):
                 table = wr.assess(run, begin=1.0).summary
             print(name, rate, dict(zip(table["quantity"], table["value"].round(3), strict=True)))
 

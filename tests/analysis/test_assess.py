@@ -6,8 +6,8 @@ from scipy import signal
 
 import wrcore as wr
 from tests.synthetic import CONTACT
-from wrcore.analysis.assess import assess, low_pass, section_table, sliding_mean, track_sections
-from wrcore.analysis.wheels import late_in
+from wrcore.analysis.assessment.assess import assess, low_pass, section_table, sliding_mean, track_sections
+from wrcore.analysis.assessment.wheels import late_in
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.run import Run

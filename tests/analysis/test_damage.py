@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.analysis.test_assess import synthetic
-from wrcore.analysis.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
-from wrcore.analysis.wheels import wheel_table
+from wrcore.analysis.assessment.wheels import wheel_table
+from wrcore.analysis.wear.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
 from wrcore.errors import InputError
 from wrcore.run.run import Run
 

@@ -15,8 +15,8 @@ import wrcore as wr
 from study.report.legible import findings
 from tests.conftest import ROOT, SCENES
 from tests.synthetic import hunting_run
-from wrcore.analysis.plot_vehicle import box_of
-from wrcore.analysis.wear_folder import claim, write_rows
+from wrcore.analysis.pictures.plot_vehicle import box_of
+from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import _schema
 

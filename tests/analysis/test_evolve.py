@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 from tests.conftest import SCENES
-from wrcore.analysis import evolve as ev
-from wrcore.analysis import wear_folder
-from wrcore.analysis.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
-from wrcore.analysis.worn_rails import laid_rails, rail_file
+from wrcore.analysis.wear import evolve as ev
+from wrcore.analysis.wear import wear_folder
+from wrcore.analysis.wear.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
+from wrcore.analysis.wear.worn_rails import laid_rails, rail_file
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.scene.description import load_scene

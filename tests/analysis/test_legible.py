@@ -10,10 +10,10 @@ from matplotlib.ticker import NullFormatter
 
 from study.report.legible import findings, save_figure
 from tests.synthetic import hunting_run
-from wrcore.analysis.damage import plot_shakedown
-from wrcore.analysis.plot_creep import plot_creep_force
-from wrcore.analysis.plot_patch import plot_wheel_on_rail
-from wrcore.analysis.plot_run import plot_run
+from wrcore.analysis.pictures.plot_creep import plot_creep_force
+from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail
+from wrcore.analysis.pictures.plot_run import plot_run
+from wrcore.analysis.wear.damage import plot_shakedown
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.analysis.test_assess import synthetic
-from wrcore.analysis.local_wear import BIN, friction_work, local_wear
-from wrcore.analysis.wear_laws import LAWS, Sliding, sheffield, wear_law
+from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
+from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError

@@ -16,7 +16,7 @@ from study.paper.tables import (
     timing_table,
 )
 from tests.conftest import SCENES
-from wrcore.analysis import motion as analysis
+from wrcore.analysis.assessment import motion as analysis
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency, zero_crossings
 from wrcore.scene.description import load_scene
 

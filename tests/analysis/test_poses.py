@@ -10,8 +10,8 @@ import wrcore as wr
 from tests.conftest import SCENES
 from tests.contact.patch import contact_reference as contact
 from tests.contact.patch.test_grid import some_cases
-from wrcore.analysis.loaded import LoadedWheels, Rolling
-from wrcore.analysis.poses import ROLLING_FIELDS, loaded_poses
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.poses import ROLLING_FIELDS, loaded_poses
 from wrcore.cli import main
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table

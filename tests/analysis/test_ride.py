@@ -5,8 +5,8 @@ import pytest
 
 import wrcore as wr
 from tests.synthetic import hunting_run
-from wrcore.analysis.assess import assess
-from wrcore.analysis.ride import (
+from wrcore.analysis.assessment.assess import assess
+from wrcore.analysis.assessment.ride import (
     DIRECTIONS,
     WEIGHTINGS,
     block_rms,

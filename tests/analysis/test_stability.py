@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT, SCENES
-from wrcore.analysis.modes import families, linear_modes, shape_table
-from wrcore.analysis.stability import at_speed, critical_speed, growth, root_locus, steady_motion, straight_ahead
+from wrcore.analysis.stability.modes import families, linear_modes, shape_table
+from wrcore.analysis.stability.stability import (
+    at_speed,
+    critical_speed,
+    growth,
+    root_locus,
+    steady_motion,
+    straight_ahead,
+)
 from wrcore.dynamics.linear import DIRECTIONS
 from wrcore.errors import InputError
 from wrcore.scene.description import compile_scene, load_scene

@@ -10,7 +10,7 @@ import wrcore as wr
 from study.speeds.tables import cost_table, speed_row
 from tests.conftest import SCENES
 from tests.synthetic import hunting_run
-from wrcore.analysis import wheels as av
+from wrcore.analysis.assessment import wheels as av
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from study.paper.tables import rigid_contact as geometry_table
 from tests.conftest import DATA, SCENES
-from wrcore.analysis.poses import loaded_poses
+from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.detection import axle_direction, detect, find_patches, planar_error_bound
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import (

@@ -8,8 +8,8 @@ import re
 import numpy as np
 
 from tests.conftest import ROOT, SCENES
-from wrcore.analysis.stability import critical_speeds
-from wrcore.analysis.wheels import wheelset_channels
+from wrcore.analysis.assessment.wheels import wheelset_channels
+from wrcore.analysis.stability.stability import critical_speeds
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene

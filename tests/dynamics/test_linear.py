@@ -8,8 +8,8 @@ from scipy.linalg import eigh
 
 from tests.conftest import ROOT, SCENES
 from tests.dynamics.test_system import LEVEL, body_state, make_model
-from wrcore.analysis.modes import linear_modes
-from wrcore.analysis.stability import at_speed, steady_motion
+from wrcore.analysis.stability.modes import linear_modes
+from wrcore.analysis.stability.stability import at_speed, steady_motion
 from wrcore.contact import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.dynamics.body import STATE_SIZE

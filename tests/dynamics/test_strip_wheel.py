@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.analysis.wheels import creep_power
+from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.library import solve_patch
 from wrcore.contact.patch.normal import NormalContact

@@ -9,8 +9,8 @@ from scipy.linalg import expm
 from tests.conftest import SCENES
 from tests.dynamics import test_jacobian as jacobian_tests
 from tests.dynamics.giving_track import EXAMPLES
-from wrcore.analysis.motion import first_flange_contact
-from wrcore.analysis.stability import modes
+from wrcore.analysis.assessment.motion import first_flange_contact
+from wrcore.analysis.stability.stability import modes
 from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import energy_balance

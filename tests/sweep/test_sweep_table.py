@@ -10,7 +10,7 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
-from wrcore.analysis.wheels import creep_power, wear_number, wheel_forces
+from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.run.motion import amplitude, hunting_frequency

@@ -89,24 +89,24 @@ def sources(*rooms):
 CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "scene")
 RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
-VEHICLE = ("analysis/motion", "analysis/wheels")
-LOADED = (*CONTACT, "creep", "dynamics", "analysis/loaded", "analysis/poses")
-STYLE = ("analysis/style", "study/report/legible")
+VEHICLE = ("analysis/assessment/motion", "analysis/assessment/wheels")
+LOADED = (*CONTACT, "creep", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
+STYLE = ("analysis/pictures/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
     "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
     "geometry": sources(*LOADED, *SCENE, "study/paper/tables"),
-    "contact_search": sources(*LOADED, "analysis/contact", "study/contact/tables", "study/contact/search"),
-    "contact_figures": sources(*LOADED, "analysis/contact", "analysis/plot_contact", *STYLE, "study/contact"),
+    "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
+    "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN),
     "vehicle": sources(*VEHICLE, "study/speeds/sweep", "study/speeds/tables"),
     "vehicle_figures": sources("run", *VEHICLE, *STYLE, "study/speeds"),
     "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
-    "paper": sources("run", "analysis/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", "analysis/motion", *STYLE, "study/paper", "study/contact/surface"),
+    "paper": sources("run", "analysis/assessment/motion", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", "analysis/assessment/motion", *STYLE, "study/paper", "study/contact/surface"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

@@ -3,7 +3,7 @@
 CRITICAL = config["critical_speed"]
 HUNTING = list(CRITICAL["vehicles"])
 CORE["critical_speed"] = CORE["simulation"] + sources(
-    "analysis/motion", "analysis/modes", "analysis/stability", "analysis/limit_cycles"
+    "analysis/assessment/motion", "analysis/stability/modes", "analysis/stability/stability", "analysis/stability/limit_cycles"
 )  # fmt: skip
 CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "study/critical_speed")
 

@@ -3,7 +3,7 @@
 HARD = config["hard_cases"]
 FAMILIES = list(HARD["families"])
 HARD_FIGURES = ["low_speed", "contact_jumps", "lift_off", "nadal", "stability_map", "tolerances", "sharp_curve"]
-CORE["hard_cases"] = CORE["critical_speed"] + sources("analysis/loaded", "analysis/poses", "study/contact/tables", "study/hard_cases")
+CORE["hard_cases"] = CORE["critical_speed"] + sources("analysis/contact/loaded", "analysis/contact/poses", "study/contact/tables", "study/hard_cases")
 
 
 wildcard_constraints:

@@ -1,7 +1,7 @@
 # Patch models against exact contact: one pose at a time, in runs, and exact contact against CONTACT.
 
 PATCH = config["patch"]
-CORE["patch"] = CORE["simulation"] + sources("analysis/loaded", "analysis/poses", *STYLE, "study/contact", "study/patch")
+CORE["patch"] = CORE["simulation"] + sources("analysis/contact/loaded", "analysis/contact/poses", *STYLE, "study/contact", "study/patch")
 
 
 rule patch_costs:
@@ -37,7 +37,7 @@ rule wheel_on_rail:
     message:
         "Figure: a loaded wheel on its rail, with its patch"
     input:
-        core=CORE["patch"] + sources("analysis/patch", "analysis/plot_patch"),
+        core=CORE["patch"] + sources("analysis/contact/patch", "analysis/pictures/plot_patch"),
     output:
         report(
             "<results>/patch/wheel_on_rail_patch.png",
@@ -154,7 +154,7 @@ rule patch_runs:
     message:
         "{wildcards.hunter} with {wildcards.patch}: limit cycle, irregular track"
     input:
-        core=CORE["simulation"] + sources(*VEHICLE, "analysis/stability", "analysis/limit_cycles", "study/patch/runs"),
+        core=CORE["simulation"] + sources(*VEHICLE, "analysis/stability/stability", "analysis/stability/limit_cycles", "study/patch/runs"),
         scenes=SCENES,
         scene=runs_scene,
         table=rules.creep_table.output,

@@ -8,7 +8,7 @@ for file in config["sweeps"]:
     except InputError as error:
         raise WorkflowError(f"configuration: sweeps: {error}")
 CORE["sweeps"] = CORE["simulation"] + sources("sweep")
-CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/plot_run", "study/sweeps")
+CORE["sweeps_figures"] = sources("sweep", *STYLE, "analysis/pictures/plot_run", "study/sweeps")
 
 
 wildcard_constraints:

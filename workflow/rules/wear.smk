@@ -2,8 +2,8 @@
 
 WEAR = config["wear"]
 CORE["wear"] = CORE["simulation"] + sources(
-    "analysis/evolve", "analysis/worn_profiles", "analysis/worn_rails", "analysis/local_wear", "analysis/wear_laws",
-    "analysis/plot_wear", *VEHICLE, *STYLE, "study/wear"
+    "analysis/wear/evolve", "analysis/wear/worn_profiles", "analysis/wear/worn_rails", "analysis/wear/local_wear", "analysis/wear/wear_laws",
+    "analysis/pictures/plot_wear", *VEHICLE, *STYLE, "study/wear"
 )  # fmt: skip
 
 

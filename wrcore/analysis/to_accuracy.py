@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrcore.analysis.wheels import wear_number, wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.wheels import wear_number, wheel_forces, wheelsets_of
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES

@@ -39,7 +39,7 @@ def add(commands):
 
 def run(options):
     """Do what the options say."""
-    from wrcore.analysis.assess import assess
+    from wrcore.analysis.assessment.assess import assess
     from wrcore.run.results import load_run
 
     out = output(options.out) if options.out else None

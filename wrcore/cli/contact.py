@@ -91,7 +91,7 @@ def add(commands):
 
 def run(options):
     """Do what the options say."""
-    from wrcore.analysis.poses import loaded_poses
+    from wrcore.analysis.contact.poses import loaded_poses
     from wrcore.contact.poses import read_poses
     from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 

@@ -34,9 +34,9 @@ def run(options):
     """Do what the options say."""
     of_run = Path(options.source).suffix.lower() in (".h5", ".hdf5")
     out = output(options.out, (".html",) if of_run else FIGURES)
-    from wrcore.analysis.animation import Animation
-    from wrcore.analysis.draw import draw
-    from wrcore.analysis.style import save_figure
+    from wrcore.analysis.pictures.animation import Animation
+    from wrcore.analysis.pictures.draw import draw
+    from wrcore.analysis.pictures.style import save_figure
 
     try:
         drawn = draw(options.source, options.scene, options.factor, options.begin, options.end)

@@ -44,7 +44,7 @@ def add(commands):
 
 def run(options):
     """Do what the options say."""
-    from wrcore.analysis.evolve import evolve
+    from wrcore.analysis.wear.evolve import evolve
 
     if not 1 <= options.threads <= 1000:
         raise InputError("wrcore evolve", "--threads", f"expected 1 to 1000, got {options.threads}")

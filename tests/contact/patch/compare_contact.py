@@ -15,7 +15,7 @@ import pandas as pd
 
 from tests.analysis.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
-from wrcore.analysis.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 
 QUANTITIES = {

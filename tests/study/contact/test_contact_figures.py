@@ -6,8 +6,8 @@ import pytest
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.report.legible import save_figure
-from wrcore.analysis.plot_contact import fig_contact_location
-from wrcore.analysis.style import ACCENT, LINES
+from wrcore.analysis.pictures.plot_contact import fig_contact_location
+from wrcore.analysis.pictures.style import ACCENT, LINES
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import first_touch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack

@@ -10,7 +10,7 @@ from study.contact import search
 from study.contact import tables as study
 from study.contact.reference import compare_with_contact, longitudinal_excess, summarise
 from tests.conftest import DATA
-from wrcore.analysis.poses import loaded_poses
+from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.detection import axle_direction, detect
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.reduction import MAX_PATCHES, MAXIMUM, PATCH_COLUMNS

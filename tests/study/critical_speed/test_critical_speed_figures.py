@@ -7,8 +7,8 @@ import pytest
 from study.critical_speed.figures import fig_limit_cycles, fig_modes, fig_root_locus
 from study.report.legible import save_figure
 from tests.conftest import SCENES
-from wrcore.analysis.stability import critical_speeds, loci, modes
-from wrcore.analysis.style import ACCENT
+from wrcore.analysis.pictures.style import ACCENT
+from wrcore.analysis.stability.stability import critical_speeds, loci, modes
 from wrcore.scene.description import load_scene
 
 

@@ -15,7 +15,7 @@ from study.paper.figures import (
     fig5_contact_points,
 )
 from tests.conftest import SCENES
-from wrcore.analysis import style as figures
+from wrcore.analysis.pictures import style as figures
 from wrcore.scene.description import load_scene
 
 POSE = {"y": 6.3e-3, "yaw": 0.015, "load": 1e4, "lowered": 4e-4}

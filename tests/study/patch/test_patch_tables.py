@@ -7,7 +7,7 @@ import pytest
 from study.contact.tables import study_pair
 from study.patch import page, reference, tables
 from tests.conftest import ROOT
-from wrcore.analysis.loaded import Found, Rolling
+from wrcore.analysis.contact.loaded import Found, Rolling
 from wrcore.contact import reduction as columns
 
 PAIR = {"wheel": "S1002", "rail": "UIC60-MBench", "inclination": 0.025, "gauge": 1.435, "rolling_radius": 0.46,

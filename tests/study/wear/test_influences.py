@@ -6,7 +6,7 @@ import pytest
 
 from study.wear.figures import fig_influences
 from study.wear.influences import influence_table, variant_depth, with_copies
-from wrcore.analysis.plot_wear import plot_evolution
+from wrcore.analysis.pictures.plot_wear import plot_evolution
 
 
 def test_copies_share_and_differ_in_their_seeds():

@@ -7,7 +7,7 @@ import numpy as np
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.report.legible import save_figure
-from wrcore.analysis.plot_contact import fig_contact_location
+from wrcore.analysis.pictures.plot_contact import fig_contact_location
 from wrcore.contact.first_touch import first_touch
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

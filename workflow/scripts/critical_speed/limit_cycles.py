@@ -3,7 +3,7 @@
 import os
 import sys
 
-from wrcore.analysis.limit_cycles import Settling, limit_cycles
+from wrcore.analysis.stability.limit_cycles import Settling, limit_cycles
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

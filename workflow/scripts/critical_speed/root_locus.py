@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from wrcore.analysis.stability import critical_speeds, loci, modes
+from wrcore.analysis.stability.stability import critical_speeds, loci, modes
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from study.report.legible import save_figure
-from wrcore.analysis.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
-from wrcore.analysis.plot_wear import plot_evolution
+from wrcore.analysis.pictures.plot_wear import plot_evolution
+from wrcore.analysis.wear.evolve import evolve, load_wear_plan, plan_mark, profiles_over_distance
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 plan, changes = snakemake.input.plan, dict(snakemake.params.settings)

@@ -7,7 +7,7 @@ from pathlib import Path
 from study.report.legible import save_figure
 from study.wear.figures import fig_influences
 from study.wear.influences import influence_table, variant_depth
-from wrcore.analysis.evolve import load_wear_plan, plan_mark
+from wrcore.analysis.wear.evolve import load_wear_plan, plan_mark
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 plan, settings, found = snakemake.input.plan, snakemake.params.settings, {}

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
 from wrcore.run.accuracy import Choice, kind_of
 from wrcore.run.motion import amplitude, hunting_frequency
 from wrcore.run.simulate import simulate

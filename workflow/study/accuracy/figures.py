@@ -1,13 +1,13 @@
 """Figures of speed against error.
 
-Units, colours and style are those of :mod:`wrcore.analysis.style`.
+Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 """
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from study.accuracy.errors import pareto_front
-from wrcore.analysis.style import ACCENT, shared_legend, styled
+from wrcore.analysis.pictures.style import ACCENT, shared_legend, styled
 
 MODELS = (
     ("spatial, fine table", "#222222", "o"),

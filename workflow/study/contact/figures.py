@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from study.contact.tables import first_order_law, over_contact_angle
-from wrcore.analysis.style import MM, styled
+from wrcore.analysis.pictures.style import MM, styled
 from wrcore.contact.conicity import en15302_tolerance
 from wrcore.geometry.track import SIDES
 

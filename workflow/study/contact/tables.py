@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.poses import loaded_poses
+from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.detection import planar_error_bound
 from wrcore.contact.first_touch import first_touch

@@ -1,12 +1,12 @@
 """Figures of cost: how it grows, and which stages of an evaluation it goes to.
 
-They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.analysis.style`.
+They draw the tables of :mod:`wrcore.cost`. Units, colours and style are those of :mod:`wrcore.analysis.pictures.style`.
 """
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from wrcore.analysis.style import styled
+from wrcore.analysis.pictures.style import styled
 
 SERIES = (
     {"color": "#0072B2", "marker": "o", "linestyle": "-"},

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from wrcore.analysis.style import ACCENT, styled
+from wrcore.analysis.pictures.style import ACCENT, styled
 
 PERCENT = 100.0
 

@@ -1,15 +1,14 @@
 """Figures of stability: root locus over speed, the modes at one speed, limit cycles over speed.
 
-They work on tables of `wrcore.analysis.stability` and `wrcore.analysis.limit_cycles`. Units change here and nowhere
-before: lengths to mm.
+They work on tables of `wrcore.analysis.stability`. Units change here and nowhere before: lengths to mm.
 """
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.modes import OVERDAMPED
-from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from wrcore.analysis.pictures.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from wrcore.analysis.stability.modes import OVERDAMPED
 
 GREY = "0.72"
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from wrcore.analysis.limit_cycles import nonlinear_critical_speed
+from wrcore.analysis.stability.limit_cycles import nonlinear_critical_speed
 
 
 def critical_table(linear, cycles):

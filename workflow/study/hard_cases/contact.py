@@ -22,7 +22,7 @@ from study.hard_cases.cases import (
     wheel_forces,
     with_forces,
 )
-from wrcore.analysis.poses import loaded_poses
+from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact import reduction
 from wrcore.contact.normal import damping_factor
 from wrcore.dynamics.body import STATE_SIZE

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import ACCENT, LINES, MM, styled
+from wrcore.analysis.pictures.style import ACCENT, LINES, MM, styled
 
 KILO = 1e-3
 

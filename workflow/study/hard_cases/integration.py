@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from study.hard_cases.cases import Check, prepare, rows, run, sound
-from wrcore.analysis.stability import LARGEST_REST, straight_ahead
+from wrcore.analysis.stability.stability import LARGEST_REST, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.constraints import constraint_workspace
 from wrcore.dynamics.joint import evaluate_joints

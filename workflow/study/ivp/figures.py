@@ -7,7 +7,7 @@ Units change here and nowhere before: lengths to micrometres.
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from wrcore.analysis.style import ACCENT, styled
+from wrcore.analysis.pictures.style import ACCENT, styled
 
 MICRO = 1e6
 

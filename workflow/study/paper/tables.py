@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.motion import (
+from wrcore.analysis.assessment.motion import (
     SIDES,
     _patches,
     difference,
@@ -11,7 +11,7 @@ from wrcore.analysis.motion import (
     mirror_defect,
     prediction_horizon,
 )
-from wrcore.analysis.poses import loaded_poses
+from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.strip import cubic_at
 from wrcore.geometry.track import SIDES as SIGNS
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency

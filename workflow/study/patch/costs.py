@@ -19,7 +19,7 @@ def patches_per_evaluation(recorded):
 
 
 def patch_costs(source, overrides, models, states, passes):
-    """Time per patch of each model (arguments of `wrcore.analysis.loaded.LoadedWheels` by name), all in turn, at
+    """Time per patch of each model (arguments of `LoadedWheels` by name), all in turn, at
     states of a run on tangent, perfect track by the scene's own model: patches per evaluation, us_per_patch (median;
     all of the evaluation, its patches aside some 0.5 us), us_low and us_high (quartiles).
     """

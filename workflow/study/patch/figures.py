@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from study.patch.tables import REFERENCE, radius_differences
-from wrcore.analysis.loaded import LoadedWheels, Rolling
-from wrcore.analysis.style import MM, shared_legend, styled
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.pictures.style import MM, shared_legend, styled
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch
 from wrcore.contact.patch.result import Patch
@@ -61,7 +61,7 @@ def fig_patch_errors(places, load):
 @styled
 def fig_patches(geometry, models, load, shifts, rolling):
     """Pressure, traction and slip of exact contact beside the ellipse of another model (title and arguments of
-    `wrcore.analysis.loaded.LoadedWheels` of both), for the left wheel under a load (N), a row per lateral shift (m);
+    `LoadedWheels` of both), for the left wheel under a load (N), a row per lateral shift (m);
     ``rolling`` is speed (m/s), friction, and creepage (longitudinal, lateral) of a wheel that otherwise rolls freely.
     """
     figure = Figure(figsize=(9.0, 4.6 * len(shifts)), layout="constrained")

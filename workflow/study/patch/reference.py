@@ -4,7 +4,7 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.loaded import LoadedWheels
+from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact import reduction as columns
 
 LOAD = 1e3
@@ -13,7 +13,7 @@ LOAD = 1e3
 
 def compare_with_contact(geometry, reference, models):
     """Each loaded case of CONTACT (in its axes) that is one patch beside every model (arguments of
-    `wrcore.analysis.loaded.LoadedWheels` by name) at the same height: errors of the wheel's normal force (relative),
+    `LoadedWheels` by name) at the same height: errors of the wheel's normal force (relative),
     greatest pressure (relative), length along and width across of the nearest patch (m).
     """
     wheels = {name: LoadedWheels(geometry, **settings) for name, settings in models.items()}

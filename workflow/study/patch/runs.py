@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.limit_cycles import Settling, settle_motion, shifted
-from wrcore.analysis.stability import at_speed, straight_ahead
-from wrcore.analysis.wheels import wheel_table, wheelsets_of
+from wrcore.analysis.assessment.wheels import wheel_table, wheelsets_of
+from wrcore.analysis.stability.limit_cycles import Settling, settle_motion, shifted
+from wrcore.analysis.stability.stability import at_speed, straight_ahead
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

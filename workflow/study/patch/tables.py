@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 
 REFERENCE = "exact, fine"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.analysis import style
+from wrcore.analysis.pictures import style
 
 BORDER = 1.0
 """Texts may touch each other, and reach over the page's edge, by this much, points."""

@@ -1,14 +1,14 @@
 """Figures of vehicles: motion of all wheelsets, guiding forces, and what changes with speed.
 
-Units, colours and the difference between planar and spatial are those of :mod:`wrcore.analysis.style`.
+Units, colours and the difference between planar and spatial are those of :mod:`wrcore.analysis.pictures.style`.
 """
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis.motion import SIDES
-from wrcore.analysis.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
-from wrcore.analysis.wheels import hunting, wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.motion import SIDES
+from wrcore.analysis.assessment.wheels import hunting, wheel_forces, wheelsets_of
+from wrcore.analysis.pictures.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
 from wrcore.run.derived import quotient
 
 KN = 1e-3

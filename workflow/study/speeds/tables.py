@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.wheels import hunting, wheel_table, wheelsets_of
+from wrcore.analysis.assessment.wheels import hunting, wheel_table, wheelsets_of
 from wrcore.run.motion import amplitude
 
 OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "growth_per_s", "damping_ratio"}

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 import pandas as pd
 
-from wrcore.analysis.evolve import evolve
+from wrcore.analysis.wear.evolve import evolve
 
 WHOLE = 1e8
 """m."""

@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import MM, styled
+from wrcore.analysis.pictures.style import MM, styled
 
 KM = 1e-3
 LOOKS = ("k-", "C0--", "C1-.", "C2:", "C3--", "C4-.", "C5:", "C6-", "C7--")

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.evolve import evolve, last_depth, load_wear_plan
-from wrcore.analysis.worn_profiles import POINTS
+from wrcore.analysis.wear.evolve import evolve, last_depth, load_wear_plan
+from wrcore.analysis.wear.worn_profiles import POINTS
 
 SEEDS = 100
 """Further copies of a scene have seeds that differ by multiples of this."""

@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.stability import at_speed, rising, straight_ahead
+from wrcore.analysis.stability.stability import at_speed, rising, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate

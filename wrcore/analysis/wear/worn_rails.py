@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.analysis.worn_profiles import file_of, onto_points, points_of, read_points, write_points
+from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, write_points
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 

@@ -1,11 +1,11 @@
 """Wheel profiles over a distance: simulate, add wear, go on with the worn profile.
 
 A plan names a scene and changes of it with their shares of the distance. Each step simulates them with the present
-wheel profile, averages the depths that all wheels lose (:mod:`wrcore.analysis.local_wear`), smooths them and goes on
+wheel profile, averages the depths that all wheels lose (`local_wear`), smooths them and goes on
 over a distance at which the deepest place has lost ``largest_wear``. All wheels wear alike, left and right: lines have
 curves to both sides. At ``limits`` the wheel ends, or is turned to its new profile. Rails stay as they are, a wheel
 sees all of a line and a rail all vehicles, unless the plan says how much traffic wears them
-(:mod:`wrcore.analysis.worn_rails`).
+(:mod:`wrcore.analysis.wear.worn_rails`).
 
 A folder holds the state: the profile at the start of each step, what it takes off the rails, and a table with a row per
 step. ``plan.json`` holds their digests: a step counts when that of its row is there; whoever is killed goes on after
@@ -25,10 +25,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.local_wear import BIN, local_wear
-from wrcore.analysis.wear_folder import claim, rows_of, write_rows
-from wrcore.analysis.wear_laws import check_friction, wear_law
-from wrcore.analysis.worn_profiles import (
+from wrcore.analysis.wear.local_wear import BIN, local_wear
+from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
+from wrcore.analysis.wear.wear_laws import check_friction, wear_law
+from wrcore.analysis.wear.worn_profiles import (
     across,
     file_of,
     flange,
@@ -40,7 +40,15 @@ from wrcore.analysis.worn_profiles import (
     smooth,
     write_points,
 )
-from wrcore.analysis.worn_rails import LaidRails, falls_of, keep_rails, laid_rails, lay_rails, to_renewal, wear_rails
+from wrcore.analysis.wear.worn_rails import (
+    LaidRails,
+    falls_of,
+    keep_rails,
+    laid_rails,
+    lay_rails,
+    to_renewal,
+    wear_rails,
+)
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError

@@ -13,8 +13,8 @@ from importlib.resources import files
 
 import numpy as np
 
-from wrcore.analysis.plot_vehicle import box_of
-from wrcore.analysis.wheels import wheelsets_of
+from wrcore.analysis.assessment.wheels import wheelsets_of
+from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.errors import InputError, check_number
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.track import SIDES
@@ -74,7 +74,7 @@ def animate(run, scene, factor=None, begin=0.0, end=math.inf):
         "bodies": [_body(vehicle, name, poses[name], frames, factor) for name in vehicle.body_names],
         "wheelsets": [_wheelset(run, scene, name, frames) for name in vehicle.wheelset_names],
     }  # fmt: skip
-    page = files("wrcore.analysis").joinpath("animation.html").read_text(encoding="utf-8")
+    page = files("wrcore.analysis.pictures").joinpath("animation.html").read_text(encoding="utf-8")
     content = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     parts = {"TITLE": escape(data["name"]), "DATA": content}  # neither is looked for in what takes its place
     return Animation(re.sub("TITLE|DATA", lambda found: parts[found[0]], page), data)

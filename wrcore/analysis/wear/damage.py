@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import styled
-from wrcore.analysis.wheels import greatest_pressure, late_in, way_shares, wear_number, wheelsets_of
+from wrcore.analysis.assessment.wheels import greatest_pressure, late_in, way_shares, wear_number, wheelsets_of
+from wrcore.analysis.pictures.style import styled
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.track import SIDES

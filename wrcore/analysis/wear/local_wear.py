@@ -2,7 +2,7 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.wear`). A wear law (:mod:`wrcore.analysis.wear_laws`) turns q into what is
+forces and creepages (:mod:`wrcore.run.wear`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is
 lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
@@ -20,8 +20,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from wrcore.analysis.wear_laws import Sliding, check_friction, wear_law
-from wrcore.analysis.wheels import late_in, way_shares, wheelsets_of
+from wrcore.analysis.assessment.wheels import late_in, way_shares, wheelsets_of
+from wrcore.analysis.wear.wear_laws import Sliding, check_friction, wear_law
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
@@ -81,7 +81,7 @@ def local_wear(
     begin : float
         Start of the evaluation, s.
     law : {"sheffield", "energy"} or mapping
-        See :func:`wrcore.analysis.wear_laws.wear_law`.
+        See :func:`wrcore.analysis.wear.wear_laws.wear_law`.
     width : float
         Of the bins, 1e-6 to 0.1 m.
 

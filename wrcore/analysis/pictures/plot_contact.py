@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.contact.first_touch import first_touch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked

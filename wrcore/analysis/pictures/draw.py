@@ -11,11 +11,11 @@ from typing import Annotated, Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.animation import Animation, animate
-from wrcore.analysis.evolve import profiles_over_distance
-from wrcore.analysis.plot_vehicle import plot_vehicle
-from wrcore.analysis.plot_wear import plot_evolution
-from wrcore.analysis.wear_folder import TABLE, rows_of
+from wrcore.analysis.pictures.animation import Animation, animate
+from wrcore.analysis.pictures.plot_vehicle import plot_vehicle
+from wrcore.analysis.pictures.plot_wear import plot_evolution
+from wrcore.analysis.wear.evolve import profiles_over_distance
+from wrcore.analysis.wear.wear_folder import TABLE, rows_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.run.results import load_run

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from wrcore.analysis.loaded import GRIDS, LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import GRIDS, LoadedWheels, Rolling
 from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import styled
+from wrcore.analysis.pictures.style import styled
 from wrcore.creep.cases import MODELS, creep_force
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, checked
 

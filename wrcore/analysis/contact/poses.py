@@ -4,7 +4,7 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
 from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wrcore.analysis.poses import AT_REST, loaded_poses
+from wrcore.analysis.contact.poses import AT_REST, loaded_poses
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import OneOf, Within, checked

@@ -4,7 +4,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import MM, styled
+from wrcore.analysis.pictures.style import MM, styled
 
 KM = 1e-3
 SHOWN = 6
@@ -19,7 +19,7 @@ FLANGE = (
 
 @styled
 def plot_evolution(profiles, table):
-    """Worn ``profiles`` (distance, u and f (m) of each step, of `wrcore.analysis.evolve.profiles_over_distance`), and
+    """Worn ``profiles`` (distance, u and f (m) of each step, of `profiles_over_distance`), and
     flange, conicity and wear rate of the ``table`` of `evolve` over the distance.
     """
     new = profiles[0][1:]

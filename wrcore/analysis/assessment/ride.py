@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.wheels import late_in, wheelsets_of
+from wrcore.analysis.assessment.wheels import late_in, wheelsets_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import build_track

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
-from wrcore.analysis.style import ACCENT, styled
+from wrcore.analysis.pictures.style import ACCENT, styled
 from wrcore.vehicle.element_data import end_points, on_line
 from wrcore.vehicle.layout import FRAME_NAME
 

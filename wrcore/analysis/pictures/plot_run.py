@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wrcore.analysis.style import styled
-from wrcore.analysis.wheels import wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.wheels import wheel_forces, wheelsets_of
+from wrcore.analysis.pictures.style import styled
 from wrcore.errors import InputError, similar
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES

@@ -19,8 +19,8 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.ride import rate_of, ride_table, whole_body_table
-from wrcore.analysis.wheels import late_in, wheel_forces, wheelsets_of
+from wrcore.analysis.assessment.ride import rate_of, ride_table, whole_body_table
+from wrcore.analysis.assessment.wheels import late_in, wheel_forces, wheelsets_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES

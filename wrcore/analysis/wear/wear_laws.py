@@ -39,7 +39,7 @@ _MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
 @dataclass(frozen=True, eq=False)
 class Sliding:
     """Friction's work over m patches: ``rows`` channels (m,) of contacts, ``y``, ``dy``, ``dx``, ``work`` of
-    :func:`wrcore.analysis.local_wear.friction_work`, friction coefficient, and rolling ``speed`` (m,), m/s.
+    :func:`wrcore.analysis.wear.local_wear.friction_work`, friction coefficient, and rolling ``speed`` (m,), m/s.
     """
 
     rows: Mapping[str, np.ndarray]

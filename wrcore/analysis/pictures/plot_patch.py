@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from wrcore.analysis.patch import pair_of, patch
-from wrcore.analysis.style import ACCENT, MM, RAIL, WHEEL, styled
+from wrcore.analysis.contact.patch import pair_of, patch
+from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked

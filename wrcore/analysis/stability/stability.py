@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from wrcore.analysis.modes import NEUTRAL, energy_table, linear_modes, shape_table
+from wrcore.analysis.stability.modes import NEUTRAL, energy_table, linear_modes, shape_table
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.linear import steady_running
@@ -118,7 +118,7 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     Returns
     -------
     table : pandas.DataFrame
-        That of `wrcore.analysis.modes.linear_modes`, followed by the columns of `energy_table`.
+        That of `wrcore.analysis.stability.modes.linear_modes`, followed by the columns of `energy_table`.
     shapes : pandas.DataFrame
         From `shape_table`.
 
@@ -150,7 +150,7 @@ def root_locus(vehicle, model, state, speeds):
     Returns
     -------
     pandas.DataFrame
-        Tables of `wrcore.analysis.modes.linear_modes` below each other, after a column speed_m_per_s.
+        Tables of `wrcore.analysis.stability.modes.linear_modes` below each other, after a column speed_m_per_s.
     """
     tables = []
     for speed in speeds:

@@ -1,0 +1,1 @@
+"""What standards and engineers ask of a run: forces, ride, safety."""

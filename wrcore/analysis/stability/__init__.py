@@ -1,0 +1,1 @@
+"""Whether a vehicle runs stably: modes, critical speeds, limit cycles."""

@@ -1,0 +1,1 @@
+"""Wear and rolling contact fatigue of wheels and rails."""
