@@ -1,5 +1,6 @@
 # make study    set up .venv, run the whole study: results/<question>, results/report/index.html, results/report.zip
-# make test     set up .venv, run the smoke workflow and all tests
+# make test     set up .venv, run the tests of the core
+# make check    the smoke workflow and all other tests: of the study, pages, attacks; lint
 # make smoke    the reduced study alone: results/smoke
 # make report   the study's report anew: results/report/index.html, results/report.zip
 # make figures  the study's pictures into reports/figures, those that are there by name
@@ -16,13 +17,16 @@ STAMP := .venv/.installed
 DOCS_STAMP := .venv/.docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-.PHONY: study test check-cpus smoke report figures docs lint bench clean
+.PHONY: study test check check-cpus smoke report figures docs lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+	$(BIN)/python -m pytest -n $(CORES) --dist loadfile -m "not check"
+
+check: $(STAMP) lint
+	$(BIN)/python -m pytest -n $(CORES) --dist loadfile -m check
 
 check-cpus: $(STAMP)
 	export NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c \

@@ -14,9 +14,20 @@ ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
 SCENES = ROOT / "config" / "scenes"
 
+CHECKS = ("study", "test_workflow", "test_workflow_lint", "test_slurm", "test_attack", "test_attack_inputs", "test_fuzz",
+          "test_fuzz_files", "test_bring_your_own", "test_first_result", "test_notebooks", "test_docs",
+          "test_wheel")  # fmt: skip
+"""Folders and files with the marker ``check``: the study, attacks, pages, the package as a whole; no tests of the core."""
+
 # What a command says must not depend on whether its kernels are compiled already; tests of bars and announcements
 # take the variable away for themselves.
 os.environ["WRCORE_PROGRESS"] = "0"
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.path.relative_to(Path(__file__).parent).parts[0].removesuffix(".py") in CHECKS:
+            item.add_marker("check")
 
 
 @pytest.fixture(scope="session")
