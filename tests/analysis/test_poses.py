@@ -110,7 +110,7 @@ def creepages_of(row):
 
 
 def test_still_ellipses_are_what_they_were(tmp_path, benchmark_pair):
-    poses = pd.DataFrame({"pose_id": "abcd", "y_m": [0.0, 0.003, -0.0051, 0.006], "yaw_rad": [0.0, 0.005, 0.01, 0.0],
+    poses = pd.DataFrame({"pose_id": list("abcd"), "y_m": [0.0, 0.003, -0.0051, 0.006], "yaw_rad": [0.0, 0.005, 0.01, 0.0],
                           "roll_rad": [math.nan, 1e-3, math.nan, 0.0], "z_m": [math.nan] * 3 + [0.45990]})  # fmt: skip
     poses.to_csv(tmp_path / "poses.csv", index=False)
     for reduction in ("moment", "maximum"):
@@ -199,7 +199,7 @@ def test_free_rolling_has_no_mean_longitudinal_slip(benchmark_pair, model):
     for y, side in ((0.0, "left"), (0.0051, "left"), (0.0051, "right")):
         z = LoadedWheels(benchmark_pair).height(side, y, 54.5e3)
         found = wheels.at_height(side, y, z, rolling=Rolling(20.0))
-        loads, slips = np.array([(one.row[columns.NORMAL], one.row[columns.XI]) for one in found]).T
+        loads, slips = np.array([(one.load, one.slip) for one in found]).T
         assert abs(loads @ slips) < (1e-12 if model != "grid" else 1e-6) * loads.sum()
 
 

@@ -18,7 +18,7 @@ def found(normal, xi, y, angle=0.0, fy=0.0, p_max=1e9):
     row = np.zeros(columns.PATCH_COLUMNS)
     row[[columns.NORMAL, columns.XI, columns.Y, columns.ANGLE]] = normal, xi, y, angle
     row[[columns.FX, columns.FY, columns.P_MAX]] = 1e3, fy, p_max
-    return Found(row, (0.0, 0.0, 0.0))
+    return Found(row, (0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 def test_a_wheel_is_the_sum_of_its_patches():

@@ -2,7 +2,7 @@
 
 A wheelset rolls with the speed V along the track and omega about its axle, moves sideways and turns; all of it is
 optional. Without a motion a patch carries its normal force alone. Without omega the wheel rolls freely: the mean of its
-longitudinal creepage over the normal forces of its patches vanishes.
+longitudinal rigid slip over the pressure of all its patches vanishes.
 """
 
 import math
@@ -93,6 +93,9 @@ class Found(NamedTuple):
     """(PATCH_COLUMNS,) as in runs; creepages are NaN without a motion."""
     extent: tuple
     """x_min, x_max (from the wheelset's cross-section) and width in the contact plane, m."""
+    load: float
+    slip: float
+    """Force of the pressure, N, and mean of the longitudinal rigid slip over it."""
     patch: Patch = None
     """With its fields, where the model has them and they were asked for."""
     on_grid: bool = False
@@ -162,14 +165,14 @@ class LoadedWheels:
         return self._rolling
 
     def _free_rate(self, pose, rolling):
-        """The rate of rolling, or where none is given that of free rolling: the creepage is linear in it."""
+        """The rate of rolling, or where none is given that of free rolling: the slip is linear in it."""
         if not math.isnan(rolling.rate):
             return rolling.rate
         usual, means = rolling.speed / self.geometry.rolling_radius, []
         for rate in (usual, 1.001 * usual):
             motion = rolling.motion(*pose[3:], rate)
-            rows = [one.row for one in self._patches(self._still_handle, pose, motion, SMOOTH, None)]
-            means.append(sum(row[columns.NORMAL] * row[columns.XI] for row in rows))
+            patches = self._patches(self._still_handle, pose, motion, SMOOTH, None)
+            means.append(sum(one.load * one.slip for one in patches))
         return usual + 1e-3 * usual * means[0] / (means[0] - means[1]) if means[0] != means[1] else usual
 
     def _patches(self, contact, pose, motion, friction, fields):
@@ -188,7 +191,7 @@ class LoadedWheels:
         for one in rows[0, wheel, : counts[0, wheel]]:
             a, b, x = float(one[columns.SEMI_A]), float(one[columns.SEMI_B]), float(one[columns.X])
             one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
-            yield Found(one, (x - a, x + a, 2.0 * b))
+            yield Found(one, (x - a, x + a, 2.0 * b), float(one[columns.NORMAL]), float(one[columns.XI]))
 
     def _on_strips(self, contact, row, pose, motion, friction, fields):
         """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
@@ -201,15 +204,15 @@ class LoadedWheels:
             work.spare[0] = 0.0
             group_wrench(contact, row, self.spatial, overlaps, first, last, out[0], wrench, self._counters, work.spare,
                          self._work_handle)  # fmt: skip
-            x, sums = out[0, columns.X] - work.sums[MEAN_X], work.sums
+            (slip, _, _, load), x, sums = work.force[:4].tolist(), out[0, columns.X] - work.sums[MEAN_X], work.sums
             extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
             if fields is not None and (self.always or self._counters[FELL_BACK] > before):
-                yield self._on_grid(out[0].copy(), row, first, last, pose, motion, friction)
+                yield self._on_grid(out[0].copy(), row, first, last, pose, motion, friction)._replace(slip=slip)
             else:
                 patch = self._fields(out[0], pose, friction) if fields and self._exact else None
-                yield Found(out[0].copy(), tuple(map(float, extent)), patch)
+                yield Found(out[0].copy(), tuple(map(float, extent)), load, slip, patch)
             first = last
 
     def _fields(self, row, pose, friction):
@@ -269,7 +272,8 @@ class LoadedWheels:
         row[[columns.ANGLE, columns.NORMAL, columns.P_MAX]] = patch.contact_angle, patch.normal, patch.p_max
         row[columns.FX : columns.MZ + 1] = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
         x_min, x_max, s_min, s_max = patch.extent
-        return Found(row, (origin[0] + x_min, origin[0] + x_max, s_max - s_min), patch, True)
+        extent = origin[0] + x_min, origin[0] + x_max, s_max - s_min
+        return Found(row, extent, patch.normal, math.nan, patch, True)
 
     def check_depth(self, side, y, z, roll, yaw, source, field):
         """Refuse a height at which a wheel lies deeper in its rail than `DEEPEST`."""
