@@ -14,10 +14,11 @@ ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
 SCENES = ROOT / "config" / "scenes"
 
-CHECKS = ("study", "test_workflow", "test_workflow_lint", "test_slurm", "test_attack", "test_attack_inputs", "test_fuzz",
-          "test_fuzz_files", "test_bring_your_own", "test_first_result", "test_notebooks", "test_docs",
-          "test_wheel")  # fmt: skip
-"""Folders and files with the marker ``check``: the study, attacks, pages, the package as a whole; no tests of the core."""
+CHECKS = (
+    "study", "test_workflow", "test_workflow_lint", "test_slurm", "test_attack", "test_attack_inputs", "test_fuzz",
+    "test_fuzz_files", "test_bring_your_own", "test_first_result", "test_notebooks", "test_docs", "test_wheel",
+)  # fmt: skip
+"""Folders and files with the marker ``check``, which are no tests of the core: study, attacks, pages, the package."""
 
 # What a command says must not depend on whether its kernels are compiled already; tests of bars and announcements
 # take the variable away for themselves.
