@@ -110,8 +110,10 @@ def creepages_of(row):
 
 
 def test_still_ellipses_are_what_they_were(tmp_path, benchmark_pair):
-    poses = pd.DataFrame({"pose_id": list("abcd"), "y_m": [0.0, 0.003, -0.0051, 0.006],
-                          "yaw_rad": [0.0, 0.005, 0.01, 0.0], "roll_rad": [math.nan, 1e-3, math.nan, 0.0], "z_m": [math.nan] * 3 + [0.45990]})  # fmt: skip
+    poses = pd.DataFrame({
+        "pose_id": list("abcd"), "y_m": [0.0, 0.003, -0.0051, 0.006], "yaw_rad": [0.0, 0.005, 0.01, 0.0],
+        "roll_rad": [math.nan, 1e-3, math.nan, 0.0], "z_m": [math.nan] * 3 + [0.45990],
+    })  # fmt: skip
     poses.to_csv(tmp_path / "poses.csv", index=False)
     for reduction in ("moment", "maximum"):
         found = loaded_poses(read_poses(tmp_path / "poses.csv"), benchmark_pair, 54.5e3, reduction)
