@@ -289,8 +289,6 @@ def with_wheels(contact):
 
 def with_fallback(contact, motion, strips):
     """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
-    if not contact.strips.strips:
-        return contact
     from wrcore.dynamics.strip_wheel import solve_on_grid
 
     fallback = Kernel(solve_on_grid, Kind(contact._replace(geometries=())), motion, strips.force)
@@ -299,11 +297,11 @@ def with_fallback(contact, motion, strips):
 
 def with_kernels(model, work):
     """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
-    wrenches, contact = wheel_wrenches, with_fallback(model.contact, work.motions[0, 0], work.strips)
-    if contact.strips.strips:
+    wrenches, contact = wheel_wrenches, model.contact
+    if contact.strips.strips and len(work.motions):
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
-        wrenches = strip_wrenches
+        wrenches, contact = strip_wrenches, with_fallback(contact, work.motions[0, 0], work.strips)
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 

@@ -133,7 +133,8 @@ class LoadedWheels:
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
             REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, 1e-3, strips,
         )  # fmt: skip
-        contact = with_fallback(contact, np.zeros(MOTION_COLUMNS), self._work)
+        if strips.strips:
+            contact = with_fallback(contact, np.zeros(MOTION_COLUMNS), self._work)
         self._still = contact._replace(strips=contact.strips._replace(rolling=0))
         self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), None
         self._exact = contact if strips.rolling else None
