@@ -72,6 +72,7 @@ def test_products_of_force_and_creepage_keep_their_signs(run):
     assert av.creep_power(run, "wheelset", "left")[0] == pytest.approx(20.0 * 9.5)
 
 
+@pytest.mark.check
 def test_creep_power_is_what_the_energy_loses_by_creep():
     channels = ["pose", "velocity", "contact", "energy"]
     run = wr.simulate(

@@ -18,6 +18,7 @@ def solve_reference(cases, level=DEFAULT_LEVEL):
     return cases.errors(forces)
 
 
+@pytest.mark.check
 @pytest.mark.parametrize(
     "name, force_95, force_max, moment_95",
     [

@@ -50,7 +50,10 @@ def slipping(state, part=0.03):
     return state
 
 
-@pytest.mark.parametrize("name", MODELS)
+COMPILED = {name: pytest.mark.check for name in ("strips", "shape numbers")}  # kernels of their own, a minute each
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=COMPILED.get(name, ())) for name in MODELS])
 def test_rails_that_differ_give_what_each_gives_alone(name):
     _, state = prepared(MODELS[name])
     state = slipping(state, 0.002)

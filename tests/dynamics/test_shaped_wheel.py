@@ -103,6 +103,7 @@ def test_mirrored_runs_have_mirrored_shape_numbers():
     np.testing.assert_allclose(y, -other.groups["wheelset"]["y_m"], atol=1e-7)
 
 
+@pytest.mark.check
 def test_psi_moves_the_motion_but_little():
     plain, shaped = (run(**{**SDEC, "contact.creep.planes": planes}) for planes in ("ellipse", "sdec"))
     assert "psi" not in plain.groups["wheelset/left"]
