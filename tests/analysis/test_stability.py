@@ -15,7 +15,7 @@ from wrcore.analysis.stability.stability import (
     steady_motion,
     straight_ahead,
 )
-from wrcore.dynamics.linear import DIRECTIONS
+from wrcore.balance.linear import DIRECTIONS
 from wrcore.errors import InputError
 from wrcore.scene.description import compile_scene, load_scene
 

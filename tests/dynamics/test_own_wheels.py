@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore.balance.linear import steady_running
 from wrcore.dynamics.energy import energy_balance
-from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene

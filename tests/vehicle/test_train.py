@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore.balance.equilibrium import solve_equilibrium
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import solve_equilibrium
 from wrcore.dynamics.system import Equations
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError

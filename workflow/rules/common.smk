@@ -87,7 +87,7 @@ def sources(*rooms):
 
 
 CONTACT = ("kernels", "geometry", "contact")
-SCENE = ("vehicle", "scene")
+SCENE = ("vehicle", "balance", "scene")
 RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/assessment/motion", "analysis/assessment/wheels")
 LOADED = (*CONTACT, "creep", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")

@@ -25,7 +25,6 @@ import numpy as np
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.drive import BRAKE, undriven
-from wrcore.dynamics.equilibrium import frictionless
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.support import support_places
@@ -43,7 +42,7 @@ from wrcore.dynamics.suspension import (
     friction_limit,
     pack_elements,
 )
-from wrcore.dynamics.system import Equations, derivatives_at, independent_at
+from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at
 from wrcore.dynamics.track import moving_frame
 from wrcore.dynamics.wheel import normal_contact
 from wrcore.kernels.jit import jit

@@ -14,6 +14,7 @@ import numpy as np
 
 from wrcore.contact.patch.model import WRENCHES_HELD, StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
@@ -26,6 +27,9 @@ from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
+
+FRICTIONLESS = 1e-9
+"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
 
 
 class Bodies(NamedTuple):
@@ -277,6 +281,12 @@ def fill_many(equations, t, states, model, work, rates):
     """Right-hand sides of several states (n, size), row by row."""
     for i in range(states.shape[0]):
         derivatives_at(equations, t, states[i], model, work, rates[i])
+
+
+def frictionless(model):
+    """The model with next to no friction anywhere, in the creep law that costs least."""
+    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
+    return model._replace(contact=contact, friction=pack_schedules([]))
 
 
 def with_wheels(contact):

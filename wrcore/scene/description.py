@@ -15,6 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from wrcore.balance.bodies import check_bodies
+from wrcore.balance.initial import initial_state, rest
+from wrcore.balance.initial import static_equilibrium as static_equilibrium
 from wrcore.contact.detection import DETECTIONS
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
@@ -31,11 +34,8 @@ from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import Track, build_track
-from wrcore.scene.bodies import check_bodies
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
-from wrcore.scene.initial import initial_state, rest
-from wrcore.scene.initial import static_equilibrium as static_equilibrium
 from wrcore.scene.pairs import digests_of_files, find_file, own_pairs, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle

@@ -6,9 +6,9 @@ import numpy as np
 
 from study.hard_cases.cases import Check, contacts, prepare, rows, run, run_in_parts, sound, with_forces
 from wrcore.analysis.stability.stability import straight_ahead
+from wrcore.balance.linear import steady_running
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.linear import steady_running
 from wrcore.dynamics.marker import FRAME
 
 DETECTIONS = ("planar", "spatial")

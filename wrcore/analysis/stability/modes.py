@@ -27,8 +27,8 @@ import re
 import numpy as np
 import pandas as pd
 
+from wrcore.balance.linear import DIRECTIONS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.linear import DIRECTIONS
 from wrcore.dynamics.support import RAILS, no_support, support_size
 
 NEUTRAL = 1e-3
@@ -203,7 +203,7 @@ def linear_modes(vehicle, linearisation, support=None):
         negative), frequency_Hz, damping_ratio (negative for a growing mode, NaN for a neutral one), the coordinate
         with most energy, and its part; of modes of the track, the kind of freedom and its part of the track.
     shapes : numpy.ndarray, shape (rows, n, 6), complex
-        Displacements (m) and rotations (rad) of the bodies, see `wrcore.dynamics.linear.DIRECTIONS`; the largest is 1.
+        Displacements (m) and rotations (rad) of the bodies, see `wrcore.balance.linear.DIRECTIONS`; the largest is 1.
         Zero for a mode in which only speeds change.
     energies : numpy.ndarray, shape (rows, n, 6)
         Kinetic energies of the same coordinates (of a wheelset's spin instead of its pitch) as parts of the whole,

@@ -10,9 +10,9 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from wrcore.analysis.stability.modes import NEUTRAL, energy_table, linear_modes, shape_table
+from wrcore.balance.linear import steady_running
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.linear import steady_running
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import checked
 from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium

@@ -11,22 +11,22 @@ import math
 
 import numpy as np
 
+from wrcore.balance.bodies import put_bodies
+from wrcore.balance.equilibrium import Equilibrium, solve_equilibrium, stand_on_rails
+from wrcore.balance.linear import cleared, steady_running
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle, settle_apart
 from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, euler_parameters, matrix_of
 from wrcore.dynamics.drive import undriven
-from wrcore.dynamics.equilibrium import Equilibrium, frictionless, solve_equilibrium, stand_on_rails
-from wrcore.dynamics.linear import cleared, steady_running
 from wrcore.dynamics.series import equations_of
 from wrcore.dynamics.support import rails_at
-from wrcore.dynamics.system import independent_at, own_states, state_size
+from wrcore.dynamics.system import frictionless, independent_at, own_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
 from wrcore.geometry.track import rotation
 from wrcore.kernels.handles import Handle
-from wrcore.scene.bodies import put_bodies
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wrcore.balance.equilibrium import RESIDUAL
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.equilibrium import RESIDUAL
 from wrcore.dynamics.joint import joint_jacobian
 from wrcore.dynamics.system import Equations, own_states
 

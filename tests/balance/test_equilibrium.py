@@ -8,9 +8,9 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
+from wrcore.balance.equilibrium import wheel_loads
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.equilibrium import wheel_loads
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium

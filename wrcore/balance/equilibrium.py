@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.schedule import pack_schedules
 from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Equations, own_states
+from wrcore.dynamics.system import Equations, frictionless, own_states
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path
 
@@ -25,9 +23,6 @@ STEP = 1e-7
 RESIDUAL = 1e-9
 """Accelerations below this count as none, m/s^2 and rad/s^2; Newton's method ends there once a step leaves more than a
 tenth of what was left before it: what is soft still moves far, in y and roll, while they are all but zero."""
-
-FRICTIONLESS = 1e-9
-"""Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +47,6 @@ def displaced(state, model, displacement):
         out[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], q[3:])
     out[STATE_SIZE * n :] += displacement[6 * n :]
     return out
-
-
-def frictionless(model):
-    """The model with next to no friction anywhere, in the creep law that costs least."""
-    contact = model.contact._replace(friction=FRICTIONLESS, law=LAWS["she"])
-    return model._replace(contact=contact, friction=pack_schedules([]))
 
 
 def _turned(p, turn):

@@ -10,10 +10,10 @@ from tests.conftest import ROOT, SCENES
 from tests.dynamics.test_system import LEVEL, body_state, make_model
 from wrcore.analysis.stability.modes import linear_modes
 from wrcore.analysis.stability.stability import at_speed, steady_motion
+from wrcore.balance.linear import linearise, moved_states, steady_running
 from wrcore.contact import reduction
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.linear import linearise, moved_states, steady_running
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations, Model, state_size
 from wrcore.integrate.integrator import integrate

@@ -1,0 +1,1 @@
+"""Where a vehicle stands and how it begins: static equilibrium, steady running, the state at the start."""
