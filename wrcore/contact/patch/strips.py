@@ -101,12 +101,7 @@ class Workspace(NamedTuple):
 
 
 def workspace():
-    """Arrays for the solution of one patch at a time.
-
-    Returns
-    -------
-    Workspace
-    """
+    """`Workspace` for the solution of one patch at a time."""
     n, m = MAX_STRIPS, MAX_WINDOWS
     return Workspace(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
