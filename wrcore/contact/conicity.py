@@ -57,8 +57,7 @@ class _Well:
         return float(self.potential[i] + 0.5 * (y - self.y[i]) * (self.difference[i] + here))
 
     def centre(self):
-        """Place (m) where the difference rises through zero, nearest to y = 0, mid-way through any play; NaN if none.
-        """
+        """Place (m) where the difference rises through zero, nearest to y = 0, mid-way through play; NaN if none."""
         d = self.difference
         cells = np.flatnonzero((d[:-1] <= 0.0) & (d[1:] >= 0.0))
         if not cells.size:

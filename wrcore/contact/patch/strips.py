@@ -1,4 +1,4 @@
-"""Galerkin strips: residual and Jacobian of the normal problem, and Newton's iteration with conforming tips."""
+"""Galerkin strips: residual and Jacobian of the normal problem."""
 
 import math
 from typing import NamedTuple
