@@ -57,10 +57,7 @@ class _Well:
         return float(self.potential[i] + 0.5 * (y - self.y[i]) * (self.difference[i] + here))
 
     def centre(self):
-        """Place (m) where the difference rises through zero, nearest to y = 0; the middle of it where there is play.
-
-        NaN if there is none.
-        """
+        """Place (m) where the difference rises through zero, nearest to y = 0, mid-way through play; NaN if none."""
         d = self.difference
         cells = np.flatnonzero((d[:-1] <= 0.0) & (d[1:] >= 0.0))
         if not cells.size:
@@ -121,28 +118,10 @@ def _cell_time(bend, h, speed):
 
 
 def equivalent_conicity(y, difference, amplitudes):
-    """Equivalent conicity of a rolling radius difference by Klingel's integral (EN 15302 annex B, UIC 519).
-
-    Nodes may be unequally spaced. The motion swings about the zero of the difference nearest to y = 0; its turning
-    points have equal potential, and the amplitude is half their distance, also where the sides are unlike. Base and
-    radius of the wheelset cancel.
-
-    Parameters
-    ----------
-    y : array_like, shape (n,)
-        Lateral positions, m, increasing.
-    difference : array_like, shape (n,)
-        r_left - r_right, m, taken as linear between the nodes.
-    amplitudes : array_like, shape (m,)
-        m, > 0.
-
-    Returns
-    -------
-    conicity : (m,) ndarray
-        0 where the motion crosses play without a rolling radius difference (infinite wavelength), NaN where the
-        table does not reach or where a wrong-signed difference lets no wave of that amplitude exist.
-    turning_points : (m, 2) ndarray
-        m.
+    """Equivalent conicities (m,) by Klingel's integral (EN 15302 annex B, UIC 519) for ``amplitudes`` (m,), m, and
+    turning points (m, 2), m, from the difference r_left - r_right (m), linear between increasing positions ``y`` (m).
+    The motion swings about the zero nearest to y = 0, between points of equal potential. 0: it crosses play without a
+    difference. NaN: the table does not reach, or a wrong-signed difference lets no such wave exist.
     """
     y, difference = np.asarray(y, dtype=float), np.asarray(difference, dtype=float)
     amplitudes = np.atleast_1d(np.asarray(amplitudes, dtype=float))
@@ -221,15 +200,5 @@ def _around_centre(y, difference):
 
 
 def en15302_tolerance(conicity):
-    """Permitted deviation from a reference value of EN 15302: min(0.05, half of it), 0.01 where it is zero.
-
-    Parameters
-    ----------
-    conicity : array_like
-        Reference values.
-
-    Returns
-    -------
-    ndarray
-    """
+    """Permitted deviation from reference conicities of EN 15302: min(0.05, half of them), 0.01 where they are zero."""
     return np.clip(0.5 * np.asarray(conicity, dtype=float), 0.01, 0.05)

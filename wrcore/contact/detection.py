@@ -312,27 +312,9 @@ def axle_direction(roll, yaw):
 
 
 def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="maximum"):
-    """Contact patches of both wheels of a wheelset.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    y, z : float
-        Wheelset centre in the track frame, m.
-    roll, yaw : float
-        Rad.
-    detection : {"planar", "spatial"}
-    reduction : {"maximum", "moment"}
-
-    Returns
-    -------
-    list of Patch
-        Left wheel first, from flange to field side.
-
-    Raises
-    ------
-    InputError
-        For an unknown detection or reduction.
+    """List of `Patch` of both wheels of a wheelset whose centre is at y, z (m) in the track frame with roll and yaw
+    (rad): left wheel first, from flange to field side. ``detection`` is planar or spatial, ``reduction`` maximum or
+    moment.
     """
     if detection not in ("planar", "spatial"):
         raise InputError("detect", "detection", f"expected planar or spatial, got {detection!r}")

@@ -49,23 +49,9 @@ def _elliptic(flat):
 
 
 def hertz_shape(ratio):
-    """Exact shape functions of the Hertz ellipse.
-
-    Parameters
-    ----------
-    ratio : float or array_like
-        Larger over smaller relative curvature, 1 to 1e20.
-
-    Returns
-    -------
-    p_large, p_small, k : float or numpy.ndarray
-        Semi-axis factors (the larger axis lies along the smaller curvature) and stiffness factor of the module's
-        formulas.
-
-    References
-    ----------
-    Johnson, Contact Mechanics (1985), section 4.2, Eqs. (4.28)-(4.32). Abramowitz and Stegun (1964), 17.6 (complete
-    elliptic integrals by the arithmetic-geometric mean).
+    """Factors of the larger (along the smaller curvature) and smaller semi-axis and of the stiffness in the module's
+    formulas, exact, from the larger over the smaller relative curvature (array_like, 1 to 1e20): Johnson, Contact
+    Mechanics (1985), Eqs. (4.28)-(4.32), with Abramowitz and Stegun (1964), 17.6.
     """
     ratio = np.asarray(ratio, float)
     low, high = np.zeros_like(ratio), np.full_like(ratio, 30.0)

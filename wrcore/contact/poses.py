@@ -23,23 +23,9 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 
 
 def read_poses(path):
-    """Read and check a CSV file of poses.
-
-    Parameters
-    ----------
-    path : str or Path
-        Columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m, and of the motion V_m_per_s, omega_rad_per_s,
-        vy_m_per_s, yaw_rate_rad_per_s, mu; an empty cell counts as not given.
-
-    Returns
-    -------
-    pandas.DataFrame
-        With all of these columns; NaN for what is not given.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the column (and row) and what was expected.
+    """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m,
+    V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the file, the
+    column, the row and what was expected.
     """
     import pandas as pd
 

@@ -27,21 +27,7 @@ _LARGEST = 1e100
 
 
 def read_cases(path):
-    """Read a case list from a CSV file; `solve_cases` then names the file in its messages.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    pandas.DataFrame
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as a table.
-    """
+    """Read a case list (pandas.DataFrame) from a CSV file; `solve_cases` then names the file in its messages."""
     frame = read_csv_table(path, "case_id")
     if frame.empty:
         raise InputError(path, "", "expected at least one case, got none")
@@ -50,25 +36,8 @@ def read_cases(path):
 
 
 def check_cases(frame, source="cases"):
-    """Columns of the case list as floats, checked.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Columns case_id, a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m; others are
-        ignored.
-    source : str
-        Name of the file, for messages.
-
-    Returns
-    -------
-    dict of str to ndarray
-
-    Raises
-    ------
-    InputError
-        On a missing column, on a value that is not a finite number, not positive where it must be, or nu outside
-        0 to 0.5. Rows are counted from 1, without the header.
+    """Columns a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m of a case list, which has a
+    case_id, too, as arrays of floats by name. InputError names ``source`` and the column and row (from 1) at fault.
     """
     frame = frame.rename(columns={other: name for other, name in OTHER_NAMES.items() if name not in frame})
     missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
@@ -96,20 +65,8 @@ def _refuse(bad, values, name, source, expected):
 
 
 def nondimensional(columns):
-    """Patch and creepages of SI cases as the laws take them.
-
-    Parameters
-    ----------
-    columns : mapping
-        As `check_cases` returns.
-
-    Returns
-    -------
-    g, psi : (n,) ndarray
-    creepages : (n, 3) ndarray
-        xi', eta', phi'.
-    c : (n,) ndarray
-        sqrt(a b), b the mean of b_neg and b_pos, m.
+    """g, psi (n,), creepages xi', eta', phi' (n, 3) as the laws take them, and c = sqrt(a b) (n,), m, with b the mean
+    of b_neg and b_pos, from columns that `check_cases` returns.
     """
     b = (columns["b_neg_m"] + columns["b_pos_m"]) / 2
     psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
@@ -120,35 +77,12 @@ def nondimensional(columns):
 
 
 def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, source=None):
-    """Creep forces of all cases of a list.
+    """Table case_id, Fx_N, Fy_N, Mz_Nm of the cases of a list (see `check_cases`) by ``model`` (of MODELS), in their
+    order; of an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of its bounding box.
 
-    For an SDEC patch (b_neg != b_pos) creepages and moment refer to the middle of the patch's bounding box.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        See `check_cases`.
-    model : str
-        Of MODELS: a law of `wrcore.creep.laws`, or "exact".
-    table : CreepTable or path, optional
-        Table for the model "table"; without it the cached table for each nu is used, built first if need be.
-    level : int
-        Refinement of the model "exact".
-    progress : callable, optional
-        Wraps the iterable of patches (tables, exact).
-    source : str, optional
-        Name of the input, for messages (default: the file that `read_cases` read).
-
-    Returns
-    -------
-    pandas.DataFrame
-        case_id, Fx_N, Fy_N, Mz_Nm in the order of the input; ``attrs["out_of_range"]`` counts cases whose patch lies
-        outside the law's data, ``attrs["not_converged"]`` exact solutions that missed their tolerance.
-
-    Raises
-    ------
-    InputError
-        On bad input, an unknown model, or a table made for another Poisson's ratio.
+    ``table`` (CreepTable or path): for the model "table"; by default the cached one for each nu, built if need be.
+    ``level``: refinement of the model "exact". ``progress`` wraps the iterable of patches, ``source`` is named in
+    messages. ``attrs`` counts cases ``out_of_range`` of the law's data and exact solutions ``not_converged``.
     """
     import pandas as pd
 

@@ -41,24 +41,9 @@ class CreepData(NamedTuple):
 
 
 def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 1.0)):
-    """Data for `creep_force`.
-
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio, 0 to 0.5.
-    table : CreepTableData, optional
-        ``CreepTable.kernel_data()``; needed for the law "table" only.
-    grid : int
-        FASTSIM's steps along x and strips across.
-    elliptic : bool
-        FASTSIM's bound: Hertzian instead of parabolic.
-    factors : tuple of float
-        k_A and k_S of Polach's law.
-
-    Returns
-    -------
-    CreepData
+    """`CreepData` for `creep_force` at Poisson's ratio ``nu``. ``table``: ``CreepTable.kernel_data()``, for the law
+    "table" only; ``grid``: FASTSIM's steps along x and strips across; ``elliptic``: its bound is Hertzian instead of
+    parabolic; ``factors``: k_A and k_S of Polach's law.
     """
     if table is None:
         table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker_data(nu), np.zeros(0, np.float32))

@@ -110,27 +110,9 @@ def _quantiles(errors):
 
 
 def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
-    """Build a table whose force error stays below a tolerance in 99 % of random cases.
-
-    Parameters
-    ----------
-    nu : float
-        Poisson's ratio, 0 to 0.5.
-    planes : {"ellipse", "sdec"}
-        Four inputs (psi = 0) or five.
-    tolerance : float
-        Bound of the 99 % quantile of abs(dF)/(mu N). The finest of the known resolutions is the last resort.
-    progress : callable, optional
-        Wraps the list of patches to solve, e.g. ``tqdm.tqdm``.
-
-    Returns
-    -------
-    CreepTable
-
-    Raises
-    ------
-    InputError
-        If nu, planes or tolerance make no sense.
+    """`CreepTable` at Poisson's ratio ``nu`` with four inputs (``planes`` "ellipse", psi = 0) or five ("sdec"), whose
+    99 % quantile of abs(dF)/(mu N) over random cases stays below ``tolerance``; the finest of the known resolutions is
+    the last resort. ``progress`` wraps the list of patches to solve, e.g. ``tqdm.tqdm``.
     """
     _check_arguments(nu, planes, tolerance)
     for resolution in _promising(planes, tolerance):
@@ -158,13 +140,7 @@ def _check_arguments(nu, planes, tolerance):
 
 
 def write_table(path, table):
-    """Write a table as HDF5, with a digest of all its bytes.
-
-    Parameters
-    ----------
-    path : path-like
-    table : CreepTable
-    """
+    """Write a `CreepTable` as HDF5, with a digest of all its bytes."""
     with new_hdf5(path) as file:
         _write_datasets(file, table)
 
@@ -188,21 +164,7 @@ def _write_datasets(file, table):
 
 
 def load_table(path):
-    """Read a creep table.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    CreepTable
-
-    Raises
-    ------
-    InputError
-        If the file is missing, is not a creep table, or is no longer what was written.
-    """
+    """Read a `CreepTable`; InputError if the file is missing, is none, or is no longer what was written."""
     with checked_hdf5(path, "a creep table in HDF5") as file:
         found = file.attrs.get("schema")
         if found != SCHEMA:
@@ -317,16 +279,7 @@ def ensure_table(
 
 
 def table_info(table):
-    """Properties of a table as a flat dict (for ``wrcore table info`` and for settings of results).
-
-    Parameters
-    ----------
-    table : CreepTable or path-like
-
-    Returns
-    -------
-    dict
-    """
+    """Properties of a `CreepTable`, or of one in a file, as a flat dict."""
     table = table if isinstance(table, CreepTable) else load_table(table)
     info = {"planes": table.planes, "nu": table.nu, "tolerance": table.tolerance, "cases": table.cases}
     info |= {f"nodes_{name[2:]}": value for name, value in table.data.axes._asdict().items() if name.startswith("n_")}

@@ -89,17 +89,11 @@ GRID, GRID_TOLERANCE = 32, 1e-3
 
 @jit
 def solve_on_grid(model, motion, place):
-    """Fallback: a patch on a uniform grid; a kernel of its own that may allocate.
+    """Fallback: a patch on a uniform grid; a kernel of its own that may allocate. ``motion`` is a left wheel's.
 
-    Parameters
-    ----------
-    model : ContactModel
-    motion : numpy.ndarray, shape (MOTION_COLUMNS,)
-        Of a left wheel.
-    place : numpy.ndarray
-        y and z of the wheelset (m), whether detection is spatial, the frame's cosine, sine, x, ur and z, and the
-        creepages, and the coefficient of friction. Overwritten: Fx, Fs, Mn about the origin, N, means over the
-        pressure of x and s, semi-axes of the ellipse of equal moments, greatest pressure, mean slope of the strips.
+    ``place``: y and z of the wheelset (m), whether detection is spatial, the frame's cosine, sine, x, ur and z, the
+    creepages, the coefficient of friction. Overwritten: Fx, Fs, Mn about the origin, N, means over the pressure of x
+    and s, semi-axes of the ellipse of equal moments, greatest pressure, mean slope of the strips.
     """
     y, z, cosine, sine = place[0], place[1], place[3], place[4]
     pose = make_pose(1.0, y, z, motion[3], motion[4], motion[5], place[2] > 0.0)
@@ -390,10 +384,8 @@ def mirror(rows, count, wrench):
 
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
-    """As `wheel_wrenches`, with patches on strips; arguments as there.
-
-    While ``work.cheap[0]`` is set the ellipse of equal moments of the overlap stands in: a Jacobian by differences
-    wants a smooth neighbour of the model, not the model.
+    """As `wheel_wrenches`, with patches on strips; while ``work.cheap[0]`` is set the ellipse of equal moments of the
+    overlap stands in: a Jacobian by differences wants a smooth neighbour of the model, not the model.
     """
     if work.cheap[0] != 0:
         wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work)

@@ -89,19 +89,8 @@ def irregularity_at(data, s, out):
 
 
 def irregularity_data(start, step, values):
-    """Spline through uniform samples that begin and end at zero.
-
-    Parameters
-    ----------
-    start, step : float
-        Arc length of the first sample and distance of the samples, m.
-    values : (n, 4) array_like
-        Deviations, m, in the order of `CHANNELS`.
-
-    Returns
-    -------
-    IrregularityData
-        With cells of zeros added at both ends, in which the spline dies out: it is C2 there, too.
+    """IrregularityData of samples (n, 4), m, in the order of `CHANNELS`, from arc length ``start`` on by ``step`` (m),
+    that begin and end at zero: a spline that dies out, C2, in cells of zeros added at both ends.
     """
     from scipy.interpolate import CubicSpline  # a third of a second that other scenes need not wait
 
@@ -146,12 +135,8 @@ def fade(s, fade_in, fade_out):
 
 
 def faded_irregularity(s, values, fade_in, fade_out, source, field):
-    """IrregularityData from samples at uniform arc lengths s (n,), values (n, 4), both in m.
-
-    Raises
-    ------
-    InputError
-        Fades longer than the samples, or samples that do not begin and end at zero and are not faded.
+    """IrregularityData from samples at uniform arc lengths s (n,), values (n, 4), both in m; InputError if the fades
+    are longer, or the ends are neither zero nor faded.
     """
     if fade_in + fade_out > s[-1] - s[0]:
         raise InputError(source, field, f"expected fades shorter than the {s[-1] - s[0]:g} m of irregularity")
@@ -164,28 +149,12 @@ def faded_irregularity(s, values, fade_in, fade_out, source, field):
 
 
 def read_irregularity(path):
-    """Read a CSV file of measured irregularity.
+    """Uniform arc lengths (n,) and deviations (n, 4), both in m, of a CSV file of measured irregularity.
 
     The header names ``s_m`` and either any of `CHANNELS` or any of `MEANS`, each with ``_m``; columns that are missing
-    are zero. Lines that begin with ``#`` are comments.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    s : (n,) ndarray
-        Uniform arc lengths, m. Samples at varying distances are carried over, by a cubic spline, to a grid of the
-        smallest distance, which is said.
-    values : (n, 4) ndarray
-        Deviations, m.
-
-    Raises
-    ------
-    InputError
-        Names the file and the line or column at fault: also samples so far apart, or so close together, that a spline
-        through them would make up what lies between.
+    are zero. Lines that begin with ``#`` are comments. Samples at varying distances are carried over, by a cubic
+    spline, to a grid of the smallest distance, which is said. InputError names the file and the line or column at
+    fault: also where such a spline would make up what lies between samples.
     """
     names, lines, table = _read_table(path)
     s, columns = table[:, 0], dict(zip(names[1:], table[:, 1:].T, strict=True))
@@ -271,28 +240,10 @@ def _check_overshoot(s, values, grid, carried, path, lines):
 
 
 def spectrum(quantity, level, omega):
-    """German (ERRI B 176) power spectral density of a track irregularity.
-
-    One-sided and per rad/m: the variance of a band is the integral of S over the positive wave numbers of the band,
-    without a further factor 2 or 2 pi.
-
-    Parameters
-    ----------
-    quantity : {"level", "alignment", "cross_angle"}
-        Mean vertical and lateral deviation (m), and the angle between the rails' heights (rad).
-    level : {"low", "high"}
-        Disturbance level.
-    omega : array_like
-        Wave number, rad/m.
-
-    Returns
-    -------
-    numpy.ndarray
-        m^2/(rad/m), or rad^2/(rad/m) for the angle.
-
-    References
-    ----------
-    ERRI B 176 RP 1, Preliminary studies and specifications (1993); constants as in public codes that read it alike.
+    """German (ERRI B 176 RP 1, 1993; constants as in public codes) power spectral density over wave numbers ``omega``
+    (rad/m) of the mean "level" or "alignment" (m^2/(rad/m)), or of the "cross_angle" between the rails' heights
+    (rad^2/(rad/m)), at the disturbance level "low" or "high". One-sided and per rad/m: a band's variance is the
+    integral of S over its positive wave numbers, without a further factor 2 or 2 pi.
     """
     square = np.asarray(omega, float) ** 2
     factor = (LATERAL if quantity == "alignment" else VERTICAL)[level]
@@ -303,28 +254,13 @@ def spectrum(quantity, level, omega):
 
 
 def generate(level, seed, length, spacing, shortest, longest):
-    """Random irregularity with the German spectra: a sum of cosines with random phases.
+    """Arc lengths s from 0 to about ``length`` (n,) and deviations (n, 4), not faded, all in m, of random irregularity
+    with the German spectra ("low" or "high"), wavelengths from ``shortest`` to ``longest`` (m); the same seed, length
+    and spacing (m) give the same track.
 
-    The cosines' wave numbers are the multiples of 2 pi / period, the period being at least twice the length, and each
-    carries the variance of its own share of the band. Alignment, level and cross level are independent; the gauge
-    stays as it is (the spectra know none).
-
-    Parameters
-    ----------
-    level : {"low", "high"}
-    seed : int
-        The same seed, length and spacing give the same track.
-    length, spacing : float
-        Extent and distance of samples, m.
-    shortest, longest : float
-        Band of wavelengths, m.
-
-    Returns
-    -------
-    s : (n,) ndarray
-        From 0 to about ``length``, m.
-    values : (n, 4) ndarray
-        Deviations of the channels, m, not faded.
+    A sum of cosines with random phases: their wave numbers are the multiples of 2 pi / period, the period being at
+    least twice the length, and each carries the variance of its own share of the band. Alignment, level and cross level
+    are independent; the gauge stays as it is (the spectra know none).
     """
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
     from scipy.fft import next_fast_len

@@ -27,37 +27,22 @@ GAUGE_DEPTH = 0.014
 
 @dataclass(frozen=True, eq=False)
 class ProfileCurve:
-    """Wheel or rail profile f(u).
-
-    Parameters
-    ----------
-    name : str
-        Name or file.
-    kind : {"wheel", "rail"}
-        Wheel: f = 0 at the tape circle (u = 0), radius r(u) = r0 - f(u). Rail: as it lies in the track, f(0) = 0 is
-        the highest point.
-    u : (n,) ndarray
-        Nodes, m, increasing and uniform; positive to the field side.
-    f : (n,) ndarray
-        Ordinate, m, positive up.
-    df : (n,) ndarray
-        Slope at the nodes.
-    d2f : (n,) ndarray
-        Second derivative that belongs to the averaged curvature, 1/m (see `averaged_second_derivative`).
-    source : str
-        Where the numbers come from.
-    outline : object, optional
-        Exact sections (tuple) or `profile_points.Outline`; used for the gauge only.
-    """
+    """Wheel or rail profile f(u), both in m: u to the field side, f up."""
 
     name: str
     kind: str
+    """Of a "wheel" f = 0 at the tape circle (u = 0), radius r(u) = r0 - f(u); of a "rail", as it lies in the track,
+    f(0) = 0 is the highest point."""
     u: np.ndarray
+    """Nodes, m, (n,), increasing and uniform."""
     f: np.ndarray
     df: np.ndarray
+    """Slope at the nodes."""
     d2f: np.ndarray
+    """Second derivative that belongs to the averaged curvature, 1/m (see `averaged_second_derivative`)."""
     source: str = ""
     outline: object = field(default=None, repr=False)
+    """Exact sections (tuple) or `profile_points.Outline`; used for the gauge only."""
 
     def __post_init__(self):
         for array in (self.u, self.f, self.df, self.d2f):
@@ -65,22 +50,9 @@ class ProfileCurve:
 
     @classmethod
     def from_sections(cls, name, kind, sections, source="", window=WINDOW, spacing=SPACING):
-        """Curve through exact sections.
-
-        Parameters
-        ----------
-        name, kind, source : str
-            See the class.
-        sections : sequence of Arc, Line or Polynomial
-            In order of increasing u, m. Rails: in track pose (`profile_sections.incline`).
-        window : float
-            Averaging length of the curvature, m.
-        spacing : float
-            Distance of the nodes, m; u = 0 is a node.
-
-        Returns
-        -------
-        ProfileCurve
+        """Curve through exact sections (Arc, Line or Polynomial) in order of increasing u (m), those of rails in track
+        pose (`profile_sections.incline`); ``window``: averaging length of the curvature, m; ``spacing``: distance of
+        the nodes, m; u = 0 is a node.
         """
         low, high, used = profile_sections.usable_span(sections, STEEPEST)
         u = _nodes(low, high, spacing)
@@ -90,38 +62,14 @@ class ProfileCurve:
     @classmethod
     def from_points(cls, u, f, kind, name="points", *, lines=None, trim=False, inclination=0.0, smoothing=0.0,
                     window=WINDOW, spacing=SPACING):  # fmt: skip
-        """Curve through measured points.
+        """Curve through measured points u, f (m), u strictly rising or falling: a parametric cubic spline (C2 along the
+        profile) that may keep ``smoothing`` (root mean square, m) from them, sampled at uniform nodes (see
+        `from_sections`).
 
-        A parametric cubic spline (C2 along the profile) runs through the points and is sampled at uniform nodes.
-
-        Parameters
-        ----------
-        u, f : (m,) array_like
-            Points, m; u strictly increasing or strictly decreasing.
-        kind : {"wheel", "rail"}
-            Wheels are shifted vertically to f(0) = 0, rails to their highest point (a rail whose origin is within
-            0.2 um of the height of its highest point keeps its lateral origin).
-        name : str
-            Named in error messages.
-        lines : sequence of int, optional
-            Line number of each point in its file, for error messages.
-        trim : bool
-            Keep the single-valued portion around the origin instead of refusing a profile that turns back.
-        inclination : float
-            Turns an upright rail into its track pose (0: the points already lie in it).
-        smoothing : float
-            Root mean square distance that the curve may keep from the points, m; 0 interpolates.
-        window, spacing : float
-            As in `from_sections`.
-
-        Returns
-        -------
-        ProfileCurve
-
-        Raises
-        ------
-        InputError
-            Points that are too few, not finite, not monotone, in another unit than stated, or no such profile.
+        Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
+        stays) after a turn by ``inclination`` (0: they lie in track pose). ``trim`` keeps the single-valued portion
+        around the origin instead of refusing a profile that turns back. ``name`` and the points' ``lines`` in a file
+        are for messages.
         """
         outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing)
         low, high = outline.working_span(STEEPEST, trim)
@@ -131,10 +79,9 @@ class ProfileCurve:
         return cls(name, kind, nodes, value, slope, d2f, f"measured points, {name}", outline)
 
     def __call__(self, u, nu=0):
-        """Ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m, any shape).
+        """Ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m, any shape); NaN beyond the ends.
 
         Ordinate and slope are those of the cubic Hermite polynomial, the second derivative is interpolated linearly.
-        NaN outside the curve's range.
         """
         u = np.asarray(u, dtype=float)
         h = self.spacing
@@ -160,14 +107,8 @@ class ProfileCurve:
         return (self.u[-1] - self.u[0]) / (self.u.size - 1)
 
     def gauge_offset(self, depth=GAUGE_DEPTH):
-        """Distance (m, positive) from a rail's origin to its innermost point within ``depth`` (m) of the top.
-
-        NaN if the profile ends above that depth on the gauge side.
-
-        Raises
-        ------
-        InputError
-            For a wheel.
+        """Distance (m, positive) from a rail's origin to its innermost point within ``depth`` (m) of the top; NaN if
+        the profile ends above that depth on the gauge side. InputError for a wheel.
         """
         if self.kind != "rail":
             raise InputError(self.name, "gauge", "expected a rail profile, got a wheel")
@@ -187,24 +128,11 @@ def _nodes(low, high, spacing):
 
 
 def averaged_second_derivative(u, f, df, window=WINDOW):
-    """Second derivative that reproduces the curvature's mean over a stretch of the profile.
+    """Second derivative (1/m) at nodes u, f (m) with slopes df, all (n,), that reproduces the curvature's mean over the
+    arc length ``window`` (m) centred there: the turn of the tangent over it, divided by it; cut off at the ends.
 
-    The mean of the curvature over the arc length ``window`` centred at a node is the turn of the tangent over that
-    stretch divided by its length. It is returned as f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature
-    f'' / (1 + f'^2)^(3/2) is the mean. On a circular arc this is exact also where the arc is steep, where the mean
-    of f'' over u is not. At the ends the stretch is cut off.
-
-    Parameters
-    ----------
-    u, f, df : (n,) array_like
-        Nodes (m), ordinates (m) and slopes.
-    window : float
-        Length of the stretch along the profile, m.
-
-    Returns
-    -------
-    (n,) ndarray
-        1/m.
+    It is f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature f'' / (1 + f'^2)^(3/2) is the mean. On a circular
+    arc this is exact also where the arc is steep, where the mean of f'' over u is not.
     """
     if not window > 0.0:
         raise ValueError(f"window must be positive, got {window!r}")

@@ -51,25 +51,16 @@ WIDENED = {"both": 0.0, "left": 0.5, "right": -0.5}
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A track with two rails of the same profile.
-
-    Parameters
-    ----------
-    gauge : float
-        Distance between the innermost points of the rails within the gauge depth of their tops, m; where the path
-        has a widening, it is added.
-    path : PathData
-        Centre line, cant and widening; without it the track is straight and level.
-    irregularity : IrregularityData
-        Deviation of the rails; without it they are perfect.
-    gauge_depth : float
-        Height below the rail top down to which the gauge is measured, m.
-    """
+    """A track with two rails of the same profile; by default straight, level and perfect."""
 
     gauge: float = 1.435
+    """Distance of the rails' innermost points within the gauge depth of their tops, m; the path's widening is added."""
     path: PathData = field(default_factory=tangent_path, repr=False)
+    """Centre line, cant and widening."""
     irregularity: IrregularityData = field(default_factory=no_irregularity, repr=False)
+    """Deviation of the rails."""
     gauge_depth: float = GAUGE_DEPTH
+    """Height below the rail top down to which the gauge is measured, m."""
 
     @cached_property
     def tangent(self):
@@ -77,38 +68,17 @@ class Track:
         return self.path.pieces.shape[0] == 0 and self.irregularity.coefficients.shape[0] == 0
 
     def rail_distance(self, rail):
-        """Distance from the track's centre line to the origin (highest point) of a rail's profile, m.
+        """Distance (m) from the track's centre line to the origin (highest point) of a rail's ProfileCurve in track
+        pose.
 
         Its part of the widening, half unless the path says otherwise, and the irregularity come on top.
-
-        Parameters
-        ----------
-        rail : ProfileCurve
-            Rail profile in the pose in which it lies in the track.
         """
         return 0.5 * self.gauge + rail.gauge_offset(self.gauge_depth)
 
 
 def build_track(data, source, folder="."):
-    """Build a track from a scene's key ``track``.
-
-    Parameters
-    ----------
-    data : dict
-        Content of the key (``wrcore/scene/schemas/track.yaml``); left as it is.
-    source : str
-        Named in errors.
-    folder : str or Path
-        A points file is looked for here, then in the folder above.
-
-    Returns
-    -------
-    Track
-
-    Raises
-    ------
-    InputError
-        One line; the field names the segment by its position in the list (from 0) and its key.
+    """Track of a scene's key ``track`` (a dict, left as it is); ``source`` is named in errors, a points file is looked
+    for in ``folder``, then above it. InputError names a segment by its position in the list (from 0) and its key.
     """
     try:
         data = validate(data, "track", source)

@@ -99,17 +99,7 @@ DESCRIPTIONS = {
 
 
 def unit_of(channel: str) -> str:
-    """Unit that a channel's name states.
-
-    Parameters
-    ----------
-    channel : str
-        Name such as ``penetration_m``.
-
-    Returns
-    -------
-    str
-        Unit, ``1`` for a pure number.
+    """Unit that a channel's name states, ``1`` for a pure number.
 
     Examples
     --------

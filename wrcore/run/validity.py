@@ -58,20 +58,9 @@ _OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")
 
 
 def exceeded(contact, patches, roll, yaw):
-    """Count the limits that patches and poses at the output times exceed.
-
-    Parameters
-    ----------
-    contact : ContactModel
-    patches : numpy.ndarray, shape (n, k, 2, MAX_PATCHES, PATCH_COLUMNS)
-        From :func:`wrcore.dynamics.outputs.evaluations_at`, NaN where there is none.
-    roll, yaw : numpy.ndarray, shape (n, k)
-        Of the wheelsets relative to the track, rad.
-
-    Returns
-    -------
-    dict of str to int
-        ``patches`` that were looked at, and the counts by name.
+    """Counts by name of limits that ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS), of
+    :func:`wrcore.dynamics.outputs.evaluations_at` (NaN: none), and ``roll``, ``yaw`` (n, k), rad, of the wheelsets
+    relative to the track exceed, and of ``patches`` that were looked at.
     """
     if contact.geometries:
         return _exceeded_by_each(contact, patches, roll, yaw)

@@ -230,21 +230,12 @@ def sweep_to_file(
     threads: int = 1,
     progress: Callable[[Iterable], Iterable] | None = None,
 ) -> None:
-    """Run a sweep batch by batch and write its table; batches of an earlier, interrupted call are kept.
+    """Run a sweep batch by batch and write its table, CSV or ``.h5``; ``threads`` and ``progress`` as for
+    :func:`run_sweep`.
 
-    Parameters
-    ----------
-    sweep : Sweep
-    path : path-like
-        Table, CSV or ``.h5``. Finished batches wait beside it in a folder whose name tells what they depend on.
-    threads, progress
-        As for :func:`run_sweep`.
-
-    Raises
-    ------
-    InputError
-        If another process writes the same table, if batches wait that were made of something else, or if a file that
-        the sweep reads changes meanwhile.
+    Finished batches wait beside it in a folder whose name tells what they depend on, and those of an interrupted call
+    are kept. InputError if another process writes the same table, if batches wait that were made of something else, or
+    if a file that the sweep reads changes meanwhile.
     """
     path = Path(path)
     remove_remains(path)
@@ -265,12 +256,8 @@ def sweep_to_file(
 
 
 def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathLike[str]) -> None:
-    """One table from those of all batches, in the order of the runs.
-
-    Raises
-    ------
-    InputError
-        Parts that are damaged, of another sweep or of other sources, runs that are missing or there twice.
+    """One table from those of all batches, in the order of the runs; InputError for parts that are damaged, of another
+    sweep or of other sources, and for runs that are missing or there twice.
     """
     tables: list[pd.DataFrame] = []
     owners: dict[int, str | PathLike[str]] = {}
@@ -341,13 +328,7 @@ def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
 
 
 def load_table(path: str | PathLike[str]) -> pd.DataFrame:
-    """Read a sweep's table, CSV or HDF5.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or it is of another kind.
-    """
+    """Read a sweep's table, CSV or HDF5; InputError if there is none or it is of another kind."""
     return _read(Path(path))
 
 

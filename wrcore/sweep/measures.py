@@ -129,19 +129,8 @@ MEASURES = (*MOTION, *FORCES, *COUNTERS)
 
 
 def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Lateral position and Euler parameters of the wheelsets, or their pose on a curved or irregular track.
-
-    Parameters
-    ----------
-    model : Model
-    starts : numpy.ndarray, shape (wheelsets,)
-        Arc lengths at the start, m.
-    states : numpy.ndarray, shape (n, size)
-
-    Returns
-    -------
-    numpy.ndarray, shape (n, wheelsets, 5)
-        On tangent track y (m) and four Euler parameters; else arc length (m), y, z (m), roll and yaw (rad).
+    """Motion of the wheelsets (n, wheelsets, 5) from ``states`` (n, size): on tangent track y (m) and four Euler
+    parameters, else arc length (m), y, z (m), roll and yaw (rad); ``starts`` (wheelsets,): arc lengths at the start, m.
     """
     wheelsets = model.bodies.wheelsets
     out = np.empty((len(states), len(wheelsets), 5))

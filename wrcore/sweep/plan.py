@@ -37,27 +37,18 @@ OF_PARTS = ("name", "description", "vehicle", "wheel", "rail", "track", "contact
 
 @dataclass(frozen=True, repr=False)
 class Sweep:
-    """A checked sweep.
-
-    Attributes
-    ----------
-    data : dict
-        Content of the sweep file with defaults.
-    source : str
-        Named in errors.
-    scene : Scene
-        With the changes that hold for all runs.
-    runs : pandas.DataFrame
-        A row per run, numbered from 0 (index ``run``), and a column per key.
-    files : dict
-        SHA-256 of all files that are read for any of the runs, by path.
-    """
+    """A checked sweep."""
 
     data: dict[str, Any]
+    """Content of the sweep file with defaults."""
     source: str
+    """Named in errors."""
     scene: Scene
+    """With the changes that hold for all runs."""
     runs: pd.DataFrame
+    """A row per run, numbered from 0 (index ``run``), and a column per key."""
     files: dict[str, str]
+    """SHA-256 of all files that are read for any of the runs, by path."""
 
     @property
     def batches(self) -> int:

@@ -77,25 +77,13 @@ def _run(model, state, settling):
 
 
 def settle_motion(model, state, settling):
-    """Follow a motion until its amplitude has settled.
+    """Follow a motion on a tangent, perfect track until its amplitude has settled: a row of what the last window shows,
+    and the state at the end.
 
-    Parameters
-    ----------
-    model : Model
-        On a tangent, perfect track.
-    state : numpy.ndarray
-    settling : Settling
-
-    Returns
-    -------
-    row : dict
-        speed_m_per_s; of the last window: amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN
-        if it derails), frequency_Hz of that wheelset, offset_m (its mean); simulated_s; status: ``at rest``,
-        ``limit cycle``, or after the longest time ``growing``, ``decaying`` or ``irregular``; ``derailed``. Windows
-        of a chaotic motion seldom agree, but may: whether it is irregular or a limit cycle then depends on the last
-        bits.
-    state : numpy.ndarray
-        At the end.
+    The row: speed_m_per_s; amplitude_m (half of the peak to peak, of the wheelset with the largest; NaN if it derails),
+    frequency_Hz and offset_m (mean) of that wheelset; simulated_s; derailed; status: ``at rest``, ``limit cycle``, or
+    after the longest time ``growing``, ``decaying`` or ``irregular``. Windows of a chaotic motion seldom agree, but
+    may: whether it is irregular or a limit cycle then depends on the last bits.
     """
     amplitudes, elapsed, status = [], 0.0, ""
     while not status:
@@ -136,29 +124,13 @@ def shifted(model, state, shift):
 
 
 def falling_branch(model, state, speeds, settling, disturbances, resolution):
-    """Amplitude of the limit cycle from the highest speed downwards.
+    """Amplitude of the limit cycle from the highest speed downwards: rows of `settle_motion`, fastest first, the last
+    one the fastest motion that comes to rest. The speed at which the limit cycle ends is halved to ``resolution``.
 
+    ``state`` runs straight ahead at the model's speed, ``speeds`` rise (m/s), ``disturbances`` are sideways shifts (m).
     The motion is carried from speed to speed. Where its amplitude drops by a third or more, fresh disturbances are
-    tried as well, and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
-
-    Parameters
-    ----------
-    model : Model
-    state : numpy.ndarray
-        Running straight ahead, at the model's speed.
-    speeds : sequence of float
-        Rising, m/s.
-    settling : Settling
-    disturbances : sequence of float
-        Sideways shifts of the vehicle with which it starts, m.
-    resolution : float
-        The speed at which the limit cycle ends is halved in between to this accuracy, m/s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Rows of :func:`settle_motion`, fastest first; the last one is the fastest motion that comes to rest. Where every
-        disturbance derails, the next lower speed is tried.
+    tried as well and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
+    Where every disturbance derails, the next lower speed is tried.
     """
     rows, lost, carried, below, queue = [], [], None, None, list(speeds)
     while queue:
@@ -181,9 +153,8 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
 
 
 def rising_branch(model, state, speeds, settling):
-    """Amplitude that a small disturbance leaves, from the lowest speed upwards; arguments as for `falling_branch`.
-
-    The motion is carried from speed to speed and disturbed again (``settling.disturbance``) at each.
+    """Amplitude that a small disturbance leaves, from the lowest speed upwards; arguments as for `falling_branch`. The
+    motion is carried from speed to speed and disturbed again (``settling.disturbance``) at each.
     """
     rows = []
     for speed in speeds:
@@ -256,19 +227,9 @@ def limit_cycles(
 
 
 def nonlinear_critical_speed(table):
-    """Lowest speed with a limit cycle on the falling branch, and what it looks like.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From :func:`limit_cycles`.
-
-    Returns
-    -------
-    dict
-        nonlinear_critical_speed_m_per_s: the speed half-way between the slowest limit cycle and the fastest motion that
-        came to rest (NaN if all or none did); their distance uncertainty_m_per_s; amplitude_m and cycle_frequency_Hz of
-        that limit cycle.
+    """Dict of nonlinear_critical_speed_m_per_s, half-way between the slowest limit cycle and the fastest motion that
+    came to rest in a table of :func:`limit_cycles` (NaN if all or none did), their distance uncertainty_m_per_s, and
+    amplitude_m and cycle_frequency_Hz of that limit cycle.
     """
     falling = table[table["branch"] == "falling"]
     cycles, rest = falling[falling["status"].isin(CYCLES)], falling[falling["status"].isin(["at rest", "decaying"])]

@@ -57,17 +57,7 @@ TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
 
 
 def families(vehicle):
-    """Bodies named alike up to a number and a side.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-
-    Returns
-    -------
-    dict of str to list of int
-        Body numbers by name, in words.
-    """
+    """Numbers of the bodies of a Vehicle that are named alike up to a number and a side, by that name in words."""
     found = {}
     for number, name in enumerate(vehicle.body_names):
         found.setdefault(re.sub(r"(_\d+)?(_left|_right)?$", "", name).replace("_", " "), []).append(number)
@@ -186,28 +176,15 @@ class _Track:
 
 
 def linear_modes(vehicle, linearisation, support=None):
-    """Modes of small motions.
+    """Table of the modes of small motions of a Vehicle from its `Linearisation` (``support``: the model's track, if it
+    gives), their shapes and energies.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    linearisation : Linearisation
-        Of this vehicle.
-    support : Support, optional
-        The model's track, if it gives.
-
-    Returns
-    -------
-    table : pandas.DataFrame
-        One row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s, imag_rad_per_s (not
-        negative), frequency_Hz, damping_ratio (negative for a growing mode, NaN for a neutral one), the coordinate
-        with most energy, and its part; of modes of the track, the kind of freedom and its part of the track.
-    shapes : numpy.ndarray, shape (rows, n, 6), complex
-        Displacements (m) and rotations (rad) of the bodies, see `wrcore.balance.linear.DIRECTIONS`; the largest is 1.
-        Zero for a mode in which only speeds change.
-    energies : numpy.ndarray, shape (rows, n, 6)
-        Kinetic energies of the same coordinates (of a wheelset's spin instead of its pitch) as parts of the whole,
-        the track's own included.
+    The table has a row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s,
+    imag_rad_per_s (not negative), frequency_Hz, damping_ratio (negative: growing, NaN: neutral), the coordinate with
+    most energy, and its part; of modes of the track, the kind of freedom and its part of the track. Shapes (rows, n,
+    6), complex: displacements (m) and rotations (rad) of the bodies, see `wrcore.balance.linear.DIRECTIONS`; the
+    largest is 1, all are 0 where only speeds change. Energies (rows, n, 6): kinetic, as parts of the whole, the track's
+    own included; of a wheelset's spin instead of its pitch.
     """
     values, vectors = np.linalg.eig(linearisation.matrix)
     kept = np.flatnonzero(values.imag >= 0.0)
@@ -239,19 +216,8 @@ def linear_modes(vehicle, linearisation, support=None):
 
 
 def shape_table(vehicle, table, shapes):
-    """Shapes of modes in a long table.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    table, shapes
-        From :func:`modes`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per mode, body and coordinate: mode (row of the table), name, body, coordinate, amplitude (m or rad, the
-        largest in a mode is 1) and phase_rad.
+    """Shapes of :func:`modes` in a long table with a row per mode, body and coordinate: mode (row of ``table``), name,
+    body, coordinate, amplitude (m or rad, the largest in a mode is 1) and phase_rad.
     """
     bodies = len(vehicle.body_names)
     return pd.DataFrame({
@@ -263,19 +229,8 @@ def shape_table(vehicle, table, shapes):
 
 
 def energy_table(vehicle, energies):
-    """Energies of modes in a wide table.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    energies
-        From :func:`modes`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row per mode, one column per family and coordinate, such as ``bogie yaw`` or ``wheelset spin``: the sum over
-        its bodies.
+    """Energies of :func:`modes` in a wide table: a row per mode, a column per family and coordinate, such as ``bogie
+    yaw`` or ``wheelset spin``, with the sum over its bodies.
     """
     columns = {}
     for family, members in families(vehicle).items():

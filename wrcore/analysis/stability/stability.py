@@ -31,39 +31,16 @@ def rising(speeds):
 
 
 def straight_ahead(scene):
-    """Model of a scene, and its vehicle in static equilibrium at the track's centre, wherever the scene lets it start.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    model : Model
-        Without motors, brakes and controller: they have no steady state.
-    state : numpy.ndarray
+    """Model of a scene, without motors, brakes and controller (they have no steady state), and the state in which its
+    vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
     """
     model, _ = compile_scene(scene)
     return undriven(model), static_equilibrium(scene, model).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):
-    """The same motion at another speed of the moving frame: bodies move as before relative to it.
-
-    Parameters
-    ----------
-    model : Model
-        On a tangent track.
-    state : numpy.ndarray
-    speed : float
-        New speed, m/s; wheelsets spin faster in proportion.
-    elapsed : float
-        Time of the state, s; the new time is zero.
-
-    Returns
-    -------
-    model : Model
-    state : numpy.ndarray
+    """Model and state of the same motion on a tangent track at another speed (m/s) of the moving frame: bodies move as
+    before relative to it, wheelsets spin faster in proportion. ``elapsed`` (s): time of the state; the new one is 0.
     """
     state = state.copy()
     for body, part in enumerate(state[: STATE_SIZE * len(model.bodies.mass)].reshape(-1, STATE_SIZE)):
@@ -76,25 +53,8 @@ def at_speed(model, state, speed, elapsed=0.0):
 
 
 def steady_motion(model, state, speed):
-    """Linearisation about steady running.
-
-    Parameters
-    ----------
-    model : Model
-        On a tangent track.
-    state : numpy.ndarray
-        Running near the centre of the track, at the model's speed.
-    speed : float
-        m/s.
-
-    Returns
-    -------
-    Linearisation
-
-    Raises
-    ------
-    InputError
-        If there is no steady motion near the state.
+    """`Linearisation` about steady running on a tangent track at a speed (m/s), found from a state near its centre at
+    the model's speed; InputError if there is none.
     """
     motion = steady_running(*at_speed(model, state, speed))
     if not np.max(np.abs(motion.residual)) < LARGEST_REST:
@@ -137,20 +97,8 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def root_locus(vehicle, model, state, speeds):
-    """Modes over speed.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    model, state
-        As :func:`steady_motion` takes them.
-    speeds : sequence of float
-        m/s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Tables of `wrcore.analysis.stability.modes.linear_modes` below each other, after a column speed_m_per_s.
+    """Tables of `linear_modes` at ``speeds`` (m/s) below each other, after a column speed_m_per_s; other arguments as
+    for `steady_motion`.
     """
     tables = []
     for speed in speeds:
@@ -169,23 +117,11 @@ def growth(motion):
 
 
 def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
-    """Linear critical speed: the lowest at which a small motion neither grows nor dies away.
+    """Linear critical speed: the lowest at which a small motion neither grows nor dies away, to ``tolerance`` (m/s),
+    sought at rising ``speeds`` (m/s) first; other arguments as for `steady_motion`.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    model, state
-        As :func:`steady_motion` takes them.
-    speeds : sequence of float
-        Rising, m/s: where to look for the first change of sign.
-    tolerance : float
-        m/s.
-
-    Returns
-    -------
-    dict
-        critical_speed_m_per_s, and name, frequency_Hz and wavelength_m of the mode that loses its stability.
-        Minus infinity if the lowest speed is unstable, infinity if none is; then without a mode.
+    Dict of critical_speed_m_per_s and name, frequency_Hz and wavelength_m of the mode that loses its stability. Minus
+    infinity if the lowest speed is unstable, infinity if none is; then without a mode.
     """
     nothing = {"mode": "", "frequency_Hz": np.nan, "wavelength_m": np.nan}
     before, motions = None, {}
@@ -219,19 +155,8 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
 
 
 def loci(scenes, speeds):
-    """Root loci of one vehicle in several scenes.
-
-    Parameters
-    ----------
-    scenes : dict of str to Scene
-        By detection.
-    speeds : sequence of float
-        Rising, m/s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Tables of :func:`root_locus` after a column detection.
+    """Tables of `root_locus` of one vehicle at rising ``speeds`` (m/s) in several scenes by detection, after a column
+    of that name.
     """
     speeds = rising(speeds)
     tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}

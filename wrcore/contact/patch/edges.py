@@ -54,21 +54,8 @@ def _area_below(c, t):
 
 @jit
 def with_sharp_edges(pressure, x, dx):
-    """Pressures whose outermost elements carry what a semi-ellipse through the row has in them.
-
-    Parameters
-    ----------
-    pressure : numpy.ndarray, shape (nx, ns)
-        Of `wrcore.contact.patch.grid_pressure.solve_pressure`.
-    x : numpy.ndarray, shape (nx,)
-        Centres of elements, m.
-    dx : float
-        Size of an element along x, m.
-
-    Returns
-    -------
-    numpy.ndarray, shape (nx, ns)
-        Every row (fixed s) carries the same load as before.
+    """Pressures (nx, ns) of `solve_pressure` whose outermost elements carry what a semi-ellipse through the row has in
+    them; every row (fixed s, elements ``dx`` long about ``x``, m) carries the same load as before.
     """
     nx, ns = pressure.shape
     out = pressure.copy()

@@ -16,9 +16,8 @@ _SWEEPS = 4
 
 @jit(allocates=False, fastmath=FUSED)
 def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
-    """Windows from fixed strips: over all overlaps, then finer ones about the runs that carry load.
-
-    Leaves c and Q of the fixed strips at the nodes as the next guesses. Returns the number of windows.
+    """Windows from fixed strips: over all overlaps, then finer ones about the runs that carry load. Returns their
+    number and leaves c and Q of the fixed strips at the nodes as the next guesses.
     """
     nodes, count = work.nodes, work.ends[stretches - 1]
     low, high = 1e9, -1e9

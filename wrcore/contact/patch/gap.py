@@ -139,22 +139,11 @@ def _shape_at(geometry, pose, tangent, u, radius, slope, along, m):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def strip_gap(geometry, pose, frame, s, u, ur):
-    """Gap of the strip at ``s`` (m, outwards) from guesses of its wheel and rail coordinates.
+    """Gap of the strip at ``s`` (m, outwards) from guesses of its wheel and rail coordinates (m).
 
-    Returns
-    -------
-    gap, gap_slope : float
-        g0 (m) along the normal of the strip's own plane, and its slope over s.
-    shape, crest : float
-        A (1/m), likewise, and x_c (m).
-    shape_rate, crest_rate : float
-        Their slopes over s (1/m^2 and -).
-    height : float
-        Height of the wheel's extreme point along n, m.
-    tilt : float
-        Slope over s of the loaded surface, midway between wheel and rail: the strip's own contact plane.
-    u, ur : float
-        Wheel and rail coordinates, m: guesses for the next strip.
+    Returns g0 (m) along the normal of the strip's own plane and its slope over s, A (1/m) likewise and x_c (m), the
+    slopes of both over s, the height (m) of the wheel's extreme point along n, the slope over s of the strip's own
+    plane (midway between wheel and rail), u and ur for the next strip.
     """
     tangent = frame.sine / frame.cosine
     here = normal = rise = radius = slope = second = along = height = m = 0.0
@@ -197,19 +186,9 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
 @jit(allocates=False)
 def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
-    """Gap at nodes over the overlaps of a patch.
-
-    Parameters
-    ----------
-    nodes : numpy.ndarray, shape (NODE_ROWS, n)
-        Filled, outwards: s, gap (m) and A (1/m).
-    ends : numpy.ndarray of int, shape (n,)
-        Filled: number of nodes up to the end of each stretch, within which nodes are equally far apart in u.
-
-    Returns
-    -------
-    int
-        Number of stretches.
+    """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m) and A (1/m) of ``nodes`` (NODE_ROWS, n),
+    and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u. Returns the number of
+    stretches.
     """
     count = stretches = 0
     stop = -1e9
@@ -278,22 +257,13 @@ def _material_point(geometry, pose, frame, s, x, height, tilt):
 
 @jit(allocates=False, fastmath=FUSED)
 def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, slip):
-    """Rigid slip of a left wheel's over its rail's surface, strip by strip, from the wheelset's motion.
+    """Rigid slip of a left wheel's over its rail's surface at the strips' middles, from the wheelset's motion.
 
-    Parameters
-    ----------
-    velocity : tuple of float
-        vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), and the rolling speed V (m/s, > 0).
-    centre, middle, height, tilt : numpy.ndarray, shape (n,)
-        s and X of the strips, the height of the wheel's extreme point along the normal, m, and the slope of the strips'
-        own planes over s.
-    slip : numpy.ndarray, shape (4, n)
-        Filled at the strips' middles: velocity of the wheel's material point relative to the rail's over V along x and
-        across in the strip's own plane, each followed by its slope over x (1/m): slip_x, slip_x_dx, slip_s, slip_s_dx.
-
-    Notes
-    -----
-    The material point lies on the wheel's undeformed surface, as in CONTACT: equal bodies shorten alike under pressure.
+    ``velocity``: vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), rolling speed V > 0 (m/s). Strips (n,):
+    s, X, height of the wheel's extreme point along n (m), slope of their own planes over s. Fills ``slip`` (4, n):
+    velocity of the wheel's material point relative to the rail's over V along x, its slope over x (1/m), and both
+    across in the strip's own plane. That point lies on the undeformed surface, as in CONTACT: equal bodies shorten
+    alike under pressure.
     """
     vx, vy, vz, wx, wy, wz, speed = velocity
     slowness = 1.0 / speed

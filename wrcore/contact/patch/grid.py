@@ -105,14 +105,8 @@ def _strip_overlap(geometry, pose, plane, s, u, middle):
 
 @jit
 def overlap_window(geometry, pose, plane):
-    """Where the undeformed surfaces overlap around a plane's origin: contact lies inside.
-
-    Overlaps further than `JOINED` from those nearer to the origin are left out.
-
-    Returns
-    -------
-    x_min, x_max, s_min, s_max : float
-        m; x_min > x_max where nothing overlaps.
+    """Where the undeformed surfaces overlap around a plane's origin, and contact lies: x_min, x_max, s_min, s_max (m),
+    with x_min > x_max where nothing does. Overlaps further than `JOINED` from those nearer to the origin are left out.
     """
     count = int(REACH / SEARCH_STEP)
     x_min, x_max, s_min, s_max = np.inf, -np.inf, np.inf, -np.inf
@@ -143,9 +137,8 @@ def _solve_window(geometry, pose, plane, modulus, window, nx, ns, tolerance):
 
 @jit
 def contact_window(patch, margin):
-    """Bounds of the contact on a grid, wider by ``margin`` elements, and the share of its rows across that touch.
-
-    All zero and 1 without contact.
+    """Bounds of the contact on a grid, wider by ``margin`` elements, and the share of its rows across that touch; all
+    zero and 1 without contact.
     """
     i0, i1, j0, j1 = patch.x.size, 0, patch.s.size, 0
     touching = np.zeros(patch.s.size, np.int64)
@@ -163,24 +156,9 @@ def contact_window(patch, margin):
 
 @jit
 def grid_normal(geometry, pose, plane, modulus, nx, ns):
-    """Normal contact of a wheel in a pose, on a grid over the contact plane.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    pose : Pose
-        Of the wheel, from :func:`wrcore.contact.strip.make_pose`.
-    plane : ContactPlane
-        All of the overlap around its origin counts as one patch.
-    modulus : float
-        Contact modulus E*, Pa.
-    nx, ns : int
-        Elements along and across the contact, about; lobes with a gap between them are given more across.
-
-    Returns
-    -------
-    GridPatch
-        Of one element without pressure where the surfaces do not overlap.
+    """Normal contact (`GridPatch`) of a wheel in a pose on a grid over a contact plane, whose overlap counts as one
+    patch; ``modulus`` is E* (Pa). About ``nx`` by ``ns`` elements cover the contact, more across where lobes leave a
+    gap; without overlap the grid is one element without pressure.
     """
     window = overlap_window(geometry, pose, plane)
     if not window[0] < window[1]:
@@ -233,23 +211,9 @@ def _paired(field, out):
 
 @jit
 def grid_rolling(patch, wx, ws, friction, shear_modulus, poisson, tolerance):
-    """Steady rolling contact for the pressure on a grid.
-
-    Parameters
-    ----------
-    patch : GridPatch
-        With an even number of elements along x.
-    wx, ws : numpy.ndarray, shape (nx, ns)
-        Rigid slip of the wheel over the rail, over the speed.
-    friction : float
-    shear_modulus, poisson : float
-        Pa and -.
-    tolerance : float
-        Remaining change of the tractions, relative to them.
-
-    Returns
-    -------
-    GridTraction
+    """Steady rolling contact (`GridTraction`) for the pressure on a grid with an even number of elements along x;
+    ``wx``, ``ws`` (nx, ns): rigid slip of the wheel over the rail, over the speed; ``tolerance``: remaining change of
+    the tractions, relative to them.
     """
     nx, ns = patch.pressure.shape
     px, ps, sx, ss = np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns))

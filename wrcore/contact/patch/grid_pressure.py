@@ -35,19 +35,8 @@ def corner_integrals(x, y):
 
 @jit
 def normal_influence(nx, ns, dx, ds):
-    """Integral of 1/R over an element, at the centre of another one.
-
-    Parameters
-    ----------
-    nx, ns : int
-        Elements of the grid along x and across.
-    dx, ds : float
-        Size of an element, m.
-
-    Returns
-    -------
-    numpy.ndarray, shape (nx, ns, ns)
-        Entry (i, j, k), m: elements i rows apart, j and k across.
+    """Integral of 1/R (m) over an element of dx by ds (m), at the centre of another: entry (i, j, k) of (nx, ns, ns)
+    for elements i rows apart, at j and k across.
     """
     corner = np.empty((nx + 1, ns + 1))
     for i in range(nx + 1):
@@ -66,9 +55,8 @@ def normal_influence(nx, ns, dx, ds):
 
 @jit
 def convolve(blocks, p, pair, part, out):
-    """out = sum over elements of influence times p: a product of matrices per distance of two rows.
-
-    ``pair`` and ``part`` are work space of p's shape.
+    """out = sum over elements of influence times p: a product of matrices per distance of two rows; ``pair`` and
+    ``part`` are work space of p's shape.
     """
     nx, ns = p.shape
     np.dot(p, blocks[0], out)
@@ -119,25 +107,9 @@ def _advance(p, e, t, q):
 
 @jit
 def solve_pressure(gap, dx, ds, modulus, tolerance, pressure):
-    """Pressure for a gap between undeformed bodies.
-
-    Parameters
-    ----------
-    gap : numpy.ndarray, shape (nx, ns)
-        Distance of the bodies along the normal, negative where they overlap, m. Contact is a part of that overlap.
-    dx, ds : float
-        Size of an element, m.
-    modulus : float
-        Contact modulus E*, Pa.
-    tolerance : float
-        Of the conditions of contact, in units of the largest overlap.
-    pressure : numpy.ndarray, shape (nx, ns)
-        Written, Pa.
-
-    Returns
-    -------
-    int
-        Steps taken; negative if the tolerance was not met after `MOST_STEPS`.
+    """Pressure (Pa, written) for a gap (nx, ns) between undeformed bodies along the normal (m, negative where they
+    overlap), to a tolerance of the conditions of contact over the largest overlap. Returns the steps taken, negative if
+    it was not met after `MOST_STEPS`.
     """
     nx, ns = gap.shape
     p, e, t, q = np.empty((nx, ns)), np.empty((nx, ns)), np.zeros((nx, ns)), np.empty((nx, ns))

@@ -29,12 +29,8 @@ MOST_ITERATIONS = 400
 
 @jit
 def slip_influence(nx, ns, dx, ds, shear_modulus, poisson):
-    """Slip at an element by a unit traction (Pa) on another one, on a periodic grid of nx by ns elements (even).
-
-    Returns
-    -------
-    numpy.ndarray, shape (3, nx, ns)
-        xx, ss, xs for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element that slips from the loaded one.
+    """Slip at an element by a unit traction (Pa) on another one, on a periodic grid of nx by ns elements (even): xx,
+    ss, xs, (3, nx, ns), for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element that slips from the loaded one.
     """
     rows, lines = nx // 2, ns // 2
     corner, u, table = np.empty((3, rows + 3, lines + 2)), np.empty((3, rows + 2, lines + 1)), np.empty((3, nx, ns))
@@ -109,27 +105,11 @@ def _project(zx, zs, limit, fx, fs):
 
 @jit
 def solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px, ps, sx, ss):
-    """Traction and slip for a given bound and rigid slip.
+    """Traction on the wheel (``px``, ``ps``, Pa) and slip (``sx``, ``ss``), written, for a bound mu p_n (Pa; 0 outside
+    the contact) and the rigid slip (``wx``, ``ws``) of the wheel over the rail, over the speed; all (nx, ns).
 
-    Parameters
-    ----------
-    bound : numpy.ndarray, shape (nx, ns)
-        Largest traction mu p_n, Pa; zero outside the contact.
-    wx, ws : numpy.ndarray, shape (nx, ns)
-        Rigid slip of the wheel over the rail, over the speed.
-    dx, ds : float
-        Size of an element, m; the contact moves towards larger x over both surfaces.
-    shear_modulus, poisson : float
-        Of both bodies, Pa and -.
-    tolerance : float
-        Remaining change of the traction, summed up, over the sum of the traction.
-    px, ps, sx, ss : numpy.ndarray, shape (nx, ns)
-        Written: traction on the wheel (Pa) and slip.
-
-    Returns
-    -------
-    int
-        Iterations; negative if the tolerance was not met after `MOST_ITERATIONS`.
+    The contact moves towards larger x over both surfaces. ``tolerance``: remaining change of the traction, summed up,
+    over the sum of the traction. Returns the iterations, negative if it was not met after `MOST_ITERATIONS`.
     """
     nx, ns = bound.shape
     wide, long = power_of_two(2 * nx - 1), power_of_two(2 * ns - 1)

@@ -15,42 +15,22 @@ LOG_MIN, LOG_STEP = -2.4, 0.4
 
 
 class Library(NamedTuple):
-    """Resolution, Poisson's ratio, and resolvents of ellipses; a kernel argument, never written to.
-
-    Fields
-    ------
-    level : Level
-    panels : Panels
-    nu : float
-    log_min, log_step : float
-        First value of ln(a/b), and distance of the values.
-    resolvents : (K, m m) ndarray of float32
-        ``(I + B)^-1`` row by row, m = 2 n strips; unknowns in the order of `rolling.Workspace`.
-    """
+    """Resolution, Poisson's ratio, and resolvents of ellipses; a kernel argument, never written to."""
 
     level: Level
     panels: Panels
     nu: float
     log_min: float
     log_step: float
+    """First value of ln(a/b), and distance of the values."""
     resolvents: np.ndarray
+    """(K, m m) float32: ``(I + B)^-1`` row by row, m = 2 n strips; unknowns in the order of `rolling.Workspace`."""
 
 
 def ellipse_strips(a, b, count):
-    """Equal strips on an ellipse under Hertz's pressure of peak 1.
-
-    The half lengths are the root mean squares over a strip's width; with peaks in proportion the load is exact.
-
-    Parameters
-    ----------
-    a, b : float
-        Semi-axes along and across the rolling direction, m.
-    count : int
-
-    Returns
-    -------
-    centre, width, half_length, middle, peak : (count,) ndarray
-        As `rolling.rolling_force` takes them.
+    """Equal strips, as `rolling.rolling_force` takes them, on an ellipse (semi-axes a along rolling, b across, m) under
+    Hertz's pressure of peak 1: half lengths are root mean squares over a strip's width; with peaks in proportion the
+    load is exact.
     """
     edge = np.linspace(-1, 1, count + 1)
     root = np.sqrt(1 - np.diff(edge**3) / (3 * np.diff(edge)))
@@ -74,23 +54,8 @@ def _invert(block, work, resolvent):
 
 @lru_cache(maxsize=16)
 def make_library(level="middle", nu=0.28):
-    """Library of a level; built in 10 to 100 ms and kept.
-
-    Parameters
-    ----------
-    level : str or Level
-        A key of `rolling.LEVELS`, or a resolution of one's own.
-    nu : float
-        Poisson's ratio of both bodies, 0 to 0.5.
-
-    Returns
-    -------
-    Library
-
-    Raises
-    ------
-    InputError
-        If the number of panels is odd or too small.
+    """`Library` of a level, by its name in `rolling.LEVELS` or as `Level`; built in 10 to 100 ms and kept. InputError
+    for panels that are odd or too few.
     """
     level = LEVELS[level] if isinstance(level, str) else level
     if level.panels < 4 or level.panels % 2 or level.strips < 2:
@@ -109,59 +74,34 @@ def make_library(level="middle", nu=0.28):
 
 
 class RollingField(NamedTuple):
-    """Creep force of a patch and fields over its panels, (strips, panels) from the leading edge backwards.
-
-    Fields
-    ------
-    Fx, Fs, Mn, residual, method
-        As `rolling.rolling_force` returns them; N, N m, on the wheel.
-    x, s : ndarray
-        Centroid of the panel's normal load, m.
-    traction_x, traction_s, pressure : ndarray
-        Means over the panel, Pa; tractions on the wheel.
-    slip_x, slip_s : ndarray
-        Slip of the wheel relative to the rail over V.
-    slides : ndarray of bool
-    power : ndarray
-        Dissipated power over area and V, Pa.
-    force : ndarray, shape (3, strips)
-        Of each strip along x and s, N, and the moment of the latter about the strip's middle, N m.
-    """
+    """Creep force on the wheel (N, N m) and fields over panels, (strips, panels), from the leading edge backwards."""
 
     Fx: float
     Fs: float
     Mn: float
     residual: float
     method: int
+    """Both as `rolling.rolling_force` returns them."""
     x: np.ndarray
     s: np.ndarray
+    """Centroid of the panel's normal load, m."""
     traction_x: np.ndarray
     traction_s: np.ndarray
     pressure: np.ndarray
+    """Means over the panel, Pa; tractions on the wheel."""
     slip_x: np.ndarray
     slip_s: np.ndarray
+    """Slip of the wheel relative to the rail over V."""
     slides: np.ndarray
     power: np.ndarray
+    """Dissipated power over area and V, Pa."""
     force: np.ndarray
+    """(3, strips): along x and s, N, and the moment of the latter about the strip's middle, N m."""
 
 
 def solve_patch(strips, slip, shear_modulus, mu, level="middle", nu=0.28, method=AUTO):
-    """Creep force and fields of one patch; see `rolling.rolling_force` for the arguments' meaning.
-
-    Parameters
-    ----------
-    strips : sequence of (M,) array_like
-        centre, width, half_length, middle, peak.
-    slip : sequence of (M,) array_like
-        slip_x, slip_x_dx, slip_s, slip_s_dx.
-    shear_modulus, mu : float
-    level : str or Level
-    nu : float
-    method : int
-
-    Returns
-    -------
-    RollingField
+    """Creep force and fields (`RollingField`) of one patch from ``strips`` (centre, width, half_length, middle, peak)
+    and ``slip`` (slip_x, slip_x_dx, slip_s, slip_s_dx), as `rolling.rolling_force` takes them.
     """
     library = make_library(level, nu)
     arrays = [np.array(part, dtype=float) for part in (*strips, *slip)]

@@ -94,26 +94,8 @@ def _emptied(part):
 
 
 def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28):
-    """Settings and tables of a scene's patch model.
-
-    Parameters
-    ----------
-    patch : {"maximum", "moment", "strips", "exact"}
-    resolution : {"coarse", "middle", "fine"}
-        8, 12 or 16 strips of a window.
-    slip : {"surfaces", "creepages"}
-        Rigid slip from the real surfaces, or from one set of creepages per patch.
-    nu : float
-        Poisson's ratio.
-
-    Returns
-    -------
-    StripModel
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
+    """`StripModel` of a scene's ``patch`` (of `PATCHES`), resolution (8, 12 or 16 strips of a window) and ``slip`` (of
+    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio. InputError for an unknown name.
     """
     named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
     for name, (value, known) in named.items():

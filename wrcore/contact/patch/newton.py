@@ -38,9 +38,8 @@ def _subtract_four(row, one, two, three, four, a, b, c, d):
 
 @jit(allocates=False, fastmath=FUSED)
 def solve_linear(matrix, n):
-    """Gaussian elimination with partial pivoting, four columns at a time; the solution ends up in column n.
-
-    Returns False if the matrix is singular.
+    """Gaussian elimination with partial pivoting, four columns at a time; the solution ends up in column n. False if
+    the matrix is singular.
     """
     for begin in range(0, n, 4):
         end = min(begin + 4, n)
@@ -131,12 +130,8 @@ def top_squares(work, windows):
 
 @jit(allocates=False, fastmath=FUSED)
 def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tolerance):
-    """Newton's iteration from the strips in ``work``, with limits strip by strip; ``bold``: see `_tips_too_fast`.
-
-    Returns
-    -------
-    int
-        CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST.
+    """Newton's iteration from the strips in ``work``, with limits strip by strip (``bold``: see `_tips_too_fast`).
+    Returns CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST.
     """
     strips = work.start[windows]
     starved_for = crossed_for = 0

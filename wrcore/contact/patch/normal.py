@@ -118,22 +118,8 @@ def even_length(half_length, width, window):
 
 
 class NormalContact:
-    """Normal contact of the wheels of a wheelset on strips.
-
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    modulus : float
-        Contact modulus E*, Pa (`wrcore.contact.normal.contact_modulus`).
-    resolution : {"coarse", "middle", "fine"}
-    model : {"exact", "strips"}
-        ``strips``: shape-corrected virtual penetration, without a solution of the half-space.
-    detection : {"planar", "spatial"}
-
-    Raises
-    ------
-    InputError
-        For an unknown name or a modulus that is not positive.
+    """Normal contact of the wheels of a wheelset on strips: ``modulus`` is E* (Pa), ``resolution`` and ``model`` are of
+    RESOLUTIONS and MODELS, ``detection`` planar or spatial; InputError for others.
     """
 
     def __init__(self, geometry, modulus, resolution="middle", model="exact", detection="spatial"):
@@ -151,23 +137,11 @@ class NormalContact:
         self._strips, self._sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, velocity=None, warm=False):
-        """Patches of one wheel in a given pose.
+        """Patches (`StripPatch`) of the left or right wheel from the flange to the field side, in a pose of the
+        wheelset (m, rad); overlaps whose planes are near each other are one patch.
 
-        Parameters
-        ----------
-        side : {"left", "right"}
-        y, z, roll, yaw : float
-            Pose of the wheelset, m and rad.
-        velocity : sequence of 7 floats, optional
-            vx, vy, vz (m/s), wx, wy, wz (rad/s) of the wheelset in the track frame and the rolling speed V (m/s): the
-            rigid slip is then given, too.
-        warm : bool
-            Start from the last solution of that side.
-
-        Returns
-        -------
-        list of StripPatch
-            From the flange to the field side; overlaps whose planes are near each other are one patch.
+        ``velocity`` (vx, vy, vz, m/s, wx, wy, wz, rad/s, of the wheelset in the track frame, and the rolling speed V,
+        m/s) asks for the rigid slip; ``warm`` starts from the last solution of that side.
         """
         if side not in SIDES:
             raise InputError("NormalContact", "side", f"expected left or right, got {side!r}")
@@ -225,22 +199,8 @@ class NormalContact:
         return windows, frame, self._strips[:, :count].copy(), self._sums.copy()
 
     def at_load(self, side, y, load, roll=0.0, yaw=0.0, guess=None, vertical=True, velocity=None):
-        """Patches of one wheel that carries a given load, and the wheelset's height.
-
-        Parameters
-        ----------
-        load : float
-            N, > 0.
-        guess : float, optional
-            Height near the one sought, m.
-        vertical : bool
-            The load is the vertical sum over the patches, else the sum of their normal forces.
-
-        Returns
-        -------
-        patches : list of StripPatch
-        z : float
-            Height of the wheelset's centre, m; NaN (and no patches) where none was found.
+        """Patches of one wheel that carries a load (N), vertically or as the sum of its normal forces, and the height
+        of the wheelset's centre (m; ``guess``: one near it), NaN with no patches where none was found.
         """
         if not 0.0 < load < math.inf:
             raise InputError("NormalContact", "load", f"expected a load in N, got {load!r}")

@@ -37,15 +37,7 @@ class InfluenceTable(NamedTuple):
 
 
 def exact_influence(xi, eta, points=160):
-    """U(xi, eta) by Gauss-Legendre quadrature graded towards the singular points.
-
-    Parameters
-    ----------
-    xi, eta : array_like
-        Broadcast together; eta > 0.
-    points : int
-        Per side of the singular point.
-    """
+    """U(xi, eta > 0) by Gauss-Legendre quadrature graded towards the singular points, ``points`` on either side."""
     xi, eta = np.broadcast_arrays(np.abs(np.asarray(xi, float))[..., None], np.asarray(eta, float)[..., None])
     node, weight = np.polynomial.legendre.leggauss(points)
     v, weight = 0.5 * (node + 1.0), 0.5 * weight
@@ -63,12 +55,7 @@ def exact_influence(xi, eta, points=160):
 
 @lru_cache(maxsize=1)
 def influence_table():
-    """Tabulate U/eta.
-
-    Returns
-    -------
-    InfluenceTable
-    """
+    """`InfluenceTable` of U/eta."""
     from scipy.ndimage import spline_filter  # only scenes with exact contact wait for its import
 
     extra = 14  # nodes beyond either end, so that what the spline assumes there does not matter
@@ -119,9 +106,8 @@ def place_across(log_eta):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _edge(eta, log_eta, sign):
-    """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table.
-
-    Beyond its end U grows with pi/2 ln eta.
+    """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table,
+    where U grows with pi/2 ln eta.
     """
     cell, part, beyond = place_across(log_eta)
     v0, v1, v2, v3, d0, d1, d2, d3 = spline_weights(part)
@@ -224,12 +210,8 @@ def _expanded(xi, low, high):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def influence_of(values, xi, low, high, edges):
-    """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0; ``edges``: see `edges_of`.
-
-    Returns
-    -------
-    value, along, over, shear : float
-        U, its slope over xi, over ln eta, and over eta (the difference of the two slopes).
+    """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0, with its slopes over xi, over ln
+    eta, and over eta (the difference of the two slopes); ``edges``: see `edges_of`.
     """
     if xi * xi + max(low, 0.0) ** 2 > _FAR:
         return _expanded(xi, low, high)

@@ -18,35 +18,13 @@ FINE = ((40, 32), (48, 40), (56, 48), (64, 48))
 def solve_on_grids(
     geometry, pose, plane, slip, friction=0.3, shear_modulus=8.2e10, poisson_ratio=0.28, grids=FINE, tolerance=1e-4
 ):
-    """Contact of one patch, with forces extrapolated from several grids.
+    """`Patch` of a wheel in a pose on a contact plane, whose overlap counts as one, with forces extrapolated from
+    several grids; fields and normal force are those of the last one.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    pose : Pose
-        Of the wheel, from :func:`wrcore.contact.strip.make_pose`.
-    plane : ContactPlane
-        All of the overlap around its origin counts as one patch.
-    slip : Motion or tuple of float
-        Motion of the wheelset, for the rigid slip of the surfaces themselves; or creepages (xi, eta, phi) at the
-        plane's origin, for that of a plane.
-    friction : float
-    shear_modulus, poisson_ratio : float
-        Of both bodies, Pa and -.
-    grids : sequence of (int, int)
-        Elements along x (even) and across, about; coarse to fine. One is enough for 1 % of the friction bound.
-    tolerance : float
-        Remaining change of the tractions over the friction bound.
-
-    Returns
-    -------
-    Patch
-        Fields and normal force of the last grid.
-
-    Raises
-    ------
-    InputError
-        For grids that are none.
+    ``slip``: the wheelset's `Motion`, for the rigid slip of the surfaces themselves, or (xi, eta, phi) at the plane's
+    origin, for that of a plane. ``grids``: elements along x (even) and across, about, coarse to fine; one is enough for
+    1 % of the friction bound. ``tolerance``: remaining change of the tractions over that bound. InputError for no such
+    grids.
     """
     if not len(grids) or any(n % 2 or n < 8 or m < 4 for n, m in grids):
         raise InputError("solve_on_grids", "grids", f"expected even numbers from 8 along, 4 across, got {grids!r}")

@@ -46,22 +46,16 @@ _TINY = np.float32(1e-30)
 
 
 class Level(NamedTuple):
-    """Resolution of the tangential problem.
-
-    Fields
-    ------
-    strips, panels : int
-        Strips of a window across, panels (even) of a strip along the rolling direction.
-    iterations : int
-        Always done with a resolvent of a similar shape.
-    reach : int
-        Strips |i - j| <= reach that the band of B keeps where no ellipse is similar.
-    """
+    """Resolution of the tangential problem."""
 
     strips: int
+    """Of a window, across."""
     panels: int
+    """Of a strip, along rolling; even."""
     iterations: int
+    """Always done with a resolvent of a similar shape."""
     reach: int
+    """Strips |i - j| <= reach that the band of B keeps where no ellipse is similar."""
 
 
 LEVELS = {
@@ -76,33 +70,22 @@ At small creepage the iterations end within 0.3 % of adhesion everywhere, the sp
 
 
 class Workspace(NamedTuple):
-    """Memory of one solution at a time (one per thread); sizes for up to M strips of n panels, m = 2 n M unknowns.
-
-    Fields
-    ------
-    matrix, factors : (m m,) float32
-        B, row by row; the resolvent or the factors of I + B.
-    corner : (4, (n+1)^2) float32
-        Distances of points and edges, and the three integrals there.
-    slip : (3, n (n + 1)) float32
-        Slip of one strip by another, components xx, ss, xs.
-    strip : (10, M)
-        Half length, middle, line, centre and width over c, share in the load, peak times half length; of a solution the
-        forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c.
-    scale : (5,)
-        c (m), normal force N (N), friction bound mu N (N), G c^2/(mu N), and what the slip was divided by.
-    bound, step, z, force, y, r, product, rigid, shift, delta, ramp : (m,) float32
-        Vectors of the iteration; component x of a strip's panels, then component s, strip by strip.
-    elastic : (n + 2,) float32
-        Elastic slip along a strip between two zeros.
+    """Memory of one solution at a time (one per thread), float32 but for ``strip`` and ``scale``; sizes for up to M
+    strips of n panels, m = 2 n M unknowns.
     """
 
     matrix: np.ndarray
     factors: np.ndarray
+    """(m m,): B, row by row; the resolvent or the factors of I + B."""
     corner: np.ndarray
+    """(4, (n+1)^2): distances of points and edges, and the three integrals there."""
     slip: np.ndarray
+    """(3, n (n + 1)): slip of one strip by another, components xx, ss, xs."""
     strip: np.ndarray
+    """(10, M): half length, middle, line, centre and width over c, share in the load, peak times half length; of a
+    solution the forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c."""
     scale: np.ndarray
+    """(5,): c (m), normal force N (N), friction bound mu N (N), G c^2/(mu N), and what the slip was divided by."""
     bound: np.ndarray
     step: np.ndarray
     z: np.ndarray
@@ -114,20 +97,13 @@ class Workspace(NamedTuple):
     shift: np.ndarray
     delta: np.ndarray
     ramp: np.ndarray
+    """(m,): vectors of the iteration; component x of a strip's panels, then component s, strip by strip."""
     elastic: np.ndarray
+    """(n + 2,): elastic slip along a strip between two zeros."""
 
 
 def make_workspace(strips, n):
-    """Workspace for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each.
-
-    Parameters
-    ----------
-    strips, n : int
-
-    Returns
-    -------
-    Workspace
-    """
+    """Workspace for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each."""
     m = 2 * n * strips
     single = [np.zeros(m, np.float32) for _ in range(11)]
     return Workspace(
@@ -152,9 +128,8 @@ def _project(size, n, z, bound, force, ramp):
 
 @jit(allocates=False, fastmath=FUSED)
 def _shift_slip(panels, start, relaxation, work):
-    """Relax delta towards the change of slip between where it holds and the load, in one strip's sliding panels.
-
-    The elastic part of the slip is h (F - z) - delta - w.
+    """Relax delta towards the change of slip between where it holds and the load, in one strip's sliding panels; the
+    elastic part of the slip is h (F - z) - delta - w.
     """
     n, elastic, force, z = panels.n, work.elastic, work.force, work.z
     for i in range(n):
@@ -261,38 +236,18 @@ def rolling_force(
     centre, width, half_length, middle, peak, slip_x, slip_x_dx, slip_s, slip_s_dx, shear_modulus, mu,
     library, work, method,
 ):  # fmt: skip
-    """Creep force on the wheel of a patch given as strips; a kernel.
+    """Creep force on the wheel of a patch given as strips: Fx, Fs (N), Mn (N m) about the normal at the frame's origin,
+    the residual (sum of the last changes of the panel forces over that of the forces: 0.01 goes with a force error of
+    1e-4), and the method used.
 
-    Parameters
-    ----------
-    centre, width : (M,) ndarray
-        Lateral middles (ascending) and widths of the strips, m. A gap between two strips separates two windows.
-    half_length, middle, peak : (M,) ndarray
-        Of the pressure ``peak sqrt(1 - ((x - middle)/half_length)^2)`` in each strip; m, m, Pa. Zero peak: no contact.
-    slip_x, slip_x_dx, slip_s, slip_s_dx : (M,) ndarray
-        Rigid slip of the wheel relative to the rail over V, longitudinal and lateral, at ``x = middle`` and its
-        derivative along x (1/m). Creepages xi, eta, phi at the origin mean slip_x = xi - phi centre, slip_x_dx = 0,
-        slip_s = eta + phi middle, slip_s_dx = phi.
-    shear_modulus, mu : float
-        G of both bodies, Pa, and coefficient of friction.
-    library : Library
-        Resolution, Poisson's ratio and resolvents (`library.make_library`).
-    work : Workspace
-        For at least M strips; afterwards it holds what `read_field` needs.
-    method : int
-        AUTO: LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else BAND;
-        DIRECT with more iterations if the residual then exceeds LIMIT. Or one of LIBRARY (falls back on BAND), BAND,
-        DIRECT.
+    Strips (M,): lateral middles (ascending; a gap separates two windows) and widths, half length and middle, m, of the
+    pressure ``peak sqrt(1 - ((x - middle)/half_length)^2)``, Pa (0: no contact). Slips (M,): rigid slip of the wheel
+    relative to the rail over V along x and s at ``x = middle``, each followed by its derivative along x (1/m).
+    Creepages xi, eta, phi at the origin mean xi - phi centre, 0, eta + phi middle, phi.
 
-    Returns
-    -------
-    Fx, Fs, Mn : float
-        Force along x and s, N, and moment about the normal axis at the frame's origin, N m, on the wheel.
-    residual : float
-        Sum of the last changes of the panel forces over that of the forces; a residual of 0.01 goes with a force
-        error of 1e-4.
-    method : int
-        The one used: LIBRARY, BAND or DIRECT.
+    ``method``: AUTO is LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else
+    BAND, and DIRECT with more iterations if the residual then exceeds LIMIT; or LIBRARY (falls back on BAND), BAND,
+    DIRECT. ``work`` afterwards holds what `read_field` needs.
     """
     panels, level = library.panels, library.level
     count = centre.size
@@ -342,19 +297,12 @@ def read_forces(count, work, force):
 
 @jit(allocates=False, fastmath=FUSED)
 def read_field(panels, count, work, field):
-    """Fields over the panels of the patch that `rolling_force` has solved last in this workspace; a kernel.
+    """Fields over the panels of the patch of ``count`` strips that `rolling_force` has solved last in this workspace,
+    into ``field`` (9, M n), strip by strip, from the leading edge backwards: x, s (m), traction on the wheel along x
+    and s (Pa), pressure (Pa), slip over V along x and s, 1 where the panel slides, dissipated power over V (Pa).
 
-    Parameters
-    ----------
-    panels : Panels
-    count : int
-        Strips M.
-    work : Workspace
-    field : (9, M n) ndarray, written
-        x, s (m), traction on the wheel along x and s (Pa), pressure (Pa), slip over V along x and s, 1 where the panel
-        slides, dissipated power over V (Pa); strip by strip, from the leading edge backwards. The power is that of
-        traction and slip times one factor, with which it adds up to what the force does on the rigid slip: the upwind
-        slip alone misses 10 to 40 % of it at the coarser levels.
+    The power is that of traction and slip times one factor, with which it adds up to what the force does on the rigid
+    slip: the upwind slip alone misses 10 to 40 % of it at the coarser levels.
     """
     n, strip, scale = panels.n, work.strip, work.scale
     c = scale[0]

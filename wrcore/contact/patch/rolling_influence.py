@@ -42,45 +42,28 @@ _LN2, _LEAST = np.float32(np.log(2.0)), np.float32(1e-30)
 
 
 class Panels(NamedTuple):
-    """Panels along a strip, over its half length and load: what depends on their number alone; a kernel argument.
-
-    Fields
-    ------
-    n : int
-        Panels per strip, from the leading edge backwards.
-    edges, points : (n + 1,)
-        Edges of the panels; points between which the slip is a difference (the first lies ahead of the strip).
-    share, load, slip : (n,)
-        Share of the panel in the strip's normal load, centroid of that load, and where the slip row holds.
-    scale : (n (n + 1) - 1,) float32
-        Reciprocals of distances between points times widths of panels, in rows of points with one void between.
-    ahead, behind : (n,)
-        Weights that carry elastic slip from ``slip`` to ``load``.
+    """Panels along a strip, from the leading edge backwards, over its half length and load: what depends on their
+    number alone; a kernel argument.
     """
 
     n: int
     edges: np.ndarray
     points: np.ndarray
+    """(n + 1,): edges of the panels; points between which slip is a difference (the first lies ahead of the strip)."""
     share: np.ndarray
     load: np.ndarray
     slip: np.ndarray
+    """(n,): share of the panel in the strip's normal load, centroid of that load, and where the slip row holds."""
     scale: np.ndarray
+    """(n (n + 1) - 1,) float32: reciprocals of distances between points times widths of panels, in rows of points with
+    one void between."""
     ahead: np.ndarray
     behind: np.ndarray
+    """(n,): weights that carry elastic slip from ``slip`` to ``load``."""
 
 
 def make_panels(n):
-    """Lay out ``n`` panels with cosine spacing on a strip with semi-elliptic pressure.
-
-    Parameters
-    ----------
-    n : int
-        Panels per strip, at least 3.
-
-    Returns
-    -------
-    Panels
-    """
+    """Lay out ``n`` >= 3 panels with cosine spacing on a strip with semi-elliptic pressure."""
     theta = np.pi * np.arange(n + 1) / n
     share = np.diff(theta / 2 - np.sin(2 * theta) / 4) / (np.pi / 2)
     load = np.diff(np.sin(theta) ** 3 / 3) / (np.pi / 2) / share
@@ -207,9 +190,8 @@ def second_window(centre, width):
 
 @jit(allocates=False, fastmath=FUSED)
 def _centroid_shift(before, here, after, first, last):
-    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola).
-
-    At a tip the load per width falls to zero at the strip's outer edge: exact for an ellipse.
+    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola); at a tip it
+    falls to zero at the strip's outer edge: exact for an ellipse.
     """
     if first and last:
         return 0.0

@@ -47,33 +47,13 @@ SUMS = 10
 
 @jit(allocates=False)
 def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, model, memory, work):
-    """Normal problem of the overlaps from ``first`` to before ``last``, which count as one patch.
+    """Normal problem of the overlaps from ``first`` to before ``last`` of ``patches`` (as `find_patches` fills it, by
+    moments), which count as one patch. Fills ``work``; returns the number of windows (0 where no solution was found)
+    and their `Frame`.
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    pose : Pose
-    hertz : HertzTable
-    values : numpy.ndarray
-        Of an `InfluenceTable`.
-    patches : numpy.ndarray
-        As `find_patches` fills it, with the reduction ``moment``.
-    first, last : int
-    resolution : int
-        Strips of a window.
-    model : int
-        EXACT or STRIPS.
-    memory : numpy.ndarray, shape (MEMORY,)
-        A solution to start from if it fits (its first number 0: none); the result is the same to the square of the
-        iteration's tolerance. Filled with this one.
-    work : Workspace
-        Filled with the solution.
-
-    Returns
-    -------
-    windows : int
-        Number of windows; 0 where no solution was found.
-    frame : Frame
+    ``resolution``: strips of a window. ``model``: EXACT or STRIPS. ``values``: of an `InfluenceTable`. ``memory``
+    (MEMORY,): a solution to start from if it fits (its first number 0: none), which leaves the result the same to the
+    square of the iteration's tolerance; filled with this one.
     """
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
@@ -107,7 +87,6 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
 @jit(allocates=False)
 def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds):
     """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be.
-
     Returns the number of windows, 0 where no solution was found, and of attempts.
     """
     bold, again = False, False
@@ -195,21 +174,8 @@ def tip(strips, end, step):
 
 @jit(allocates=False, fastmath=FUSED)
 def publish(modulus, work, windows, strips, sums):
-    """Strips of a solution in the contact frame, and sums over them.
-
-    Parameters
-    ----------
-    modulus : float
-        E*, Pa.
-    strips : numpy.ndarray, shape (STRIP_ROWS, MAX_STRIPS)
-        Filled: rows CENTRE to OWN_WIDTH, by increasing s.
-    sums : numpy.ndarray, shape (SUMS,)
-        Filled: normal force, largest pressure, means over the pressure of x, s, x^2, s^2, and extents.
-
-    Returns
-    -------
-    int
-        Number of strips.
+    """Fill ``strips`` (STRIP_ROWS, MAX_STRIPS), by increasing s, and ``sums`` over them: normal force, largest
+    pressure, means over the pressure of x, s, x^2, s^2, extents. ``modulus`` is E* (Pa). Returns the number of strips.
     """
     count, stiffness = work.start[windows], math.pi * modulus
     for q in range(SUMS):

@@ -1,4 +1,4 @@
-"""Galerkin strips: residual and Jacobian of the normal problem, and Newton's iteration with conforming tips."""
+"""Galerkin strips: residual and Jacobian of the normal problem."""
 
 import math
 from typing import NamedTuple
@@ -101,12 +101,7 @@ class Workspace(NamedTuple):
 
 
 def workspace():
-    """Arrays for the solution of one patch at a time.
-
-    Returns
-    -------
-    Workspace
-    """
+    """`Workspace` for the solution of one patch at a time."""
     n, m = MAX_STRIPS, MAX_WINDOWS
     return Workspace(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),

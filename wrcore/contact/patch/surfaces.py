@@ -52,9 +52,8 @@ def contact_plane(x, y, z, angle):
 
 @jit(allocates=False)
 def rail_height(geometry, pose, plane, s, u):
-    """Height n (m) of the rail over a contact plane at s, and its profile coordinate there, from the guess ``u``.
-
-    NaN where the line along n does not meet the rail's profile.
+    """Height n (m) of the rail over a contact plane at s, and its profile coordinate there, from the guess ``u``; NaN
+    where the line along n does not meet the rail's profile.
     """
     side, sine = pose.side, pose.side * plane.sine
     origin = side * plane.y - geometry.rail_distance
@@ -107,21 +106,11 @@ def wheel_height(geometry, pose, plane, x, s, n):
 
 @jit(allocates=False)
 def surface_gap(geometry, pose, plane, x, s, gap, height):
-    """Gap between wheel and rail over a contact plane, exactly as the surfaces are.
+    """Gap between wheel and rail over a contact plane, exactly as the surfaces are, at points ``x`` (nx,), ``s`` (ns,)
+    relative to its origin (m, increasing).
 
-    Parameters
-    ----------
-    geometry : ContactGeometry
-    pose : Pose
-        Of the wheel, from :func:`wrcore.contact.strip.make_pose` (spatial or planar makes no difference).
-    plane : ContactPlane
-    x : numpy.ndarray, shape (nx,)
-    s : numpy.ndarray, shape (ns,)
-        Points of the plane relative to its origin, m, both increasing.
-    gap : numpy.ndarray, shape (nx, ns)
-        Written: distance from rail to wheel along n, m; negative in overlap, `NO_RAIL` where a profile has ended.
-    height : numpy.ndarray, shape (nx, ns)
-        Written: the wheel's height n over the plane, m; 0 where a profile has ended.
+    Writes, (nx, ns), the distance from rail to wheel along n (m; negative in overlap, `NO_RAIL` where a profile has
+    ended) and the wheel's height n over the plane (m; 0 where a profile has ended). A pose may be spatial or planar.
     """
     u = pose.side * plane.y - geometry.rail_distance + pose.side * plane.cosine * s[0]
     for j in range(s.size):
@@ -137,18 +126,8 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
 
 @jit
 def strip_planes(s, gap, height):
-    """Of each strip along x the wheel's least height (m), and the slope over s midway between wheel and rail there.
-
-    Parameters
-    ----------
-    s : numpy.ndarray, shape (ns,)
-    gap, height : numpy.ndarray, shape (nx, ns)
-        Of `surface_gap`.
-
-    Returns
-    -------
-    low, tilt : numpy.ndarray, shape (ns,)
-        0 where a profile has ended.
+    """Of each strip along x the wheel's least height (m), and the slope over s midway between wheel and rail there,
+    (ns,), from ``gap`` and ``height`` of `surface_gap`; 0 where a profile has ended.
     """
     low, tilt = np.zeros(s.size), np.zeros(s.size)
     for j in range(s.size):
@@ -177,23 +156,11 @@ def _lowest(gap, height, j):
 
 @jit(allocates=False)
 def surface_slip(pose, plane, motion, x, s, low, tilt, wx, ws):
-    """Rigid slip of the wheel's own surface over the rail at rest, across in the plane of each strip along x.
+    """Rigid slip of the wheel's own surface over the rail at rest, forward and (``ws``) to the left in the plane of
+    each strip along x, over the speed: fills ``wx``, ``ws`` (nx, ns); ``low``, ``tilt``: of `strip_planes`.
 
     A strip of the wheel counts with its radius at its point nearest to the rail: away from it the undeformed wheel
     moves more slowly along x, but the flattened one does not, as its surface passes over the same length.
-
-    Parameters
-    ----------
-    pose, plane
-        As for `surface_gap`.
-    motion : Motion
-        Of the wheelset.
-    x, s : numpy.ndarray, shapes (nx,), (ns,)
-        m.
-    low, tilt : numpy.ndarray, shape (ns,)
-        Of `strip_planes`.
-    wx, ws : numpy.ndarray, shape (nx, ns)
-        Written: velocity of wheel relative to rail over the speed, forward and to the left.
     """
     slowness = 1.0 / motion.speed
     for j in range(s.size):

@@ -36,8 +36,8 @@ def guess_squares(hertz, patches, first, work, stretches, by_lobes):
     """First guess of c and Q at the nodes: shape-corrected virtual penetration of every lobe.
 
     For a lobe of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's ellipse of
-    the overlap, and Q of that ellipse: exact for an ellipse. Else (not ``by_lobes``) d - min g is that
-    ellipse's, too, and Q gives its force.
+    the overlap, and Q of that ellipse: exact for an ellipse. Else (not ``by_lobes``) d - min g is that ellipse's, too,
+    and Q gives its force.
     """
     nodes = work.nodes
     begin = 0
