@@ -37,9 +37,10 @@ def late_in(run, begin, what):
 
 
 def way_shares(run, wheelset, late):
-    """Shares of the way of a wheelset in the output times that count, shape (m,): weights of means per metre."""
+    """Shares of the way of a wheelset in the output times that count, shape (m,): weights of means per metre; at rest
+    those of time."""
     speed = np.broadcast_to(rolling_speed(run[wheelset], run.scene["speed"]), late.shape)[late]
-    return speed / speed.sum()
+    return speed / speed.sum() if speed.any() else np.full(speed.shape, 1.0 / speed.size)
 
 
 @checked
