@@ -88,7 +88,7 @@ def sources(*rooms):
 
 CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "scene")
-RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
+RUN = (*CONTACT, "creep", "elements", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/motion", "analysis/wheels")
 STYLE = ("analysis/style", "study/report/legible")
 CORE = {

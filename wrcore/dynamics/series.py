@@ -44,7 +44,8 @@ def with_kernels_of(model, other):
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(fallback=other.contact.strips.fallback))
     kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
-    return model._replace(contact=with_wheels(contact), **kept)
+    elements = model.elements._replace(laws=other.elements.laws)
+    return model._replace(contact=with_wheels(contact), elements=elements, **kept)
 
 
 def _arrays(part):

@@ -43,7 +43,7 @@ def _turn_into(frame, x, y, z):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _turn_back(frame, x, y, z):
+def turned_back(frame, x, y, z):
     """Vector whose components along the columns of a frame are given."""
     return (
         frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
@@ -92,7 +92,7 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
         _rail_frame(frame, lateral, vertical, rail)
         # the wheelset's centre from the rail's origin, turned into the rail's frame
-        gx, gy, gz = _turn_back(frame, 0.0, y - place - shift, z - lift)
+        gx, gy, gz = turned_back(frame, 0.0, y - place - shift, z - lift)
         _, ry, row[2] = _turn_into(rail, gx, gy, gz)
         row[0], row[1] = side, ry + place
         row[3], row[4], row[5] = _turn_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
@@ -109,8 +109,8 @@ def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
     they are in the track's."""
     for wheel in range(2):
         rail, wrench = rails[wheel], wrenches[wheel]
-        wrench[0], wrench[1], wrench[2] = _turn_back(rail, wrench[0], wrench[1], wrench[2])
-        wrench[3], wrench[4], wrench[5] = _turn_back(rail, wrench[3], wrench[4], wrench[5])
+        wrench[0], wrench[1], wrench[2] = turned_back(rail, wrench[0], wrench[1], wrench[2])
+        wrench[3], wrench[4], wrench[5] = turned_back(rail, wrench[3], wrench[4], wrench[5])
         for k in range(counts[wheel]):
             patches[wheel, k, Y] += shifts[wheel, 0]
             patches[wheel, k, Z] += shifts[wheel, 1]
@@ -123,7 +123,7 @@ def moving_frame(track, speed, t, ahead, axes):
     station = track_frame(track.path, ahead + speed * t, axes)
     along, left, up = frame_turn(station)
     velocity = (speed * axes[0, 0], speed * axes[1, 0], speed * axes[2, 0])
-    return (station.x, station.y, station.z), velocity, _turn_back(axes, speed * along, speed * left, speed * up)
+    return (station.x, station.y, station.z), velocity, turned_back(axes, speed * along, speed * left, speed * up)
 
 
 @jit
