@@ -29,7 +29,7 @@ import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.track import moving_frame, turned_back
+from wrcore.dynamics.track import moving_frame, turned_back, turned_into
 from wrcore.dynamics.vector import cross, dot
 from wrcore.elements.law import (
     AXIS,
@@ -138,8 +138,8 @@ def with_laws(elements):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def relative_motion(elements, p, track, t, speed, state, rotations, turns):
-    """Relative motion of a pair: R row by row, rho, u and W; beside it the axes of the second body, and in track axes
-    ri - rj, vj and wj."""
+    """Relative motion of a pair, R column by column, rho, u and W; beside it the axes of the second body and, in track
+    axes, ri - rj, vj and wj."""
     i, j = elements.pairs[p, 0], elements.pairs[p, 1]
     at = STATE_SIZE * i
     if j == FRAME:
@@ -160,31 +160,22 @@ def relative_motion(elements, p, track, t, speed, state, rotations, turns):
     vz = state[at + 9] - velocity[2] - turn[0] * dy + turn[1] * dx
     wx, wy, wz = turns[i, 0] - turn[0], turns[i, 1] - turn[1], turns[i, 2] - turn[2]
     body = rotations[i]
-    a00, a01, a02 = axes[0, 0], axes[0, 1], axes[0, 2]
-    a10, a11, a12 = axes[1, 0], axes[1, 1], axes[1, 2]
-    a20, a21, a22 = axes[2, 0], axes[2, 1], axes[2, 2]
-    px, py, pz = a00 * dx + a10 * dy + a20 * dz, a01 * dx + a11 * dy + a21 * dz, a02 * dx + a12 * dy + a22 * dz
-    ux, uy, uz = a00 * vx + a10 * vy + a20 * vz, a01 * vx + a11 * vy + a21 * vz, a02 * vx + a12 * vy + a22 * vz
-    ox, oy, oz = a00 * wx + a10 * wy + a20 * wz, a01 * wx + a11 * wy + a21 * wz, a02 * wx + a12 * wy + a22 * wz
-    b00, b01, b02 = body[0, 0], body[0, 1], body[0, 2]
-    b10, b11, b12 = body[1, 0], body[1, 1], body[1, 2]
-    b20, b21, b22 = body[2, 0], body[2, 1], body[2, 2]
     rotation = (
-        (a00 * b00 + a10 * b10 + a20 * b20, a00 * b01 + a10 * b11 + a20 * b21, a00 * b02 + a10 * b12 + a20 * b22),
-        (a01 * b00 + a11 * b10 + a21 * b20, a01 * b01 + a11 * b11 + a21 * b21, a01 * b02 + a11 * b12 + a21 * b22),
-        (a02 * b00 + a12 * b10 + a22 * b20, a02 * b01 + a12 * b11 + a22 * b21, a02 * b02 + a12 * b12 + a22 * b22),
+        turned_into(axes, body[0, 0], body[1, 0], body[2, 0]),
+        turned_into(axes, body[0, 1], body[1, 1], body[2, 1]),
+        turned_into(axes, body[0, 2], body[1, 2], body[2, 2]),
     )
-    track_axes = axes, (dx, dy, dz), velocity, turn
-    return (rotation, (px, py, pz), (ux, uy, uz), (ox, oy, oz)), track_axes
+    local = rotation, turned_into(axes, dx, dy, dz), turned_into(axes, vx, vy, vz), turned_into(axes, wx, wy, wz)
+    return local, (axes, (dx, dy, dz), velocity, turn)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _marker_motion(row, motion):
     """R m, d and d' of a part from the beginning of its row, m and n."""
-    (r0, r1, r2), (px, py, pz), (ux, uy, uz), (ox, oy, oz) = motion
-    bx = r0[0] * row[0] + r0[1] * row[1] + r0[2] * row[2]
-    by = r1[0] * row[0] + r1[1] * row[1] + r1[2] * row[2]
-    bz = r2[0] * row[0] + r2[1] * row[1] + r2[2] * row[2]
+    (c0, c1, c2), (px, py, pz), (ux, uy, uz), (ox, oy, oz) = motion
+    bx = c0[0] * row[0] + c1[0] * row[1] + c2[0] * row[2]
+    by = c0[1] * row[0] + c1[1] * row[1] + c2[1] * row[2]
+    bz = c0[2] * row[0] + c1[2] * row[1] + c2[2] * row[2]
     apart = px + bx - row[3], py + by - row[4], pz + bz - row[5]
     return (bx, by, bz), apart, (ux + oy * bz - oz * by, uy + oz * bx - ox * bz, uz + ox * by - oy * bx)
 
@@ -225,19 +216,19 @@ def _pressing_force(elements, k, motion):
 def pair_forces(elements, p, motion, state, inner_at, rate):
     """Force and moment of a pair's elements on its first body, about its centre and in the second one's axes; what they
     store (J) and dissipate (W). Writes the rates of internal states, which begin at ``inner_at``."""
-    (r0, r1, r2), _, _, (ox, oy, oz) = motion
+    ((r00, r10, r20), (r01, r11, r21), (r02, r12, r22)), _, _, (ox, oy, oz) = motion
     turning = elements.turning[p]
     fx = fy = fz = 0.0
     c0, c1, c2 = turning[0, 0], turning[0, 1], turning[0, 2]
-    stored = c0 * (1.0 - r0[0]) + c1 * (1.0 - r1[1]) + c2 * (1.0 - r2[2])
+    stored = c0 * (1.0 - r00) + c1 * (1.0 - r11) + c2 * (1.0 - r22)
     if turning[2, 0] != 0.0 or turning[2, 1] != 0.0 or turning[2, 2] != 0.0:
-        tx, ty, tz = 1.0 + r0[0] - r1[1] - r2[2], 1.0 - r0[0] + r1[1] - r2[2], 1.0 - r0[0] - r1[1] + r2[2]
+        tx, ty, tz = 1.0 + r00 - r11 - r22, 1.0 - r00 + r11 - r22, 1.0 - r00 - r11 + r22
         h0, h1, h2 = turning[2, 0] * tx, turning[2, 1] * ty, turning[2, 2] * tz
         c0, c1, c2 = c0 + 0.5 * (h1 + h2 - h0), c1 + 0.5 * (h0 + h2 - h1), c2 + 0.5 * (h0 + h1 - h2)
         stored += 0.25 * (turning[2, 0] * (tx * tx) + turning[2, 1] * (ty * ty) + turning[2, 2] * (tz * tz))
-    mx = c2 * r1[2] - c1 * r2[1] - turning[1, 0] * ox
-    my = c0 * r2[0] - c2 * r0[2] - turning[1, 1] * oy
-    mz = c1 * r0[1] - c0 * r1[0] - turning[1, 2] * oz
+    mx = c2 * r12 - c1 * r21 - turning[1, 0] * ox
+    my = c0 * r20 - c2 * r02 - turning[1, 1] * oy
+    mz = c1 * r01 - c0 * r10 - turning[1, 2] * oz
     lost = turning[1, 0] * (ox * ox) + turning[1, 1] * (oy * oy) + turning[1, 2] * (oz * oz)
     for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
         row = elements.springs[k]

@@ -32,49 +32,45 @@ class Kind:
 
 
 class Spring(NamedTuple):
-    """Spring and damper along the three axes of the second body."""
+    """Spring and damper along the three axes of the second body, at the first of its ``ends`` (2, 3); a ``preload`` (N)
+    of None is found, along z."""
 
     ends: np.ndarray
-    """(2, 3): points at the first and at the second body, m; it acts at the first one."""
     stiffness: Any = ZERO
     damping: Any = ZERO
     preload: Any = None
-    """N on the first body; None: found, along z."""
 
 
 class Turning(NamedTuple):
-    """Spring and damper against relative rotation about the three axes of the second body."""
+    """Spring and damper against relative rotation about the three axes of the second body. At a wheelset, values of the
+    element's ``keys`` for pitch are errors, and its place is on the axle, but for what may be ``anywhere``."""
 
     ends: np.ndarray
     stiffness: Any = ZERO
     damping: Any = ZERO
     cubic: Any = ZERO
-    """N m/rad^3."""
     keys: tuple[str, ...] = ()
-    """Of stiffness, damping and cubic stiffness, where a value for pitch is an error at a wheelset."""
     anywhere: bool = False
-    """Whether it may be fixed to a wheelset beside its axle."""
 
 
 class Along(NamedTuple):
-    """What acts along one direction by a law."""
+    """What acts along one direction by a law: a unit vector in the second body's axes, or the line between the ends."""
 
     ends: np.ndarray
     law: Any
     axis: np.ndarray | None
-    """Unit vector in the second body's axes; None: along the line between the ends."""
     numbers: Any = ()
-    """At most six for the law; with ``normal`` a function that returns them, of the nominal pressing force (N)."""
+    """At most six for the law, or a function that returns them, of the force that presses in nominal position (N)."""
     points: np.ndarray | None = None
     """(q, 2): polygon of force over displacement or speed, or the inverse of it."""
     inner: bool = False
     """Whether it has an internal state."""
     slope: float = 0.0
-    """Stiffness in nominal position with which it may carry weight, N/m."""
+    """Stiffness with which it may carry weight, N/m."""
     preload: float = 0.0
-    """Force on the first body along the axis in nominal position, N; for statics, a law has it among its numbers."""
+    """Force on the first body along the axis in nominal position, N, for statics; the law has it among its numbers."""
     presses: float | None = None
-    """The same for elements that may press friction, which have no internal state."""
+    """The same of what may press friction, which has no internal state."""
     normal: str | None = None
     """Name of the element that presses on it."""
     odd: bool = True
@@ -139,8 +135,8 @@ def curve(abscissa, unit):
                "items": {"type": "number", "minimum": -MOST, "maximum": MOST}}  # fmt: skip
     return {
         "type": "object", "additionalProperties": False, "required": [abscissa, "force"],
-        "description": f"the lists {abscissa} (in {unit}) and force (in N), rising; from (0, 0) on they are continued as an "
-        "odd function, beyond the last point with the last slope",
+        "description": f"the lists {abscissa} (in {unit}) and force (in N), rising; from (0, 0) on continued as an odd "
+        "function, beyond the last point with the last slope",
         "properties": {abscissa: {**numbers, "description": f"values in {unit}, rising"},
                        "force": {**numbers, "description": "forces in N, not falling"}},
     }  # fmt: skip
