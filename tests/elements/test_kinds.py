@@ -1,9 +1,11 @@
 """What every kind of force element says of itself, and a law of the user's own."""
 
+import math
+
 import numpy as np
 import pytest
 
-from tests.dynamics.test_suspension import MASSES, at_rest, evaluate, model_with, moving, tumbling
+from tests.dynamics.test_suspension import MASSES, at_rest, evaluate, model_with, moving
 from tests.dynamics.test_system import body_state, contact, run  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.energy import energy_balance, energy_channels
 from wrcore.dynamics.suspension import with_laws
@@ -94,14 +96,9 @@ def test_an_unknown_function_is_an_error(contact, registered):  # noqa: F811
     assert caught.value.field == "elements.e0.function" and "air drag" in caught.value.expected
 
 
-def test_a_stop_on_a_line_presses_friction_along_it(contact):  # noqa: F811
+def test_a_stop_on_a_line_presses_friction_with_its_force(contact):  # noqa: F811
     stop = {"name": "stop", "kind": "bump_stop", "direction": "line", "at": [[0, 0.6, 2.0], [0, 0.2, 1.0]], "gap": 0.0,
             "stiffness": 500.0}  # fmt: skip
-    slider = {"kind": "friction", "direction": "x", "at": [0, 0, 1.5], "mu": 0.2, "normal": "stop",
-              "series_stiffness": 1e4}  # fmt: skip
-    model = model_with(contact, [stop, slider])
-    for state in (np.append(tumbling(np.random.default_rng(k)), 0.0) for k in range(3)):
-        alone, both = (evaluate(model_with(contact, items), state) for items in ([stop], [stop, slider]))
-        shaken = evaluate(model, state)
-        np.testing.assert_array_equal(shaken[0], both[0])
-        assert np.all(np.isfinite(both[0])) and np.linalg.norm(alone[0]) > 0.0
+    slips = {"kind": "friction", "direction": "x", "at": [0, 0, 1.5], "mu": 0.2, "normal": "stop", "approach": 1e-3}
+    wrench = evaluate(model_with(contact, [stop, slips]), at_rest(upper=(0, 0.3, 2.2), own=[1e-3]))[0]
+    assert wrench[0, 0] == pytest.approx(-0.2 * 500.0 * (math.hypot(0.7, 1.2) - math.hypot(0.4, 1.0)), rel=1e-12)

@@ -78,6 +78,8 @@ BAD = [
     (set_in(DAMPER, damping=None), f"elements.{DAMPER}", "either damping or characteristic"),
     (set_in(DAMPER, damping=0.0), f"elements.{DAMPER}.series_stiffness", "above 0"),
     (set_in(DAMPER, series_stiffness=0), f"elements.{DAMPER}.series_stiffness", "above 0"),
+    (set_in(DAMPER, damping=None, series_stiffness=0.0, characteristic={"velocity": [0, 1], "force": [0, 2]}),
+     f"elements.{DAMPER}.series_stiffness", "above 0"),
     (set_in("lateral_bump_stop_1", gap=0.02), "elements.lateral_bump_stop_1", "either a characteristic"),
     (set_in("lateral_bump_stop_1", characteristic=None), "elements.lateral_bump_stop_1", "gap and stiffness"),
     (add(kind="friction", at=[9.5, 0, 0.7], direction="y", force=1e3), "elements.new.series_stiffness", "needs one"),

@@ -6,7 +6,8 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT
-from wrcore.elements.kinds import KINDS
+from wrcore.elements.kinds import KINDS, compiled
+from wrcore.elements.kinds.traction_rod import linear
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.vehicle.description import build_vehicle
 
@@ -18,7 +19,8 @@ BOLSTER = {"kind": "body", "mass": 500.0, "inertia": {"roll": 1.0, "pitch": 1.0,
 @pytest.mark.parametrize(
     "item", [item for block in EXAMPLES if isinstance(block, list) for item in block], ids=lambda item: item["name"]
 )
-def test_each_example_is_a_part_of_a_vehicle(item):
+def test_each_example_is_a_part_of_a_vehicle(item, monkeypatch):
+    monkeypatch.setitem(compiled.FUNCTIONS, "air_drag", linear)
     data = yaml.safe_load(yaml.safe_dump(VEHICLE))
     if item["kind"] in KINDS:
         data["elements"].append(item)

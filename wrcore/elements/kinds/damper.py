@@ -80,8 +80,8 @@ def check(item):
         yield "", "expected either damping or characteristic"
     if "direction" not in item and "characteristic" in item:
         yield "direction", "expected a value, as a characteristic needs one"
-    if "damping" in item and "series_stiffness" in item:
-        damped, sprung = (np.atleast_1d(item[key]) > 0.0 for key in ("damping", "series_stiffness"))
+    if "series_stiffness" in item:
+        damped, sprung = (np.atleast_1d(value) > 0.0 for value in (item.get("damping", 1.0), item["series_stiffness"]))
         if np.any(damped != sprung):
             expected = "expected values above 0 where damping is above 0, and nowhere else"
             yield "series_stiffness", f"{expected}, got {item['series_stiffness']!r}"
@@ -90,10 +90,8 @@ def check(item):
 
 def _either(one, three_of_them):
     """Schema of a key with one number, or one for each axis."""
-    return {
-        "description": f"{one}, or {three(three_of_them)['description']}",
-        "anyOf": [number(one), three(three_of_them)],
-    }
+    forms = [number(one), three(three_of_them)]
+    return {"description": ", or ".join(form["description"] for form in forms), "anyOf": forms}
 
 
 KIND = Kind(
