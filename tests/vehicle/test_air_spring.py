@@ -61,7 +61,7 @@ def test_a_turbulent_orifice_presses_as_its_power_law():
     elements = elements_of(orifice_damping=drag, orifice_exponent=exponent)
     below = elements.springs[elements.springs[:, 8] > 0.0, 8].sum()
     series, first, last = elements.directed[0, NUMBERS], *elements.law[0, [FIRST, LAST]]
-    points, z = elements.table[first:last], lambda t: 0.015 * np.sin(omega * t)
+    points, z = elements.table[first:last, :2], lambda t: 0.015 * np.sin(omega * t)
 
     def through(t, w):
         push = bag * (z(t) - w) - behind * w

@@ -70,6 +70,7 @@ BAD = [
     (set_in("coupler", stiffness=[1.0, 2.0]), "elements.coupler.stiffness", "three numbers [x, y, z]"),
     (set_in("coupler", stiffness=1.0e6), "elements.coupler.stiffness", "three numbers [x, y, z]"),
     (set_in("coupler", stiffness=[1e6, -1.0, 0]), "elements.coupler.stiffness.1", "none negative: stiffnesses in N/m"),
+    (set_in("anti_roll_bar_1", stiffness=-1.0), "elements.anti_roll_bar_1.stiffness", "N m/rad, not negative, got -1"),
     (set_in("coupler", stiffness="1 MN/m"), "elements.coupler.stiffness", "in N/m, got '1 MN/m'"),
     (set_in("coupler", preload=[0, 0, float("inf")]), "elements.coupler.preload.2", "finite"),
     (set_in("anti_roll_bar_1", stiffness=[1.0, 0, 0]), "elements.anti_roll_bar_1.stiffness", "a stiffness in N m/rad"),

@@ -130,7 +130,7 @@ def _with_integral(points):
 
 def with_laws(elements):
     """The elements with the addresses of the laws that they follow: these alone are compiled."""
-    addresses, example = np.zeros(len(LAWS), np.int64), Kind(elements._replace(laws=np.zeros(0, np.int64)))
+    addresses, example = np.zeros(len(LAWS), np.int64), Kind(elements)
     for number in np.unique(elements.law[:, LAW]):
         addresses[number] = Kernel(LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
     return elements._replace(laws=addresses)

@@ -101,8 +101,9 @@ def polygon(x, force):
 
 
 def number(description, least=0.0, most=MOST, **more):
-    """Schema of a key that holds one number."""
-    return {"type": "number", "minimum": least, "maximum": most, "description": description, **more}
+    """Schema of a key that holds one number; ``description`` names other bounds than 0 and `MOST`."""
+    said = f"{description}, not negative" if (least, most) == (0.0, MOST) else description
+    return {"type": "number", "minimum": least, "maximum": most, "description": said, **more}
 
 
 def three(description, least=0.0, axes="[x, y, z]"):
