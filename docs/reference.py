@@ -8,6 +8,7 @@ from importlib.resources import files
 import yaml
 
 import wrcore
+from wrcore.errors.checked_yaml import kinds_in
 
 GROUPS = {
     "Scenes and runs": (
@@ -193,7 +194,7 @@ def files_page():
 
 def _keys(schema, before):
     """Rows of a schema's keys, depth first; alternatives that are mappings are followed."""
-    for part in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ())):
+    for part in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ()), *kinds_in(schema)):
         required = part.get("required", ())
         for key, value in part.get("properties", {}).items():
             path = f"{before}{key}"

@@ -8,8 +8,8 @@ import pytest
 from tests.conftest import ROOT
 
 ROOMS = (
-    "errors", "kernels", "geometry", "contact", "creep", "dynamics", "integrate", "vehicle", "balance", "scene", "run",
-    "sweep", "analysis", "cli",
+    "errors", "kernels", "geometry", "contact", "creep", "elements", "dynamics", "integrate", "vehicle", "balance",
+    "scene", "run", "sweep", "analysis", "cli",
 )  # fmt: skip
 """In the order of the data; ``wrcore/__init__.py`` is the door to all of them."""
 

@@ -18,6 +18,9 @@ from tests.synthetic import hunting_run
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main
+from wrcore.elements import kinds as elements
+from wrcore.elements.kinds import compiled
+from wrcore.elements.kinds.traction_rod import linear
 from wrcore.errors.checked_yaml import _schema
 
 VEHICLES = sorted(path.stem for path in SCENES.glob("*.yaml"))
@@ -48,6 +51,7 @@ ELEMENTS = {
     "damper": {"damping": [1e3, 1e3, 1e3]}, "friction": {"direction": "x", "force": 1e3, "series_stiffness": 1e6},
     "bump_stop": {"direction": "y", "gap": 0.02, "stiffness": 1e6}, "anti_roll_bar": {"stiffness": 1e6},
     "traction_rod": {"stiffness": 1e6, "at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
+    "compiled": {"direction": "x", "function": "linear"},
 }  # fmt: skip
 JOINTS = {
     "coordinate": {"axis": "x"}, "spherical": {"at": [0.0, 0.0, 0.5]}, "rigid": {"at": [0.0, 0.0, 0.5]},
@@ -55,8 +59,9 @@ JOINTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", KINDS["elements"]["items"]["properties"]["kind"]["enum"])
-def test_every_kind_of_element_is_drawn(tmp_path, kind):
+@pytest.mark.parametrize("kind", elements.KINDS)
+def test_every_kind_of_element_is_drawn(tmp_path, kind, monkeypatch):
+    monkeypatch.setitem(compiled.FUNCTIONS, "linear", linear)
     item = {"name": "new", "kind": kind, "bodies": ["wheelset", "frame"]}
     at = {} if kind == "anti_roll_bar" else {"at": [0.0, 0.3, 0.5]}
     assert "element:new:side" in drawn_of(tmp_path, "elements", item | at | ELEMENTS[kind])

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from tests.dynamics.test_suspension import at_rest, evaluate, model_with
 from tests.dynamics.test_system import contact  # noqa: F401 (a fixture)
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.suspension import FLOOR
 from wrcore.dynamics.system import Equations, workspace
+from wrcore.elements.kinds.friction import FLOOR
 from wrcore.errors import InputError
 
 LOAD, STIFFNESS, MU, AMPLITUDE = 4e4, 1e6, 0.3, 0.01  # N, N/m, 1, m
@@ -130,7 +130,7 @@ BAD = [
     (
         {"normal": "nothing"},
         "elements.e1.normal",
-        "spring_damper, shear_spring or bump_stop between the same two bodies",
+        "a spring or bump stop between the same two bodies",
     ),
     ({"bodies": ["lower", "upper"]}, "elements.e1.normal", "in the same order"),
     ({"bodies": ["upper", "frame"]}, "elements.e1.normal", "between the same two bodies"),

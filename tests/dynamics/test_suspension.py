@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 from tests.dynamics.test_body import matrix_of
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.suspension import GIVING_WAY
 from wrcore.dynamics.system import Equations, workspace
-from wrcore.vehicle.element_checks import check_element
+from wrcore.elements.kinds.friction import GIVING_WAY
+from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
 

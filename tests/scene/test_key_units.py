@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from wrcore.cli import main
+from wrcore.elements.kinds import KINDS
 from wrcore.errors.checked_yaml import _schema, _unit, keys_of, unit_of_key
 from wrcore.run.channels import UNIT_SUFFIXES
 from wrcore.sweep.batch import column_unit, write_table
@@ -24,7 +25,7 @@ COMPOUND = {
     "kg/m",
     "N, m^3/m",
 }
-KNOWN = {"1", "that of the key", *UNIT_SUFFIXES.values(), *COMPOUND}
+KNOWN = {"1", "that of the key", "that of the function", *UNIT_SUFFIXES.values(), *COMPOUND}
 
 
 def has_numbers(part):
@@ -48,6 +49,12 @@ def named_parts(part, path=""):
 def test_every_number_has_a_unit(name):
     units = {path: _unit(part) for path, part in named_parts(_schema(name)) if has_numbers(part)}
     assert len(units) >= 3 and {path: unit for path, unit in units.items() if unit not in KNOWN} == {}
+
+
+def test_every_number_of_a_force_element_has_a_unit():
+    units = {(kind, key): _unit(part) for kind, said in KINDS.items() for key, part in said.keys.items()
+             if has_numbers(part)}  # fmt: skip
+    assert len(units) >= 30 and {key: unit for key, unit in units.items() if unit not in KNOWN} == {}
 
 
 def test_a_pure_number_is_one_where_the_schema_says_so_only():

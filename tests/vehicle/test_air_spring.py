@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 from tests.vehicle.conftest import element
 from wrcore.dynamics.energy import energy_balance
+from wrcore.elements.law import FIRST, LAST, NUMBERS
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
@@ -35,7 +36,7 @@ def test_dynamic_stiffness_is_that_of_bag_reservoir_and_orifice():
     bag, behind, changing = physical()
     elements = elements_of()
     below = elements.springs[elements.springs[:, 8] > 0.0, 8].sum()
-    series, damping = elements.directed[0, 7:9]
+    series, damping = elements.directed[0, NUMBERS : NUMBERS + 2]
     for omega in (0.0, 1.0, 2.0 * np.pi, 40.0, 1e4):
         drag = 4e4j * omega
         expected = changing + bag * (behind + drag) / (bag + behind + drag)
@@ -59,8 +60,8 @@ def test_a_turbulent_orifice_presses_as_its_power_law():
     exponent, drag, omega = 1.8, 6e5, 2.0 * np.pi * 1.2
     elements = elements_of(orifice_damping=drag, orifice_exponent=exponent)
     below = elements.springs[elements.springs[:, 8] > 0.0, 8].sum()
-    series, (_, _, first, last, _) = elements.directed[0, 7], elements.law[0]
-    points, z = elements.table[first:last], lambda t: 0.015 * np.sin(omega * t)
+    series, first, last = elements.directed[0, NUMBERS], *elements.law[0, [FIRST, LAST]]
+    points, z = elements.table[first:last, :2], lambda t: 0.015 * np.sin(omega * t)
 
     def through(t, w):
         push = bag * (z(t) - w) - behind * w

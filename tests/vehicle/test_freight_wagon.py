@@ -5,6 +5,7 @@ import pytest
 
 from tests.conftest import ROOT, SCENES
 from wrcore.dynamics.energy import energy_balance
+from wrcore.elements.law import INNER, NUMBERS, PRESSING_SPRING
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_equilibrium
@@ -24,8 +25,7 @@ def test_it_stands_evenly_and_its_friction_grows_with_its_load(load, mass):
     np.testing.assert_allclose(equilibrium.wheel_loads, mass * GRAVITY / 4, rtol=1e-6)
     on_a_spring = scene.vehicle.bodies.mass[0] * GRAVITY / 4
     elements = scene.vehicle.elements
-    own = elements.law[elements.law[:, 4] >= 0]
-    limits = sorted(elements.table[own[:, 2], 1])  # in nominal position
+    limits = sorted(elements.directed[elements.law[:, INNER] >= 0, NUMBERS + 1])  # in nominal position
     expected = sorted(4 * [mu * on_a_spring for mu in (0.07, 0.08, 0.14)])
     np.testing.assert_allclose(limits, expected, rtol=1e-6)
 
@@ -69,5 +69,5 @@ def test_friction_in_links_and_leaves_keeps_hunting_small(tmp_path):
 def test_friction_in_a_train_is_pressed_by_its_own_vehicle():
     one, two = scene_of("empty").vehicle, scene_of("empty", vehicle={"count": 2, "spacing": 14.0}).vehicle
     assert two.elements.states == 2 * one.elements.states
-    pressed = two.elements.law[two.elements.law[:, 4] >= 0, 3]
+    pressed = two.elements.law[two.elements.law[:, INNER] >= 0, PRESSING_SPRING]
     assert sorted(pressed) == sorted(3 * [k for k, row in enumerate(two.elements.springs) if row[8] > 0.0])

@@ -6,7 +6,7 @@ import pytest
 from tests.vehicle.conftest import element
 from wrcore.errors import InputError
 from wrcore.vehicle.description import GRAVITY, build_vehicle
-from wrcore.vehicle.element_data import single_elements
+from wrcore.vehicle.element_parts import parts_of
 from wrcore.vehicle.layout import Layout
 from wrcore.vehicle.statics import preloads
 
@@ -23,7 +23,8 @@ def preloads_by_name(data):
         "test", vehicle.body_names, vehicle.positions, vehicle.bodies.mass, vehicle.bodies.spins.astype(bool),
         {name: part["wheelset"] for name, part in data["bodies"].items() if part["kind"] == "axle_box"},
     )  # fmt: skip
-    shares = preloads(single_elements(vehicle.data["elements"], layout), layout, data.get("joints", []), GRAVITY)
+    parts = [part for item in vehicle.data["elements"] for part in parts_of(item, layout)]
+    shares = preloads(parts, layout, data.get("joints", []), GRAVITY)
     for name, force in shares.items():  # what the kernels get is what statics found
         stated = tuple(np.round([0.0, 0.0, force], 6))
         assert stated in found, name
@@ -74,7 +75,7 @@ def statics_of(bodies, items, joints=()):
     )  # fmt: skip
     items = [{"name": f"s{k}", **item} for k, item in enumerate(items)]
     joints = [{"name": f"j{k}", **item} for k, item in enumerate(joints)]
-    return preloads(single_elements(items, layout), layout, joints, 10.0)
+    return preloads([part for item in items for part in parts_of(item, layout)], layout, joints, 10.0)
 
 
 def spring(bodies, at, k=1e5):

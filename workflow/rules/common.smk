@@ -88,9 +88,9 @@ def sources(*rooms):
 
 CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "balance", "scene")
-RUN = (*CONTACT, "creep", "dynamics", "integrate", *SCENE, "run")
+RUN = (*CONTACT, "creep", "elements", "dynamics", "integrate", *SCENE, "run")
 VEHICLE = ("analysis/assessment/motion", "analysis/assessment/wheels")
-LOADED = (*CONTACT, "creep", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
+LOADED = (*CONTACT, "creep", "elements", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
 STYLE = ("analysis/pictures/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),

@@ -25,25 +25,10 @@ import numpy as np
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.drive import BRAKE, undriven
-from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.support import support_places
-from wrcore.dynamics.suspension import (
-    APPROACH,
-    CUBIC,
-    DISPLACEMENT,
-    LINE,
-    SERIES,
-    SERIES_VELOCITY,
-    SLIDER,
-    VELOCITY,
-    characteristic,
-    friction_force,
-    friction_limit,
-    pack_elements,
-)
+from wrcore.dynamics.suspension import element_energies, pack_elements
 from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at
-from wrcore.dynamics.track import moving_frame
 from wrcore.dynamics.wheel import normal_contact
 from wrcore.kernels.jit import jit
 
@@ -67,137 +52,6 @@ class EnergyBalance(NamedTuple):
     """Energy that is missing: change of the stores and losses less inputs, the contact's store by its power, J."""
     contact_remainder: np.ndarray
     """Change of 2/5 N_el delta less the integral of the elastic contact forces' power, J."""
-
-
-@jit
-def _polygon_integral(table, first, last, x):
-    """Integral of a characteristic from the first of its points to x."""
-    total, k = 0.0, first
-    while k < last - 2 and x > table[k + 1, 0]:
-        total += 0.5 * (table[k, 1] + table[k + 1, 1]) * (table[k + 1, 0] - table[k, 0])
-        k += 1
-    return total + 0.5 * (table[k, 1] + characteristic(table, first, last, x)) * (x - table[k, 0])
-
-
-@jit
-def _limit(elements, k, R, rho, u, W):
-    """`friction_limit` with the pair's motion in arrays."""
-    rotation = (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2])
-    place, velocity, turn = (rho[0], rho[1], rho[2]), (u[0], u[1], u[2]), (W[0], W[1], W[2])
-    return friction_limit(elements, k, rotation, place, velocity, turn)
-
-
-@jit
-def _friction_energy(elements, k, stretch, speed, own, limit):
-    """Force, energy, its rate and the loss of the k-th element along one direction, one with a limit. Approach stores
-    what it would at the limit of the nominal position; what a limit that varies does counts as lost."""
-    row, law = elements.directed[k], elements.law[k]
-    force, rate = friction_force(elements, k, stretch, speed, own, limit)
-    if law[1] == APPROACH:
-        nominal, distance, hanging = elements.table[law[2], 1], row[8], row[7]
-        stored = 0.5 * nominal * (own**2 / distance + hanging * stretch**2)
-        storing = nominal * (own * rate / distance + hanging * stretch * speed)
-        return force, stored, storing, force * speed - storing
-    return force, 0.5 * row[7] * (stretch - own) ** 2, force * (speed - rate), force * rate
-
-
-@jit
-def _directed_energy(elements, k, stretch, speed, own, limit):
-    """Force against stretch (N), energy (J), its rate and the loss (W) of the k-th element along one direction."""
-    if elements.law[k, 1] >= SLIDER:
-        return _friction_energy(elements, k, stretch, speed, own, limit)
-    row, law, table = elements.directed[k], elements.law[k], elements.table
-    stiffness, damping, preload = row[7], row[8], row[9]
-    if law[1] == SERIES or law[1] == SERIES_VELOCITY:
-        force = stiffness * (stretch - own)
-        rate = force / damping if law[1] == SERIES else characteristic(table, law[2], law[3], force)
-        stored = 0.5 * stiffness * (stretch - own) ** 2 - preload * stretch
-        return force - preload, stored, force * (speed - rate) - preload * speed, force * rate
-    elastic, viscous = stiffness * stretch - preload, damping * speed
-    stored = 0.5 * stiffness * stretch**2 - preload * stretch
-    if law[1] == DISPLACEMENT:
-        elastic += characteristic(table, law[2], law[3], stretch)
-        stored += _polygon_integral(table, law[2], law[3], stretch) - _polygon_integral(table, law[2], law[3], 0.0)
-    elif law[1] == VELOCITY:
-        viscous += characteristic(table, law[2], law[3], speed)
-    elif law[1] == CUBIC:
-        elastic += table[law[2], 0] * stretch**3
-        stored += 0.25 * table[law[2], 0] * stretch**4
-    return elastic + viscous, stored, elastic * speed, viscous * speed
-
-
-@jit
-def element_energies(elements, track, t, speed, state, rotations, turns):
-    """Energy (J) of the springs of all force elements, its rate, the power that dampers and friction dissipate, and
-    that of the moving frame's ends (W); arguments as for ``wrcore.dynamics.suspension.element_forces``. The energy is
-    zero in nominal position, where a preload's spring is not relaxed."""
-    own = STATE_SIZE * turns.shape[0]
-    stored = rate = lost = driven = 0.0
-    axes = np.empty((3, 3))
-    for p in range(elements.pairs.shape[0]):
-        i, j = elements.pairs[p]
-        at = STATE_SIZE * i
-        if j != FRAME:
-            axes[:] = rotations[j]
-            other = STATE_SIZE * j
-            origin, velocity, turn = state[other : other + 3], state[other + 7 : other + 10], turns[j]
-        elif track.tangent:
-            axes[:] = np.eye(3)
-            origin, velocity = np.array([speed * t + elements.ahead[p], 0.0, 0.0]), np.array([speed, 0.0, 0.0])
-            turn = np.zeros(3)
-        else:
-            place, ahead, turning = moving_frame(track, speed, t, elements.ahead[p], axes)
-            origin, velocity, turn = np.array(place), np.array(ahead), np.array(turning)
-        # relative motion in the axes of the second body, as in wrcore.dynamics.suspension
-        into = axes.T.copy()
-        R = into @ rotations[i]
-        apart = state[at : at + 3] - origin
-        rho, u = into @ apart, into @ (state[at + 7 : at + 10] - velocity - np.cross(turn, apart))
-        W = into @ (turns[i] - turn)
-        c, d, h = elements.turning[p]
-        single = 0.5 * (1.0 - np.trace(R)) + np.diag(R)  # T of each axis
-        stored += np.sum(h * single**2)
-        c = c + np.sum(h * single) - 2.0 * h * single
-        moment = np.array([
-            c[2] * R[1, 2] - c[1] * R[2, 1] - d[0] * W[0], c[0] * R[2, 0] - c[2] * R[0, 2] - d[1] * W[1],
-            c[1] * R[0, 1] - c[0] * R[1, 0] - d[2] * W[2],
-        ])  # fmt: skip
-        loss = np.sum(d * W * W)
-        stored += np.sum(elements.turning[p, 0] * (1.0 - np.diag(R)))
-        rate -= np.sum(moment * W) + loss
-        lost += loss
-        force = np.zeros(3)
-        for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
-            row = elements.springs[k]
-            arm = R @ row[:3]
-            stretch, along = rho + arm - row[3:6], u + np.cross(W, arm)
-            elastic = row[12:15] - row[6:9] * stretch
-            stored += np.sum(0.5 * row[6:9] * stretch**2 - row[12:15] * stretch)
-            rate -= np.sum(elastic * along)
-            lost += np.sum(row[9:12] * along**2)
-            push = elastic - row[9:12] * along
-            force += push
-            moment += np.cross(arm, push)
-        for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
-            row, law = elements.directed[k], elements.law[k]
-            arm = R @ row[:3]
-            line = rho + arm - row[3:6]
-            n = np.zeros(3)
-            if law[0] == LINE:
-                n[:] = line / np.sqrt(np.sum(line**2))
-            else:
-                n[law[0]] = 1.0
-            along = np.sum(n * (u + np.cross(W, arm)))
-            inner = state[own + law[4]] if law[4] >= 0 else 0.0
-            stretch = np.sum(n * line) - row[6]
-            limit = 0.0 if law[1] < SLIDER else _limit(elements, k, R, rho, u, W)
-            against, energy, power, loss = _directed_energy(elements, k, stretch, along, inner, limit)
-            stored, rate, lost = stored + energy, rate + power, lost + loss
-            force -= against * n
-            moment -= np.cross(arm, against * n)
-        if j == FRAME:  # the element's force on the first body, times the velocity of the frame's point there
-            driven += np.sum((axes @ force) * (velocity + np.cross(turn, apart))) + np.sum((axes @ moment) * turn)
-    return stored, rate, lost, driven
 
 
 @jit(inline="always")
@@ -259,16 +113,16 @@ def _elastic_contact_energy(contact, work):
 
 
 @jit
-def _energies(times, states, evaluation, model, work):
+def _energies(times, states, evaluation, work):
     """Four stores (J), rates of springs and gravity, power lost in dampers and power of the frame (W), shape (n, 8).
     ``evaluation``: the arguments of the model's `Equations` with this workspace."""
     rows, rate = np.empty((times.shape[0], 8)), np.empty(states.shape[1])
-    equations, model_handle, work_handle = evaluation
+    equations, model, work_handle = evaluation
     for i in range(times.shape[0]):
-        derivatives_at(equations, times[i], states[i], model_handle, work_handle, rate)
+        derivatives_at(equations, times[i], states[i], model, work_handle, rate)
         kinetic, height, rise = _kinetic_and_gravitational(model, work.rotations, states[i])
         stored, stretching, damped, driven = element_energies(
-            model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns
+            model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns, rate
         )
         rows[i, 0], rows[i, 1], rows[i, 2] = kinetic, height, stored
         rows[i, 3] = _elastic_contact_energy(model.contact, work)
@@ -294,7 +148,7 @@ def energy_channels(model, work, times, states):
         parts.append(_powers(times, states, variant, work))
     whole, contact, normal, hertz = parts
     work.arc_lengths[:] = begin
-    rows = _energies(times, states, Equations(model, work).arguments, model, work)
+    rows = _energies(times, states, Equations(model, work).arguments, work)
     kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
     work.arc_lengths[:] = begin
     drives = _drive_powers(model, work, times, states) if len(model.drive.rows) else {}

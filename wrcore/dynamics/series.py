@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 
+from wrcore.dynamics.suspension import with_laws
 from wrcore.dynamics.system import Equations, own_states, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
 from wrcore.kernels.handles import Kind
@@ -44,7 +45,7 @@ def with_kernels_of(model, other):
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(fallback=other.contact.strips.fallback))
     kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
-    return model._replace(contact=with_wheels(contact), **kept)
+    return model._replace(contact=with_wheels(contact), elements=with_laws(model.elements), **kept)
 
 
 def _arrays(part):

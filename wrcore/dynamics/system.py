@@ -22,7 +22,7 @@ from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.rail_friction import fill_rail_friction
 from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.support import Support, SupportWork, no_support, support_work, support_wrenches
-from wrcore.dynamics.suspension import Elements, element_forces
+from wrcore.dynamics.suspension import Elements, element_forces, with_laws
 from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
 from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
@@ -306,7 +306,8 @@ def with_fallback(contact, motion, strips):
 
 
 def with_kernels(model, work):
-    """The model with the addresses of the kernels of its wheels, joints and so on: only what it runs is compiled."""
+    """The model with the addresses of the kernels of its wheels, elements, joints and so on: only what it runs is
+    compiled."""
     wrenches, contact = wheel_wrenches, model.contact
     if contact.strips.strips and len(work.motions):
         from wrcore.dynamics.strip_wheel import strip_wrenches
@@ -316,7 +317,8 @@ def with_kernels(model, work):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 
         wrenches = shaped_wrenches
-    model = model._replace(contact=with_wheels(contact))  # what follows is compiled for the model as it will be
+    # what follows is compiled for the model as it will be
+    model = model._replace(contact=with_wheels(contact), elements=with_laws(model.elements))
     if model.joints.equations:
         kernel = Kernel(add_reactions, Kind(model), 0.0, np.empty(0), Kind(work))
         model = model._replace(reactions=kernel.address)

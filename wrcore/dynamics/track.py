@@ -33,7 +33,7 @@ class TrackModel(NamedTuple):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _turn_into(frame, x, y, z):
+def turned_into(frame, x, y, z):
     """Components of a vector along the columns of a frame."""
     return (
         frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
@@ -43,7 +43,7 @@ def _turn_into(frame, x, y, z):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _turn_back(frame, x, y, z):
+def turned_back(frame, x, y, z):
     """Vector whose components along the columns of a frame are given."""
     return (
         frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
@@ -81,7 +81,7 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
     irregularity_at(track.irregularity, s, values)
     _, bend_vertical, bend = frame_turn(station)
     dx, dy, dz = state[at] - station.x, state[at + 1] - station.y, state[at + 2] - station.z
-    _, y, z = _turn_into(frame, dx, dy, dz)
+    _, y, z = turned_into(frame, dx, dy, dz)
     for wheel in range(2):
         side, rail, row = 1.0 - 2.0 * wheel, rails[wheel], motions[wheel]
         share = side * 0.5 + track.path.aside
@@ -92,12 +92,12 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
         _rail_frame(frame, lateral, vertical, rail)
         # the wheelset's centre from the rail's origin, turned into the rail's frame
-        gx, gy, gz = _turn_back(frame, 0.0, y - place - shift, z - lift)
-        _, ry, row[2] = _turn_into(rail, gx, gy, gz)
+        gx, gy, gz = turned_back(frame, 0.0, y - place - shift, z - lift)
+        _, ry, row[2] = turned_into(rail, gx, gy, gz)
         row[0], row[1] = side, ry + place
-        row[3], row[4], row[5] = _turn_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
-        row[6], row[7], row[8] = _turn_into(rail, state[at + 7], state[at + 8], state[at + 9])
-        row[9], row[10], row[11] = _turn_into(rail, state[at + 10], state[at + 11], state[at + 12])
+        row[3], row[4], row[5] = turned_into(rail, axle[0, 1], axle[1, 1], axle[2, 1])
+        row[6], row[7], row[8] = turned_into(rail, state[at + 7], state[at + 8], state[at + 9])
+        row[9], row[10], row[11] = turned_into(rail, state[at + 10], state[at + 11], state[at + 12])
         row[12], row[13] = bend + values[2, 2 * wheel], -bend_vertical + values[2, 2 * wheel + 1]
         shifts[wheel, 0], shifts[wheel, 1] = shift, lift
     return s
@@ -109,8 +109,8 @@ def turn_back_wrenches(rails, shifts, wrenches, patches, counts):
     they are in the track's."""
     for wheel in range(2):
         rail, wrench = rails[wheel], wrenches[wheel]
-        wrench[0], wrench[1], wrench[2] = _turn_back(rail, wrench[0], wrench[1], wrench[2])
-        wrench[3], wrench[4], wrench[5] = _turn_back(rail, wrench[3], wrench[4], wrench[5])
+        wrench[0], wrench[1], wrench[2] = turned_back(rail, wrench[0], wrench[1], wrench[2])
+        wrench[3], wrench[4], wrench[5] = turned_back(rail, wrench[3], wrench[4], wrench[5])
         for k in range(counts[wheel]):
             patches[wheel, k, Y] += shifts[wheel, 0]
             patches[wheel, k, Z] += shifts[wheel, 1]
@@ -123,7 +123,7 @@ def moving_frame(track, speed, t, ahead, axes):
     station = track_frame(track.path, ahead + speed * t, axes)
     along, left, up = frame_turn(station)
     velocity = (speed * axes[0, 0], speed * axes[1, 0], speed * axes[2, 0])
-    return (station.x, station.y, station.z), velocity, _turn_back(axes, speed * along, speed * left, speed * up)
+    return (station.x, station.y, station.z), velocity, turned_back(axes, speed * along, speed * left, speed * up)
 
 
 @jit
@@ -136,11 +136,11 @@ def track_poses(track, states, at, guess):
         state, frame, out = states[i, at : at + STATE_SIZE], axes[i], poses[i]
         s = arc_length_of(track.path, state[0], state[1], state[2], s)
         station = track_frame(track.path, s, frame)
-        _, y, z = _turn_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
+        _, y, z = turned_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
         rotation_matrix(state, 0, body)
-        ax, ay, az = _turn_into(frame, body[0, 1], body[1, 1], body[2, 1])
-        _, _, forward = _turn_into(frame, body[0, 0], body[1, 0], body[2, 0])
-        _, _, upward = _turn_into(frame, body[0, 2], body[1, 2], body[2, 2])
+        ax, ay, az = turned_into(frame, body[0, 1], body[1, 1], body[2, 1])
+        _, _, forward = turned_into(frame, body[0, 0], body[1, 0], body[2, 0])
+        _, _, upward = turned_into(frame, body[0, 2], body[1, 2], body[2, 2])
         out[0], out[1], out[2], out[3] = s, y, z, math.asin(min(max(az, -1.0), 1.0))
         out[4], out[5] = math.atan2(-ax, ay), math.atan2(-forward, upward)
     return poses, axes

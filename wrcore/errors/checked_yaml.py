@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from functools import cache
+from importlib import import_module
 from importlib.resources import files
 from itertools import islice
 
@@ -193,10 +194,15 @@ def _keys(part, path):
         if "description" in item:
             yield key, item["description"], name in part.get("required", ()), item.get("default"), _unit(item)
         yield from _keys(item, key)
-    for one in part.get("anyOf", ()):
+    for one in (*part.get("anyOf", ()), *kinds_in(part)):
         yield from _keys(one, path)
     if isinstance(part.get("items"), dict):
         yield from _keys(part["items"], f"{path}[]")
+
+
+def kinds_in(part):
+    """Schemas of the kinds of things that a part of a schema may be, if it names a module that knows them."""
+    return import_module(part["x-kinds"]).SCHEMAS if "x-kinds" in part else ()
 
 
 def validate(data, schema_name, source):
@@ -205,13 +211,18 @@ def validate(data, schema_name, source):
     """
     schema = _schema(schema_name)
     data = plain_tree(data, source)
+    check(data, schema, source)
+    _fill_defaults(data, schema, schema)
+    return data
+
+
+def check(data, schema, source, above=""):
+    """Raise an InputError where data are not what a schema (a dict) asks for; ``above``: the field that holds them."""
     found = islice(_validator()(schema).iter_errors(data), 1000)
     errors = sorted(found, key=lambda e: (len(e.path), str(e.path)))
     if errors:
         field, expected = _explain(errors[0], schema)
-        raise InputError(source, field, expected)
-    _fill_defaults(data, schema, schema)
-    return data
+        raise InputError(source, ".".join(filter(None, [above, field])), expected)
 
 
 def plain_tree(data, source):

@@ -17,7 +17,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "dynamics", "integrate")
+KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "elements", "dynamics", "integrate")
 _KEEP_SECONDS = 14 * 86400
 
 

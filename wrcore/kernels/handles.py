@@ -176,17 +176,23 @@ class _KernelModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.IntType(8).as_pointer())
 
 
-class Kernel:
-    """A kernel that returns nothing, compiled (or loaded) for the types of example arguments, to be called by its
-    address."""
+FOUR = types.UniTuple(types.float64, 4)
+"""Type of four numbers."""
 
-    def __init__(self, function, *examples):
+
+class Kernel:
+    """A kernel that returns nothing (or ``returns``), compiled (or loaded) for the types of example arguments, to be
+    called by its address."""
+
+    def __init__(self, function, *examples, returns=types.none):
         signature = tuple(typeof(example) for example in examples)
         function = function.in_form("addressed")
         if signature not in function.overloads:
             function.compile(signature)
         compiled = function.overloads[signature]
         self._numba_type_ = KernelType(signature)
+        if compiled.signature.return_type != returns:
+            raise TypeError(f"{function.__name__}: expected a kernel that returns {returns}, not {compiled.signature}")
         self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
@@ -204,13 +210,13 @@ def _call(context, builder, call, values):
     """Call what ``values[0]`` points at with the arguments in ``values[1]``."""
     kinds = tuple(call.args[1])
     handed = [builder.extract_value(values[1], k) for k in range(len(kinds))]
-    function = context.call_conv.get_function_type(types.none, kinds).as_pointer()
+    function = context.call_conv.get_function_type(call.return_type, kinds).as_pointer()
     from_number = isinstance(values[0].type, ir.IntType)
     pointer = (builder.inttoptr if from_number else builder.bitcast)(values[0], function)
-    status, _ = context.call_conv.call_function(builder, pointer, types.none, kinds, handed)
+    status, found = context.call_conv.call_function(builder, pointer, call.return_type, kinds, handed)
     with cgutils.if_unlikely(builder, status.is_error):
         context.call_conv.return_status_propagate(builder, status)
-    return context.get_dummy_value()
+    return found
 
 
 @intrinsic
@@ -225,3 +231,9 @@ def call_at(_, kernel, *arguments):
 def call_address(_, address, *arguments):
     """Call the `Kernel` with this ``address``, a field of a model say; the types of the arguments are not checked."""
     return types.void(types.int64, types.StarArgTuple(arguments)), _call
+
+
+@intrinsic
+def four_at(_, address, *arguments):
+    """The four numbers that the `Kernel` with this ``address`` returns; all else as for `call_address`."""
+    return FOUR(types.int64, types.StarArgTuple(arguments)), _call

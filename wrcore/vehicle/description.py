@@ -11,7 +11,7 @@ from wrcore.dynamics.suspension import Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
-from wrcore.vehicle.element_checks import check_element
+from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
 

@@ -14,19 +14,16 @@ springs, traction rods and bump stops are free of load.
 import numpy as np
 
 from wrcore.dynamics.marker import FRAME
+from wrcore.elements.kind import Along, Spring, Turning
 from wrcore.errors import InputError
-from wrcore.vehicle.element_data import end_points, on_line, rotational
 
 UNCARRIED = 1e-6
 """Part of a body's weight that nothing may be left to carry."""
 
-SPRINGS = ("spring_damper", "shear_spring")
-"""Kinds that take a preload by themselves."""
-
 
 @np.errstate(all="ignore")  # numbers that overflow carry nothing
-def preloads(items, layout, joints, gravity):
-    """Vertical preloads (N on the first body, by name) of the springs in ``items``, single elements, that state none,
+def preloads(parts, layout, joints, gravity):
+    """Vertical preloads (N on the first body, by name) of the springs among the elements' ``parts`` that state none,
     such that the vehicle rests in nominal position. They share what the elements with a stated preload leave over, as
     linear springs would; ``gravity`` in m/s^2. An InputError names a body that neither springs nor joints carry."""
     size = 6 * len(layout.names)
@@ -34,15 +31,16 @@ def preloads(items, layout, joints, gravity):
     weight[2::6] = -gravity * layout.mass
     fixed = np.repeat(layout.spins, 6)
     free, shared, holding = np.zeros((size, size)), np.zeros((size, size)), {}
-    for item in items:
-        motion = _relative_motion(item, layout)
-        stiffness = _stiffness(item, layout)
+    for name, bodies, does in parts:
+        here = does.ends[0]
+        motion = _point_motion(bodies[0], here, layout) - _point_motion(bodies[1], here, layout)
+        stiffness, stated = _stiffness(does)
         free += motion.T @ stiffness @ motion
-        if "preload" in item:
-            load += motion[:3].T @ _stated(item)
-        elif item["kind"] in SPRINGS:
-            holding[item["name"]] = stiffness[2, 2] * motion[2]
-            shared += np.outer(motion[2], holding[item["name"]])
+        if stated is not None:
+            load += motion[:3].T @ stated
+        elif isinstance(does, Spring):
+            holding[name] = stiffness[2, 2] * motion[2]
+            shared += np.outer(motion[2], holding[name])
     constraints = np.vstack([np.zeros((0, size)), *(_constraints(item, layout) for item in joints)])
     left = _solve(free, constraints, weight, fixed)[1]
     for body, name in enumerate(layout.names):
@@ -85,37 +83,20 @@ def _point_motion(body, point, layout):
     return motion
 
 
-def _relative_motion(item, layout):
-    """Motion (6, size) of an element's first end relative to the second body at the same point."""
-    first, second = layout.ends(item, f"elements.{item['name']}")
-    here = end_points(item)[0]
-    return _point_motion(first, here, layout) - _point_motion(second, here, layout)
-
-
-def _direction(item):
-    """Unit vector of an element that acts along one direction."""
-    if not on_line(item):
-        return np.eye(3)["xyz".index(item["direction"])]
-    here, there = end_points(item)
-    return (here - there) / max(np.linalg.norm(here - there), 1e-9)
-
-
-def _stiffness(item, layout):
-    """Stiffness (6, 6) of an element against relative translation and rotation; of a characteristic, the steepest."""
+def _stiffness(does):
+    """Stiffness (6, 6) of a part against relative translation and rotation, and its stated preload (N on the first
+    body) or None."""
     stiffness = np.zeros((6, 6))
-    stiffness[range(3, 6), range(3, 6)] = rotational(item, layout)[0]
-    if item["kind"] in SPRINGS:
-        stiffness[range(3), range(3)] = item.get("stiffness", 0.0)
-    elif item["kind"] in ("traction_rod", "bump_stop"):
-        points = item["points"]
-        slope = item["stiffness"] if points is None else np.max(np.diff(points[:, 1]) / np.diff(points[:, 0]))
-        stiffness[:3, :3] = slope * np.outer(_direction(item), _direction(item))
-    return stiffness
-
-
-def _stated(item):
-    """Stated preload of an element as a force on its first body, N."""
-    return np.array(item["preload"], float) if item["kind"] in SPRINGS else item["preload"] * _direction(item)
+    if isinstance(does, Along):
+        here, there = does.ends
+        axis = (here - there) / max(np.linalg.norm(here - there), 1e-9) if does.axis is None else does.axis
+        stiffness[:3, :3] = does.slope * np.outer(axis, axis)
+        return stiffness, does.preload * axis
+    first = 3 * isinstance(does, Turning)
+    stiffness[range(first, first + 3), range(first, first + 3)] = does.stiffness
+    if first or does.preload is None:
+        return stiffness, None
+    return stiffness, np.array(does.preload, float)
 
 
 def _constraints(item, layout):

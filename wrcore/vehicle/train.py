@@ -26,8 +26,8 @@ def train_of(vehicle, count, spacing, source):
         expected = f"expected more than the {length:g} m between the outermost bodies of a vehicle, got {spacing:g}"
         raise InputError(source, "vehicle.spacing", expected)
     train = compile_vehicle(repeated(vehicle.data, count, spacing), vehicle.source_file)
-    own_states_in_order = not len(vehicle.bodies.independent)  # of vehicle after vehicle
-    return replace(train, unit=vehicle if own_states_in_order else None)
+    internal_states_in_order = not len(vehicle.bodies.independent)  # of vehicle after vehicle
+    return replace(train, unit=vehicle if internal_states_in_order else None)
 
 
 def repeated(data, count, spacing):

@@ -1,6 +1,6 @@
 """Figures of stability: root locus over speed, the modes at one speed, limit cycles over speed.
 
-They work on tables of `wrcore.analysis.stability`. Units change here and nowhere before: lengths to mm.
+They work on tables of `wrcore.analysis.stability.stability`. Units change here and nowhere before: lengths to mm.
 """
 
 import numpy as np

@@ -13,22 +13,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from wrcore.analysis.pictures.style import ACCENT, styled
-from wrcore.vehicle.element_data import end_points, on_line
+from wrcore.elements.kind import ends_of
+from wrcore.elements.kinds import KINDS
 from wrcore.vehicle.layout import FRAME_NAME
 
-MARKS = {
-    "spring_damper": {"marker": "s", "color": "#0072B2", "markerfacecolor": "white"},
-    "bushing": {"marker": "h", "color": "#0072B2"},
-    "shear_spring": {"marker": "s", "color": "#0072B2"},
-    "air_spring": {"marker": "o", "color": "#0072B2"},
-    "damper": {"marker": "D", "color": "#E69F00"},
-    "friction": {"marker": "^", "color": "#E69F00"},
-    "bump_stop": {"marker": "P", "color": "0.1"},
-    "traction_rod": {"marker": ">", "color": "#009E73"},
-    "anti_roll_bar": {"marker": "v", "color": "#CC79A7"},
-    "joint": {"marker": "o", "color": ACCENT, "markerfacecolor": "white"},
+MARKS = {name: kind.mark for name, kind in KINDS.items()} | {
+    "joint": {"marker": "o", "color": ACCENT, "markerfacecolor": "white"}
 }
-"""Look of each kind of force element, and of joints; markers tell them apart in grey."""
+"""Look of each kind of force element, and of joints."""
 
 VIEWS = (("side", 2), ("plan", 1))
 """Name, and which coordinate stands upright."""
@@ -101,12 +93,11 @@ def _elements(vehicle):
     parts = []
     for item in vehicle.data["elements"]:
         if "at" in item:
-            at = np.array(item["at"], float).reshape(-1, 3)
-            ends = at[[0, -1]] if len(at) > 1 else np.array(end_points(item))
+            ends = ends_of(item)
         else:  # it acts between bodies as wholes
             ends = np.array([bodies[name]["position"] for name in item["bodies"] if name in bodies])[[-1, -1]]
         along = np.zeros(3)
-        if item.get("direction") in ("x", "y", "z") and not on_line(item):
+        if item.get("direction", "line") != "line":
             along["xyz".index(item["direction"])] = 1.0
         parts.append((len(parts) + 1, item["name"], item["kind"], item["bodies"], ends, along))
     return parts
