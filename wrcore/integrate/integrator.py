@@ -28,6 +28,7 @@ from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.errors import InputError
 from wrcore.integrate import engine
+from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
@@ -92,7 +93,7 @@ def integrate(
     work = equations.work
     begin = start.memory.state if goes_on else start
     memory = new_memory(begin, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
-    linear = new_linear(model) if method in ROSENBROCK else None
+    linear, system = (new_linear(model), new_system(model)) if method in ROSENBROCK else (None, None)
     work.strips.memory[...] = 0.0
     if goes_on:
         _take_over(memory, start.memory)
@@ -111,7 +112,9 @@ def integrate(
     def advance(attempts):
         if linear is None:
             return advance_explicit(tableau, control, memory, scratch, record, attempts, *equations.arguments)
-        return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, *equations.arguments)
+        return advance_rosenbrock(
+            tableau, control, memory, scratch, linear, system, record, attempts, *equations.arguments
+        )
 
     outcome, given_up = advance(0), ""  # compiles, or loads the kernel from the cache
     before, started = memory.counters.copy(), time.perf_counter()
