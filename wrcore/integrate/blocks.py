@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.links import own_state_bodies, own_state_groups, reached_bodies
 from wrcore.dynamics.vector import dot
-from wrcore.integrate.links import own_state_bodies, own_state_groups, reached_bodies
 from wrcore.integrate.moving_axes import RATE
 from wrcore.kernels.jit import jit
 

@@ -9,7 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.dynamics.contact_blocks import contacts_alone
+from wrcore.dynamics.contract import after_rejection, before_attempt, touching
+from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.system import derivatives_at
+from wrcore.dynamics.vector import copy_into
 from wrcore.integrate.blocks import factorise, solve_stage
 from wrcore.integrate.engine import (
     AGE,
@@ -26,9 +30,7 @@ from wrcore.integrate.engine import (
     TOUCHING,
     T,
     accept,
-    copy_into,
     error_size,
-    forget_wild_places,
     judge,
     take_stock,
 )
@@ -36,7 +38,6 @@ from wrcore.integrate.jacobian import (
     Jacobian,
     Joined,
     Sweep,
-    contacts_alone,
     joined_bodies,
     new_jacobian,
     plan_sweep,
@@ -97,15 +98,6 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
 
 
 @jit(allocates=False)
-def _touching(work):
-    """Patches in the last evaluation."""
-    total = 0
-    for k in range(work.counts.shape[0]):
-        total += work.counts[k, 0] + work.counts[k, 1]
-    return total
-
-
-@jit(allocates=False)
 def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
     """Error by the rate at the end of an attempt (``scratch.slope``) against the step's own dense output there.
 
@@ -142,8 +134,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
-        work.strips.warm[0] = 1
-        copy_into(scratch.arc_lengths, work.arc_lengths)
+        before_attempt(work, scratch.places)
         step, regular = clock[NEXT], True
         for i in range(last + 1):
             trial[:] = 0.0
@@ -155,12 +146,12 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
             moment = tableau.nodes[i] * step
             carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
             if i > 0 or not counters[HAS_RATE]:
-                derivatives_at(equations, clock[T] + moment, trial, model, work, slope)
+                derivatives_at(equations, clock[T] + moment, trial, model, work, slope, WARM)
                 counters[EVALUATIONS] += 1
             if i == 0:
                 if not counters[HAS_RATE]:
                     copy_into(memory.rate, slope)
-                    counters[HAS_RATE], counters[TOUCHING] = 1, _touching(work)
+                    counters[HAS_RATE], counters[TOUCHING] = 1, touching(work)
                 regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
@@ -181,21 +172,21 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
         rate = pace(model, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
-        looked_ahead, touching = error <= 1.0, 0
+        looked_ahead, contacts = error <= 1.0, 0
         if looked_ahead:  # the next step's first rate
-            derivatives_at(equations, clock[T] + step, trial, model, work, slope)
+            derivatives_at(equations, clock[T] + step, trial, model, work, slope, WARM)
             counters[EVALUATIONS] += 1
-            touching = _touching(work)
-            if touching > counters[TOUCHING]:
+            contacts = touching(work)
+            if contacts > counters[TOUCHING]:
                 error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, system, model))
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
             linear.jacobian.turn[ANGLE] += linear.jacobian.turn[RATE] * step
             counters[AGE] += 1
-            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, touching
+            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, contacts
             if looked_ahead:
                 copy_into(memory.rate, slope)
         elif control.fixed_step > 0.0:
             return NOT_FINITE
         else:
-            forget_wild_places(scratch, work)
+            after_rejection(work, scratch.places)
