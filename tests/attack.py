@@ -307,9 +307,9 @@ def _spoiled(end, kind, rng):
         name = rng.choice(memory._fields)
         value = None if kind == "none" else rng.choice([getattr(memory, name)[:-1], np.zeros((2, 2))])
         return end.__class__(**{**vars(end), "memory": memory._replace(**{name: value})})
-    system = end.linear.system
-    name = rng.choice([name for name in system._fields if name != "pattern" and len(getattr(system, name))])
-    linear = end.linear._replace(system=system._replace(**{name: getattr(system, name)[:0]}))
+    jacobian = end.linear.jacobian
+    name = rng.choice([name for name in jacobian._fields if len(getattr(jacobian, name))])
+    linear = end.linear._replace(jacobian=jacobian._replace(**{name: getattr(jacobian, name)[:0]}))
     return end.__class__(**{**vars(end), "linear": linear})
 
 

@@ -86,6 +86,14 @@ def test_rooms_stand_in_the_order_of_the_data():
     assert breaches(ROOT) == []
 
 
+def test_the_integrator_knows_no_rail():
+    """What it asks of a model besides its rates stands in `wrcore.dynamics.contract`."""
+    paths = (ROOT / "wrcore/integrate").glob("*.py")
+    names = {name for path in paths for name, _ in imports(ast.parse(path.read_text("utf-8")))}
+    rooms = {room_of(name) for name in names if name.startswith("wrcore.")}
+    assert rooms == {"errors", "kernels", "dynamics", "integrate"}
+
+
 def test_the_core_shows_its_rooms_and_nothing_else():
     entries = {p.name for p in (ROOT / "wrcore").iterdir()} - {"__pycache__"}
     assert {name.removesuffix(".py") for name in entries} == {*ROOMS, "__init__", "__main__", "py.typed"}

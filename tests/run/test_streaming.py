@@ -16,6 +16,7 @@ import pytest
 from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.errors import InputError
+from wrcore.errors.checked_hdf5 import sign
 from wrcore.run.results import load_run
 from wrcore.run.simulate import output_blocks, output_times, simulate
 from wrcore.run.streaming import Parts, simulate_to
@@ -66,6 +67,12 @@ def test_a_checkpoint_from_a_file_goes_on_bit_by_bit(tmp_path):
         whole = simulate(scene_of(HUNTING | {"integration.method": method}))
         half = scene_of(HUNTING | {"integration.method": method, "integration.duration": 2.0})
         simulate_to(half, tmp_path / "half.h5", block=97)
+        with h5py.File(tmp_path / "half.h5", "r+") as file:
+            linear = file["end/checkpoint"].get("linear", {})
+            assert "system" not in linear  # what the Jacobian makes again; older files have it
+            if method == "ros34pw2":
+                linear.create_group("system")["blocks"] = np.zeros((1, 6, 6))
+        sign(tmp_path / "half.h5")
         rest = simulate(half, start=load_run(tmp_path / "half.h5").end)
         assert np.array_equal(rest["wheelset"].y_m, whole["wheelset"].y_m[whole.t >= 2.0])
 

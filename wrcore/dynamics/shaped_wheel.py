@@ -19,6 +19,7 @@ import math
 from wrcore.contact.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHEEL
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
+from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.wheel import FRICTION, contact_of, find_overlaps, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
@@ -62,7 +63,7 @@ def shape_number(skewness):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
+def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """As `wrcore.dynamics.wheel.wheel_wrenches`, whose arguments it takes, with the patches' shape numbers."""
     for i in range(motions.shape[0]):
         for wheel in range(2):

@@ -68,6 +68,7 @@ from wrcore.contact.reduction import (
 )  # fmt: skip
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import creep_force_at
+from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.wheel import FRICTION, contact_of, falling, wheel_wrenches
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
@@ -383,12 +384,10 @@ def mirror(rows, count, wrench):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
-    """As `wheel_wrenches`, with patches on strips; while ``work.cheap[0]`` is set the ellipse of equal moments of the
-    overlap stands in: a Jacobian by differences wants a smooth neighbour of the model, not the model.
-    """
-    if work.cheap[0] != 0:
-        wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work)
+def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
+    """As `wheel_wrenches`, with patches on strips; arguments as there."""
+    if mode & ELLIPSES:
+        wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
     m = work.motion
     for i in range(motions.shape[0]):
@@ -405,7 +404,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             first = kept = group = 0
             while first < count:
                 last = group_end(rows, count, first)
-                memory = work.memory[i, wheel, group] if work.warm[0] else work.spare
+                memory = work.memory[i, wheel, group] if mode & WARM else work.spare
                 work.spare[0] = 0.0
                 group_wrench(own, m, spatial, rows, first, last, work.out, w, counters, memory, work)
                 group += 1

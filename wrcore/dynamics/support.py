@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.model import PATCHES_HELD
 from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import jit
 
@@ -121,7 +121,7 @@ def rails_at(model, state, k):
 
 
 @jit(allocates=False)
-def support_wrenches(model, state, work, rate):
+def support_wrenches(model, state, work, rate, mode):
     """Wrenches of rails that give on all wheels, as by the kernel of the wheels, and the rates of the track's states,
     written into ``rate``; the motions in ``work``, over rails at rest, become those over rails that give."""
     support, own = model.support, work.support
@@ -136,9 +136,9 @@ def support_wrenches(model, state, work, rate):
                 own.ground[k, wheel, i] = work.motions[k, wheel, 7 + i]
                 own.speeds[k, wheel, i] = 0.0 if massless else state[at + d]
     missed, on_grid = work.counters[1], work.counters[2]
-    _press(model, work, -1)
+    _press(model, work, -1, mode)
     if massless:
-        _give_way(model, state, work, first, missed, on_grid)
+        _give_way(model, state, work, first, missed, on_grid, mode)
     own.power[0] = 0.0
     for k in range(own.speeds.shape[0]):
         at = first + size * k
@@ -157,7 +157,7 @@ def support_wrenches(model, state, work, rate):
 
 
 @jit(allocates=False)
-def _press(model, work, faster):
+def _press(model, work, faster, mode):
     """Find the wrenches and the forces on the rails at the rails' speeds, in one direction (< 0: none) a bit faster."""
     own = work.support
     for k in range(own.speeds.shape[0]):
@@ -167,7 +167,7 @@ def _press(model, work, faster):
                 work.motions[k, wheel, 7 + i] = own.ground[k, wheel, i] - speed
     call_address(
         model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips,
+        work.counters, work.strips, mode,
     )  # fmt: skip
     for k in range(own.speeds.shape[0]):
         for wheel in range(2):
@@ -176,26 +176,23 @@ def _press(model, work, faster):
 
 
 @jit(allocates=False)
-def _find_slopes(model, work):
+def _find_slopes(model, work, mode):
     """Derivatives of the forces on the rails by the rails' speeds, where forces are known; patches stay. For patches on
     strips ellipses stand in, as in a Jacobian: the derivatives only lead to the solution."""
-    own, strips, cheap = work.support, work.strips, work.strips.cheap[0]
+    own, rough = work.support, mode | ELLIPSES
     if model.contact.strips.strips > 0:
-        strips.cheap[0], strips.held[0] = 1, 0
-        _press(model, work, -1)
-        strips.held[0] = PATCHES_HELD
+        _press(model, work, -1, rough)
     for k in range(own.speeds.shape[0]):
         for wheel in range(2):
             for i in range(2):
                 own.known[k, wheel, i] = own.forces[k, wheel, i]
     for faster in range(2):
-        _press(model, work, faster)
+        _press(model, work, faster, rough | PATCHES_HELD)
         for k in range(own.speeds.shape[0]):
             for wheel in range(2):
                 for i in range(2):
                     change = own.forces[k, wheel, i] - own.known[k, wheel, i]
                     own.slopes[k, wheel, faster, i] = change / DIFFERENCE
-    strips.cheap[0] = cheap
 
 
 @jit(allocates=False)
@@ -255,16 +252,14 @@ def _find_residuals(support, own, state, first):
 
 
 @jit(allocates=False)
-def _give_way(model, state, work, first, missed, on_grid):
-    """Find the speeds of rails without mass, with all wrenches there; the last two arguments restore counters."""
-    support, own, strips = model.support, work.support, work.strips
-    held, differences, moving = strips.held[0], True, True
+def _give_way(model, state, work, first, missed, on_grid, mode):
+    """Find the speeds of rails without mass, with all wrenches there; ``missed`` and ``on_grid`` restore counters."""
+    support, own, differences, moving = model.support, work.support, True, True
     own.left[:] = math.inf
-    strips.held[0] = PATCHES_HELD
     for n in range(MOST):
         _find_residuals(support, own, state, first)
         if differences:
-            _find_slopes(model, work)
+            _find_slopes(model, work, mode)
         fresh, differences, moving = differences, False, False
         for k in range(own.speeds.shape[0]):
             for wheel in range(2):
@@ -273,8 +268,7 @@ def _give_way(model, state, work, first, missed, on_grid):
                     differences |= _step(support, own, k, wheel, fresh)
                     moving |= abs(step[0]) > LAST or abs(step[1]) > LAST
         work.counters[1], work.counters[2] = missed, on_grid
-        _press(model, work, -1)
+        _press(model, work, -1, mode | PATCHES_HELD)
         if not moving:
             break
     own.unbalanced[0] += _find_residuals(support, own, state, first)
-    strips.held[0] = held

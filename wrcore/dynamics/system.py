@@ -12,13 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.model import WRENCHES_HELD, StripWork, strip_work
+from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.joint import Joints
+from wrcore.dynamics.modes import FRESH, WRENCHES_HELD
 from wrcore.dynamics.rail_friction import fill_rail_friction
 from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.support import Support, SupportWork, no_support, support_work, support_wrenches
@@ -208,17 +209,17 @@ def wheel_motions(model, state, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_rail_wrenches(model, state, work, rate):
+def _add_rail_wrenches(model, state, work, rate, mode):
     """Add the wrenches of the rails to those of the wheelsets; while they are held, those found last."""
-    wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, work.strips.held[0] == WRENCHES_HELD
+    wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, mode & WRENCHES_HELD
     if not held:
         wheel_motions(model, state, work)
         if model.rails != 0:
-            call_address(model.rails, model, state, work, rate)
+            call_address(model.rails, model, state, work, rate, mode)
         else:
             call_address(
                 model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-                work.counters, work.strips,
+                work.counters, work.strips, mode,
             )  # fmt: skip
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
@@ -229,9 +230,9 @@ def _add_rail_wrenches(model, state, work, rate):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def fill_derivatives(t, state, model, work, rate):
+def fill_derivatives(t, state, model, work, rate, mode=FRESH):
     """Right-hand side of the equations of motion: fills ``rate``; patches and counts in ``work`` belong to this
-    evaluation afterwards.
+    evaluation afterwards. The ``mode`` is one of `wrcore.dynamics.modes`.
 
     The state: per body position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the
     force elements' own states (m), those of wheels that turn independently (rad/s) and of a track that gives (m, m/s,
@@ -252,7 +253,7 @@ def fill_derivatives(t, state, model, work, rate):
         wrench[:] = 0.0
         wrench[2] = -model.gravity * bodies.mass[b]
     if bodies.wheelsets.shape[0] > 0:
-        _add_rail_wrenches(model, state, work, rate)
+        _add_rail_wrenches(model, state, work, rate, mode)
         _turn_wheels_apart(bodies, work, rate)
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     if model.torques != 0:
@@ -271,16 +272,16 @@ def fill_derivatives(t, state, model, work, rate):
 
 
 @jit(allocates=False, forceinline=True)
-def derivatives_at(equations, t, state, model, work, rate):
+def derivatives_at(equations, t, state, model, work, rate, mode=FRESH):
     """Right-hand side by its address; all else as for :func:`fill_derivatives`."""
-    call_at(equations, t, state, model, work, rate)
+    call_at(equations, t, state, model, work, rate, mode)
 
 
 @jit(allocates=False, nogil=True)
-def fill_many(equations, t, states, model, work, rates):
+def fill_many(equations, t, states, model, work, rates, mode=FRESH):
     """Right-hand sides of several states (n, size), row by row."""
     for i in range(states.shape[0]):
-        derivatives_at(equations, t, states[i], model, work, rates[i])
+        derivatives_at(equations, t, states[i], model, work, rates[i], mode)
 
 
 def frictionless(model):
@@ -331,11 +332,11 @@ def with_kernels(model, work):
     if not len(model.bodies.wheelsets):
         return model
     if len(model.support.mass):
-        kernel = Kernel(support_wrenches, Kind(model), np.empty(0), Kind(work), np.empty(0))
+        kernel = Kernel(support_wrenches, Kind(model), np.empty(0), Kind(work), np.empty(0), FRESH)
         model = model._replace(rails=kernel.address)
     kernel = Kernel(
         wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, Kind(work.strips),
+        work.counters, Kind(work.strips), FRESH,
     )  # fmt: skip
     return model._replace(wheels=kernel.address)
 
@@ -348,15 +349,15 @@ class Equations:
         self.work = workspace(model) if work is None else work
         model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
         state = np.empty(0)
-        self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state), model, work
+        self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state, FRESH), model, work
 
-    def __call__(self, t, state):
-        """Rate of a state, shape (size,), at a time (s)."""
-        return self.at(t, state[None, :])[0]
+    def __call__(self, t, state, mode=FRESH):
+        """Rate of a state, shape (size,), at a time (s), in a mode of `wrcore.dynamics.modes`."""
+        return self.at(t, state[None, :], mode)[0]
 
-    def at(self, t, states):
+    def at(self, t, states, mode=FRESH):
         """Rates of several states, shape (n, size), at one time (s)."""
         states, rates = np.ascontiguousarray(states, float), np.empty(states.shape)
         equations, model, work = self.arguments
-        fill_many(equations, t, states, model, work, rates)
+        fill_many(equations, t, states, model, work, rates, mode)
         return rates

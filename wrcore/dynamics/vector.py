@@ -1,4 +1,4 @@
-"""Vectors of three numbers as tuples, which the compiler keeps in registers."""
+"""Vectors of three numbers as tuples, which the compiler keeps in registers, and copies of arrays."""
 
 from wrcore.kernels.jit import jit
 
@@ -31,3 +31,10 @@ def load(array, start):
 def store(vector, array):
     """Write the first three numbers of an array."""
     array[0], array[1], array[2] = vector
+
+
+@jit(allocates=False, inline="always")
+def copy_into(target, source):
+    """Copy numbers one by one; an assignment of slices might allocate."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]

@@ -7,7 +7,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, damping_factor, hertz_shape_at, inverse_cube_root
-from wrcore.contact.patch.model import PATCHES_HELD, StripModel
+from wrcore.contact.patch.model import StripModel
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -28,6 +28,7 @@ from wrcore.contact.reduction import (
     Z,
 )
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
+from wrcore.dynamics.modes import FRESH, PATCHES_HELD
 from wrcore.kernels.handles import one_of
 from wrcore.kernels.jit import FUSED, jit
 
@@ -165,7 +166,7 @@ def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, 
 
 
 @jit(allocates=False, fastmath=FUSED)
-def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work):
+def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
 
     A row of ``motions`` (k, 2, MOTION_COLUMNS), left and right: side (+1 left, -1 right); y and z of the wheelset's
@@ -173,13 +174,13 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     curvature of the rail's line towards y and towards z (1/m; 0 on a tangent track); the rail's coefficient of friction
     at no slip. Fills ``patches`` (k, 2, MAX_PATCHES, PATCH_COLUMNS), rows beyond their ``counts`` keep old content;
     AUTO's ``bounds`` of planar detection's error (m); ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's
-    centre (N m). The second of the ``counters`` counts creep look-ups out of the table's range. While ``work.held[0]``
-    is `PATCHES_HELD` the patches are those of the last call: only velocities have changed.
+    centre (N m). The second of the ``counters`` counts creep look-ups out of the table's range. The ``mode`` is
+    one of `wrcore.dynamics.modes`; ``work`` is for patches on strips.
 
     One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
     chains of neighbours overlap.
     """
-    held = work.held[0] == PATCHES_HELD
+    held = mode & PATCHES_HELD
     if not held:
         for i in range(motions.shape[0]):
             for wheel in range(2):

@@ -1,11 +1,12 @@
 """The linear system of a Rosenbrock step: 1/(h gamma) - J, body by body.
 
-With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v, those of a force element
-its own state x. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body,
-and go first: q = (sigma - Q)^-1 (g + R v). The own states go next, one number each. What is left has a block of 6 x 6
-for each pair of bodies that elements or joints link; the blocks are eliminated in an order that creates few others
-(wheelsets, bogies, car body). All loops are written out, without a linear algebra library: a step is the same to the
-bit on every run.
+With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v, those that belong to no body
+their own state x. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body,
+and go first: q = (sigma - Q)^-1 (g + R v). Own states that act on bodies alone go next, one number each. What is left
+has a block of 6 x 6 for each pair of bodies that elements or joints link. Own states that act on one another, those of
+the track under a wheelset, stand there as bodies do, by up to six. The blocks are eliminated in an order that creates
+few others (track, wheelsets, bogies, car body). All loops are written out, without a linear algebra library: a step is
+the same to the bit on every run.
 """
 
 from typing import NamedTuple
@@ -13,30 +14,36 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.integrate.groups import FACTORISE, REDUCE, RESTORE, Groups, new_groups
-from wrcore.integrate.links import own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.links import own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.vector import dot
 from wrcore.integrate.moving_axes import RATE
-from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import jit
 
 
 class Pattern(NamedTuple):
-    """Which blocks there are, and the order in which bodies are eliminated."""
+    """Which blocks there are, and the order in which nodes, bodies and then own states by up to six, are eliminated.
+    Unknowns have the numbers of the Jacobian's ``by_velocity``."""
 
+    first: np.ndarray
+    """(m,) int: first unknown of each node."""
+    width: np.ndarray
+    """(m,) int: number of its unknowns."""
     order: np.ndarray
-    """(n,) int: bodies."""
+    """(m,) int: nodes."""
     place: np.ndarray
-    """(n, n) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
+    """(m, m) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
     later_starts: np.ndarray
-    """(n + 1,) int."""
+    """(m + 1,) int."""
     later: np.ndarray
-    """(p,) int: bodies linked to the k-th one of the order and eliminated later, later_starts[k] <= p."""
+    """(p,) int: nodes linked to the k-th one of the order and eliminated later, later_starts[k] <= p."""
     pairs: np.ndarray
     """(q, 2) int: rows and columns of the Jacobian's own blocks."""
+    states: np.ndarray
+    """(s,) int: unknowns that act on bodies alone."""
     state_starts: np.ndarray
     """(s + 1,) int."""
     state_bodies: np.ndarray
-    """(r,) int: bodies of the k-th element with a state of its own, state_starts[k] <= r."""
+    """(r,) int: bodies of the k-th one of these, state_starts[k] <= r."""
 
 
 class System(NamedTuple):
@@ -44,52 +51,53 @@ class System(NamedTuple):
 
     pattern: Pattern
     inverse: np.ndarray
-    """(n, 3, 3): (sigma - Q)^-1 of the rotations."""
+    """(n, 2, 3, 3): (sigma - Q)^-1 of positions and of rotations."""
     carried: np.ndarray
-    """(n, 3, 3): (sigma - Q)^-1 R of the rotations."""
+    """(n, 2, 3, 3): (sigma - Q)^-1 R of positions and of rotations."""
     blocks: np.ndarray
     """(b, 6, 6): on the diagonal the inverse, below it L, above it U."""
     pivot: np.ndarray
-    """(s,): diagonal entries of the own states."""
+    """(s,): diagonal entries of own states that act on bodies alone."""
     force: np.ndarray
-    """(r, 6): column of an own state in the rows of its bodies."""
+    """(r, 6): column of such a state in the rows of its bodies."""
     drive: np.ndarray
-    """(r, 6): row of an own state in the columns of its bodies."""
+    """(r, 6): row of such a state in the columns of its bodies."""
     right: np.ndarray
-    """(n, 6): right-hand side, then velocities."""
+    """(m, 6): right-hand side, then velocities and own states."""
     shift: np.ndarray
     """(n, 6): displacements that do not depend on the velocities sought."""
     scratch: np.ndarray
     """(6, 6)."""
-    slide: np.ndarray
-    """(3,): (sigma - Q)^-1 of the positions in axes that turn: along x and y, across them, along z."""
-    groups: Groups
-    """Own states that go together, where there are any."""
 
 
 def plan_elimination(model):
-    """Pattern of an elimination by minimum degree: the body with the fewest neighbours left goes next and links
+    """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
     them."""
     n, reached, own = len(model.bodies.mass), reached_bodies(model), own_state_bodies(model)
-    pairs = {(i, j) for j in range(n) for i in reached[j]}
-    links = {b: {b} | {k for i, j in pairs if b in (i, j) for k in (i, j)} for b in range(n)}
-    for ends in own:
-        for body in ends:
-            links[body] |= ends
-    for state in (state for states in own_state_groups(model) for state in states):
-        own[state] = set()
-    place, order, later = np.full((n, n), -1), [], []
-    left = {b: neighbours - {b} for b, neighbours in links.items()}
+    pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
+    together = own_state_groups(model)
+    for states in together:
+        packs = [states[k : k + 6] for k in range(0, len(states), 6)]
+        ends = [*own[states[0]], *range(len(nodes), len(nodes) + len(packs))]
+        pairs |= {pair for pack in ends[-len(packs) :] for k in ends for pair in ((pack, k), (k, pack))}
+        nodes += [[6 * n + state for state in pack] for pack in packs]
+    alone = [state for state in range(len(own)) if not any(state in states for states in together)]
+    m, order, later = len(nodes), [], []
+    left = {node: set() for node in range(m)}
+    for ends in [*pairs, *(own[state] for state in alone)]:
+        for node in ends:
+            left[node] |= {*ends} - {node}
+    place = np.full((m, m), -1)
     while left:
-        body = min(left, key=lambda b: (len(left[b]), b))
-        rest = left.pop(body)
-        order.append(body)
+        node = min(left, key=lambda k: (len(left[k]), k < n, k))
+        rest = left.pop(node)
+        order.append(node)
         later.append(sorted(rest))
         for other in rest:
-            left[other] = (left[other] | rest) - {other, body}
+            left[other] = (left[other] | rest) - {other, node}
     number = 0
-    for body, rest in zip(order, later, strict=True):
-        for i, j in [(body, body), *((body, k) for k in rest), *((k, body) for k in rest)]:
+    for node, rest in zip(order, later, strict=True):
+        for i, j in [(node, node), *((node, k) for k in rest), *((k, node) for k in rest)]:
             place[i, j] = number
             number += 1
 
@@ -97,17 +105,21 @@ def plan_elimination(model):
         starts = np.cumsum([0] + [len(items) for items in lists])
         return starts, np.array([item for items in lists for item in sorted(items)], np.int64)
 
-    return Pattern(np.array(order, np.int64), place, *packed(later), np.array(sorted(pairs), np.int64), *packed(own))
+    return Pattern(
+        *(np.array(items) for items in zip(*((node[0], len(node)) for node in nodes), strict=True)),
+        np.array(order), place, *packed(later), np.array(sorted(pairs)),
+        6 * n + np.array(alone, np.int64), *packed([own[state] for state in alone]),
+    )  # fmt: skip
 
 
 def new_system(model):
     """Allocate the system of a model."""
-    pattern = plan_elimination(model)
-    n, entries = len(pattern.order), len(pattern.state_bodies)
+    pattern, n = plan_elimination(model), len(model.bodies.mass)
+    m, entries = len(pattern.order), len(pattern.state_bodies)
     return System(
-        pattern, np.zeros((n, 3, 3)), np.zeros((n, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),
-        np.zeros(len(pattern.state_starts) - 1), np.zeros((entries, 6)), np.zeros((entries, 6)), np.zeros((n, 6)),
-        np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(3), new_groups(model),
+        pattern, np.zeros((n, 2, 3, 3)), np.zeros((n, 2, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),
+        np.zeros(len(pattern.states)), np.zeros((entries, 6)), np.zeros((entries, 6)), np.zeros((m, 6)),
+        np.zeros((n, 6)), np.zeros((6, 6)),
     )  # fmt: skip
 
 
@@ -181,12 +193,16 @@ def _subtract_product(target, left, right):
 
 
 @jit(allocates=False)
-def _carry_rotations(jacobian, system, sigma):
-    """Eliminate the lengths of p, then the rotations."""
+def _carry(jacobian, system, sigma):
+    """Eliminate the positions, u' = v - omega x u, the lengths of p, then the rotations."""
+    rate, share = jacobian.turn[RATE], 1.0 / (sigma - jacobian.length[0])
+    ahead, aside = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
     for b in range(system.carried.shape[0]):
-        turning, inverse, carried = jacobian.turning[b], system.inverse[b], system.carried[b]
-        by_length = jacobian.spin[b]
-        share = 1.0 / (sigma - jacobian.length[0])
+        for slide in (system.inverse[b, 0], system.carried[b, 0]):
+            slide[0, 0] = slide[1, 1] = ahead
+            slide[0, 1], slide[1, 0], slide[2, 2] = aside, -aside, 1.0 / sigma
+        turning, by_length = jacobian.turning[b], jacobian.spin[b]
+        inverse, carried = system.inverse[b, 1], system.carried[b, 1]
         for i in range(3):
             for j in range(3):
                 carried[i, j] = (sigma if i == j else 0.0) - turning[i, j] - share * by_length[i] * turning[3, j]
@@ -198,56 +214,59 @@ def _carry_rotations(jacobian, system, sigma):
                     carried[i, j] += inverse[i, k] * (turning[k, 3 + j] + share * by_length[k] * turning[3, 3 + j])
 
 
-@jit(allocates=False, inline="always")
-def _slid(slide, x, y, z):
-    """(sigma - Q)^-1 times a vector, for positions: u' = v - omega x u."""
-    return slide[0] * x + slide[1] * y, slide[0] * y - slide[1] * x, slide[2] * z
+@jit(allocates=False, forceinline=True)
+def _fill(jacobian, system, first, count, j, block):
+    """Write the negative derivatives of some rows with respect to the velocities of body j, with what the displacements
+    that these bring about add."""
+    for part in range(2):
+        at, carried = 6 * j + 3 * part, system.carried[j, part]
+        x, y, z = jacobian.by_position[at], jacobian.by_position[at + 1], jacobian.by_position[at + 2]
+        for k in range(3):
+            known, by_x, by_y, by_z = jacobian.by_velocity[at + k], carried[0, k], carried[1, k], carried[2, k]
+            for row in range(count):
+                i = first + row
+                block[row, 3 * part + k] = -(known[i] + x[i] * by_x + y[i] * by_y + z[i] * by_z)
 
 
-@jit(allocates=False, inline="always")
-def derivative(jacobian, system, row, body, direction):
-    """Derivative of a row with respect to a velocity, with what the displacement that it brings about adds."""
-    columns, first = jacobian.by_position, 6 * body
-    value = jacobian.by_velocity[first + direction, row]
-    if direction == 0:
-        return value + system.slide[0] * columns[first, row] - system.slide[1] * columns[first + 1, row]
-    if direction == 1:
-        return value + system.slide[1] * columns[first, row] + system.slide[0] * columns[first + 1, row]
-    if direction == 2:
-        return value + system.slide[2] * columns[first + 2, row]
-    for k in range(3):
-        value += columns[first + 3 + k, row] * system.carried[body, k, direction - 3]
-    return value
+@jit(allocates=False, forceinline=True)
+def _add_shift(jacobian, shift, first, count, j, to):
+    """Add what the displacements of body j that do not depend on the velocities sought bring about in some rows."""
+    for k in range(6):
+        column, share = jacobian.by_position[6 * j + k], shift[j, k]
+        for row in range(count):
+            to[row] += share * column[first + row]
 
 
 @jit(allocates=False)
 def factorise(jacobian, system, sigma):
     """Assemble and factorise the system for sigma = 1/(h gamma); False if it is singular."""
-    pattern, blocks = system.pattern, system.blocks
-    n = pattern.order.shape[0]
-    rate = jacobian.turn[RATE]
-    system.slide[0], system.slide[1] = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
-    system.slide[2] = 1.0 / sigma
-    _carry_rotations(jacobian, system, sigma)
+    pattern, blocks, bodies = system.pattern, system.blocks, system.carried.shape[0]
+    _carry(jacobian, system, sigma)
     blocks[:] = 0.0
     for q in range(pattern.pairs.shape[0]):
         i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
         block = blocks[pattern.place[i, j]]
-        for column in range(6):
-            for row in range(6):
-                block[row, column] = -derivative(jacobian, system, 6 * i + row, j, column)
-    for b in range(n):
-        block = blocks[pattern.place[b, b]]
+        if j >= bodies:
+            for column in range(pattern.width[j]):
+                for row in range(pattern.width[i]):
+                    block[row, column] = -jacobian.by_velocity[pattern.first[j] + column, pattern.first[i] + row]
+        elif i < bodies:
+            _fill(jacobian, system, 6 * i, 6, j, block)
+        else:
+            _fill(jacobian, system, pattern.first[i], pattern.width[i], j, block)
+    for node in range(pattern.order.shape[0]):
+        block = blocks[pattern.place[node, node]]
         for k in range(6):
             block[k, k] += sigma
     for s in range(system.pivot.shape[0]):
-        system.pivot[s] = sigma - jacobian.by_velocity[6 * n + s, 6 * n + s]
+        state = pattern.states[s]
+        system.pivot[s] = sigma - jacobian.by_velocity[state, state]
         first, last = pattern.state_starts[s], pattern.state_starts[s + 1]
         for q in range(first, last):
             body = pattern.state_bodies[q]
+            _fill(jacobian, system, state, 1, body, system.drive[q : q + 1])
             for k in range(6):
-                system.force[q, k] = -jacobian.by_velocity[6 * n + s, 6 * body + k]
-                system.drive[q, k] = -derivative(jacobian, system, 6 * n + s, body, k)
+                system.force[q, k] = -jacobian.by_velocity[state, 6 * body + k]
         for q in range(first, last):
             for p in range(first, last):
                 block = blocks[pattern.place[pattern.state_bodies[q], pattern.state_bodies[p]]]
@@ -255,8 +274,6 @@ def factorise(jacobian, system, sigma):
                     factor = system.force[q, i] / system.pivot[s]
                     for j in range(6):
                         block[i, j] -= factor * system.drive[p, j]
-    if system.groups.address[0] != 0:
-        call_address(system.groups.address[0], jacobian, system, sigma, system.pivot, FACTORISE)
     return _eliminate(pattern, blocks, system.scratch)
 
 
@@ -279,13 +296,14 @@ def _eliminate(pattern, blocks, scratch):
 
 
 @jit(allocates=False)
-def _solve_velocities(system, own):
-    """Solve for velocities (system.right) and the elements' own states (``own``), in place."""
+def _substitute(system, own):
+    """Solve for velocities and own states, in ``system.right`` and, by the number of the unknown, in ``own``, in
+    place."""
     pattern, blocks, right = system.pattern, system.blocks, system.right
     n = pattern.order.shape[0]
     for s in range(system.pivot.shape[0]):
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
-            to, share = right[pattern.state_bodies[q]], own[s] / system.pivot[s]
+            to, share = right[pattern.state_bodies[q]], own[pattern.states[s]] / system.pivot[s]
             for k in range(6):
                 to[k] -= system.force[q, k] * share
     for k in range(n):
@@ -313,11 +331,11 @@ def _solve_velocities(system, own):
         for i in range(6):
             at[i] = result[i]
     for s in range(system.pivot.shape[0]):
-        total = own[s]
+        total = own[pattern.states[s]]
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
             for k in range(6):
                 total -= system.drive[q, k] * right[pattern.state_bodies[q], k]
-        own[s] = total / system.pivot[s]
+        own[pattern.states[s]] = total / system.pivot[s]
 
 
 @jit(allocates=False)
@@ -325,53 +343,52 @@ def solve_stage(jacobian, system, sigma, increment):
     """Turn the right-hand side of a stage, in the shape of a state, into the stage's increment, in place. Euler
     parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
     pattern, right, shift = system.pattern, system.right, system.shift
-    n = pattern.order.shape[0]
-    own = increment[STATE_SIZE * n :]
+    n = shift.shape[0]
+    own = increment[(STATE_SIZE - 6) * n :]  # by the number of the unknown
     for b in range(n):
         at, axes, inverse, to = STATE_SIZE * b, jacobian.axes[b], system.inverse[b], shift[b]
-        to[0], to[1], to[2] = _slid(system.slide, increment[at], increment[at + 1], increment[at + 2])
-        for i in range(3):
-            to[3 + i] = 0.0
-            right[b, i], right[b, 3 + i] = increment[at + 7 + i], increment[at + 10 + i]
         length = 0.0
         for j in range(4):
             length += axes[3, j] * increment[at + 3 + j]
         length /= sigma - jacobian.length[0]
+        for i in range(6):
+            to[i], right[b, i] = 0.0, increment[at + 7 + i]
         for k in range(3):
             turn = length * jacobian.spin[b, k]
             for j in range(4):
                 turn += 2.0 * axes[k, j] * increment[at + 3 + j]
             for i in range(3):
-                to[3 + i] += inverse[i, k] * turn
+                to[i] += inverse[0, i, k] * increment[at + k]
+                to[3 + i] += inverse[1, i, k] * turn
+    for node in range(n, right.shape[0]):
+        for k in range(pattern.width[node]):
+            right[node, k] = own[pattern.first[node] + k]
     for q in range(pattern.pairs.shape[0]):
         i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
-        for k in range(6):
-            column, share = jacobian.by_position[6 * j + k], shift[j, k]
-            for row in range(6):
-                right[i, row] += share * column[6 * i + row]
-    for s in range(own.shape[0]):
+        if j < n and i < n:
+            _add_shift(jacobian, shift, 6 * i, 6, j, right[i])
+        elif j < n:
+            _add_shift(jacobian, shift, pattern.first[i], pattern.width[i], j, right[i])
+    for s in range(pattern.states.shape[0]):
+        state = pattern.states[s]
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
-            body = pattern.state_bodies[q]
-            for k in range(6):
-                own[s] += jacobian.by_position[6 * body + k, 6 * n + s] * shift[body, k]
-    groups = system.groups.address[0]
-    if groups != 0:
-        call_address(groups, jacobian, system, sigma, increment, REDUCE)
-    _solve_velocities(system, own)
-    if groups != 0:
-        call_address(groups, jacobian, system, sigma, increment, RESTORE)
+            _add_shift(jacobian, shift, state, 1, pattern.state_bodies[q], own[state : state + 1])
+    _substitute(system, own)
+    for node in range(n, right.shape[0]):
+        for k in range(pattern.width[node]):
+            own[pattern.first[node] + k] = right[node, k]
     for b in range(n):
         at, axes, turning = STATE_SIZE * b, jacobian.axes[b], jacobian.turning[b]
         carried, to, velocity = system.carried[b], shift[b], right[b]
         length = 0.0
         for j in range(4):
             length += axes[3, j] * increment[at + 3 + j]
-        x, y, z = _slid(system.slide, velocity[0], velocity[1], velocity[2])
-        increment[at], increment[at + 1], increment[at + 2] = to[0] + x, to[1] + y, to[2] + z
+        for i in range(6):
+            increment[at + 7 + i] = velocity[i]
         for i in range(3):
-            increment[at + 7 + i], increment[at + 10 + i] = velocity[i], velocity[3 + i]
+            increment[at + i] = to[i] + dot(carried[0, i], velocity)
             for j in range(3):
-                to[3 + i] += carried[i, j] * velocity[3 + j]
+                to[3 + i] += carried[1, i, j] * velocity[3 + j]
         for j in range(3):
             length += turning[3, j] * to[3 + j] + turning[3, 3 + j] * velocity[3 + j]
         for j in range(4):

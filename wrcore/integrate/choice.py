@@ -10,8 +10,11 @@ import math
 
 import numpy as np
 
+from wrcore.dynamics.contact_blocks import contacts_alone
+from wrcore.dynamics.contract import places
 from wrcore.dynamics.drive import may_drive
-from wrcore.integrate.jacobian import contacts_alone, plan_sweep
+from wrcore.dynamics.modes import ELLIPSES
+from wrcore.integrate.jacobian import plan_sweep
 from wrcore.integrate.tolerances import pace, step_tolerances
 
 STABLE = 2.5
@@ -33,14 +36,12 @@ def fastest_rate(model, equations, t, state):
     the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
     work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
     unit = unit[0] + pace(model, state, state) * unit[1]
-    kept = [(own, own.copy()) for own in (work.arc_lengths, work.counters)]
-    work.strips.cheap[0] = 1
-    base, direction, growths = equations(t, state), np.random.default_rng(0).normal(size=len(state)), []
+    kept = [(own, own.copy()) for own in (*places(work), work.counters)]
+    base, direction, growths = equations(t, state, ELLIPSES), np.random.default_rng(0).normal(size=len(state)), []
     for _ in range(PASSES):
         direction /= math.sqrt(np.mean(direction**2)) or 1.0
-        direction = (equations(t, state + unit * direction) - base) / unit
+        direction = (equations(t, state + unit * direction, ELLIPSES) - base) / unit
         growths.append(math.sqrt(np.mean(direction**2)))
-    work.strips.cheap[0] = 0
     for own, before in kept:
         own[:] = before
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))

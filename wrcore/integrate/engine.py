@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.contract import after_rejection, before_attempt, outside
+from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.system import derivatives_at
-from wrcore.geometry.path import arc_length_of, track_frame
+from wrcore.dynamics.vector import copy_into
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry
 from wrcore.integrate.tolerances import pace
 from wrcore.kernels.jit import jit
@@ -28,9 +30,6 @@ LEAST_STEP = 1e-13
 
 COLLAPSE = 3
 """Rejections in a row that make a collapse of the step size: each may shorten the step fivefold."""
-
-WILD = 10.0
-"""A stage whose wheelset is so far along the track from where it was, m, is none of a step that is accepted."""
 
 STILL = (0.0, 0.0)
 """Axes that do not turn."""
@@ -61,8 +60,8 @@ class Control(NamedTuple):
     """s; 0 for steps by the error estimate."""
     longest_step: float
     """s."""
-    derailed_y: float
-    """Lateral distance of a wheelset from the track's centre that ends the run, m."""
+    limit: float
+    """A state `outside` of it ends the run, m."""
 
 
 class Memory(NamedTuple):
@@ -91,8 +90,8 @@ class Scratch(NamedTuple):
     """(n,)."""
     still: np.ndarray
     """(n,): zeros."""
-    arc_lengths: np.ndarray
-    """(k,): of the wheelsets before the attempt, m."""
+    places: np.ndarray
+    """(k,): where searches started before the attempt."""
 
 
 class Record(NamedTuple):
@@ -115,16 +114,9 @@ def new_memory(state, start, stages, first_step):
     return Memory(clock, counters, state, np.zeros_like(state), state.copy(), np.zeros((stages, len(state))))
 
 
-def new_scratch(size, wheelsets):
-    """Scratch arrays for a state vector of a length and for a number of wheelsets."""
-    return Scratch(*np.zeros((4, size)), np.zeros(wheelsets))
-
-
-@jit(allocates=False, inline="always")
-def copy_into(target, source):
-    """Copy numbers one by one; an assignment of slices might allocate."""
-    for i in range(target.shape[0]):
-        target[i] = source[i]
+def new_scratch(size, places):
+    """Scratch arrays for a state vector of a length and a number of places."""
+    return Scratch(*np.zeros((4, size)), np.zeros(places))
 
 
 @jit(allocates=False)
@@ -197,38 +189,11 @@ def accept(control, memory, trial, step):
 
 
 @jit(allocates=False)
-def forget_wild_places(scratch, work):
-    """After a rejected attempt: undo arc lengths that wild stages have found. The search for a wheelset's arc length
-    starts from the last one. On a circle that its path goes round more than once, one that a wild stage has led to
-    another lap would be kept."""
-    for k in range(work.arc_lengths.shape[0]):
-        if abs(work.arc_lengths[k] - scratch.arc_lengths[k]) > WILD or math.isnan(work.arc_lengths[k]):
-            work.arc_lengths[k] = scratch.arc_lengths[k]
-
-
-@jit(allocates=False)
-def _on_the_rails(limit, state, model, work):
-    """Whether all wheelsets are within a lateral distance (m) from the track's centre."""
-    for k in range(model.bodies.wheelsets.shape[0]):
-        at = STATE_SIZE * model.bodies.wheelsets[k]
-        x, y, z = state[at], state[at + 1], state[at + 2]
-        if not model.track.tangent:
-            frame = work.frame
-            s = arc_length_of(model.track.path, x, y, z, work.arc_lengths[k])
-            station = track_frame(model.track.path, s, frame)
-            y = (x - station.x) * frame[0, 1] + (y - station.y) * frame[1, 1] + (z - station.z) * frame[2, 1]
-        if not abs(y) <= limit:
-            return False
-    return True
-
-
-@jit(allocates=False)
 def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
     stages at the step's end, see `wrcore.integrate.moving_axes`."""
     clock, stages = memory.clock, memory.stages
-    work.strips.warm[0] = 0
     times, reached = record.times, record.reached[0]
     while reached < times.shape[0] and times[reached] <= clock[T]:
         out = record.states[reached]
@@ -248,11 +213,11 @@ def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
             carry(model.bodies.mass.shape[0], begin, drift, times[reached] - clock[T_OLD], memory.old, out)
         reached += 1
         record.reached[0] = reached
-        if not _on_the_rails(control.derailed_y, out, model, work):
+        if outside(control.limit, out, model, work):
             return DERAILED
     if reached == times.shape[0]:
         return COMPLETED
-    if not _on_the_rails(control.derailed_y, memory.state, model, work):
+    if outside(control.limit, memory.state, model, work):
         return DERAILED
     if clock[NEXT] < LEAST_STEP * max(1.0, abs(clock[T])):
         return TOO_SMALL
@@ -270,8 +235,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
-        work.strips.warm[0] = 1
-        copy_into(scratch.arc_lengths, work.arc_lengths)
+        before_attempt(work, scratch.places)
         step = clock[NEXT]
         for i in range(last + 1):
             stage = stages[i]
@@ -284,7 +248,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
                 if weight != 0.0:
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
-            derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, stage)
+            derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, stage, WARM)
             counters[EVALUATIONS] += 1
             if i == 0:
                 copy_into(memory.rate, stage)
@@ -303,4 +267,4 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
         elif control.fixed_step > 0.0:
             return NOT_FINITE
         else:
-            forget_wild_places(scratch, work)
+            after_rejection(work, scratch.places)

@@ -24,16 +24,18 @@ import time
 
 import numpy as np
 
+from wrcore.dynamics.contract import begin, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.errors import InputError
 from wrcore.integrate import engine
+from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
-from wrcore.integrate.trajectory import Checkpoint, Trajectory, derailment
+from wrcore.integrate.trajectory import Checkpoint, Trajectory
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""
@@ -90,28 +92,29 @@ def integrate(
     tableau = EXPLICIT.get(method) or ROSENBROCK[method]
     equations = equations or Equations(model)
     work = equations.work
-    begin = start.memory.state if goes_on else start
-    memory = new_memory(begin, times[0], len(tableau.nodes), step or min(engine.FIRST_STEP, longest_step))
-    linear = new_linear(model) if method in ROSENBROCK else None
-    work.strips.memory[...] = 0.0
+    state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
+    memory = new_memory(state, times[0], len(tableau.nodes), first_step)
+    linear, system = (new_linear(model), new_system(model)) if method in ROSENBROCK else (None, None)
+    begin(work)
     if goes_on:
         _take_over(memory, start.memory)
-        _take_over((work.strips.memory,), (start.patches,))
+        _take_over(places(work), (start.arc_lengths, start.patches))
         _take_over(linear, start.linear, planned=True)
         if not np.isfinite(memory.clock[: engine.ERROR]).all():
             raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
-        work.arc_lengths[:] = start.arc_lengths
         if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
             memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
             memory.clock[engine.NEXT] = step
-    scratch = new_scratch(len(memory.state), len(work.arc_lengths))
+    scratch = new_scratch(len(memory.state), len(places(work)[0]))
     record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
     control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
 
     def advance(attempts):
         if linear is None:
             return advance_explicit(tableau, control, memory, scratch, record, attempts, *equations.arguments)
-        return advance_rosenbrock(tableau, control, memory, scratch, linear, record, attempts, *equations.arguments)
+        return advance_rosenbrock(
+            tableau, control, memory, scratch, linear, system, record, attempts, *equations.arguments
+        )
 
     outcome, given_up = advance(0), ""  # compiles, or loads the kernel from the cache
     before, started = memory.counters.copy(), time.perf_counter()
@@ -130,7 +133,7 @@ def integrate(
         method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
         int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
         int(counters[engine.FACTORISATIONS]), int(work.counters[1]), float(memory.clock[engine.SMALLEST]), wall,
-        Checkpoint(method, float(last), memory, linear, work.arc_lengths.copy(), work.strips.memory.copy()),
+        Checkpoint(method, float(last), memory, linear, *(place.copy() for place in places(work))),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
         int(work.counters[2]), int(work.support.unbalanced[0]),
@@ -171,8 +174,7 @@ def _checked(start, model):
     """A start whose state fits the model and is finite."""
     if isinstance(start, Checkpoint):
         _checked(start.memory.state, model)
-        places = np.shape(start.arc_lengths) == model.bodies.wheelsets.shape
-        if start.method not in METHODS or not places:
+        if start.method not in METHODS:
             raise InputError("start", "checkpoint", f"expected one that a run of {model.bodies.mass.size} bodies left")
         return start
     size = state_size(model)
@@ -202,7 +204,7 @@ def _ending(outcome, given_up, model, memory, work):
     if outcome == engine.COMPLETED:
         return "completed", ""
     if outcome == engine.DERAILED:
-        return "derailed", derailment(model, t, memory.state, work.arc_lengths)
+        return "derailed", why_outside(model, t, memory.state, places(work)[0])
     if outcome == engine.RUNNING:
         return "stalled", given_up
     if not np.isfinite(memory.rate).all():

@@ -6,7 +6,7 @@ rates of the elements' own states need differences; how velocities change positi
 
 A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
 bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). They keep the rails' wrenches as
-they are; what the contacts add, and bring up to date more often, is in :mod:`wrcore.integrate.contact_blocks`.
+they are; what the contacts add, and bring up to date more often, is in :mod:`wrcore.dynamics.contact_blocks`.
 
 All bodies run ahead at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
 greatest error of all. Positions are therefore counted from a motion at constant velocity, the ``drift`` of when the
@@ -18,22 +18,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.model import WRENCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.system import derivatives_at, state_size
-from wrcore.dynamics.vector import cross, dot
-from wrcore.dynamics.wheel import MOTION_COLUMNS
-from wrcore.integrate.contact_blocks import (
+from wrcore.dynamics.contact_blocks import (
     DIRECTIONS,
     DISPLACEMENT,
     SPEED,
     SPIN,
     TURN,
+    contacts_alone,
     renew_contacts,
 )
-from wrcore.integrate.engine import copy_into
-from wrcore.integrate.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_rate
+from wrcore.dynamics.contract import turn_rate
+from wrcore.dynamics.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
+from wrcore.dynamics.system import derivatives_at, state_size
+from wrcore.dynamics.vector import copy_into, cross, dot
+from wrcore.dynamics.wheel import MOTION_COLUMNS
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
 from wrcore.kernels.jit import jit
 
@@ -101,7 +102,7 @@ class Jacobian(NamedTuple):
     motions: np.ndarray
     wrenches: np.ndarray
     idle: np.ndarray
-    """Scratch of :mod:`wrcore.integrate.contact_blocks`."""
+    """Scratch of :mod:`wrcore.dynamics.contact_blocks`."""
 
 
 def _groups(reach):
@@ -179,17 +180,6 @@ def new_jacobian(model):
 def turn_of(jacobian):
     """Turn rate and angle of the axes, see `Jacobian`."""
     return jacobian.turn[RATE], jacobian.turn[ANGLE]
-
-
-@jit(allocates=False, inline="always")
-def contacts_alone(model):
-    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
-    independently and rails that give are own states, whose rows and columns these do not tell."""
-    return (
-        model.bodies.wheelsets.shape[0] > 0
-        and model.bodies.independent.shape[0] == 0
-        and model.support.mass.shape[0] == 0
-    )
 
 
 @jit(allocates=False)
@@ -309,33 +299,30 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     fine = min(1.0, pace(model, state, state) * HALF_GAUGE / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
     strips, wheels = model.contact.strips.strips > 0, contacts_alone(model)
     copy_into(base, rate)
-    if strips:  # a smooth neighbour of the model: ellipses
-        work.strips.cheap[0] = 1
-    if strips or whole:
-        derivatives_at(equations, t, state, model, work, base)
+    if strips or whole:  # of a smooth neighbour of the model
+        derivatives_at(equations, t, state, model, work, base, ELLIPSES)
     rates_of_increments(n, axes, drift, 0.0, state, state, base)
     _take_axes(jacobian, state, base)
     _take_turning(jacobian, model.bodies.spins, state)
     last = sweep.starts.shape[0] - 1
     for i in range(0 if whole else last, last + 1):
         in_time = i == last
-        work.strips.held[0] = WRENCHES_HELD if wheels and not in_time else 0
+        mode = ELLIPSES | WRENCHES_HELD if wheels and not in_time else ELLIPSES
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time
-            renew_contacts(joined, whole, jacobian, t, state, model, work, fine)
+            renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, model, work, fine)
         trial[:] = 0.0
         for k in range(first, end):
             differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes, fine)
         carry(n, axes, drift, moment, state, trial)
         for k in range(first, end):
             differences[k - first] = _resolved(differences[k - first], sweep.columns[k], n, axes, state, trial)
-        derivatives_at(equations, t + moment, trial, model, work, slope)
+        derivatives_at(equations, t + moment, trial, model, work, slope, mode)
         rates_of_increments(n, axes, drift, moment, state, trial, slope)
         if in_time:
             for j in range(state.shape[0]):
                 jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT
         for k in range(first, end):
             _take_column(sweep, jacobian, k, differences[k - first], n, base, slope)
-    work.strips.cheap[0] = 0
     return sweep.starts.shape[0] + 1 if whole else 1 + strips

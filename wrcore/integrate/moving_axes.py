@@ -19,26 +19,10 @@ what it costs on straight track, where omega is zero.
 import math
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.geometry.path import arc_length_of, track_frame
 from wrcore.kernels.jit import jit
 
 RATE, ANGLE = range(2)
 """Places in ``turn``: turn rate (rad/s), turn since the Jacobian was taken (rad)."""
-
-
-@jit(allocates=False)
-def turn_rate(state, model, work):
-    """Rate at which the track turns under the wheelsets on average, about the vertical, rad/s."""
-    wheelsets, total, frame = model.bodies.wheelsets, 0.0, work.frame
-    if model.track.tangent or not wheelsets.shape[0]:
-        return 0.0
-    for k in range(wheelsets.shape[0]):
-        at = STATE_SIZE * wheelsets[k]
-        s = arc_length_of(model.track.path, state[at], state[at + 1], state[at + 2], work.arc_lengths[k])
-        station = track_frame(model.track.path, s, frame)
-        total += station.curvature * (station.tx * state[at + 7] + station.ty * state[at + 8])
-    total /= wheelsets.shape[0]
-    return total if math.isfinite(total) else 0.0
 
 
 @jit(allocates=False, inline="always")

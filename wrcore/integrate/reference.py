@@ -5,9 +5,10 @@ import time
 import numpy as np
 from scipy import integrate as scipy_integrate
 
+from wrcore.dynamics.contract import places, why_outside
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
-from wrcore.integrate.trajectory import Trajectory, derailment
+from wrcore.integrate.trajectory import Trajectory
 
 SOLVERS = {
     "scipy_rk45": "RK45", "scipy_rk23": "RK23", "scipy_dop853": "DOP853", "scipy_radau": "Radau", "scipy_bdf": "BDF",
@@ -27,7 +28,7 @@ def integrate_by_reference(model, state, times, method, tolerances, longest_step
     function = Equations(model)
 
     def stop(t, state):
-        return derailment(model, t, state, function.work.arc_lengths, derailed_y)
+        return why_outside(model, t, state, places(function.work)[0], derailed_y)
 
     bounded = stop if np.isfinite(derailed_y) else None
     return integrate_function(

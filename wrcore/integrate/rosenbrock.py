@@ -9,8 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.dynamics.contact_blocks import contacts_alone
+from wrcore.dynamics.contract import after_rejection, before_attempt, touching
+from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.system import derivatives_at
-from wrcore.integrate.blocks import System, factorise, new_system, solve_stage
+from wrcore.dynamics.vector import copy_into
+from wrcore.integrate.blocks import factorise, solve_stage
 from wrcore.integrate.engine import (
     AGE,
     EVALUATIONS,
@@ -26,18 +30,14 @@ from wrcore.integrate.engine import (
     TOUCHING,
     T,
     accept,
-    copy_into,
     error_size,
-    forget_wild_places,
     judge,
     take_stock,
 )
-from wrcore.integrate.group_elimination import eliminate_groups
 from wrcore.integrate.jacobian import (
     Jacobian,
     Joined,
     Sweep,
-    contacts_alone,
     joined_bodies,
     new_jacobian,
     plan_sweep,
@@ -46,7 +46,6 @@ from wrcore.integrate.jacobian import (
 )
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
 from wrcore.integrate.tolerances import pace
-from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import jit
 
 CONTACT_REFRESHES = 20
@@ -58,27 +57,23 @@ factorised matrix."""
 
 
 class Linear(NamedTuple):
-    """The Jacobian and the factorised system of a run."""
+    """The Jacobian of a run."""
 
     sweep: Sweep
     joined: Joined
     jacobian: Jacobian
-    system: System
     differences: np.ndarray
     """(p,): scratch of the Jacobian."""
 
 
 def new_linear(model):
-    """Plan the Jacobian of a model and its elimination, and allocate their arrays."""
-    sweep, jacobian, system = plan_sweep(model), new_jacobian(model), new_system(model)
-    if len(system.groups.members):
-        kernel = Kernel(eliminate_groups, jacobian, system, 0.0, system.pivot, 0)
-        system.groups.address[0] = kernel.address
-    return Linear(sweep, joined_bodies(model), jacobian, system, np.zeros(int(np.diff(sweep.starts).max())))
+    """Plan the Jacobian of a model and allocate its arrays."""
+    sweep = plan_sweep(model)
+    return Linear(sweep, joined_bodies(model), new_jacobian(model), np.zeros(int(np.diff(sweep.starts).max())))
 
 
 @jit(allocates=False)
-def _renew(tableau, memory, scratch, linear, equations, model, work):
+def _renew(tableau, memory, scratch, linear, system, equations, model, work):
     """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
     After a rejected step a Jacobian from an earlier state is refreshed first."""
     clock, counters = memory.clock, memory.counters
@@ -98,21 +93,12 @@ def _renew(tableau, memory, scratch, linear, equations, model, work):
     if clock[MATRIX_STEP] != step:
         clock[MATRIX_STEP] = step
         counters[FACTORISATIONS] += 1
-        return factorise(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma))
+        return factorise(linear.jacobian, system, 1.0 / (step * tableau.gamma))
     return True
 
 
 @jit(allocates=False)
-def _touching(work):
-    """Patches in the last evaluation."""
-    total = 0
-    for k in range(work.counts.shape[0]):
-        total += work.counts[k, 0] + work.counts[k, 1]
-    return total
-
-
-@jit(allocates=False)
-def _touchdown_error(tableau, control, memory, scratch, linear, model):
+def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
     """Error by the rate at the end of an attempt (``scratch.slope``) against the step's own dense output there.
 
     Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
@@ -129,24 +115,26 @@ def _touchdown_error(tableau, control, memory, scratch, linear, model):
             weight += (k + 1) * tableau.dense[i, k]
         for k in range(defect.shape[0]):
             defect[k] -= weight / step * stages[i, k]
-    solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), defect)
+    solve_stage(linear.jacobian, system, 1.0 / (step * tableau.gamma), defect)
     return error_size(control.tolerances, pace(model, memory.state, scratch.trial), bodies, scratch.trial, defect)
 
 
 @jit(allocates=False, nogil=True)
-def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget, equations, model, work):
-    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome."""
+def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record, budget, equations, model, work):
+    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome. What ``system``
+    holds is found anew: no checkpoint keeps it."""
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
     hold = HOLD if tableau.reuse > 1 else 1.0
+    if clock[MATRIX_STEP] > 0.0:
+        factorise(linear.jacobian, system, 1.0 / (clock[MATRIX_STEP] * tableau.gamma))
     while True:
         outcome = take_stock(control, tableau.dense, 1.0, turn_of(linear.jacobian), drift, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1
-        work.strips.warm[0] = 1
-        copy_into(scratch.arc_lengths, work.arc_lengths)
+        before_attempt(work, scratch.places)
         step, regular = clock[NEXT], True
         for i in range(last + 1):
             trial[:] = 0.0
@@ -158,13 +146,13 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
             moment = tableau.nodes[i] * step
             carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
             if i > 0 or not counters[HAS_RATE]:
-                derivatives_at(equations, clock[T] + moment, trial, model, work, slope)
+                derivatives_at(equations, clock[T] + moment, trial, model, work, slope, WARM)
                 counters[EVALUATIONS] += 1
             if i == 0:
                 if not counters[HAS_RATE]:
                     copy_into(memory.rate, slope)
-                    counters[HAS_RATE], counters[TOUCHING] = 1, _touching(work)
-                regular = _renew(tableau, memory, scratch, linear, equations, model, work)
+                    counters[HAS_RATE], counters[TOUCHING] = 1, touching(work)
+                regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
             rates_of_increments(bodies, turn_of(linear.jacobian), drift, moment, state, trial, slope)
@@ -175,7 +163,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
                 weight = tableau.couplings[i, j] / step
                 for k in range(n):
                     increment[k] += weight * stages[j, k]
-            solve_stage(linear.jacobian, linear.system, 1.0 / (step * tableau.gamma), increment)
+            solve_stage(linear.jacobian, system, 1.0 / (step * tableau.gamma), increment)
         trial[:], slope[:] = 0.0, 0.0
         for i in range(last + 1):
             for k in range(n):
@@ -184,21 +172,21 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, record, budget
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
         rate = pace(model, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
-        looked_ahead, touching = error <= 1.0, 0
+        looked_ahead, contacts = error <= 1.0, 0
         if looked_ahead:  # the next step's first rate
-            derivatives_at(equations, clock[T] + step, trial, model, work, slope)
+            derivatives_at(equations, clock[T] + step, trial, model, work, slope, WARM)
             counters[EVALUATIONS] += 1
-            touching = _touching(work)
-            if touching > counters[TOUCHING]:
-                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, model))
+            contacts = touching(work)
+            if contacts > counters[TOUCHING]:
+                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, system, model))
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
             linear.jacobian.turn[ANGLE] += linear.jacobian.turn[RATE] * step
             counters[AGE] += 1
-            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, touching
+            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, contacts
             if looked_ahead:
                 copy_into(memory.rate, slope)
         elif control.fixed_step > 0.0:
             return NOT_FINITE
         else:
-            forget_wild_places(scratch, work)
+            after_rejection(work, scratch.places)

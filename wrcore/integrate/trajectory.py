@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.track import track_poses
 from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 
@@ -67,17 +65,3 @@ class Trajectory:
     """Patches that strips did not solve and a grid did."""
     unbalanced: int = 0
     """Evaluations in which rails without mass found no balance."""
-
-
-def derailment(model, t, state, arc_lengths, limit=-1.0):
-    """Say how far the farthest wheelset is off the track's centre, from its rough arc lengths (k,); empty if none is
-    farther than the limit (m)."""
-    worst = 0.0
-    for k, body in enumerate(model.bodies.wheelsets):
-        y = state[STATE_SIZE * body + 1]
-        if not model.track.tangent:
-            y = track_poses(model.track, state[None, :], STATE_SIZE * body, arc_lengths[k])[0][0, 1]
-        worst = abs(y) if not abs(y) <= worst else worst
-    if worst <= limit:
-        return ""
-    return f"a wheelset is {1e3 * worst:.0f} mm off the track's centre at t = {t:.6g} s"

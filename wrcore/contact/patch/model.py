@@ -22,9 +22,6 @@ RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
 FORCE_ROWS, MOTION = 24, 15
 
-PATCHES_HELD, WRENCHES_HELD = 1, 2
-"""What `StripWork.held` says."""
-
 
 class StripModel(NamedTuple):
     """Settings and tables of patches on strips, for kernels; without strips its arrays are empty."""
@@ -52,15 +49,9 @@ class StripModel(NamedTuple):
 class StripWork(NamedTuple):
     """Scratch arrays of one patch at a time."""
 
-    cheap: np.ndarray
-    """(1,) int: 1 while ellipses stand in for strips."""
-    held: np.ndarray
-    """(1,) int: PATCHES_HELD while ellipses keep the patches found last (only velocities have changed), WRENCHES_HELD
-    while the rails' wrenches are kept, else 0."""
-    warm: np.ndarray
-    """(1,) int: 1 during a step, where patches start from their last solutions. Elsewhere from nothing."""
     memory: np.ndarray
-    """(wheelsets, 2, MAX_PATCHES, MEMORY): these solutions; part of what a run knows."""
+    """(wheelsets, 2, MAX_PATCHES, MEMORY): last solutions, from which the next ones may start; part of what a run
+    knows."""
     spare: np.ndarray
     """(MEMORY,): a memory of nothing."""
     rows: np.ndarray
@@ -129,9 +120,9 @@ def strip_work(model, wheelsets):
         normal = normal_strips.Workspace(*(_emptied(part) for part in normal))
     wheels = (wheelsets, 2, MAX_PATCHES) if model.strips else (0, 0, 0)
     return StripWork(
-        *(np.zeros(1, np.int64) for _ in range(3)), np.zeros((*wheels, normal_strips.MEMORY)),
-        np.zeros(normal_strips.MEMORY), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
-        np.zeros(MOTION), np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
+        np.zeros((*wheels, normal_strips.MEMORY)), np.zeros(normal_strips.MEMORY),
+        np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(MOTION),
+        np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(FORCE_ROWS), np.zeros(2, np.int64),
         normal,
         *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),

@@ -9,12 +9,11 @@ the rail and a turn about the axle change nothing, and differences of velocities
 
 import math
 
-from wrcore.contact.patch.model import PATCHES_HELD
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.dynamics.constraints import apply_inverse_inertia
+from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
 from wrcore.dynamics.system import wheel_motions
-from wrcore.integrate.engine import copy_into
-from wrcore.integrate.moving_axes import ANGLE
+from wrcore.dynamics.vector import copy_into
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -26,6 +25,17 @@ DIRECTIONS = 12
 
 UNIT = 1e3
 """Wrench whose accelerations are looked at, N and N m."""
+
+
+@jit(allocates=False, inline="always")
+def contacts_alone(model):
+    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
+    independently and rails that give are own states, whose rows and columns these do not tell."""
+    return (
+        model.bodies.wheelsets.shape[0] > 0
+        and model.bodies.independent.shape[0] == 0
+        and model.support.mass.shape[0] == 0
+    )
 
 
 @jit(allocates=False)
@@ -65,10 +75,10 @@ def _accelerations(t, state, model, work, body, direction, out):
 
 
 @jit(allocates=False)
-def _wrenches(model, work):
+def _wrenches(model, work, mode):
     call_address(
         model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips,
+        work.counters, work.strips, mode,
     )  # fmt: skip
 
 
@@ -100,9 +110,9 @@ def _add_column(rail, direction, base, wrench, scale, columns):
 
 
 @jit(allocates=False)
-def _take_rails(jacobian, model, work):
+def _take_rails(jacobian, angle, model, work):
     """Write the axes of all rails' frames in the axes in which increments are counted."""
-    c, s, tangent = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE]), model.track.tangent
+    c, s, tangent = math.cos(angle), math.sin(angle), model.track.tangent
     for k in range(jacobian.rails.shape[0]):
         for wheel in range(2):
             rail = jacobian.rails[k, wheel]
@@ -114,26 +124,24 @@ def _take_rails(jacobian, model, work):
 
 
 @jit(allocates=False)
-def contact_blocks(jacobian, state, model, work, fine, columns):
+def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     """Fill ``columns`` (k, 12, 6) with the derivatives of the rails' force and moment by displacement, rotation,
-    velocity and angular velocity of their wheelsets, in the axes in which increments are counted. Differences of
-    velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
-    wheelsets, base, found, held = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, work.strips.held
+    velocity and angular velocity of their wheelsets, in axes turned by an ``angle`` (rad). Differences of velocities
+    are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
+    wheelsets, base, found, mode = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, ELLIPSES
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
     wheel_motions(model, state, work)
-    _take_rails(jacobian, model, work)
-    _wrenches(model, work)
+    _take_rails(jacobian, angle, model, work)
+    _wrenches(model, work, mode)
     for k in range(wheelsets.shape[0]):
         for wheel in range(2):
             copy_into(base[k, wheel], work.motions[k, wheel])
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     columns[:] = 0.0
-    held[0] = PATCHES_HELD  # velocities first: the patches are those of the pose
     for step in range(DIRECTIONS):
-        direction = (step + 6) % DIRECTIONS
-        if direction == 0:
-            held[0] = 0
+        direction = (step + 6) % DIRECTIONS  # velocities first: the patches are those of the pose
+        mode = ELLIPSES | PATCHES_HELD if direction >= 6 else ELLIPSES
         if direction == 0 or direction == 4:
             continue
         difference = DISPLACEMENT if direction < 3 else TURN
@@ -142,7 +150,7 @@ def contact_blocks(jacobian, state, model, work, fine, columns):
         for k in range(base.shape[0]):
             for wheel in range(2):
                 _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
-        _wrenches(model, work)
+        _wrenches(model, work, mode)
         for k in range(base.shape[0]):
             for wheel in range(2):
                 rail, row, axle = jacobian.rails[k, wheel], work.rail_wrenches[k, wheel], base[k, wheel, 3:6]
@@ -172,14 +180,15 @@ def _respond(mobility, axes, c, s, wrench, body, out):
 
 
 @jit(allocates=False)
-def renew_contacts(joined, whole, jacobian, t, state, model, work, fine):
+def renew_contacts(joined, whole, jacobian, angle, t, state, model, work, fine):
     """Replace the contacts' part of the Jacobian, or add it where the ``whole`` has just been taken at the wrenches of
-    the rails; ``joined``: bodies that accelerate with each wheelset."""
+    the rails. ``joined``: bodies that accelerate with each wheelset; ``angle``: of the axes in which increments are
+    counted, rad."""
     columns, out = jacobian.columns, jacobian.idle
-    contact_blocks(jacobian, state, model, work, fine, columns)
+    contact_blocks(jacobian, angle, state, model, work, fine, columns)
     if whole:
         take_mobility(jacobian, t, state, model, work)
-    c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
+    c, s = math.cos(angle), math.sin(angle)
     for k in range(columns.shape[0]):
         own = model.bodies.wheelsets[k]
         for direction in range(DIRECTIONS):

@@ -1,0 +1,16 @@
+"""What a right-hand side may leave out or start from: bits of its argument ``mode``."""
+
+FRESH = 0
+"""All of it, from nothing: the same numbers whatever was evaluated before."""
+
+WARM = 1
+"""Within a step: patches on strips start from their last solutions, part of what a run knows."""
+
+ELLIPSES = 2
+"""The ellipse of equal moments stands in for strips: differences want a smooth neighbour of the model."""
+
+PATCHES_HELD = 4
+"""Ellipses keep the patches found last: only velocities have changed."""
+
+WRENCHES_HELD = 8
+"""The rails' wrenches are those found last."""
