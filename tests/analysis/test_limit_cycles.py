@@ -8,6 +8,7 @@ import pytest
 
 from study.critical_speed.tables import critical_table
 from tests.conftest import SCENES
+from wrcore.analysis.stability import limit_cycles as analysis_limit_cycles
 from wrcore.analysis.stability.limit_cycles import (
     Settling,
     falling_branch,
@@ -18,7 +19,6 @@ from wrcore.analysis.stability.limit_cycles import (
     shifted,
 )
 from wrcore.analysis.stability.stability import at_speed
-from wrcore.analysis.stability.stability import limit_cycles as analysis_limit_cycles
 from wrcore.errors import InputError
 from wrcore.run.motion import amplitude
 from wrcore.run.simulate import simulate

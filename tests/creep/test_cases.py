@@ -100,7 +100,7 @@ def test_not_positive(name, value):
 def test_impossible_material_and_model(table):
     with pytest.raises(InputError, match="nu, row 1: expected 0 to 0.5, got 0.7"):
         solve_cases(frame(nu=0.7), "linear")
-    with pytest.raises(InputError, match="model: expected one of table, exact"):
+    with pytest.raises(InputError, match="model: expected one of table, linear"):
         solve_cases(frame(), "kalker")
     with pytest.raises(InputError, match="nu, row 1: expected the table's 0.28, got 0.3"):
         solve_cases(frame(nu=0.3), "table", table)

@@ -293,7 +293,7 @@ def _balanced(vehicle, model, equations, state):
         found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
         if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
-    return cleared(standing(found)[0])
+    return cleared(model, standing(found)[0])
 
 
 def _improved(standing, stands, steps):

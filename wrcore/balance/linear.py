@@ -80,7 +80,7 @@ def steady_running(model, state, iterations=10):
     Check ``residual``. A free wheelset keeps some: nothing drives it, and its spin creepage slows it down. A
     displacement that nothing resists, such as that along the track, stays as it is.
     """
-    best = linearise(model, cleared(state))
+    best = linearise(model, cleared(model, state))
     places, size = best.places, len(best.matrix)
     own = size - own_states(model)
     columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
@@ -94,7 +94,8 @@ def steady_running(model, state, iterations=10):
         largest = np.max(np.abs(slopes), axis=1)
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
         step = np.linalg.lstsq(weights[:, None] * slopes, -weights * best.residual[places:], rcond=RANK)[0]
-        new = linearise(model, cleared(moved_states(model, best.state, (best.basis[:, columns] @ step)[None, :])[0]))
+        moved = moved_states(model, best.state, (best.basis[:, columns] @ step)[None, :])[0]
+        new = linearise(model, cleared(model, moved))
         before, after = (np.max(np.abs(linear.residual)) for linear in (best, new))
         # by weights, too: a wheel's spin that grows may hide rails that come to rest
         weighted, less = (np.max(weights * np.abs(linear.residual[places:])) for linear in (best, new))
@@ -104,10 +105,10 @@ def steady_running(model, state, iterations=10):
     return best
 
 
-def cleared(state):
-    """The state without what is below the rounding of a balance (1e-13): single precision in rolling contact would make
-    millinewtons of it, between wheels that are mirror images."""
-    return np.where(np.abs(state) < 1e-13, 0.0, state)
+def cleared(model, state):
+    """The state; for patches on strips without what is below the rounding of a balance (1e-13): single precision in
+    rolling contact would make millinewtons of it, between wheels that are mirror images."""
+    return np.where(np.abs(state) < 1e-13, 0.0, state) if model.contact.strips.strips else state
 
 
 def moved_states(model, state, moves):

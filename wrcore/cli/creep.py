@@ -1,7 +1,10 @@
 """``wrcore creep``: creep forces of given cases."""
 
+from argparse import ArgumentTypeError
+
 from wrcore.cli.files import output, write_csv
 from wrcore.cli.options import columns
+from wrcore.errors import one_of
 
 ABOUT = """
 Creep forces of the cases in IN.csv, on elliptic patches and on double ellipses. In Python: wr.creep_force.
@@ -25,6 +28,15 @@ CASES = columns(
 FILES = columns("OUT.csv, a row per case", case_id="of its case", Fx_N="", Fy_N="", Mz_Nm="")
 
 
+def _law(name):
+    """A creep law's name, or Python's word for a wrong one."""
+    from wrcore.creep.cases import MODELS
+
+    if name not in MODELS:
+        raise ArgumentTypeError(one_of(MODELS, name))
+    return name
+
+
 def add(commands):
     """The command's parser."""
     command = commands.add_parser(
@@ -32,7 +44,7 @@ def add(commands):
     )
     command.add_argument("--cases", required=True, metavar="IN.csv", help="a case per row")
     command.add_argument(
-        "--model", default="table", metavar="NAME",
+        "--model", default="table", metavar="NAME", type=_law,
         help="a creep law as in a scene: a table of exact solutions or a formula; or exact, rolling contact itself",
     )  # fmt: skip
     command.add_argument("--table", metavar="FILE", help="creep table; left out, one is built or found in the cache")

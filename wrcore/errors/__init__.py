@@ -67,7 +67,7 @@ def similar(word, known):
 
     words = {name.lower(): name for name in map(str, known)}
     word = word.lower() if isinstance(word, str) else ""
-    near = [name for name in words if word.startswith(name + "_")] or get_close_matches(word, words, n=1)
+    near = get_close_matches(word, words, n=1) or [name for name in words if word.startswith(name + "_")]
     return f"; did you mean {words[near[0]]!r}?" if near else ""
 
 

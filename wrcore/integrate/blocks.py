@@ -77,7 +77,12 @@ def plan_elimination(model):
     pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
     together = own_state_groups(model)
     for states in together:
-        packs = [states[k : k + 6] for k in range(0, len(states), 6)]
+        packs: list[list[int]] = []
+        for state in sorted(states):  # one after the other in the state vector
+            if packs and state == packs[-1][-1] + 1 and len(packs[-1]) < 6:
+                packs[-1].append(state)
+            else:
+                packs.append([state])
         ends = [*own[states[0]], *range(len(nodes), len(nodes) + len(packs))]
         pairs |= {pair for pack in ends[-len(packs) :] for k in ends for pair in ((pack, k), (k, pack))}
         nodes += [[6 * n + state for state in pack] for pack in packs]
