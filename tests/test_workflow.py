@@ -125,7 +125,7 @@ def checkout(smoke, tmp_path_factory):
 @pytest.mark.parametrize(
     ("edited", "again", "kept"),
     [
-        ("wrcore/creep/laws.py", {"creep_table", "creep_laws", "simulate"}, {"contact_pairs", "fig_ivp"}),
+        ("wrcore/creep/laws.py", {"creep_table", "creep_laws", "simulate"}, {"fig2_profiles", "fig_ivp"}),
         (
             "wrcore/analysis/assessment/motion.py", {"motion_table", "sweep_speeds", "accuracy_study"},
             {"simulate", "creep_table"},

@@ -15,6 +15,7 @@ from numba.core.dispatcher import Dispatcher
 
 from wrcore.dynamics import constraints, wheel
 from wrcore.dynamics.system import workspace
+from wrcore.elements.law import LAW, LAWS
 
 STAGES = ("bodies", "suspension", "joints", "search", "patch", "Hertz", "creep", "rest")
 """In the order in which they are added up."""
@@ -235,6 +236,11 @@ def _call(_, *arguments):
     kernel(*arguments)
 
 
+def _by_law(elements, k, *motion):
+    """Stands for calls of elements' laws by address."""
+    return LAWS[int(elements.law[k, LAW])].py_func(elements, k, *motion)
+
+
 @contextmanager
 def interpreted(tally):
     """Kernels run by Python, their stages told apart, until the block ends."""
@@ -245,7 +251,9 @@ def interpreted(tally):
     for module in modules:
         for name, value in list(vars(module).items()):
             new = value
-            if isinstance(value, Dispatcher):
+            if (module.__name__, name) == ("wrcore.dynamics.suspension", "_by_law"):
+                new = _by_law
+            elif isinstance(value, Dispatcher):
                 new = value.py_func
             elif value is math:
                 new = mathematics
