@@ -205,6 +205,19 @@ def test_free_rolling_has_no_mean_longitudinal_slip(benchmark_pair, model):
         assert abs(loads @ slips) < (1e-12 if model != "grid" else 1e-6) * loads.sum()
 
 
+@pytest.mark.parametrize("model", ["exact", "moment"])
+def test_steady_rolling_does_not_depend_on_the_speed(benchmark_pair, model):
+    """Slip over speed is what counts, at 20 m/s and at 10 um/s, ahead of free rolling and to the side."""
+    wheels, rows = LoadedWheels(benchmark_pair, model, "coarse"), []
+    for speed in (20.0, 1e-5):
+        rolling = Rolling(speed, speed / 0.459, 1e-3 * speed, 1e-3 * speed)
+        (found,) = wheels.at_height("left", 0.003, 0.4598, rolling=rolling)
+        rows.append(found.row[columns.FX : columns.PHI + 1])
+    assert rows[0][0] > 0.0 > rows[0][3]  # a wheel that turns too fast slides back (-) and is pushed ahead (+)
+    assert rows[0][1] < 0.0 < rows[0][4]  # one that moves to the left is held back
+    np.testing.assert_allclose(rows[1], rows[0], rtol=1e-5, atol=1e-9)
+
+
 def test_only_what_moves_has_creep_forces(tmp_path):
     poses = [{"pose_id": k, "y_m": 0.002, "yaw_rad": 0.0, "V_m_per_s": v, "mu": mu}
              for k, (v, mu) in enumerate(((math.nan, 0.3), (10.0, 0.0), (10.0, 0.4)))]  # fmt: skip

@@ -170,3 +170,15 @@ def test_rails_named_like_numbers_stay_names_and_numbers_numbers():
     scene = load_scene(SCENES / "wheelset.yaml", changes)
     assert scene.data["rail"]["profile"] == "60E1" and scene.rail.name == "60E1"
     assert (scene.data["integration"]["rtol"], scene.data["integration"]["atol"]) == (1e-5, 1e-8)
+
+
+def test_the_wheel_on_its_rail_of_a_side():
+    worn = "wheel.wheelsets={wheelset_2: {right: {rolling_radius: 0.45}}}"
+    scene = load_scene(SCENES / "trailer_vehicle.yaml", [worn])
+    radii = [[scene.pair(side, k).rolling_radius for side in ("left", "right")] for k in range(4)]
+    assert radii[1][1] == 0.45 and [left for left, _ in radii] == 4 * [scene.vehicle.rolling_radius]
+    assert scene.pair("right", 1).rail_distance == scene.track.rail_distance(scene.rail)
+    wrong = {("rihgt",): "did you mean 'right'", ("left", 4): "wheelset", ("left", -1): "wheelset"}
+    for arguments, expected in wrong.items():
+        with pytest.raises(InputError, match=expected):
+            scene.pair(*arguments)

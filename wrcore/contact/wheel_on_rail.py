@@ -46,6 +46,9 @@ class WheelOnRail:
         check_number(self.half_distance, *HALF_DISTANCES, "wheelset", "half_distance", "m")
         if self.rail_distance is None:
             object.__setattr__(self, "rail_distance", 0.5 * 1.435 + self.rail.gauge_offset())
+        if math.isnan(self.rail_distance):
+            raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
+        check_number(self.rail_distance, *HALF_DISTANCES, "track", "rail_distance", "m")
 
     @cached_property
     def geometry(self):

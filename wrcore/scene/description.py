@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -30,10 +30,10 @@ from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError, one_of, short
-from wrcore.errors.checked_calls import checked
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
 from wrcore.geometry.profile import ProfileCurve
-from wrcore.geometry.track import Track, build_track
+from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import digests_of_files, find_file, own_pairs, wheel_and_rail
@@ -90,9 +90,12 @@ class Scene:
         vehicle, distance = self.vehicle, self.track.rail_distance(self.rail)
         return WheelOnRail(self.wheel, self.rail, vehicle.rolling_radius, vehicle.half_distance, distance)
 
-    def pair(self, side: str = "left", wheelset: int = 0) -> WheelOnRail:
+    @checked
+    def pair(self, side: Annotated[str, OneOf(SIDES)] = "left", wheelset: Annotated[int, Within(0)] = 0) -> WheelOnRail:
         """A side of a wheelset, counted from the front."""
-        return self.pairs[2 * wheelset + (side == "right")] if self.pairs else self.alike
+        if wheelset >= len(self.vehicle.wheelset_names):
+            raise InputError(self.source, "wheelset", f"expected a number below that of wheelsets, got {wheelset}")
+        return self.pairs[2 * wheelset + list(SIDES).index(side)] if self.pairs else self.alike
 
     def __repr__(self) -> str:
         wheel, rail = (self.data[kind]["profile"] for kind in ("wheel", "rail"))

@@ -63,6 +63,9 @@ LOWEST = 0.1
 SMOOTH = 1e-9
 """Coefficient of friction where the normal forces alone are looked at."""
 
+SLOWEST = 1e-9
+"""Creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at."""
+
 _CARRIED = 1e-9
 """Relative error of F^(2/3) that ends the search for a height."""
 
@@ -131,7 +134,7 @@ class LoadedWheels:
         self._work = strip_work(strips, 1)
         contact = ContactModel(
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
-            REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, 1e-3, strips,
+            REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, SLOWEST, strips,
         )  # fmt: skip
         if strips.strips:
             contact = with_fallback(contact, np.zeros(MOTION_COLUMNS), self._work)
