@@ -2,7 +2,7 @@
 
 Coordinates of a body are the displacement of its centre (track axes) and the small rotation of its frame about its own
 axes; with them go the velocity of its centre (track axes) and its angular velocity (body axes). Displacements q and
-velocities u are then related by q' = u, and only accelerations and the rates of the force elements' own states need
+velocities u are then related by q' = u, and only accelerations and the rates of the elements' internal states need
 difference quotients. The frame of a wheelset does not spin (see wrcore.dynamics.body): a wheelset has no rotation about
 its axle, and its spin rate is a velocity alone.
 
@@ -17,7 +17,7 @@ import numpy as np
 from wrcore.balance.equilibrium import RESIDUAL
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.joint import joint_jacobian
-from wrcore.dynamics.system import Equations, own_states
+from wrcore.dynamics.system import Equations, internal_states
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""
@@ -37,7 +37,7 @@ class Linearisation:
     """x' = A x for small motions about a steady state."""
 
     matrix: np.ndarray
-    """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' own states."""
+    """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' internal states."""
     basis: np.ndarray
     """(12 n + states, m): turns independent coordinates into the moves of the n bodies, see :func:`moved_states`."""
     state: np.ndarray
@@ -59,7 +59,7 @@ def linearise(model, state):
     equations = Equations(model)
     equations(0.0, state)  # leaves the joints' Jacobian
     places, speeds = _independent_motions(model, state, equations.work)
-    basis = block_diag(places, speeds, np.eye(own_states(model)))
+    basis = block_diag(places, speeds, np.eye(internal_states(model)))
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
@@ -82,7 +82,7 @@ def steady_running(model, state, iterations=10):
     """
     best = linearise(model, cleared(model, state))
     places, size = best.places, len(best.matrix)
-    own = size - own_states(model)
+    own = size - internal_states(model)
     columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
     last = np.inf
     for _ in range(iterations):
@@ -114,7 +114,7 @@ def cleared(model, state):
 def moved_states(model, state, moves):
     """States (k, size) with displaced bodies and changed velocities. A row of ``moves`` (k, 12 n + states):
     displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s, track
-    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states."""
+    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' internal states."""
     n = len(model.bodies.mass)
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
@@ -147,7 +147,7 @@ def _into_body(p, vector):
 
 
 def _accelerations(model, states, rates):
-    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of the elements' own states."""
+    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
     n = len(model.bodies.mass)
     parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))
     turning, change = (_into_body(parts[..., 3:7], rows[..., 10:13]) for rows in (parts, slopes))

@@ -112,15 +112,10 @@ def invert_masses(bodies, joints, rotations, scratch):
 def apply_inverse_masses(joints, scratch, wrenches):
     """accelerations = M^-1 wrenches, of the bodies that joints hold."""
     for b in joints.order.moving:
-        inverse_mass, inverse_inertia, out = (
-            scratch.inverse_mass[b],
-            scratch.inverse_inertia[b],
-            scratch.accelerations[b],
-        )
-        moment = load(wrenches[b], 3)
+        out, moment = scratch.accelerations[b], load(wrenches[b], 3)
         for i in range(3):
-            out[i] = inverse_mass * wrenches[b, i]
-            out[3 + i] = dot(inverse_inertia[i], moment)
+            out[i] = scratch.inverse_mass[b] * wrenches[b, i]
+            out[3 + i] = dot(scratch.inverse_inertia[b, i], moment)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

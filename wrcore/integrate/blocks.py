@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.links import own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, packed, reached_bodies
 from wrcore.dynamics.vector import dot
 from wrcore.integrate.moving_axes import RATE
 from wrcore.kernels.jit import jit
@@ -73,9 +73,9 @@ class System(NamedTuple):
 def plan_elimination(model):
     """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
     them."""
-    n, reached, own = len(model.bodies.mass), reached_bodies(model), own_state_bodies(model)
+    n, reached, own = len(model.bodies.mass), reached_bodies(model), internal_state_bodies(model)
     pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
-    together = own_state_groups(model)
+    together = internal_state_groups(model)
     for states in together:
         packs: list[list[int]] = []
         for state in sorted(states):  # one after the other in the state vector
@@ -106,14 +106,10 @@ def plan_elimination(model):
             place[i, j] = number
             number += 1
 
-    def packed(lists):
-        starts = np.cumsum([0] + [len(items) for items in lists])
-        return starts, np.array([item for items in lists for item in sorted(items)], np.int64)
-
     return Pattern(
         *(np.array(items) for items in zip(*((node[0], len(node)) for node in nodes), strict=True)),
         np.array(order), place, *packed(later), np.array(sorted(pairs)),
-        6 * n + np.array(alone, np.int64), *packed([own[state] for state in alone]),
+        6 * n + np.array(alone, np.int64), *packed([sorted(own[state]) for state in alone]),
     )  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """The Jacobian of the equations of motion by finite differences, in blocks that make use of their structure.
 
 Unknown are, per body, a displacement (r, and a rotation vector in track axes that turns the Euler parameters by
-``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the force elements' own states. Only the accelerations and the
-rates of the elements' own states need differences; how velocities change positions is known.
+``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the internal states. Only the accelerations and the rates of
+internal states need differences; how velocities change positions is known.
 
 A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
 bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). They keep the rails' wrenches as
@@ -19,22 +19,14 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.contact_blocks import (
-    DIRECTIONS,
-    DISPLACEMENT,
-    SPEED,
-    SPIN,
-    TURN,
-    contacts_alone,
-    renew_contacts,
-)
+from wrcore.dynamics.contact_blocks import DIRECTIONS, DISPLACEMENT, SPEED, SPIN, TURN, contacts_alone, renew_contacts
 from wrcore.dynamics.contract import turn_rate
-from wrcore.dynamics.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
 from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
+from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import copy_into, cross, dot
-from wrcore.dynamics.wheel import MOTION_COLUMNS
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
 from wrcore.kernels.jit import jit
 
@@ -55,11 +47,11 @@ class Sweep(NamedTuple):
     starts: np.ndarray
     """(e + 1,) int: evaluation i perturbs the columns starts[i] <= k < starts[i + 1]."""
     columns: np.ndarray
-    """(p,) int: displacements of all bodies (6 each), velocities of all bodies (6 each), elements' own states."""
+    """(p,) int: displacements of all bodies (6 each), velocities of all bodies (6 each), elements' internal states."""
     row_starts: np.ndarray
     """(p + 1,) int."""
     rows: np.ndarray
-    """(q,) int: accelerations of all bodies (6 each), rates of the elements' own states."""
+    """(q,) int: accelerations of all bodies (6 each), rates of the elements' internal states."""
 
 
 class Joined(NamedTuple):
@@ -77,7 +69,7 @@ class Jacobian(NamedTuple):
     by_position: np.ndarray
     """(6 n, m): with respect to displacements."""
     by_velocity: np.ndarray
-    """(m, m): with respect to velocities and the elements' own states."""
+    """(m, m): with respect to velocities and the elements' internal states."""
     turning: np.ndarray
     """(n, 4, 6): rate of the rotation vector, and of the length of p, with respect to rotation and angular velocity."""
     length: np.ndarray
@@ -119,21 +111,9 @@ def _groups(reach):
     return [members for members, _ in groups]
 
 
-def _sweep(evaluations):
-    """Sweep from a list of evaluations, each a list of (column, rows)."""
-    columns = [item for evaluation in evaluations for item in evaluation]
-    return Sweep(
-        np.cumsum([0] + [len(evaluation) for evaluation in evaluations]),
-        np.array([column for column, _ in columns], np.int64),
-        np.cumsum([0] + [len(rows) for _, rows in columns]),
-        np.array([row for _, rows in columns for row in sorted(rows)], np.int64),
-    )  # fmt: skip
-
-
 def plan_sweep(model):
     """Plan the evaluations for the whole Jacobian."""
-    n, own = len(model.bodies.mass), own_state_bodies(model)
-    reached = reached_bodies(model)
+    n, own, reached = len(model.bodies.mass), internal_state_bodies(model), reached_bodies(model)
 
     def column(body, direction):
         return 6 * body + direction if direction < 6 else 6 * n + 6 * body + direction - 6
@@ -148,20 +128,18 @@ def plan_sweep(model):
         for direction in range(DIRECTIONS)
     ]
     own_rows = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(own)]
-    for states in own_state_groups(model):
+    for states in internal_state_groups(model):
         for state in states:
             own_rows[state] |= {6 * n + other for other in states}
     full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
-    return _sweep(full)
+    columns = [[k for k, _ in evaluation] for evaluation in full]
+    return Sweep(*packed(columns), *packed([sorted(rows) for evaluation in full for _, rows in evaluation]))
 
 
 def joined_bodies(model):
     """Bodies that accelerate together with each wheelset."""
-    joined = [sorted(joined_sets(model)[b]) for b in model.bodies.wheelsets]
-    return Joined(
-        np.cumsum([0] + [len(bodies) for bodies in joined]),
-        np.array([b for bodies in joined for b in bodies], np.int64),
-    )
+    joined = joined_sets(model)
+    return Joined(*packed([sorted(joined[body]) for body in model.bodies.wheelsets]))
 
 
 def new_jacobian(model):
@@ -171,15 +149,9 @@ def new_jacobian(model):
     return Jacobian(
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
         np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
-        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)),
+        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)),
         np.zeros(6 * n),
     )  # fmt: skip
-
-
-@jit(allocates=False, inline="always")
-def turn_of(jacobian):
-    """Turn rate and angle of the axes, see `Jacobian`."""
-    return jacobian.turn[RATE], jacobian.turn[ANGLE]
 
 
 @jit(allocates=False)
@@ -206,7 +178,7 @@ def _take_turning(jacobian, spins, state):
 
     With p' = 1/2 Omega p (quaternions; Omega = w, or w - (w a) a for a body of revolution about a, whose frame does not
     spin) and p + 1/2 theta p in place of p: the rotation vector's rate changes by dOmega + 1/2 Omega x theta, the rate
-    of the length of p by -1/4 Omega theta. In axes that turn, Omega is relative to them.
+    of the length of p by -1/4 Omega theta. In rotating axes, Omega is relative to them.
     """
     c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
     for b in range(jacobian.axes.shape[0]):
@@ -247,7 +219,7 @@ def _perturb(trial, column, axes, fine):
         at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
     elif column >= 6 * n:
         k = (column - 6 * n) % 6
-        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + 7 + k, fine * (SPEED if k < 3 else SPIN)
+        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + VELOCITY + k, fine * (SPEED if k < 3 else SPIN)
     else:
         k = column % 6
         at, difference = STATE_SIZE * (column // 6) + k, DISPLACEMENT

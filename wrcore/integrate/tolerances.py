@@ -18,8 +18,8 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 import numpy as np
 
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.support import RAILS, support_places
-from wrcore.dynamics.system import own_states
+from wrcore.dynamics.flexible_track import RAILS, track_places
+from wrcore.dynamics.system import internal_states
 from wrcore.kernels.jit import jit
 
 LENGTH = 0.01
@@ -43,10 +43,10 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
     ``rtol`` is the part of `LENGTH`, ``atol`` (m) comes on top; a method in `SHARE` counts with that. Units: m, 1, m/s,
     rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s for the velocities
-    of a track that gives; its sleeper's roll counts at the rails).
+    of a flexible track; its sleeper's roll counts at the rails).
     """
     n = len(model.bodies.mass)
-    weights, lever = np.ones(STATE_SIZE * n + own_states(model)), gyration(model.bodies)[:, None]
+    weights, lever = np.ones(STATE_SIZE * n + internal_states(model)), gyration(model.bodies)[:, None]
     fast, bodies = np.zeros(weights.shape, bool), weights[: STATE_SIZE * n].reshape(n, STATE_SIZE)
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2
     bodies[:, OMEGA:] = 1.0 / lever
@@ -54,9 +54,9 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     for wheelset, state in model.bodies.independent:
         weights[STATE_SIZE * n + state] = 1.0 / lever[model.bodies.wheelsets[wheelset], 0]
         fast[STATE_SIZE * n + state] = True
-    freedoms = len(model.support.mass)
+    freedoms = len(model.flexible_track.mass)
     if freedoms:
-        places = support_places(model)
+        places = track_places(model)
         fast[places[:, freedoms:]] = True
         if freedoms > RAILS:  # roll of the sleeper
             weights[places[:, RAILS + 2 :: freedoms]] /= HALF_GAUGE

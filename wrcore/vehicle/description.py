@@ -7,7 +7,7 @@ import numpy as np
 
 from wrcore.dynamics.joint import Joint, Joints, build_joints
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import Elements
+from wrcore.dynamics.suspension import PRELOAD, Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
@@ -65,7 +65,7 @@ class Vehicle:
             carried = np.sum(self.bodies.mass[[name not in held for name in self.body_names]])
             return float(carried) * GRAVITY / (2 * len(self.bodies.wheelsets))
         pair = np.repeat(self.elements.pairs[:, 0], np.diff(self.elements.first_spring))
-        return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, 14]))
+        return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, PRELOAD + 2]))
 
 
 def load_vehicle(path, axle_boxes=True):

@@ -53,7 +53,7 @@ class Layout:
             raise InputError(self.source, f"{field}.at", f"{expected}, got {[float(value) for value in point]}")
         return marker
 
-    def rest(self, marker, first, second, ahead):
+    def rest(self, marker, first, second, offset):
         """Nominal position of a marker of the first body relative to the second one, m."""
         point = self.positions[first] + marker
-        return point - (np.array([ahead, 0.0, 0.0]) if second == FRAME else self.positions[second])
+        return point - (np.array([offset, 0.0, 0.0]) if second == FRAME else self.positions[second])

@@ -41,7 +41,7 @@ from wrcore.contact.patch.solve import (
     solve_patch,
     wheel_overlaps,
 )
-from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, workspace
+from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, workspace
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError, one_of
@@ -166,11 +166,11 @@ class NormalContact:
 
     def _solve(self, side, pose, first, last, velocity, memory):
         windows, frame, strips, sums = self._once(pose, first, last, memory)
-        share = self._work.more[1]
+        share = self._work.more[WEIGHT]
         if share > 0.0:  # the mean with a solution on more strips; the strips of the one that weighs more
-            self._work.more[0] = MORE
+            self._work.more[WIDENED] = MORE
             more, _, finer, others = self._once(pose, first, last, memory)
-            self._work.more[0] = 1.0
+            self._work.more[WIDENED] = 1.0
             if more:
                 load = (others if share > 0.5 else sums)[LOAD]
                 sums, strips = (1.0 - share) * sums + share * others, finer if share > 0.5 else strips
