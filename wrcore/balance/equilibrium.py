@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
 from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import Equations, frictionless, internal_states
 from wrcore.geometry.irregularity import irregularity_at
@@ -45,7 +45,7 @@ def displaced(state, model, displacement):
     for b in range(n):
         at, q = STATE_SIZE * b, displacement[6 * b : 6 * b + 6]
         out[at : at + 3] += q[:3]
-        out[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], q[3:])
+        out[at + EULER : at + VELOCITY] = _turned(state[at + EULER : at + VELOCITY], q[3:])
     out[STATE_SIZE * n :] += displacement[6 * n :]
     return out
 
@@ -143,7 +143,8 @@ def stand_on_rails(model, state, loads):
 def _lift(state, at, lifts, base):
     """Lift the axle of a wheelset over the left and over the right rail, m."""
     state[at + 2] += 0.5 * (lifts[0] + lifts[1])
-    state[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0]))
+    euler, turn = slice(at + EULER, at + VELOCITY), np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0])
+    state[euler] = _turned(state[euler], turn)
 
 
 def _loads_when_lifted(equations, state, at, k, base, lifts):

@@ -17,7 +17,7 @@ from wrcore.balance.linear import cleared, steady_running
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle
-from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
 from wrcore.dynamics.drive import undriven
 from wrcore.dynamics.flexible_track import rails_at
 from wrcore.dynamics.series import equations_of
@@ -91,7 +91,7 @@ def _standing(scene, model, offset):
             k = int(np.flatnonzero(wheelsets == body)[0])
             roll, state[at + 2] = _settled(scene, model, k, offset, 0.0, load, state)
             if model.contact.geometries:
-                state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
+                state[at + EULER : at + VELOCITY] = euler_of(rotation(roll, 0.0))
     return state
 
 
@@ -125,7 +125,7 @@ def _roll_as_it_stands(scene, model, k, state):
     """Let the k-th wheelset roll without slip in its pose in the state, independent wheels each by itself."""
     body = model.bodies.wheelsets[k]
     part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-    roll, _, yaw = angles(part[3:7])
+    roll, _, yaw = angles(part[EULER:VELOCITY])
     left, right = _radii(scene, model, k, state, float(roll), float(yaw))
     radius = sum(left + right) / len(left + right)
     part[OMEGA:] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
@@ -204,7 +204,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
     put_bodies(moved, vehicle, state, model.track.path)
     if not model.track.tangent:
         parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
-        moves = {name: (part[0], part[7]) for name, part in parts.items()}
+        moves = {name: (part[0], part[VELOCITY]) for name, part in parts.items()}
         for name, part in parts.items():  # an axle box is where its wheelset is
             part[:] = _on_path(model.track.path, *moves[vehicle.data["bodies"][name].get("wheelset", name)], part)
     return np.concatenate([state, np.zeros(internal_states(driven) - internal_states(model))])
@@ -215,7 +215,7 @@ def _move(scene, model, moved, at_rest, state):
     for k, body in enumerate(scene.vehicle.bodies.wheelsets):
         part, values = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
         if values.keys() & {"y", "yaw"}:
-            y, yaw = values.get("y", part[1]), values.get("yaw", float(angles(part[3:7])[2]))
+            y, yaw = values.get("y", part[1]), values.get("yaw", float(angles(part[EULER:VELOCITY])[2]))
             roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             _roll_as_it_stands(scene, model, k, state)
@@ -236,10 +236,10 @@ def _with_axle_boxes(vehicle, state):
     for name, part in parts.items():
         described = vehicle.data["bodies"][name]
         if described["kind"] == "axle_box":
-            axle, (_, pitch, _) = parts[described["wheelset"]], angles(part[3:7])
-            axes = matrix_of(axle[3:7])
+            axle, (_, pitch, _) = parts[described["wheelset"]], angles(part[EULER:VELOCITY])
+            axes = matrix_of(axle[EULER:VELOCITY])
             part[:3] = axle[:3] + axes @ (places[name] - places[described["wheelset"]])
-            part[3:7] = euler_of(axes @ matrix_of(euler_parameters(0.0, float(pitch), 0.0)))
+            part[EULER:VELOCITY] = euler_of(axes @ matrix_of(euler_parameters(0.0, float(pitch), 0.0)))
     return state
 
 
@@ -270,9 +270,9 @@ def _balanced(vehicle, model, equations, state):
     wheelsets = model.bodies.wheelsets
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
-    rolls, _, yaws = angles(parts[:, 3:7])
-    axles = np.array([matrix_of(part[3:7])[:, 1] for part in parts])
-    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, 10:13], axis=1)])
+    rolls, _, yaws = angles(parts[:, EULER:VELOCITY])
+    axles = np.array([matrix_of(part[EULER:VELOCITY])[:, 1] for part in parts])
+    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, OMEGA:], axis=1)])
 
     def standing(stands):
         """The state with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
@@ -280,10 +280,10 @@ def _balanced(vehicle, model, equations, state):
         axes = [rotation(roll, yaw) for roll, yaw in zip(stands[:, 1], yaws, strict=True)]
         for body, turned, (z, _, rate) in zip(wheelsets, axes, stands, strict=True):
             part = new[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-            part[2:7], part[10:13] = (z, *euler_of(turned)), rate * turned[:, 1]
+            part[2:7], part[OMEGA:] = (z, *euler_of(turned)), rate * turned[:, 1]
         new = _with_axle_boxes(vehicle, new) if boxes else new
         rates = _parts(vehicle, equations(0.0, new))[wheelsets]
-        about = [row[10:13] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
+        about = [row[OMEGA:] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
         return new, np.column_stack([rates[:, 9:11], about])
 
     for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
@@ -327,5 +327,6 @@ def _on_path(path, s, speed, part):
     turn = frame @ np.array(frame_turn(station)) * speed
     arm = frame @ np.array([part[0] - s, part[1], part[2]])
     position = np.array([station.x, station.y, station.z]) + arm
-    velocity = frame @ part[7:10] + np.cross(turn, arm)
-    return np.concatenate([position, euler_of(frame @ matrix_of(part[3:7])), velocity, frame @ part[10:13] + turn])
+    velocity = frame @ part[VELOCITY:OMEGA] + np.cross(turn, arm)
+    euler = euler_of(frame @ matrix_of(part[EULER:VELOCITY]))
+    return np.concatenate([position, euler, velocity, frame @ part[OMEGA:] + turn])

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.balance.equilibrium import RESIDUAL
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.joint import joint_jacobian
 from wrcore.dynamics.system import Equations, internal_states
 
@@ -82,8 +82,7 @@ def steady_running(model, state, iterations=10):
     """
     best = linearise(model, cleared(model, state))
     places, size = best.places, len(best.matrix)
-    own = size - internal_states(model)
-    columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
+    columns = np.r_[:places, size - internal_states(model) - np.count_nonzero(model.bodies.spins) : size]
     last = np.inf
     for _ in range(iterations):
         left = np.max(np.abs(best.residual))
@@ -119,11 +118,11 @@ def moved_states(model, state, moves):
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
     place, speed = moves[:, : 12 * n].reshape(-1, 2, n, 6).swapaxes(0, 1)
-    turning = _into_body(parts[..., 3:7], parts[..., 10:13])
+    turning = _into_body(parts[..., EULER:VELOCITY], parts[..., OMEGA:])
     parts[..., :3] += place[..., :3]
-    parts[..., 3:7] = _turned(parts[..., 3:7], place[..., 3:])
-    parts[..., 7:10] += speed[..., :3]
-    parts[..., 10:13] = _out_of_body(parts[..., 3:7], turning + speed[..., 3:])
+    parts[..., EULER:VELOCITY] = _turned(parts[..., EULER:VELOCITY], place[..., 3:])
+    parts[..., VELOCITY:OMEGA] += speed[..., :3]
+    parts[..., OMEGA:] = _out_of_body(parts[..., EULER:VELOCITY], turning + speed[..., 3:])
     states[:, STATE_SIZE * n :] += moves[:, 12 * n :]
     return states
 
@@ -150,10 +149,10 @@ def _accelerations(model, states, rates):
     """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
     n = len(model.bodies.mass)
     parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))
-    turning, change = (_into_body(parts[..., 3:7], rows[..., 10:13]) for rows in (parts, slopes))
+    turning, change = (_into_body(parts[..., EULER:VELOCITY], rows[..., OMEGA:]) for rows in (parts, slopes))
     frame = turning.copy()
     frame[:, model.bodies.spins == 1, 1] = 0.0
-    both = np.concatenate([slopes[..., 7:10], change - np.cross(frame, turning)], axis=-1)
+    both = np.concatenate([slopes[..., VELOCITY:OMEGA], change - np.cross(frame, turning)], axis=-1)
     return np.hstack([both.reshape(-1, 6 * n), rates[:, STATE_SIZE * n :]])
 
 
@@ -163,7 +162,7 @@ def _independent_motions(model, state, work):
     spins = 6 * np.flatnonzero(model.bodies.spins) + 4
     turning = np.delete(np.arange(6 * n), spins)
     jacobian = joint_jacobian(model.joints, work.constraints.joints, n)
-    jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 3:7], jacobian[..., 3:])
+    jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, EULER:VELOCITY], jacobian[..., 3:])
     places = np.eye(6 * n)[:, turning]
     if len(jacobian):
         _, values, vectors = np.linalg.svd(jacobian.reshape(-1, 6 * n)[:, turning])

@@ -182,13 +182,13 @@ def renew_contacts(joined, whole, jacobian, angle, t, state, model, work, fine):
         take_mobility(jacobian, t, state, model, work)
     c, s = math.cos(angle), math.sin(angle)
     for k in range(columns.shape[0]):
-        own = model.bodies.wheelsets[k]
+        wheelset = model.bodies.wheelsets[k]
         for direction in range(DIRECTIONS):
-            column = jacobian.by_position[6 * own + direction] if direction < 6 else \
-                jacobian.by_velocity[6 * own + direction - 6]  # fmt: skip
+            column = jacobian.by_position[6 * wheelset + direction] if direction < 6 else \
+                jacobian.by_velocity[6 * wheelset + direction - 6]  # fmt: skip
             for j in range(joined.starts[k], joined.starts[k + 1]):
                 body = joined.bodies[j]
-                _respond(jacobian.mobility[k], work.rotations[own], c, s, columns[k, direction], body, out)
+                _respond(jacobian.mobility[k], work.rotations[wheelset], c, s, columns[k, direction], body, out)
                 for row in range(6):
                     known = jacobian.contact[k, direction, 6 * body + row]
                     jacobian.contact[k, direction, 6 * body + row] = out[row]

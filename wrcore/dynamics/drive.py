@@ -56,13 +56,11 @@ class Drive(NamedTuple):
     rows: np.ndarray
     """(m, 6) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
     kind, table, what that is over."""
-    lever: np.ndarray
-    """(m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)."""
+    lever: np.ndarray  # (m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)
     control: np.ndarray
     """(c, 4) int, c = 0 or 1: body whose speed counts, number of the wheelset whose arc length does, table, what that
     is over."""
-    gains: np.ndarray
-    """(c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)."""
+    gains: np.ndarray  # (c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)
     tables: Schedules
 
 

@@ -171,8 +171,8 @@ def _track_energies(model, states, work):
     track, places, d = model.flexible_track, track_places(model), len(model.flexible_track.mass)
     if track.mass[0] == 0.0:
         rates = Equations(model, work).at(0.0, states)
-        own = np.concatenate([states[:, places], rates[:, places]], axis=-1)
-        parts = states[:, : places[0, 0]], own.reshape(len(states), -1), states[:, places[-1, -1] + 1 :]
+        moving = np.concatenate([states[:, places], rates[:, places]], axis=-1)
+        parts = states[:, : places[0, 0]], moving.reshape(len(states), -1), states[:, places[-1, -1] + 1 :]
         states, elements = np.hstack(parts), model.elements
         elements = elements._replace(states=elements.states + places.size)
         model = model._replace(flexible_track=track._replace(mass=np.ones(d)), elements=elements)

@@ -52,12 +52,9 @@ UNBALANCED = 1e-4
 class FlexibleTrack(NamedTuple):
     """The track under each wheelset, for kernels; of a rigid one all arrays are empty."""
 
-    mass: np.ndarray
-    """(d,): kg, and kg m^2 in roll; zeros for rails without mass."""
-    stiffness: np.ndarray
-    """(d, d): K."""
-    damping: np.ndarray
-    """(d, d): C."""
+    mass: np.ndarray  # (d,): kg, and kg m^2 in roll; zeros for rails without mass
+    stiffness: np.ndarray  # (d, d): K
+    damping: np.ndarray  # (d, d): C
     first: int
     """Place of the first of its states among the internal states: wheelset after wheelset, q, then q' where there are
     masses."""
@@ -66,32 +63,19 @@ class FlexibleTrack(NamedTuple):
 class FlexibleTrackWork(NamedTuple):
     """Scratch arrays for each wheelset and freedom of its rails (k, 4); none for a rigid track."""
 
-    ground: np.ndarray
-    """(k, 4): velocities of the wheelset's centre over the ground, m/s."""
-    speeds: np.ndarray
-    """(k, 4): q', m/s."""
-    forces: np.ndarray
-    """(k, 4): f, N."""
-    known: np.ndarray
-    """(k, 4): f without a difference in q', N."""
-    residuals: np.ndarray
-    """(k, 4): C q' + K q - f, N."""
-    began: np.ndarray
-    """(k, 4): the same where the step began, N."""
-    steps: np.ndarray
-    """(k, 4): of Newton's method, m/s."""
-    slopes: np.ndarray
-    """(k, 4, 2): derivatives of f by both q' of its rail (last index), N s/m."""
-    matrix: np.ndarray
-    """(k, 2, 2, 2): derivatives of a rail's residuals by its q' (last index), N s/m."""
-    left: np.ndarray
-    """(k, 2): size of a rail's residuals, N."""
-    parts: np.ndarray
-    """(k, 2): of Newton's full steps."""
-    power: np.ndarray
-    """(1,): f q', summed over all rails, W; 0 for a rigid track."""
-    unbalanced: np.ndarray
-    """(1,) int: counts evaluations in which rails without mass found no balance."""
+    ground: np.ndarray  # (k, 4): velocities of the wheelset's centre over the ground, m/s
+    speeds: np.ndarray  # (k, 4): q', m/s
+    forces: np.ndarray  # (k, 4): f, N
+    known: np.ndarray  # (k, 4): f without a difference in q', N
+    residuals: np.ndarray  # (k, 4): C q' + K q - f, N
+    began: np.ndarray  # (k, 4): the same where the step began, N
+    steps: np.ndarray  # (k, 4): of Newton's method, m/s
+    slopes: np.ndarray  # (k, 4, 2): derivatives of f by both q' of its rail (last index), N s/m
+    matrix: np.ndarray  # (k, 2, 2, 2): derivatives of a rail's residuals by its q' (last index), N s/m
+    left: np.ndarray  # (k, 2): size of a rail's residuals, N
+    parts: np.ndarray  # (k, 2): of Newton's full steps
+    power: np.ndarray  # (1,): f q', summed over all rails, W; 0 for a rigid track
+    unbalanced: np.ndarray  # (1,) int: counts evaluations in which rails without mass found no balance
 
 
 def rigid_track():

@@ -42,20 +42,16 @@ STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
 class Elements(NamedTuple):
     """Force elements of a model, sorted by pair, for kernels."""
 
-    pairs: np.ndarray
-    """(p, 2) int: first and second body; FRAME as the second one for the moving frame."""
-    offset: np.ndarray
-    """(p,): for the moving frame, arc length of its cross-section from the frame's origin, m."""
+    pairs: np.ndarray  # (p, 2) int: first and second body; FRAME as the second one for the moving frame
+    offset: np.ndarray  # (p,): for the moving frame, arc length of its cross-section from the frame's origin, m
     turning: np.ndarray
     """(p, 3, 3): factors c of the energy U(R) (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) about
     the second body's axes."""
-    first_spring: np.ndarray
-    """(p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]."""
+    first_spring: np.ndarray  # (p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]
     springs: np.ndarray
     """(n, 15): along all three axes; marker of i, position relative to j at which the element is at rest (m),
     stiffness (N/m), damping (N s/m), preload (N, on i)."""
-    first_directed: np.ndarray
-    """(p + 1,) int, as first_spring."""
+    first_directed: np.ndarray  # (p + 1,) int, as first_spring
     directed: np.ndarray
     """(m, 16): along one direction; marker of i, marker of j or rest position (m), length at rest (m) on a line, unit
     vector in j's axes elsewhere, and six numbers that its law reads."""
@@ -67,8 +63,7 @@ class Elements(NamedTuple):
     states: int
     """Number of internal states: displacements (m) of dampers that act in series with a spring; and what else is
     counted with them, see `wrcore.dynamics.system.fill_derivatives`."""
-    laws: np.ndarray = np.zeros(0, np.int64)
-    """Addresses of the laws by their number, see `with_laws`."""
+    laws: np.ndarray = np.zeros(0, np.int64)  # addresses of the laws by their number, see `with_laws`
 
 
 def pack_elements(springs=(), directed=(), turning=()):
@@ -235,14 +230,14 @@ def pair_forces(elements, p, motion, state, inner_at, rate):
         lost += dx * (vx * vx) + dy * (vy * vy) + dz * (vz * vz)
     for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
         (bx, by, bz), (nx, ny, nz), stretch, along = _along(elements, k, motion)
-        inner, press, own = 0.0, 0.0, elements.law[k, law.INNER]
+        inner, press, place = 0.0, 0.0, elements.law[k, law.INNER]
         if elements.law[k, law.PRESSING_SPRING] >= 0 or elements.law[k, law.PRESSING] >= 0:
             press = _pressing_force(elements, k, motion)
-        if own >= 0:
-            inner = state[inner_at + own]
+        if place >= 0:
+            inner = state[inner_at + place]
         force, inner_rate, energy, loss = _by_law(elements, k, stretch, along, inner, press)
-        if own >= 0:
-            rate[inner_at + own] = inner_rate
+        if place >= 0:
+            rate[inner_at + place] = inner_rate
         gx, gy, gz = -force * nx, -force * ny, -force * nz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx

@@ -39,14 +39,10 @@ FRICTIONLESS = 1e-9
 class Bodies(NamedTuple):
     """Rigid bodies, for kernels."""
 
-    mass: np.ndarray
-    """(n,), kg."""
-    inertia: np.ndarray
-    """(n, 3): principal moments about the body's x, y, z axes, kg m^2."""
-    spins: np.ndarray
-    """(n,) int: 1 for a body of revolution about its y axis whose frame does not spin along."""
-    wheelsets: np.ndarray
-    """(k,) int: bodies with wheels."""
+    mass: np.ndarray  # (n,), kg
+    inertia: np.ndarray  # (n, 3): principal moments about the body's x, y, z axes, kg m^2
+    spins: np.ndarray  # (n,) int: 1 for a body of revolution about its y axis whose frame does not spin along
+    wheelsets: np.ndarray  # (k,) int: bodies with wheels
     independent: np.ndarray = np.zeros((0, 2), np.int64)
     """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
     difference of their rolling rates, left less right (rad/s), among the internal states."""
@@ -60,61 +56,39 @@ class Model(NamedTuple):
     elements: Elements
     joints: Joints
     track: TrackModel
-    speed: float
-    """Speed of the moving frame, m/s."""
-    gravity: float
-    """m/s^2, downwards."""
+    speed: float  # speed of the moving frame, m/s
+    gravity: float  # m/s^2, downwards
     alpha: float
     beta: float
     """Baumgarte's parameters, 1/s."""
-    wheels: int = 0
-    """Address of the kernel that finds the rails' wrenches, see `with_kernels`."""
-    reactions: int = 0
-    """Address of the kernel that adds the joints' reactions."""
+    wheels: int = 0  # address of the kernel that finds the rails' wrenches, see `with_kernels`
+    reactions: int = 0  # address of the kernel that adds the joints' reactions
     friction: Schedules = pack_schedules([])
     """Over arc length, for the left and the right rail, where friction is not the same everywhere; else empty."""
-    rail_friction: int = 0
-    """Address of the kernel that looks it up."""
-    drive: Drive = no_drive()
-    """Motors, brakes and speed controller."""
-    torques: int = 0
-    """Address of the kernel that adds their torques."""
-    flexible_track: FlexibleTrack = rigid_track()
-    """The track under each wheelset, if it is flexible."""
-    rails: int = 0
-    """Address of the kernel that finds the wrenches of the rails of a flexible track."""
+    rail_friction: int = 0  # address of the kernel that looks it up
+    drive: Drive = no_drive()  # motors, brakes and speed controller
+    torques: int = 0  # address of the kernel that adds their torques
+    flexible_track: FlexibleTrack = rigid_track()  # the track under each wheelset, if it is flexible
+    rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
 
 
 class Workspace(NamedTuple):
     """Scratch arrays of one evaluation, and what it leaves for output."""
 
-    rotations: np.ndarray
-    """(n + 1, 3, 3): of the bodies, and of the moving frame on a curved track."""
-    arc_lengths: np.ndarray
-    """(k,): last arc length of each wheelset, m; where the search for the next one starts."""
-    turns: np.ndarray
-    """(n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin."""
-    wrenches: np.ndarray
-    """(n, 6): force and moment about the centre of mass of each body."""
-    patches: np.ndarray
-    """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
-    counts: np.ndarray
-    """(k, 2) int: patches in contact."""
-    motions: np.ndarray
-    """(k, 2, 15): `WheelMotion` of each wheel in its rail's frame."""
-    rail_wrenches: np.ndarray
-    """(k, 2, 6): force and moment of the rails on each wheelset."""
-    rails: np.ndarray
-    """(k, 2, 3, 3): axes of the rails' frames."""
-    shifts: np.ndarray
-    """(k, 2, 2): where rails are off their nominal places, m."""
-    bounds: np.ndarray
-    """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
-    counters: np.ndarray
-    """(3,) int, see `wrcore.dynamics.wheel`."""
+    rotations: np.ndarray  # (n + 1, 3, 3): of the bodies, and of the moving frame on a curved track
+    arc_lengths: np.ndarray  # (k,): last arc length of each wheelset, m; where the search for the next one starts
+    turns: np.ndarray  # (n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin
+    wrenches: np.ndarray  # (n, 6): force and moment about the centre of mass of each body
+    patches: np.ndarray  # (k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right
+    counts: np.ndarray  # (k, 2) int: patches in contact
+    motions: np.ndarray  # (k, 2, 15): `WheelMotion` of each wheel in its rail's frame
+    rail_wrenches: np.ndarray  # (k, 2, 6): force and moment of the rails on each wheelset
+    rails: np.ndarray  # (k, 2, 3, 3): axes of the rails' frames
+    shifts: np.ndarray  # (k, 2, 2): where rails are off their nominal places, m
+    bounds: np.ndarray  # (k, 2): bound of planar detection's error (detection ``auto`` only), m
+    counters: np.ndarray  # (3,) int, see `wrcore.dynamics.wheel`
     constraints: ConstraintWork
-    frame: np.ndarray
-    """(3, 3): axes of the track's frame."""
+    frame: np.ndarray  # (3, 3): axes of the track's frame
     irregularity: np.ndarray
     strips: StripWork
     flexible_track: FlexibleTrackWork
@@ -293,7 +267,7 @@ def with_wheels(contact):
     if not contact.geometries:
         return contact
     alone = contact._replace(geometries=())
-    return alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
+    return alone._replace(wheels=tuple(alone._replace(geometry=each) for each in contact.geometries))
 
 
 def with_fallback(contact):

@@ -29,8 +29,7 @@ from wrcore.kernels.jit import FUSED, jit
 class TrackModel(NamedTuple):
     """Path and irregularity, for kernels."""
 
-    tangent: bool
-    """Straight, level and perfect: none of this module runs."""
+    tangent: bool  # straight, level and perfect: none of this module runs
     path: PathData
     irregularity: IrregularityData
 
@@ -153,7 +152,7 @@ def track_poses(track, states, at, guess):
     poses, axes, body = np.empty((len(states), 6)), np.empty((len(states), 3, 3)), np.empty((3, 3))
     s = guess
     for i in range(len(states)):
-        state, frame, out = states[i, at : at + STATE_SIZE], axes[i], poses[i]
+        state, frame = states[i, at : at + STATE_SIZE], axes[i]
         s = arc_length_of(track.path, state[0], state[1], state[2], s)
         station = track_frame(track.path, s, frame)
         _, y, z = turned_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
@@ -161,6 +160,7 @@ def track_poses(track, states, at, guess):
         ax, ay, az = turned_into(frame, body[0, 1], body[1, 1], body[2, 1])
         _, _, forward = turned_into(frame, body[0, 0], body[1, 0], body[2, 0])
         _, _, upward = turned_into(frame, body[0, 2], body[1, 2], body[2, 2])
-        out[0], out[1], out[2], out[3] = s, y, z, math.asin(min(max(az, -1.0), 1.0))
-        out[4], out[5] = math.atan2(-ax, ay), math.atan2(-forward, upward)
+        angles = math.asin(min(max(az, -1.0), 1.0)), math.atan2(-ax, ay), math.atan2(-forward, upward)
+        store((s, y, z), poses[i])
+        store(angles, poses[i, 3:])
     return poses, axes

@@ -24,36 +24,24 @@ class ContactModel(NamedTuple):
 
     geometry: ContactGeometry
     hertz: HertzTable
-    law: int
-    """Creep law, see wrcore.creep.laws.LAWS."""
+    law: int  # creep law, see wrcore.creep.laws.LAWS
     creep: CreepData
-    detection: int
-    """PLANAR, SPATIAL or AUTO of wrcore.contact.detection."""
-    detection_tolerance: float
-    """AUTO: normal penetration that planar detection may miss, m."""
-    reduction: int
-    """MAXIMUM or MOMENT of wrcore.contact.reduction."""
-    shear_modulus: float
-    """G, Pa."""
+    detection: int  # PLANAR, SPATIAL or AUTO of wrcore.contact.detection
+    detection_tolerance: float  # AUTO: normal penetration that planar detection may miss, m
+    reduction: int  # MAXIMUM or MOMENT of wrcore.contact.reduction
+    shear_modulus: float  # G, Pa
     poisson_ratio: float
     friction: float
     """Coulomb's mu at no slip; of rails that differ, or along which it changes, the largest one."""
-    damping: float
-    """c_e of Eq. (7)'s damping factor; 1 means none."""
-    damping_speed: float
-    """v0 of the damping factor, m/s."""
-    least_speed: float
-    """Rolling speed is not taken smaller than this in creepages, m/s."""
-    strips: StripModel
-    """Patches on strips, if the scene asks for them."""
-    friction_ratio: float = 1.0
-    """A: friction at large slip velocity over that at none; 1: it does not fall."""
-    friction_decay: float = 0.0
-    """B: rate at which friction falls with slip velocity, s/m."""
+    damping: float  # c_e of Eq. (7)'s damping factor; 1 means none
+    damping_speed: float  # v0 of the damping factor, m/s
+    least_speed: float  # rolling speed is not taken smaller than this in creepages, m/s
+    strips: StripModel  # patches on strips, if the scene asks for them
+    friction_ratio: float = 1.0  # A: friction at large slip velocity over that at none; 1: it does not fall
+    friction_decay: float = 0.0  # B: rate at which friction falls with slip velocity, s/m
     geometries: tuple = ()
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
-    wheels: tuple = ()
-    """The same as contact models, see `wrcore.dynamics.system.with_kernels`."""
+    wheels: tuple = ()  # the same as contact models, see `wrcore.dynamics.system.with_kernels`
 
 
 @jit(allocates=False, inline="always")

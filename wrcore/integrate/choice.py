@@ -36,14 +36,14 @@ def fastest_rate(model, equations, t, state):
     the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
     work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
     unit = unit[0] + pace(model, state, state) * unit[1]
-    kept = [(own, own.copy()) for own in (*places(work), work.counters)]
+    kept = [(array, array.copy()) for array in (*places(work), work.counters)]
     base, direction, growths = equations(t, state, ELLIPSES), np.random.default_rng(0).normal(size=len(state)), []
     for _ in range(PASSES):
         direction /= math.sqrt(np.mean(direction**2)) or 1.0
         direction = (equations(t, state + unit * direction, ELLIPSES) - base) / unit
         growths.append(math.sqrt(np.mean(direction**2)))
-    for own, before in kept:
-        own[:] = before
+    for array, before in kept:
+        array[:] = before
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
 
 

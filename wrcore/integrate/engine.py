@@ -56,12 +56,9 @@ class Control(NamedTuple):
 
     tolerances: np.ndarray
     """(2, n): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
-    fixed_step: float
-    """s; 0 for steps by the error estimate."""
-    longest_step: float
-    """s."""
-    limit: float
-    """A state `outside` of it ends the run, m."""
+    fixed_step: float  # s; 0 for steps by the error estimate
+    longest_step: float  # s
+    limit: float  # a state `outside` of it ends the run, m
 
 
 class Memory(NamedTuple):
@@ -71,10 +68,8 @@ class Memory(NamedTuple):
     counters: np.ndarray
     state: np.ndarray
     """(n,): state reached."""
-    rate: np.ndarray
-    """(n,): its derivative, if known."""
-    old: np.ndarray
-    """(n,): state before the last step."""
+    rate: np.ndarray  # (n,): its derivative, if known
+    old: np.ndarray  # (n,): state before the last step
     stages: np.ndarray
     """(s, n): derivatives (explicit pairs) or increments (Rosenbrock methods) of the last step's stages."""
 
@@ -82,27 +77,19 @@ class Memory(NamedTuple):
 class Scratch(NamedTuple):
     """Arrays that hold nothing between two attempts."""
 
-    trial: np.ndarray
-    """(n,)."""
-    slope: np.ndarray
-    """(n,)."""
-    defect: np.ndarray
-    """(n,)."""
-    still: np.ndarray
-    """(n,): zeros."""
-    places: np.ndarray
-    """(k,): where searches started before the attempt."""
+    trial: np.ndarray  # (n,)
+    slope: np.ndarray  # (n,)
+    defect: np.ndarray  # (n,)
+    still: np.ndarray  # (n,): zeros
+    places: np.ndarray  # (k,): where searches started before the attempt
 
 
 class Record(NamedTuple):
     """Output times and the states there."""
 
-    times: np.ndarray
-    """(m,), s."""
-    states: np.ndarray
-    """(m, n)."""
-    reached: np.ndarray
-    """(1,) int: outputs written."""
+    times: np.ndarray  # (m,), s
+    states: np.ndarray  # (m, n)
+    reached: np.ndarray  # (1,) int: outputs written
 
 
 def new_memory(state, start, stages, first_step):

@@ -16,7 +16,6 @@ SOLVERS = {
 }  # fmt: skip
 """scipy's classes by method name."""
 
-
 LEAST_RTOL = 3e-14
 """Tolerance by the size of a component, as small as scipy allows: what counts are the tolerances of each."""
 

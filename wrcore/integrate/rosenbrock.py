@@ -36,8 +36,7 @@ class Linear(NamedTuple):
     sweep: Sweep
     joined: Joined
     jacobian: Jacobian
-    differences: np.ndarray
-    """(p,): scratch of the Jacobian."""
+    differences: np.ndarray  # (p,): scratch of the Jacobian
 
 
 def new_linear(model):

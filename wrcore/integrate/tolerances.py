@@ -20,6 +20,7 @@ import numpy as np
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.flexible_track import RAILS, track_places
 from wrcore.dynamics.system import internal_states
+from wrcore.dynamics.vector import load
 from wrcore.kernels.jit import jit
 
 LENGTH = 0.01
@@ -64,10 +65,9 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
 
 @jit(allocates=False, inline="always")
-def _ahead(state, at):
+def _forward_speed(state, at):
     """Speed (m/s) of the body whose state starts at ``at`` along its own x axis, either way."""
-    e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
-    vx, vy, vz = state[at + 7], state[at + 8], state[at + 9]
+    e0, (e1, e2, e3), (vx, vy, vz) = state[at + EULER], load(state, at + EULER + 1), load(state, at + VELOCITY)
     return abs(vx + 2.0 * ((e1 * e2 + e0 * e3) * vy + (e1 * e3 - e0 * e2) * vz - (e2 * e2 + e3 * e3) * vx))
 
 
@@ -77,7 +77,7 @@ def pace(model, old, new):
     rate = RATE
     for wheelset in model.bodies.wheelsets:
         at = STATE_SIZE * wheelset
-        speed = max(min(_ahead(old, at), _ahead(new, at)), model.contact.least_speed)
+        speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), model.contact.least_speed)
         rate = min(rate, speed / HALF_GAUGE)
     return rate
 

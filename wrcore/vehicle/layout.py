@@ -14,17 +14,12 @@ FRAME_NAME = "frame"
 class Layout:
     """Bodies of a vehicle in nominal position, all with their axes along the track's."""
 
-    source: str
-    """Named in errors."""
+    source: str  # named in errors
     names: tuple
-    positions: np.ndarray
-    """(n, 3): centres of mass, m."""
-    mass: np.ndarray
-    """(n,), kg."""
-    spins: np.ndarray
-    """(n,): True for wheelsets, whose frame does not spin with them."""
-    aliases: dict
-    """Names of bodies that are part of another one."""
+    positions: np.ndarray  # (n, 3): centres of mass, m
+    mass: np.ndarray  # (n,), kg
+    spins: np.ndarray  # (n,): True for wheelsets, whose frame does not spin with them
+    aliases: dict  # names of bodies that are part of another one
 
     def ends(self, item, field):
         """Body numbers of the two ends of an element or joint; the moving frame can only be the second one."""
