@@ -29,6 +29,7 @@ class HertzTable(NamedTuple):
     """(n, 8): p(l), p(-l), k and ln(a/b) at l = -LOG_RATIO_MAX + i * step, then their slopes times the step."""
 
 
+@jit(allocates=False, forceinline=True)
 def contact_modulus(shear_modulus, poisson_ratio):
     """Contact modulus E* of two equal bodies, Pa: 1/E* = 2 (1 - nu^2)/E, E = 2 G (1 + nu), so E* = G/(1 - nu)."""
     return shear_modulus / (1.0 - poisson_ratio)

@@ -35,7 +35,7 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
-        strips[:4], sizes,
+        strips[:5], sizes,
     )  # fmt: skip
 
 
@@ -43,9 +43,15 @@ def with_kernels_of(model, other):
     """The model with the addresses of another one of the same structure, from `wrcore.dynamics.system.with_kernels`."""
     contact = model.contact
     if contact.strips.strips:
-        contact = contact._replace(strips=contact.strips._replace(fallback=other.contact.strips.fallback))
+        contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
     kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
     return model._replace(contact=with_wheels(contact), elements=with_laws(model.elements), **kept)
+
+
+def _addresses(contact):
+    """Of the kernels of patches on strips, from a contact model that may have one for each wheel."""
+    strips = (contact.wheels[0] if contact.wheels else contact).strips
+    return {"fallback": strips.fallback, "group": strips.group}
 
 
 def _arrays(part):

@@ -124,7 +124,7 @@ def _lifted(model, y, z, m, spatial, u, rows):
 
 
 @jit(allocates=False, forceinline=True)
-def _solve(model, pose, low, high, memory, work):
+def solve_overlaps(model, pose, low, high, memory, work):
     """Number of windows, 0 where strips find no solution, and frame of the overlaps of a lifted wheel."""
     settings = model.strips
     return solve.solve_patch(
@@ -208,7 +208,7 @@ def _add_wrenches(geometry, pose, frame, count, share, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work):
+def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work):
     """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``."""
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
     count = solve.publish(model.shear_modulus / (1.0 - model.poisson_ratio), work.normal, windows, strips, sums)
@@ -247,7 +247,7 @@ def _roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, c
 
 @jit(allocates=False, fastmath=FUSED)
 def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
-    """As `_roll_patch`, on a grid: it acts on one strip at the pressure's centroid. ``row`` is overwritten."""
+    """As `roll_patch`, on a grid: it acts on one strip at the pressure's centroid. ``row`` is overwritten."""
     strips, slip, force = work.strips, work.slip, work.friction
     call_address(model.strips.fallback, model, m, pose, frame, creepage, friction, row)
     (xi, eta, phi), x, s, load = creepage, row[reduction.X], row[reduction.Y], row[reduction.NORMAL]
@@ -263,13 +263,13 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
-    wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
+def lifted_overlaps(model, m, spatial, rows, first, last, out, work):
+    """Overlaps in ``work.rows`` of a left wheel that the damping lifts: its pose, their first and end, their frame as
+    they are, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row."""
     speed = max(abs(m.vx), model.least_speed)
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
-    depth, u = 0.0, 0.0
+    depth, u, low, high = 0.0, 0.0, first, first
     for k in range(first, last):
         if rows[k, reduction.PENETRATION] > depth:
             depth, u = rows[k, reduction.PENETRATION], rows[k, reduction.U_WHEEL]
@@ -283,31 +283,42 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     friction = falling(model, m.friction, xi, eta, speed)
     factor = damping_factor(approach, model.damping, model.damping_speed)
     lift = (1.0 - factor * inverse_cube_root(factor)) * depth
-    windows = 0
     if lift < depth:
         pose, low, high = _lifted(model, m.y - lift * frame.sine, m.z + lift * frame.cosine, m, spatial, u, work.rows)
+    return pose, low, high, frame, depth - lift, (xi, eta, phi), friction
+
+
+@jit(allocates=False, fastmath=FUSED)
+def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
+    """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
+    wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
+    speed, windows = max(abs(m.vx), model.least_speed), 0
+    pose, low, high, frame, depth, creepage, friction = lifted_overlaps(
+        model, m, spatial, rows, first, last, out, work
+    )
+    if depth > 0.0:
         if high == low:
             out[reduction.NORMAL] = 0.0
             return NOTHING
-        windows, frame = _solve(model, pose, low, high, memory, work)
+        windows, frame = solve_overlaps(model, pose, low, high, memory, work)
     for k in range(6):
         work.wrench[0, k] = work.wrench[1, k] = 0.0
     if windows == 0:
         counters[ON_GRID] += 1
-        found = _roll_on_grid(model, m, pose, frame, depth - lift, (xi, eta, phi), friction, out, work)
+        found = _roll_on_grid(model, m, pose, frame, depth, creepage, friction, out, work)
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
-        found = _roll_patch(model, m, pose, frame, windows, depth - lift, speed, friction, 1.0, counters, work)
+        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, counters, work)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE
-            windows, frame = _solve(model, pose, low, high, memory, work)
+            windows, frame = solve_overlaps(model, pose, low, high, memory, work)
             finer[WIDENED] = 1.0
             if windows > 0:
                 for k in range(6):
                     work.wrench[0, k] *= 1.0 - share
                     work.wrench[1, k] *= 1.0 - share
-                more = _roll_patch(model, m, pose, frame, windows, depth - lift, speed, friction, share, counters, work)
+                more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work)
                 found = _mean(found, more, share)
     _fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z
@@ -387,7 +398,13 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 last = group_end(rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
                 work.spare[0] = 0.0
-                group_wrench(contact, m, spatial, rows, first, last, work.out, wrench, counters, memory, work)
+                if contact.strips.group != 0:
+                    call_address(
+                        contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters,
+                        memory, work,
+                    )  # fmt: skip
+                else:
+                    group_wrench(contact, m, spatial, rows, first, last, work.out, wrench, counters, memory, work)
                 group += 1
                 if work.out[reduction.NORMAL] > 0.0:
                     copy_into(rows[kept], work.out)

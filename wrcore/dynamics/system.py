@@ -86,7 +86,7 @@ class Workspace(NamedTuple):
     rails: np.ndarray  # (k, 2, 3, 3): axes of the rails' frames
     shifts: np.ndarray  # (k, 2, 2): where rails are off their nominal places, m
     bounds: np.ndarray  # (k, 2): bound of planar detection's error (detection ``auto`` only), m
-    counters: np.ndarray  # (3,) int, see `wrcore.dynamics.wheel`
+    counters: np.ndarray  # (4,) int, see `wrcore.dynamics.wheel`
     constraints: ConstraintWork
     frame: np.ndarray  # (3, 3): axes of the track's frame
     irregularity: np.ndarray
@@ -111,7 +111,7 @@ def workspace(model):
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
-        np.zeros(3, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
+        np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k),
     )  # fmt: skip
 
@@ -264,10 +264,12 @@ def frictionless(model):
 
 def with_wheels(contact):
     """Contact with what each wheel runs on where they differ."""
+    alone, with_pair = contact._replace(geometries=()), (lambda each: each)
+    if contact.strips.looked_up:
+        from wrcore.dynamics.pair_store import with_pair
     if not contact.geometries:
-        return contact
-    alone = contact._replace(geometries=())
-    return alone._replace(wheels=tuple(alone._replace(geometry=each) for each in contact.geometries))
+        return with_pair(alone)
+    return alone._replace(wheels=tuple(with_pair(alone._replace(geometry=each)) for each in contact.geometries))
 
 
 def with_fallback(contact):
@@ -282,6 +284,20 @@ def with_fallback(contact):
     return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
 
 
+def with_look_up(contact, work):
+    """Contact with the address of the kernel that looks patches up, if it asks for one."""
+    if not contact.strips.looked_up:
+        return contact
+    from wrcore.dynamics.tabulated_wheel import add_tabulated
+
+    m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
+    kernel = Kernel(
+        add_tabulated, Kind(contact._replace(geometries=())), m, True, np.zeros((1, PATCH_COLUMNS)), 0, 0, row, np.zeros(6),
+        np.zeros(4, np.int64), row, Kind(work),
+    )  # fmt: skip
+    return contact._replace(strips=contact.strips._replace(group=kernel.address))
+
+
 def with_kernels(model, work):
     """The model with the addresses of the kernels of its wheels, elements, joints and so on: only what it runs is
     compiled."""
@@ -289,7 +305,7 @@ def with_kernels(model, work):
     if contact.strips.strips and len(work.motions):
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
-        wrenches, contact = strip_wrenches, with_fallback(contact)
+        wrenches, contact = strip_wrenches, with_look_up(with_fallback(contact), work.strips)
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 

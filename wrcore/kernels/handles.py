@@ -237,3 +237,18 @@ def call_address(_, address, *arguments):
 def four_at(_, address, *arguments):
     """The four numbers that the `Kernel` with this ``address`` returns; all else as for `call_address`."""
     return FOUR(types.int64, types.StarArgTuple(arguments)), _call
+
+
+@intrinsic
+def call_c(_, address, *numbers):
+    """Call the C function with this address, ``void f(int64_t, ...)``, with whole numbers."""
+
+    def generate(context, builder, call, values):
+        count = len(call.args[1])
+        kind = ir.FunctionType(ir.VoidType(), [ir.IntType(64)] * count)
+        pointer = builder.inttoptr(values[0], kind.as_pointer())
+        handed = [context.cast(builder, builder.extract_value(values[1], k), call.args[1][k], types.int64) for k in range(count)]
+        builder.call(pointer, handed)
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.StarArgTuple(numbers)), generate

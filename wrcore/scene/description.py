@@ -324,7 +324,7 @@ def compile_scene(
             REDUCTIONS.get(contact["patch"], MOMENT),
             float(material["shear_modulus"]), float(material["poisson_ratio"]), friction.largest,
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
-            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"]),
+            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"], friction.largest),
             friction.ratio, friction.decay,
             tuple(pair.geometry for pair in scene.pairs),
         ),

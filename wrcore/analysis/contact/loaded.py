@@ -142,7 +142,7 @@ class LoadedWheels:
         self._still = contact._replace(strips=contact.strips._replace(rolling=0))
         self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), None
         self._exact = contact if strips.rolling else None
-        self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(3, np.int64)
+        self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(4, np.int64)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
         """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),

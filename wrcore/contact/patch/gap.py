@@ -246,7 +246,7 @@ def unroll(centre, width, tilt, place, own):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _material_point(geometry, pose, frame, s, x, height, tilt):
+def material_point(geometry, pose, frame, s, x, height, tilt):
     """Point of a left wheel's undeformed surface on a strip, from the wheelset's centre, and its own plane's angle."""
     cosine = 1.0 / math.sqrt(1.0 + tilt * tilt)
     across = frame.ur + geometry.rail_distance + s * frame.cosine - height * frame.sine
@@ -268,7 +268,7 @@ def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, sl
     vx, vy, vz, wx, wy, wz, speed = velocity
     slowness = 1.0 / speed
     for i in range(len(centre)):
-        px, py, pz, cosine, sine = _material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
+        px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         slip[0, i] = (vx + wy * pz - wz * py) * slowness
         slip[1, i] = 0.0
         slip[2, i] = ((vy + wz * px - wx * pz) * cosine + (vz + wx * py - wy * px) * sine) * slowness
@@ -284,7 +284,7 @@ def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, fo
     along x and across, N, and the moment of the latter about the strip's middle, N m.
     """
     for i in range(len(centre)):
-        px, py, pz, cosine, sine = _material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
+        px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         fx, fs, turn = share * force[0, i], share * force[1, i], share * force[2, i]
         _add_force(px, py, pz, fx, fs * cosine, fs * sine, friction)
         friction[4] -= turn * sine

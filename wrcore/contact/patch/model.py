@@ -15,11 +15,30 @@ from wrcore.contact.patch.solve import EXACT, STRIP_ROWS, STRIPS, SUMS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError, one_of
 
-PATCHES = ("maximum", "moment", "strips", "exact")
+PATCHES = ("maximum", "moment", "strips", "exact", "tabulated")
 """Patch models by name: two reductions to an ellipse, cheap and exact strips."""
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
+
+
+class PairTable(NamedTuple):
+    """Exact contact of a wheel on its rail at the nodes of a lattice, see `wrcore.dynamics.pair_table`; empty where it
+    is not looked up."""
+
+    cells: np.ndarray
+    """(2, ...) uint8: EMPTY, READY or HARD, by a cell's first corner; of tread and flange."""
+    nodes: np.ndarray
+    """(2, ..., 3, NUMBERS) float32: without yaw, and with it to the left and to the right."""
+    modes: np.ndarray
+    """(n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages."""
+    fill: int
+    """Address of what solves a cell's nodes."""
+
+
+NO_TABLE = PairTable(np.zeros((0,) * 4, np.uint8), np.zeros((0,) * 6, np.float32), np.zeros((0,) * 3, np.float32), 0)
+NUMBERS, MODES = 32, 16
+"""Numbers of a node, and modes of the creep force that are among them."""
 
 
 class StripModel(NamedTuple):
@@ -33,6 +52,8 @@ class StripModel(NamedTuple):
     """1: the rolling problem is solved on the strips, 0: the scene's creep law at the ellipse of equal moments."""
     surfaces: int
     """1: rigid slip of the surfaces, strip by strip; 0: one set of creepages."""
+    looked_up: float
+    """Coefficient of friction of the pair's table in which patches are looked up; 0: they are solved."""
     values: np.ndarray
     """Of the `InfluenceTable`."""
     library: Library
@@ -43,6 +64,9 @@ class StripModel(NamedTuple):
     """Resolution of slender patches."""
     fallback: int = 0
     """Address of the kernel that solves a patch on a grid."""
+    table: PairTable = NO_TABLE
+    group: int = 0
+    """Address of the kernel that looks a patch up in the table; 0: it is solved."""
 
 
 class StripWork(NamedTuple):
@@ -64,6 +88,9 @@ class StripWork(NamedTuple):
     sums: np.ndarray
     solved: np.ndarray
     """(2,) int: strips of the last solution, and 1 if they are slender."""
+    numbers: np.ndarray
+    modes: np.ndarray
+    """(NUMBERS,) and (3 MODES,): of a patch that is looked up."""
     normal: normal_strips.Workspace
     rolling: RollingWork
     slender: RollingWork
@@ -80,22 +107,23 @@ def _emptied(part):
     return np.zeros((0,) * part.ndim, part.dtype) if isinstance(part, np.ndarray) else part
 
 
-def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28):
+def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0.3):
     """`StripModel` of a scene's ``patch`` (of `PATCHES`), resolution (8, 12 or 16 strips of a window) and ``slip`` (of
-    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio. InputError for an unknown name.
+    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio, ``friction`` the coefficient of a
+    table. InputError for an unknown name.
     """
     named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
     for name, (value, known) in named.items():
         if value not in known:
             raise InputError("contact", name, one_of(known, value))
-    return _strip_model(patch, resolution, slip, float(nu))
+    return _strip_model(patch, resolution, slip, float(nu), float(friction) if patch == "tabulated" else 0.0)
 
 
 @lru_cache(maxsize=8)
-def _strip_model(patch, resolution, slip, nu):
-    if patch not in ("strips", "exact"):
-        return StripModel(0, 0, 0, 0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
-    exact, level = patch == "exact", LEVELS[resolution]
+def _strip_model(patch, resolution, slip, nu, friction):
+    if patch in ("maximum", "moment"):
+        return StripModel(0, 0, 0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
+    exact, level = patch != "strips", LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
     libraries = (make_library(each, nu) if exact else _no_library(nu) for each in (*levels, LEVELS["slender"]))
     return StripModel(
@@ -103,6 +131,7 @@ def _strip_model(patch, resolution, slip, nu):
         EXACT if exact else STRIPS,
         int(exact),
         int(slip == "surfaces"),
+        friction,
         influence_table().values,
         *libraries,
     )
@@ -119,7 +148,7 @@ def strip_work(model, wheelsets):
         np.zeros((*wheels, normal_strips.MEMORY)), np.zeros(normal_strips.MEMORY),
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
-        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64), np.zeros(NUMBERS), np.zeros(3 * MODES),
         normal,
         *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip

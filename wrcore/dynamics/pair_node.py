@@ -1,0 +1,185 @@
+"""A node of a `PairTable`: exact contact of a wheel at a place over its rail, reduced to some numbers."""
+
+import math
+
+import numpy as np
+
+from wrcore.contact.detection import find_patches
+from wrcore.contact.normal import contact_modulus
+from wrcore.contact.patch import solve
+from wrcore.contact.patch.gap import group_end, material_point
+from wrcore.contact.patch.strips import WEIGHT, WIDENED
+from wrcore.contact.patch.windows import MORE
+from wrcore.contact.reduction import MOMENT
+from wrcore.contact.strip import make_pose
+from wrcore.creep.kalker import coefficients_at
+from wrcore.creep.laws import LAWS, creep_forces
+from wrcore.dynamics import pair_table as columns
+from wrcore.dynamics.pair_table import NUMBERS, depth_of, round_part
+from wrcore.dynamics.motion import WheelMotion
+from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
+from wrcore.kernels.jit import jit
+
+SUMS = 13
+PROBE = 0.06
+"""Creepages, over those of saturation, between which the slopes at rest are taken."""
+
+AT_REST = PROBE * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0, 0]])
+"""Creepages with which slopes and force at rest are found."""
+
+
+@jit(allocates=False)
+def overlaps_at(geometry, y, z, ex, ey, ez, flange, rows):
+    """First and end of the tread's or the flange's overlaps, and their depth D; 0, 0, 0 where there are none."""
+    count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
+    first = 0
+    while first < count:
+        last = group_end(rows, count, first)
+        depth, steep = depth_of(rows, first, last)
+        if steep == flange:
+            return first, last, depth
+        first = last
+    return 0, 0, 0.0
+
+
+@jit(allocates=False)
+def height_of(geometry, y, ex, ey, ez, depth, flange, rows):
+    """Height of the wheelset's centre at which the overlaps have a depth D (Illinois steps); NaN if there is none."""
+    z, low, high, e_low, e_high = geometry.rolling_radius - geometry.half_distance * ez, np.nan, np.nan, 0.0, 0.0
+    last, step = 0, 2e-5
+    for _ in range(80):
+        e = overlaps_at(geometry, y, z, ex, ey, ez, flange, rows)[2] - depth
+        if abs(e) < 1e-9 * depth:
+            return z
+        if e > 0.0:
+            low, e_low = z, e
+            if last > 0:
+                e_high *= 0.5
+        else:
+            high, e_high = z, e
+            if last < 0:
+                e_low *= 0.5
+        if math.isnan(low) or math.isnan(high):
+            z, step = z + (step if e > 0.0 else -step), 2.0 * step
+            continue
+        last = 1 if e > 0.0 else -1
+        z = low + (high - low) * e_low / (e_low - e_high)
+        if high - low < 1e-14:
+            return z
+    return np.nan
+
+
+@jit(allocates=False)
+def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters, work):
+    """Exact solution of a left wheel's pose for several velocities (n, 6) of its wheelset, linear and angular: the mean
+    of those with less and with more strips.
+
+    Fills ``forces`` (n, 6), wrenches of friction about the wheelset's centre at V = 1 m/s, and ``sums`` (SUMS,):
+    wrench of pressure, place of the slip from the centre, semi-axes, p_max, and height over the rail's surface. Returns
+    whether strips found a solution.
+    """
+    finer, share, geometry, (ex, ey, ez) = work.normal.more, 0.0, model.geometry, axle
+    first, last, _ = overlaps_at(geometry, y, z, ex, ey, ez, flange, work.rows)
+    if first == last:
+        return False
+    pose = make_pose(1.0, y, z, ex, ey, ez, True)
+    sums[:] = 0.0
+    forces[:] = 0.0
+    for turn in range(2):
+        finer[WIDENED], work.spare[0] = MORE if turn else 1.0, 0.0
+        windows, frame = solve_overlaps(model, pose, first, last, work.spare, work)
+        finer[WIDENED] = 1.0
+        if windows == 0:
+            return False
+        if turn == 0:
+            share = finer[WEIGHT]
+        weight = share if turn else 1.0 - share
+        for k in range(len(velocities)):
+            v = velocities[k]
+            m = WheelMotion(1.0, y, z, ex, ey, ez, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
+            for q in range(6):
+                work.wrench[0, q] = work.wrench[1, q] = 0.0
+            found = roll_patch(model, m, pose, frame, windows, 0.0, 1.0, model.friction, 1.0, counters, work)
+            for q in range(6):
+                forces[k, q] += weight * work.wrench[1, q]
+        for i in range(work.normal.start[windows]):
+            height, part = work.strips[solve.WHEEL_HEIGHT, i], weight * work.strips[solve.STRIP_LOAD, i] / found.load
+            px, py, pz, _, _ = material_point(
+                geometry, pose, frame, work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i], height,
+                work.strips[solve.STRIP_TILT, i],
+            )  # fmt: skip
+            sums[6], sums[7], sums[8], sums[12] = (
+                sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz, sums[12] + part * height
+            )  # fmt: skip
+        for q in range(6):
+            sums[q] += weight * work.wrench[0, q]
+        sums[9], sums[10], sums[11] = sums[9] + weight * found.a, sums[10] + weight * found.b, sums[11] + weight * found.p_max
+        if not share > 0.0:
+            break
+    return True
+
+
+def solve_node(model, handle, work, t, slope, depth, yaw, flange, modes, numbers):
+    """Fill ``numbers`` (NUMBERS,) with those of a place; returns whether there is a solution.
+
+    ``model``: the `ContactModel`, and its handle; ``work``: handle of a `StripWork`; ``modes``: `Modes`.
+    """
+    geometry, counters, sums = model.geometry, np.zeros(8, np.int64), np.zeros(SUMS)
+    half, radius = geometry.half_distance, geometry.rolling_radius
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
+    y = t + geometry.rail_distance - half * axle[1]
+    z = height_of(geometry, y, *axle, depth, flange, work.value.rows)
+    if math.isnan(z):
+        return False
+
+    def forces_at(velocities):
+        forces = np.zeros((len(velocities), 6))
+        return forces if solve_motions(handle, y, z, tuple(axle), flange, velocities, forces, sums, counters, work) else None
+
+    if forces_at(np.array([[1.0, 0.0, 0.0, *(axle / radius)]])) is None:
+        return False
+    place, (a, b), normal = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])
+    cosine, sine = sums[2] / normal, -sums[1] / normal
+    numbers[:] = 0.0
+    numbers[columns.LOG_NORMAL] = math.log(normal / (modulus * depth**1.5))
+    numbers[columns.ANGLE], numbers[columns.HEIGHT] = math.atan2(sine, cosine), sums[12]
+    numbers[columns.PLACE_X : columns.PLACE_Z + 1] = place - half * axle + [0.0, 0.0, radius]
+    numbers[[columns.LOG_A, columns.LOG_B, columns.LOG_PEAK]] = np.log([a, b, sums[11] / modulus])
+    # rolling without slip in the mean, and what is added to it
+    turning = axle / (axle[2] * place[1] - axle[1] * place[2])
+    drift = np.cross(turning, place)
+    free = np.array([1.0, -(drift[1] * cosine + drift[2] * sine) / cosine, 0.0, *turning])
+    c, limit, log_g = math.sqrt(a * b), model.friction * normal, math.log(a / b)
+    c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
+    scale, spin = model.shear_modulus * c * c / limit, turning[2] * cosine - turning[1] * sine
+
+    def exact_and_table(points, factors):
+        """Forces (n, 3) at creepages over those of saturation, exact and from the table with factors."""
+        xi, eta = (3.0 * points / (np.array([c11, c22]) * np.array(factors))).T
+        found = forces_at(free + np.stack([xi / scale, eta / (scale * cosine), *np.zeros((4, len(xi)))], axis=1))
+        if found is None:
+            return None
+        moment = found[:, 3:] - np.cross(place, found[:, :3])
+        force, table = found[:, 1] * cosine + found[:, 2] * sine, np.zeros((len(xi), 3))
+        turn = (moment[:, 2] * cosine - moment[:, 1] * sine) / c
+        case = np.full(len(xi), math.exp(log_g)), np.zeros(len(xi))
+        creepages = np.stack([factors[0] * xi, factors[1] * eta, np.full(len(xi), spin * scale * c)], axis=1)
+        creep_forces(LAWS["table"], model.creep, *case, creepages, table)
+        return np.stack([found[:, 0], force, turn], axis=1) / limit, table
+
+    found = exact_and_table(AT_REST, (1.0, 1.0))
+    if found is None:
+        return False
+    exact, table = found
+    factors = np.clip([(exact[k, q] - exact[k + 1, q]) / (table[k, q] - table[k + 1, q]) for k, q in ((0, 0), (2, 1))],
+                      0.5, 2.0)  # fmt: skip
+    numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
+    rest = exact[4] - table[4]
+    found = exact_and_table(modes.points, factors)
+    if found is None:
+        return False
+    remainder = found[0] - found[1] - (1.0 - modes.weights)[:, None] * rest
+    numbers[columns.FORCE : columns.MODE] = rest
+    numbers[columns.MODE : columns.MODE + columns.MODES] = modes.inverse @ remainder.ravel()
+    return bool(np.isfinite(numbers).all())

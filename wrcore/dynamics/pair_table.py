@@ -1,0 +1,172 @@
+"""Exact contact, looked up: a lattice of solutions of one wheel on one rail, solved where it is first needed.
+
+A wheel's place over its own rail decides its patch: t, the distance of its tape circle from the rail's origin across
+the track; the slope of its axle; its yaw; and the depth D that the overlaps of the patch imply,
+
+    M0 = sum of int g^2 ds,   D = (15/16 sqrt(B0) M0)^0.4,
+
+which stays smooth where overlaps merge. Between nodes: Catmull-Rom in t, slope and ln D at no yaw; what yaw changes, a
+parabola through three nodes, is linear in the other three. A node depends on its place alone, not on what was solved
+before it.
+
+A node's numbers (`NUMBERS`) give the normal problem, and the creep force: the creep table at the ellipse of equal
+moments, with the creepages scaled so that both slopes at rest are exact, and a remainder in fixed modes over the two
+creepages. Spin is no input of its own: a wheel that rolls has the spin of its contact angle, and the remainder is that
+of just this spin. It fades out where a wheel slides or stands.
+"""
+
+import math
+
+from wrcore.contact import reduction
+from wrcore.contact.patch.model import MODES, NUMBERS
+from wrcore.creep.kalker import coefficients_at
+from wrcore.creep.laws import LAWS, creep_force_at
+from wrcore.kernels.jit import FAST, FUSED, jit
+
+STEPS = 2e-4, 5e-4, 0.25
+"""Of the lattice in t (m), slope of the axle and ln D."""
+
+FIRST = -0.024, -0.02, math.log(4e-6)
+"""Its first places."""
+
+COUNTS = 141, 81, 20
+
+YAW = 0.015
+"""Nodes have yaw 0 and plus and minus this, rad; looked up is half as much again."""
+
+SPAN = 0.6
+"""Contact angle from which patches have a lattice of their own: those of the flange, rad."""
+
+CURVATURE = 2.0
+"""B0 of the depth D, 1/m."""
+
+(LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, HEIGHT, FORCE) = range(12)
+MODE = FORCE + 3
+"""A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
+plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages; height over the rail's
+surface (m); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage; and its coefficients of modes."""
+
+ROUND = 0.1
+"""Modes set in from this radius on in the disk of the creepages, where the slopes at rest shall stay what they are."""
+
+LOCKED = 0.3
+"""Deviation from free rolling at which the remainder has faded out."""
+
+EMPTY, READY, HARD = 0, 1, 2
+_TABLE = LAWS["table"]
+
+
+@jit(allocates=False)
+def depth_of(rows, first, last):
+    """D of the overlaps of a patch, m, and whether it is the flange's."""
+    deepest, angle, total = 0.0, 0.0, 0.0
+    for k in range(first, last):
+        d = rows[k, reduction.PENETRATION]
+        total += 16.0 / 15.0 * d * d * math.sqrt(d / rows[k, reduction.CURVATURE_Y])
+        if d > deepest:
+            deepest, angle = d, rows[k, reduction.ANGLE]
+    return (15.0 / 16.0 * math.sqrt(CURVATURE) * total) ** 0.4, abs(angle) > SPAN
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _weights(f):
+    """Catmull-Rom's weights of four nodes at f, 0 to 1 between the middle two."""
+    g = 1.0 - f
+    return -0.5 * f * g * g, 1.0 + f * f * (1.5 * f - 2.5), 1.0 + g * g * (1.5 * g - 2.5), -0.5 * g * f * f
+
+
+@jit(allocates=False, fastmath=FUSED)
+def cell_of(t, slope, depth, yaw):
+    """First corner of the cell of a place, its parts of a step beyond that, and whether it lies in the lattice."""
+    x, y = (t - FIRST[0]) / STEPS[0], (slope - FIRST[1]) / STEPS[1]
+    z = (math.log(depth) - FIRST[2]) / STEPS[2] if depth > 0.0 else 0.0
+    inside = 1.0 <= x < COUNTS[0] - 2 and 1.0 <= y < COUNTS[1] - 2 and 1.0 <= z < COUNTS[2] - 2
+    i, j, k = int(x), int(y), int(z)
+    return i, j, k, x - i, y - j, z - k, inside and abs(yaw) <= 1.5 * YAW
+
+
+@jit(allocates=False, fastmath=FAST)
+def look_up(lattice, i, j, k, fx, fy, fz, yaw, numbers):
+    """Fill ``numbers`` (NUMBERS,) at a place in a cell of a `lattice`, (*COUNTS, 3, NUMBERS)."""
+    wx, wy, (w0, w1, w2, w3) = _weights(fx), _weights(fy), _weights(fz)
+    for m in range(NUMBERS):
+        numbers[m] = 0.0
+    for a in range(4):
+        for b in range(4):
+            nodes, w = lattice[i - 1 + a, j - 1 + b], wx[a] * wy[b]
+            one, two, three, four = nodes[k - 1, 0], nodes[k, 0], nodes[k + 1, 0], nodes[k + 2, 0]
+            v0, v1, v2, v3 = w * w0, w * w1, w * w2, w * w3
+            for m in range(NUMBERS):
+                numbers[m] += v0 * one[m] + v1 * two[m] + v2 * three[m] + v3 * four[m]
+    s = yaw / YAW
+    odd, even = 0.5 * s, 0.5 * s * s
+    for a in range(2):
+        for b in range(2):
+            nodes, w = lattice[i + a, j + b], (fx if a else 1.0 - fx) * (fy if b else 1.0 - fy)
+            for c in range(2):
+                v = w * (fz if c else 1.0 - fz)
+                left, right, middle = v * (even + odd), v * (even - odd), v * s * s
+                one, two, three = nodes[k + c, 0], nodes[k + c, 1], nodes[k + c, 2]
+                for m in range(NUMBERS):
+                    numbers[m] += left * two[m] + right * three[m] - middle * one[m]
+
+
+@jit(allocates=False, forceinline=True)
+def round_part(square):
+    """Weight of the modes at the square of a radius in the disk."""
+    return square / (square + ROUND * ROUND)
+
+
+@jit(allocates=False, fastmath=FAST)
+def _remainder(modes, numbers, x, y, sums):
+    """Remainder of Fx, Fy, Mz at creepages over those of saturation; ``sums`` is scratch."""
+    cells, root = modes.shape[0] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
+    p, q = x * root, y * root
+    weight = round_part(p * p + q * q)
+    u, v = 0.5 * (p + 1.0) * cells, 0.5 * (q + 1.0) * cells
+    i, j = min(int(u), cells - 1), min(int(v), cells - 1)
+    f, g = u - i, v - j
+    b0, b1, b2 = 0.5 * (1.0 - g) * (1.0 - g), 0.5 + g * (1.0 - g), 0.5 * g * g
+    for m in range(3 * MODES):
+        sums[m] = 0.0
+    for r in range(3):
+        a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
+        one, two, three = modes[i + r, j], modes[i + r, j + 1], modes[i + r, j + 2]
+        a0, a1, a2 = a * b0, a * b1, a * b2
+        for m in range(3 * MODES):
+            sums[m] += a0 * one[m] + a1 * two[m] + a2 * three[m]
+    fx = fy = mz = 0.0
+    for m in range(MODES):
+        c = numbers[MODE + m]
+        fx, fy, mz = fx + c * sums[m], fy + c * sums[MODES + m], mz + c * sums[2 * MODES + m]
+    rest = 1.0 - weight
+    return (
+        rest * numbers[FORCE] + weight * fx, rest * numbers[FORCE + 1] + weight * fy,
+        rest * numbers[FORCE + 2] + weight * mz,
+    )  # fmt: skip
+
+
+@jit(allocates=False, fastmath=FUSED)
+def base_force(model, log_a, log_b, limit, xi, eta, phi):
+    """Creep force of the table at an ellipse, over mu N and mu N c; creepages over those of saturation; look-ups
+    missed; c."""
+    square, log_g = math.exp(log_a + log_b), log_a - log_b
+    c, scale = math.sqrt(square), model.shear_modulus * square / limit
+    f1, f2, m3, missed = creep_force_at(
+        _TABLE, model.creep, log_g, math.exp(log_g), 0.0, xi * scale, eta * scale, phi * scale * c
+    )
+    c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
+    return f1, f2, m3, xi * scale * c11 / 3.0, eta * scale * c22 / 3.0, missed, c
+
+
+@jit(allocates=False, fastmath=FUSED)
+def tabulated_force(model, modes, numbers, xi, eta, phi, limit, turning, sums):
+    """Creep force Fx, Fy (N), Mz (N m) from a node's numbers, and look-ups missed. ``turning``: of the wheel's rate of
+    rolling over that of free rolling, less 1."""
+    part = turning / LOCKED
+    fade = max(0.0, 1.0 - part * part)
+    fade *= fade
+    lx, ly = 1.0 + fade * (numbers[SLOPE_XI] - 1.0), 1.0 + fade * (numbers[SLOPE_ETA] - 1.0)
+    f1, f2, m3, x, y, missed, c = base_force(model, numbers[LOG_A], numbers[LOG_B], limit, lx * xi, ly * eta, phi)
+    r1, r2, r3 = _remainder(modes, numbers, x, y, sums)
+    return limit * (f1 + fade * r1), limit * (f2 + fade * r2), limit * c * (m3 + fade * r3), missed
