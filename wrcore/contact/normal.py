@@ -109,19 +109,6 @@ def hertz_ellipse(table, A, B):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def loaded_ellipse(table, modulus, factor, penetration, A, B):
-    """Normal force (N) by Eq. (7) with a damping factor c_d, semi-axes (m) of the ellipse that carries it, their ratio
-    a/b and its logarithm, for relative curvatures A and B (1/m)."""
-    stiffness, a, b, log_axis_ratio = hertz_shape_at(table, A, B)
-    root = math.sqrt(penetration)
-    force = factor * modulus * stiffness * penetration * root
-    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
-    inverse = inverse_cube_root(factor)
-    root *= factor * inverse * inverse
-    return force, a * root, b * root, a / b, log_axis_ratio
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def damping_factor(approach_speed, c_e, v0):
     """Damping factor c_d of Eq. (7) at an approach speed (m/s): c_e (0 to 1; 1: no damping) when separating, 1 when
     approaching, a cubic in |speed| < v0 (m/s).
@@ -150,3 +137,17 @@ def inverse_cube_root(x):
         rest = 1.0 - x * y * y * y
         y += y * rest * (1.0 / 3.0 + rest * (2.0 / 9.0 + rest * (14.0 / 81.0)))
     return y
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def loaded_ellipse(table, modulus, c_e, v0, penetration, A, B, approach_speed):
+    """Normal force (N) by Eq. (7), semi-axes (m) of the ellipse that carries it, their ratio a/b and its logarithm, for
+    relative curvatures A and B (1/m); ``c_e`` and ``v0`` of `damping_factor`."""
+    stiffness, a, b, log_axis_ratio = hertz_shape_at(table, A, B)
+    factor = damping_factor(approach_speed, c_e, v0)
+    root = math.sqrt(penetration)
+    force = factor * modulus * stiffness * penetration * root
+    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
+    inverse = inverse_cube_root(factor)
+    root *= factor * inverse * inverse
+    return force, a * root, b * root, a / b, log_axis_ratio

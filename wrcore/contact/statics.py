@@ -30,7 +30,7 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, redu
     for k in range(count):
         row = patches[k]
         normal, row[columns.SEMI_A], row[columns.SEMI_B], _, _ = loaded_ellipse(
-            hertz, modulus, 1.0, row[columns.PENETRATION], row[columns.CURVATURE_X], row[columns.CURVATURE_Y]
+            hertz, modulus, 1.0, 1.0, row[columns.PENETRATION], row[columns.CURVATURE_X], row[columns.CURVATURE_Y], 0.0
         )
         row[columns.NORMAL] = normal
         force += normal * math.cos(row[columns.ANGLE])

@@ -7,7 +7,7 @@ from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
-from wrcore.contact.normal import HertzTable, damping_factor, loaded_ellipse
+from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
@@ -68,9 +68,10 @@ def shaped(contact):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """`normal_contact`, and a/b and its logarithm."""
-    factor = damping_factor(approach_speed, model.damping, model.damping_speed)
-    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
-    return loaded_ellipse(model.hertz, modulus, factor, penetration, curvature_x, curvature_y)
+    return loaded_ellipse(
+        model.hertz, model.shear_modulus / (1.0 - model.poisson_ratio), model.damping, model.damping_speed, penetration,
+        curvature_x, curvature_y, approach_speed,
+    )  # fmt: skip
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -151,10 +152,10 @@ def add_patches(model, motions, patches, counts, wrenches, counters, shaped):
     """Fill the ``wrenches`` of all wheels from the patches that were found, with their shape numbers if ``shaped``."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
-            m, wrench = motion_of(motions[i, wheel]), wrenches[i, wheel]
+            wrench = wrenches[i, wheel]
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
-                row = patches[i, wheel, k]
+                m, row = motion_of(motions[i, wheel]), patches[i, wheel, k]
                 psi = row[reduction.PSI] if shaped else 0.0
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(model, m, row, psi)
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
