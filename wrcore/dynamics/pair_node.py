@@ -15,8 +15,8 @@ from wrcore.contact.strip import make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import NUMBERS, depth_of, round_part
 from wrcore.dynamics.motion import WheelMotion
+from wrcore.dynamics.pair_table import NUMBERS, depth_of
 from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
@@ -113,73 +113,78 @@ def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters,
             )  # fmt: skip
         for q in range(6):
             sums[q] += weight * work.wrench[0, q]
-        sums[9], sums[10], sums[11] = sums[9] + weight * found.a, sums[10] + weight * found.b, sums[11] + weight * found.p_max
+        sums[9], sums[10], sums[11] = (
+            sums[9] + weight * found.a,
+            sums[10] + weight * found.b,
+            sums[11] + weight * found.p_max,
+        )
         if not share > 0.0:
             break
     return True
 
 
-def solve_node(model, handle, work, t, slope, depth, yaw, flange, modes, numbers):
-    """Fill ``numbers`` (NUMBERS,) with those of a place; returns whether there is a solution.
+def solve_place(contact, handle, work, place, points):
+    """Numbers of a node at a place, all but those of its modes, and the remainder (n, 3) of its creep force at
+    creepages (n, 2) over those of saturation; None where strips find no solution.
 
-    ``model``: the `ContactModel`, and its handle; ``work``: handle of a `StripWork`; ``modes``: `Modes`.
+    ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``work``: handle of a `StripWork`;
+    ``place``: t, slope of the axle, depth D, yaw, and whether it is the flange's.
     """
-    geometry, counters, sums = model.geometry, np.zeros(8, np.int64), np.zeros(SUMS)
-    half, radius = geometry.half_distance, geometry.rolling_radius
-    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    (t, slope, depth, yaw, flange), geometry = place, contact.geometry
+    half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
     axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
     y = t + geometry.rail_distance - half * axle[1]
     z = height_of(geometry, y, *axle, depth, flange, work.value.rows)
     if math.isnan(z):
-        return False
+        return None
+    sums, counters = np.zeros(SUMS), np.zeros(4, np.int64)
 
     def forces_at(velocities):
         forces = np.zeros((len(velocities), 6))
-        return forces if solve_motions(handle, y, z, tuple(axle), flange, velocities, forces, sums, counters, work) else None
+        return solve_motions(handle, y, z, tuple(axle), flange, velocities, forces, sums, counters, work), forces
 
-    if forces_at(np.array([[1.0, 0.0, 0.0, *(axle / radius)]])) is None:
-        return False
-    place, (a, b), normal = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])
+    if not forces_at(np.array([[1.0, 0.0, 0.0, *(axle / radius)]]))[0]:
+        return None
+    slip, (a, b), normal = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])
     cosine, sine = sums[2] / normal, -sums[1] / normal
-    numbers[:] = 0.0
+    numbers = np.zeros(NUMBERS)
     numbers[columns.LOG_NORMAL] = math.log(normal / (modulus * depth**1.5))
     numbers[columns.ANGLE], numbers[columns.HEIGHT] = math.atan2(sine, cosine), sums[12]
-    numbers[columns.PLACE_X : columns.PLACE_Z + 1] = place - half * axle + [0.0, 0.0, radius]
+    numbers[columns.PLACE_X : columns.PLACE_Z + 1] = slip - half * axle + [0.0, 0.0, radius]
     numbers[[columns.LOG_A, columns.LOG_B, columns.LOG_PEAK]] = np.log([a, b, sums[11] / modulus])
-    # rolling without slip in the mean, and what is added to it
-    turning = axle / (axle[2] * place[1] - axle[1] * place[2])
-    drift = np.cross(turning, place)
+    # what is added to rolling without slip in the mean, over the creepages of saturation
+    turning = axle / (axle[2] * slip[1] - axle[1] * slip[2])
+    drift = np.cross(turning, slip)
     free = np.array([1.0, -(drift[1] * cosine + drift[2] * sine) / cosine, 0.0, *turning])
-    c, limit, log_g = math.sqrt(a * b), model.friction * normal, math.log(a / b)
-    c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
-    scale, spin = model.shear_modulus * c * c / limit, turning[2] * cosine - turning[1] * sine
+    c, limit, spin = math.sqrt(a * b), contact.friction * normal, turning[2] * cosine - turning[1] * sine
+    kalker = coefficients_at(math.log(a / b), contact.creep.table.kalker)[:2]
+    unit = contact.shear_modulus * c * c / limit
 
     def exact_and_table(points, factors):
-        """Forces (n, 3) at creepages over those of saturation, exact and from the table with factors."""
-        xi, eta = (3.0 * points / (np.array([c11, c22]) * np.array(factors))).T
-        found = forces_at(free + np.stack([xi / scale, eta / (scale * cosine), *np.zeros((4, len(xi)))], axis=1))
-        if found is None:
-            return None
-        moment = found[:, 3:] - np.cross(place, found[:, :3])
-        force, table = found[:, 1] * cosine + found[:, 2] * sine, np.zeros((len(xi), 3))
-        turn = (moment[:, 2] * cosine - moment[:, 1] * sine) / c
-        case = np.full(len(xi), math.exp(log_g)), np.zeros(len(xi))
-        creepages = np.stack([factors[0] * xi, factors[1] * eta, np.full(len(xi), spin * scale * c)], axis=1)
-        creep_forces(LAWS["table"], model.creep, *case, creepages, table)
-        return np.stack([found[:, 0], force, turn], axis=1) / limit, table
+        """Forces (n, 3) of both, over mu N and mu N c; the table's creepages are those times factors."""
+        creepages = 3.0 * points / (kalker * factors)
+        velocities = np.tile(free, (len(points), 1))
+        velocities[:, :2] += creepages / (unit * np.array([1.0, cosine]))
+        solved, found = forces_at(velocities)
+        moment, table = found[:, 3:] - np.cross(slip, found[:, :3]), np.zeros((len(points), 3))
+        across, turn = found[:, 1] * cosine + found[:, 2] * sine, moment[:, 2] * cosine - moment[:, 1] * sine
+        scaled = np.column_stack([creepages * factors, np.full(len(points), spin * unit * c)])
+        creep_forces(LAWS["table"], contact.creep, np.full(len(points), a / b), np.zeros(len(points)), scaled, table)
+        return solved, np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
 
-    found = exact_and_table(AT_REST, (1.0, 1.0))
-    if found is None:
-        return False
-    exact, table = found
-    factors = np.clip([(exact[k, q] - exact[k + 1, q]) / (table[k, q] - table[k + 1, q]) for k, q in ((0, 0), (2, 1))],
-                      0.5, 2.0)  # fmt: skip
-    numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
-    rest = exact[4] - table[4]
-    found = exact_and_table(modes.points, factors)
-    if found is None:
-        return False
-    remainder = found[0] - found[1] - (1.0 - modes.weights)[:, None] * rest
-    numbers[columns.FORCE : columns.MODE] = rest
-    numbers[columns.MODE : columns.MODE + columns.MODES] = modes.inverse @ remainder.ravel()
-    return bool(np.isfinite(numbers).all())
+    solved, exact, table = exact_and_table(AT_REST, np.ones(2))
+    slopes = (
+        [(force[0] - force[1])[0] for force in (exact, table)],
+        [(force[2] - force[3])[1] for force in (exact, table)],
+    )
+    factors = np.clip([of_exact / of_table for of_exact, of_table in slopes], 0.5, 2.0)
+    numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1], numbers[columns.FORCE : columns.MODE] = (
+        factors,
+        exact[4] - table[4],
+    )
+    solved_too, exact, table = exact_and_table(points, factors)
+    return (numbers, exact - table) if solved and solved_too and np.isfinite(exact).all() else None
+
+
+def _modulus(contact):
+    return contact_modulus(contact.shear_modulus, contact.poisson_ratio)

@@ -2,14 +2,14 @@
 
 What a table's numbers depend on (both surfaces and their places, material, friction, strips, creep table, modes, and
 the sources of all kernels) is in its file's name. A node depends on its place alone, and whether a cell may be looked
-up on its nodes and on an exact solution in its middle: a run gives the same numbers on a full table and on an empty one.
+up on its nodes and on an exact solution in its middle: a run gives the same numbers on a full table and on an empty
+one.
 """
 
 import atexit
 import ctypes
 import hashlib
 import math
-import sys
 import time
 from functools import cache
 from pathlib import Path
@@ -63,7 +63,7 @@ class Pair:
     """The table of a `ContactModel` with exact patches and one pair of profiles."""
 
     def __init__(self, contact, digest):
-        self.path, self._contact, self._lock, self._tools = table_folder() / f"pair_{digest}.h5", contact, Lock(), None
+        self.path, self.contact, self._lock, self._tools = table_folder() / f"pair_{digest}.h5", contact, Lock(), None
         self._cells, self._nodes = np.zeros((2, *COUNTS), np.uint8), np.zeros((2, *COUNTS, 3, NUMBERS), np.float32)
         self._known = np.zeros((2, *COUNTS, 3), np.uint8)
         self._told, self._new, self._spent, self._written, self.misses = False, 0, 0.0, time.monotonic(), {}
@@ -77,7 +77,8 @@ class Pair:
 
     def table(self):
         """`PairTable` for kernels, which keeps the pair alive."""
-        return PairTable(np.asarray(self), self._nodes, creep_modes().values, ctypes.cast(self._call, ctypes.c_void_p).value)
+        address = ctypes.cast(self._call, ctypes.c_void_p).value
+        return PairTable(np.asarray(self), self._nodes, creep_modes().values, address)
 
     def _fill(self, *cell):
         """Solve what a cell needs; kernels call this."""
@@ -111,15 +112,22 @@ class Pair:
 
     def _at(self, branch, i, j, k, yaw):
         """Numbers of a place in steps of the lattice; NaN where there is no solution."""
-        from wrcore.dynamics.pair_node import solve_node
+        modes, (t, slope, log_depth) = creep_modes(), np.array(FIRST) + np.array(STEPS) * (i, j, k)
+        found = self.solve((t, slope, math.exp(log_depth), yaw, bool(branch)), modes.points)
+        if found is None:
+            return np.full(NUMBERS, np.nan)
+        numbers, remainder = found
+        remainder -= (1.0 - modes.weights)[:, None] * numbers[columns.FORCE : columns.MODE]
+        numbers[columns.MODE : columns.MODE + MODES] = modes.inverse @ remainder.ravel()
+        return numbers
+
+    def solve(self, place, points):
+        """`solve_place` with the pair's own scratch arrays."""
+        from wrcore.dynamics.pair_node import solve_place
 
         if self._tools is None:
-            self._tools = Handle(self._contact), Handle(strip_work(self._contact.strips, 1))
-        numbers, (t, slope, log_depth) = np.empty(NUMBERS), np.array(FIRST) + np.array(STEPS) * (i, j, k)
-        place = t, slope, math.exp(log_depth), yaw, bool(branch)
-        if not solve_node(self._contact, *self._tools, *place, creep_modes(), numbers):
-            numbers[:] = math.nan
-        return numbers
+            self._tools = Handle(self.contact), Handle(strip_work(self.contact.strips, 1))
+        return solve_place(self.contact, *self._tools, place, points)
 
     def _miss(self, branch, i, j, k):
         """Errors in the middle of a cell: of N, and of the creep force over mu N at rest and where modes are found."""
@@ -142,7 +150,9 @@ class Pair:
                     numbers, misses = file["numbers"][...], file["misses"][...]
                 self._nodes[tuple(places[:, :5].T)], self._known[tuple(places[:, :5].T)] = numbers, places[:, 5]
                 self._cells[tuple(cells[:, :4].T)] = cells[:, 4]
-                self.misses |= {tuple(map(int, cell[:4])): tuple(miss) for cell, miss in zip(cells, misses, strict=True)}
+                self.misses |= {
+                    tuple(map(int, cell[:4])): tuple(miss) for cell, miss in zip(cells, misses, strict=True)
+                }
             except (InputError, IndexError) as error:
                 warn(f"{error}; it is solved anew")
 

@@ -118,7 +118,7 @@ def round_part(square):
 
 
 @jit(allocates=False, fastmath=FAST)
-def _remainder(modes, numbers, x, y, sums):
+def remainder(modes, numbers, x, y, sums):
     """Remainder of Fx, Fy, Mz at creepages over those of saturation; ``sums`` is scratch."""
     cells, root = modes.shape[0] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
     p, q = x * root, y * root
@@ -168,5 +168,5 @@ def tabulated_force(model, modes, numbers, xi, eta, phi, limit, turning, sums):
     fade *= fade
     lx, ly = 1.0 + fade * (numbers[SLOPE_XI] - 1.0), 1.0 + fade * (numbers[SLOPE_ETA] - 1.0)
     f1, f2, m3, x, y, missed, c = base_force(model, numbers[LOG_A], numbers[LOG_B], limit, lx * xi, ly * eta, phi)
-    r1, r2, r3 = _remainder(modes, numbers, x, y, sums)
+    r1, r2, r3 = remainder(modes, numbers, x, y, sums)
     return limit * (f1 + fade * r1), limit * (f2 + fade * r2), limit * c * (m3 + fade * r3), missed

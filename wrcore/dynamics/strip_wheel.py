@@ -293,9 +293,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
     wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
     speed, windows = max(abs(m.vx), model.least_speed), 0
-    pose, low, high, frame, depth, creepage, friction = lifted_overlaps(
-        model, m, spatial, rows, first, last, out, work
-    )
+    pose, low, high, frame, depth, creepage, friction = lifted_overlaps(model, m, spatial, rows, first, last, out, work)
     if depth > 0.0:
         if high == low:
             out[reduction.NORMAL] = 0.0

@@ -292,8 +292,8 @@ def with_look_up(contact, work):
 
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
     kernel = Kernel(
-        add_tabulated, Kind(contact._replace(geometries=())), m, True, np.zeros((1, PATCH_COLUMNS)), 0, 0, row, np.zeros(6),
-        np.zeros(4, np.int64), row, Kind(work),
+        add_tabulated, Kind(contact._replace(geometries=())), m, True, row[None], 0, 0, row, row, np.zeros(4, np.int64),
+        row, Kind(work),
     )  # fmt: skip
     return contact._replace(strips=contact.strips._replace(group=kernel.address))
 

@@ -16,8 +16,8 @@ from wrcore.kernels.handles import call_address, one_of
 from wrcore.kernels.jit import FUSED, jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED = range(4)
-"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, and patches of
-a pair's table that were solved instead of looked up."""
+"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, and patches
+of a pair's table that were solved instead of looked up."""
 
 
 class ContactModel(NamedTuple):

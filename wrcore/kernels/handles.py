@@ -247,7 +247,10 @@ def call_c(_, address, *numbers):
         count = len(call.args[1])
         kind = ir.FunctionType(ir.VoidType(), [ir.IntType(64)] * count)
         pointer = builder.inttoptr(values[0], kind.as_pointer())
-        handed = [context.cast(builder, builder.extract_value(values[1], k), call.args[1][k], types.int64) for k in range(count)]
+        handed = [
+            context.cast(builder, builder.extract_value(values[1], k), call.args[1][k], types.int64)
+            for k in range(count)
+        ]
         builder.call(pointer, handed)
         return context.get_dummy_value()
 

@@ -267,10 +267,12 @@ def announce(text):
 
 
 def _creep(scene, progress):
-    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table."""
-    creep, nu = scene.data["contact"]["creep"], scene.data["contact"]["material"]["poisson_ratio"]
-    if creep["model"] != "table":
-        return creep_data(nu, factors=(creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))))
+    """Data of the scene's creep law; only the law ``table`` and patches that are looked up load (or build) a table."""
+    contact = scene.data["contact"]
+    creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
+    factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
+    if creep["model"] != "table" and contact["patch"] != "tabulated":
+        return creep_data(nu, factors=factors)
     if "table" in creep:
         table = load_table(creep["table"])
     else:
@@ -283,7 +285,7 @@ def _creep(scene, progress):
             "contact.creep.table",
             f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}",
         )
-    return creep_data(nu, table.kernel_data())
+    return creep_data(nu, table.kernel_data(), factors=factors)
 
 
 def compile_scene(
@@ -319,12 +321,14 @@ def compile_scene(
         vehicle.bodies,
         ContactModel(
             geometry, hertz_table(), LAWS[contact["creep"]["model"]],
-            _once(shared, "creep", (*contact["creep"].values(), *material.values()), lambda: _creep(scene, progress)),
+            _once(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
+                  lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
             float(material["shear_modulus"]), float(material["poisson_ratio"]), friction.largest,
             float(damping["c_e"]), float(damping["v0"]), float(contact["creep"]["least_speed"]),
-            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"], friction.largest),
+            strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"],
+                        friction.largest),
             friction.ratio, friction.decay,
             tuple(pair.geometry for pair in scene.pairs),
         ),

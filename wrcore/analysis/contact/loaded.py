@@ -43,8 +43,10 @@ from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
 from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
+from wrcore.dynamics.pair_store import with_pair
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
 from wrcore.dynamics.system import with_fallback
+from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
@@ -130,8 +132,9 @@ class LoadedWheels:
         self.geometry, self.spatial, self.always = geometry, detection == "spatial", model == "grid"
         self.shear_modulus, self.poisson_ratio = float(shear_modulus), float(poisson_ratio)
         self.modulus, self.surfaces = contact_modulus(self.shear_modulus, self.poisson_ratio), slip == "surfaces"
+        self.tabulated = model == "tabulated"
         self.grids = GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
-        strips = strip_model("exact" if self.always else model, resolution, slip, self.poisson_ratio)
+        strips = strip_model("exact" if self.always or self.tabulated else model, resolution, slip, self.poisson_ratio)
         self._work = strip_work(strips, 1)
         contact = ContactModel(
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
@@ -140,7 +143,7 @@ class LoadedWheels:
         if strips.strips:
             contact = with_fallback(contact)
         self._still = contact._replace(strips=contact.strips._replace(rolling=0))
-        self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), None
+        self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), {}
         self._exact = contact if strips.rolling else None
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(4, np.int64)
 
@@ -151,7 +154,7 @@ class LoadedWheels:
         pose, motion, contact = (side, y, z, roll, yaw), None, self._still_handle
         if rolling is not None:
             motion = rolling.motion(roll, yaw, self._free_rate(pose, rolling))
-            contact = self._at_work()
+            contact = self._at_work(friction if self.tabulated and not fields else 0.0)
         elif fields and self._exact:
             contact, friction = self._at_work(), SMOOTH
         else:
@@ -162,12 +165,17 @@ class LoadedWheels:
                 one.row[columns.FX : columns.MZ + 1], one.row[columns.XI : columns.PHI + 1] = 0.0, math.nan
         return found
 
-    def _at_work(self):
-        """The contact that rolls: exact, or by the creep table."""
-        if self._rolling is None:
-            table = {} if self._exact else {"law": LAWS["table"], "creep": _table(self.poisson_ratio)}
-            self._rolling = Handle((self._exact or self._still)._replace(**table))
-        return self._rolling
+    def _at_work(self, looked_up=0.0):
+        """The contact that rolls: exact, by the creep table, or looked up in a pair's table for a coefficient of
+        friction."""
+        if looked_up not in self._rolling:
+            contact = self._exact or self._still
+            if looked_up or not self._exact:
+                contact = contact._replace(law=LAWS["table"], creep=_table(self.poisson_ratio))
+            if looked_up:
+                contact = with_pair(contact._replace(strips=contact.strips._replace(looked_up=float(looked_up))))
+            self._rolling[looked_up] = Handle(contact)
+        return self._rolling[looked_up]
 
     def _free_rate(self, pose, rolling):
         """The rate of rolling, or where none is given that of free rolling: the slip is linear in it."""
@@ -206,8 +214,9 @@ class LoadedWheels:
         while first < count:
             last, before = group_end(overlaps, count, first), self._counters[ON_GRID]
             work.spare[0] = 0.0
-            found = group_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench, self._counters,
-                                 work.spare, self._work_handle)  # fmt: skip
+            find = tabulated_wrench if contact.value.strips.looked_up else group_wrench
+            found = find(contact, left, self.spatial, overlaps, first, last, out[0], wrench, self._counters,
+                         work.spare, self._work_handle)  # fmt: skip
             x, sums = out[0, columns.X] - work.sums[MEAN_X], work.sums
             extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
             if sign < 0.0:

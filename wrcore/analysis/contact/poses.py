@@ -35,7 +35,7 @@ def loaded_poses(
     geometry : ContactGeometry
     wheel_load : float
         N per wheel, above 0 and up to 1e6.
-    patch : {"maximum", "moment", "strips", "exact", "grid"}
+    patch : {"maximum", "moment", "strips", "exact", "tabulated", "grid"}
     resolution, slip : str
         See `LoadedWheels`.
     load_by : {"vertical", "normal"}

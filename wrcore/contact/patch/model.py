@@ -109,8 +109,8 @@ def _emptied(part):
 
 def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0.3):
     """`StripModel` of a scene's ``patch`` (of `PATCHES`), resolution (8, 12 or 16 strips of a window) and ``slip`` (of
-    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio, ``friction`` the coefficient of a
-    table. InputError for an unknown name.
+    the real surfaces, or of one set of creepages per patch); ``nu`` is Poisson's ratio, ``friction`` the coefficient
+    of a table. InputError for an unknown name.
     """
     named = {"patch": (patch, PATCHES), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS)}
     for name, (value, known) in named.items():

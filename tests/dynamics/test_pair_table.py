@@ -1,0 +1,143 @@
+"""Exact contact, looked up: against the exact solver, its symmetries, and the same bits however full the table is."""
+
+import numpy as np
+import pytest
+
+import wrcore as wr
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.contact import reduction
+from wrcore.dynamics import pair_store, pair_table
+from wrcore.dynamics.pair_store import creep_modes
+from wrcore.dynamics.pair_table import YAW, look_up
+
+SPEED, Z = 20.0, 0.45973
+"""Rolling speed, m/s, and height of the wheelset, m."""
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    """Tables in a folder of their own, and none in memory."""
+    monkeypatch.setattr(pair_store, "table_folder", lambda: tmp_path)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    return tmp_path
+
+
+def test_what_is_linear_is_looked_up_exactly():
+    """And what depends on yaw as a parabola."""
+    i, j, k, yaw = np.meshgrid(*map(np.arange, (6, 6, 6)), (0.0, YAW, -YAW), indexing="ij")
+    lattice = np.zeros((*i.shape, pair_table.NUMBERS), np.float32)
+    lattice[..., 0] = 2.0 * i - 3.0 * j + 0.5 * k
+    lattice[..., 1] = i + 4.0 * yaw / YAW + 2.0 * (yaw / YAW) ** 2
+    numbers = np.empty(pair_table.NUMBERS)
+    look_up(lattice, 2, 3, 1, 0.3, 0.6, 0.9, 0.4 * YAW, numbers)
+    np.testing.assert_allclose(numbers[:2], [2 * 2.3 - 3 * 3.6 + 0.5 * 1.9, 2.3 + 1.6 + 0.32], rtol=1e-6)
+
+
+def test_modes_leave_the_slopes_at_rest():
+    """Near no creepage the remainder is the one stored there, to second order."""
+    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(48)
+    numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
+    numbers[pair_table.MODE :][:16] = 1.0
+    near, far = (pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums) for x in (1e-4, 0.5))
+    np.testing.assert_allclose(near, [0.1, 0.2, 0.3], atol=1e-5)
+    assert max(map(abs, np.subtract(far, near))) > 1e-3
+
+
+@pytest.fixture(scope="module")
+def rolling_wheels(benchmark_pair):
+    """Poses about one, rolled over by both models: rows of each."""
+    models = {name: LoadedWheels(benchmark_pair, name) for name in ("exact", "tabulated")}
+    random, rows = np.random.default_rng(4), {name: [] for name in models}
+    for _ in range(12):
+        y, yaw, depth = random.uniform(-1.5e-3, -1.45e-3), random.uniform(-3e-3, 3e-3), random.uniform(0.0, 5e-6)
+        drift, spin = random.uniform(-3e-3, 3e-3, 2)
+        rolling = Rolling(SPEED, SPEED / 0.46 * (1.0 + spin), SPEED * (yaw + drift))
+        for name, wheels in models.items():
+            (found,) = wheels.at_height("left", y, Z - depth, yaw=yaw, rolling=rolling)
+            rows[name].append(found.row)
+    return models, {name: np.array(found) for name, found in rows.items()}
+
+
+def test_against_the_exact_solver(rolling_wheels):
+    models, rows = rolling_wheels
+    exact, table = rows["exact"], rows["tabulated"]
+    assert models["tabulated"]._counters[3] == 0  # nothing was solved in place of being looked up
+    normal = exact[:, reduction.NORMAL]
+    assert np.ptp(normal) > 2e3
+    assert abs(table[:, reduction.NORMAL] / normal - 1.0).max() < 0.002
+    force = np.hypot(*(table - exact)[:, [reduction.FX, reduction.FY]].T) / (0.3 * normal)
+    assert force.max() < 0.005
+    np.testing.assert_allclose(table[:, reduction.P_MAX], exact[:, reduction.P_MAX], rtol=0.015)
+    np.testing.assert_allclose(table[:, [reduction.X, reduction.Y]], exact[:, [reduction.X, reduction.Y]], atol=5e-5)
+    np.testing.assert_allclose(table[:, reduction.ANGLE], exact[:, reduction.ANGLE], atol=2e-4)
+
+
+def test_a_right_wheel_is_the_mirror_image_of_a_left_one(rolling_wheels):
+    wheels = rolling_wheels[0]["tabulated"]
+    (left,), (right,) = (
+        wheels.at_height(side, sign * -1.5e-3, Z, yaw=sign * 1e-3, rolling=Rolling(SPEED, SPEED / 0.46, sign * 0.01))
+        for side, sign in (("left", 1.0), ("right", -1.0))
+    )
+    mirrored = [reduction.Y, reduction.ANGLE, reduction.FY, reduction.MZ, reduction.ETA, reduction.PHI]
+    same = [reduction.NORMAL, reduction.FX, reduction.XI, reduction.X, reduction.SEMI_A, reduction.P_MAX]
+    np.testing.assert_array_equal(right.row[same], left.row[same])
+    np.testing.assert_array_equal(right.row[mirrored], -left.row[mirrored])
+
+
+def test_a_wheel_that_rolls_back_is_a_mirror_image_too(rolling_wheels):
+    """x and yaw change their sign, and what points along x or turns about y and z."""
+    wheels = rolling_wheels[0]["tabulated"]
+    (ahead,), (back,) = (
+        wheels.at_height(
+            "left", -1.5e-3, Z, yaw=sign * 1e-3, rolling=Rolling(sign * SPEED, sign * SPEED / 0.459, 0.01)
+        )
+        for sign in (1.0, -1.0)
+    )
+    mirrored = [reduction.X, reduction.FX, reduction.MZ, reduction.XI, reduction.PHI]
+    same = [reduction.NORMAL, reduction.FY, reduction.ETA, reduction.Y]
+    np.testing.assert_allclose(back.row[same], ahead.row[same], rtol=1e-12)
+    np.testing.assert_allclose(back.row[mirrored], -ahead.row[mirrored], rtol=1e-12)
+
+
+def test_what_lies_outside_is_solved(rolling_wheels):
+    models = rolling_wheels[0]
+    rolling = Rolling(SPEED, SPEED / 0.46)
+    (table,), (exact,) = (
+        models[name].at_height("left", -1.5e-3, Z, yaw=1.6 * YAW, rolling=rolling) for name in ("tabulated", "exact")
+    )
+    np.testing.assert_array_equal(table.row, exact.row)
+    models["tabulated"]._counters[:] = 0
+
+
+def simulated():
+    run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.3, "contact.patch": "tabulated"})
+    return np.column_stack([run["wheelset"].y_m, load(run), run["wheelset/right"].Fx_N[:, 0]])
+
+
+def load(run):
+    """Normal force of the left wheel, N."""
+    return np.nansum(run["wheelset/left"].N_N, axis=1)
+
+
+def test_the_same_bits_on_an_empty_a_full_and_a_damaged_table(own_cache, capsys):
+    empty = simulated()
+    for pair in list(pair_store._PAIRS.values()):
+        pair.write()
+    (path,) = own_cache.glob("pair_*.h5")
+    pair_store._PAIRS.clear()
+    full = simulated()
+    solved = [pair._new for pair in pair_store._PAIRS.values()]
+    np.testing.assert_array_equal(full, empty)
+    assert solved == [0]
+    pair_store._PAIRS.clear()
+    path.write_bytes(path.read_bytes()[:-100])
+    np.testing.assert_array_equal(simulated(), empty)
+    assert "solved anew" in capsys.readouterr().err
+
+
+def test_a_run_beside_the_exact_one():
+    table = simulated()
+    run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.3, "contact.patch": "exact"})
+    y = run["wheelset"].y_m
+    assert abs(table[:, 0] - y).max() < 2e-3 * abs(y).max()
+    assert np.sqrt(np.mean((table[:, 1] / load(run) - 1.0) ** 2)) < 1e-3
