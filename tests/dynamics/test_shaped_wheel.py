@@ -75,7 +75,9 @@ def test_force_of_two_half_ellipses_against_the_solution_on_strips(psi, creepage
     speed, (xi, eta, phi), row = 20.0, creepages, np.zeros(PATCH_COLUMNS)
     row[[Z, PENETRATION, CURVATURE_X, CURVATURE_Y, COSINE]] = -0.46, 6e-5, 1.1, 1.4, 1.0
     velocity = speed, eta * speed, 0.0, 0.0, (1.0 - xi) * speed / 0.46, phi * speed
-    patch_wrench(Handle(model.contact), WheelMotion(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, *velocity, 0.0, 0.0, 0.3), row, psi)
+    patch_wrench(
+        Handle(model.contact), WheelMotion(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, *velocity, 0.0, 0.0, 0.3), 0.0, 0.0, row, psi
+    )
     a, b, load, limit = row[SEMI_A], row[SEMI_B], row[NORMAL], 0.3 * row[NORMAL]
     edges = np.linspace(-1.0, 1.0, 25) * b + 0.25 * b * psi  # the middle, seen from the load's centroid
     centre, crest = 0.5 * (edges[1:] + edges[:-1]), -0.75 * b * psi

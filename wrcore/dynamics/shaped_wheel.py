@@ -21,7 +21,7 @@ from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import motion_of
-from wrcore.dynamics.wheel import add_patches, bend_rail, contact_of, find_overlaps
+from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, find_overlaps, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -68,14 +68,19 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
     """As `wrcore.dynamics.wheel.wheel_wrenches`, whose arguments it takes, with the patches' shape numbers."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
-            m, rows, contact = motion_of(motions[i, wheel]), patches[i, wheel], contact_of(model, i, wheel)
+            m, wrench, rows = motion_of(motions[i, wheel]), wrenches[i, wheel], patches[i, wheel]
+            contact = contact_of(model, i, wheel)
             count, bound, spatial = find_overlaps(contact, m, rows)
-            bend_rail(m, count, rows)
             counts[i, wheel], bounds[i, wheel] = count, bound
             pose = make_pose(m.side, m.y, m.z, m.side * m.ex, m.side * m.ey, m.side * m.ez, spatial)
+            for k in range(6):
+                wrench[k] = 0.0
             for k in range(count):
                 row = rows[k]
                 slope = gap_at(contact.geometry, pose, row[U_WHEEL])[1]
                 half = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
                 row[PSI] = m.side * shape_number(overlap_skewness(contact.geometry, pose, row[U_WHEEL], half / STEPS))
-    add_patches(model, motions, patches, counts, wrenches, counters, True)
+                gx, gy, gz, nx, ny, nz, missed = patch_wrench(model, m, m.bend_y, m.bend_z, row, row[PSI])
+                wrench[0], wrench[1], wrench[2] = wrench[0] + gx, wrench[1] + gy, wrench[2] + gz
+                wrench[3], wrench[4], wrench[5] = wrench[3] + nx, wrench[4] + ny, wrench[5] + nz
+                counters[OUT_OF_RANGE] += missed

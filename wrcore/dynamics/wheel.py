@@ -11,7 +11,7 @@ from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
-from wrcore.dynamics.motion import motion_of
+from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.kernels.handles import call_address, one_of
 from wrcore.kernels.jit import FUSED, jit
 
@@ -94,14 +94,6 @@ def find_overlaps(model, m, rows):
     return count, bound, spatial
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def bend_rail(m, count, rows):
-    """Add the curvature with which the rail bends away from the wheel to that of its patches along x."""
-    for k in range(count):
-        bend = m.bend_y * rows[k, reduction.SINE] - m.bend_z * rows[k, reduction.COSINE]
-        rows[k, reduction.CURVATURE_X] += 0.5 * bend
-
-
 @jit(allocates=False, forceinline=True)
 def falling(model, friction, xi, eta, speed):
     """Coefficient of friction mu0 ((1 - A) exp(-B w) + A) at the slip velocity w of a patch (Polach, Wear 258 (2005)
@@ -114,10 +106,11 @@ def falling(model, friction, xi, eta, speed):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def patch_wrench(model, m, row, psi):
+def patch_wrench(model, m, bend_y, bend_z, row, psi):
     """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
 
-    ``psi`` is the patch's shape number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`. Creep laws and tables are
+    The rail bends by the curvatures ``bend_y`` and ``bend_z``, if the patch does not know yet; ``psi`` is its shape
+    number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`. Creep laws and tables are
     those of a wheel that rolls forward; one that rolls back is the mirror image of one that rolls forward with the
     opposite spin. Below the least speed spin goes to and fro through zero, so that nothing jumps at standstill.
     """
@@ -125,6 +118,7 @@ def patch_wrench(model, m, row, psi):
     cosine, sine = row[reduction.COSINE], row[reduction.SINE]
     speed = max(abs(m.vx), model.least_speed)
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
+    row[reduction.CURVATURE_X] += 0.5 * (bend_y * sine - bend_z * cosine)  # rail bending away from the wheel
     normal, a, b, axis_ratio, log_axis_ratio = _normal_contact(
         model, row[reduction.PENETRATION], row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], approach
     )
@@ -147,23 +141,6 @@ def patch_wrench(model, m, row, psi):
     return f1, gy, gz, mx, my, mz, missed
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def add_patches(model, motions, patches, counts, wrenches, counters, shaped):
-    """Fill the ``wrenches`` of all wheels from the patches that were found, with their shape numbers if ``shaped``."""
-    for i in range(motions.shape[0]):
-        for wheel in range(2):
-            wrench = wrenches[i, wheel]
-            fx = fy = fz = mx = my = mz = 0.0
-            for k in range(counts[i, wheel]):
-                m, row = motion_of(motions[i, wheel]), patches[i, wheel, k]
-                psi = row[reduction.PSI] if shaped else 0.0
-                gx, gy, gz, nx, ny, nz, missed = patch_wrench(model, m, row, psi)
-                fx, fy, fz = fx + gx, fy + gy, fz + gz
-                mx, my, mz = mx + nx, my + ny, mz + nz
-                counters[OUT_OF_RANGE] += missed
-            wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = fx, fy, fz, mx, my, mz
-
-
 @jit(allocates=False, fastmath=FUSED)
 def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
@@ -176,11 +153,24 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
     chains of neighbours overlap.
     """
-    if not mode & PATCHES_HELD:
+    held = mode & PATCHES_HELD
+    if not held:
         for i in range(motions.shape[0]):
             for wheel in range(2):
-                m, rows = motion_of(motions[i, wheel]), patches[i, wheel]
-                count, bound, _ = find_overlaps(contact_of(model, i, wheel), m, rows)
-                bend_rail(m, count, rows)
+                m, contact = motion_of(motions[i, wheel]), contact_of(model, i, wheel)
+                count, bound, _ = find_overlaps(contact, m, patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
-    add_patches(model, motions, patches, counts, wrenches, counters, False)
+    for i in range(motions.shape[0]):
+        for wheel in range(2):
+            row, wrench, bend_y, bend_z = motions[i, wheel], wrenches[i, wheel], 0.0, 0.0
+            if not held:  # else the patches have it already
+                bend_y, bend_z = row[MOTION.bend_y], row[MOTION.bend_z]
+            fx = fy = fz = mx = my = mz = 0.0
+            for k in range(counts[i, wheel]):
+                gx, gy, gz, nx, ny, nz, missed = patch_wrench(
+                    model, motion_of(row), bend_y, bend_z, patches[i, wheel, k], 0.0
+                )
+                fx, fy, fz = fx + gx, fy + gy, fz + gz
+                mx, my, mz = mx + nx, my + ny, mz + nz
+                counters[OUT_OF_RANGE] += missed
+            wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = fx, fy, fz, mx, my, mz
