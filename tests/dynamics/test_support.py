@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from tests.conftest import SCENES
-from tests.dynamics import test_jacobian as jacobian_tests
 from tests.dynamics.giving_track import EXAMPLES
+from tests.integrate import test_jacobian as jacobian_tests
 from wrcore.analysis.assessment.motion import first_flange_contact
 from wrcore.analysis.stability.stability import modes
 from wrcore.contact.reduction import Y, Z

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.analysis.test_assess import synthetic
+from tests.analysis.assessment.test_assess import synthetic
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
 from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
 from wrcore.creep.fastsim import FastsimData, fastsim
