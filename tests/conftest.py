@@ -20,15 +20,24 @@ CHECKS = (
 )  # fmt: skip
 """Folders and files with the marker ``check``, which are no tests of the core: study, attacks, pages, the package."""
 
+FIRST = (
+    "test_workflow", "dynamics/test_energy", "contact/patch", "analysis/contact", "creep", "dynamics", "integrate",
+    "run", "vehicle", "balance", "sweep", "analysis", "test_api", "study", "contact", "test_attack", "test_fuzz",
+)  # fmt: skip
+"""Folders and files in the order in which they begin (``--no-loadscope-reorder``): of two workers one compiles what
+vehicles run with, the other one what patches are solved with; what is quick comes last, when one of them waits."""
+
 # What a command says must not depend on whether its kernels are compiled already; tests of bars and announcements
 # take the variable away for themselves.
 os.environ["WRCORE_PROGRESS"] = "0"
 
 
 def pytest_collection_modifyitems(items):
-    for item in items:
-        if item.path.relative_to(Path(__file__).parent).parts[0].removesuffix(".py") in CHECKS:
+    names = {item: item.path.relative_to(Path(__file__).parent).as_posix() for item in items}
+    for item, name in names.items():
+        if name.partition("/")[0].removesuffix(".py") in CHECKS:
             item.add_marker("check")
+    items.sort(key=lambda item: next((k for k, begin in enumerate(FIRST) if names[item].startswith(begin)), len(FIRST)))
 
 
 @pytest.fixture(scope="session")

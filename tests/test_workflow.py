@@ -79,37 +79,41 @@ def test_smoke_runs_every_rule_of_the_study(smoke):
     assert rules[0] >= {"creep_study_table", "creep_errors", "creep_costs", *(f"fig_{name}" for name in CREEP_FIGURES)}
 
 
-@pytest.mark.parametrize(
-    ("change", "again", "kept"),
-    [
-        (
-            {"paper": {"cases": {"suspended_v60": {"set": {"integration.duration": 0.6}}}}},
-            "suspended_v60: planar and spatial run",
-            "wheelset_v20: planar and spatial run",
-        ),
-        (
-            {"paper": {"twins": {"rtol": 2.0e-8}}},
-            "wheelset_v20: tighter and mirrored twin",
-            "wheelset_v20: planar and spatial run",
-        ),
-        (
-            {"paper": {"timing": {"repetitions": 3}}},
-            "Timing: planar and spatial runs",
-            "wheelset_v20: planar and spatial run",
-        ),
-        ({"creep": {"table": {"tolerance": 0.04}}}, "Creep table", "Contact geometry without load"),
-        ({"creep": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
-        ({"contact": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
-        ({"ivp": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
-        ({"paper": {"figures": {"detection_pose": {"y": 0.006}}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
-    ],
-)
-def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, change, again, kept):
-    (tmp_path / "change.yaml").write_text(yaml.safe_dump(change))
-    plan = snakemake("-n", "--configfile", "config/smoke.yaml", tmp_path / "change.yaml")
+CHANGES = [
+    (
+        {"paper": {"cases": {"suspended_v60": {"set": {"integration.duration": 0.6}}}}},
+        "suspended_v60: planar and spatial run",
+        "wheelset_v20: planar and spatial run",
+    ),
+    (
+        {"paper": {"twins": {"rtol": 2.0e-8}}},
+        "wheelset_v20: tighter and mirrored twin",
+        "wheelset_v20: planar and spatial run",
+    ),
+    (
+        {"paper": {"timing": {"repetitions": 3}}},
+        "Timing: planar and spatial runs",
+        "wheelset_v20: planar and spatial run",
+    ),
+    ({"creep": {"cost": {"passes": 3}}}, "Costs of all creep laws", "Errors of all creep laws"),
+    ({"contact": {"search": {"dense": 300}}}, "Contact search against", "Error of planar detection"),
+    ({"ivp": {"repetitions": 2}}, "Benchmark: the Test Set's wheelset", "Fig. 2"),
+    ({"paper": {"figures": {"detection_pose": {"y": 0.006}}}}, "Fig. 3: planar and spatial detection", "Fig. 2"),
+]
+"""Settings, what each runs again because of its parameters, and what it does not concern."""
+ALONE = [({"creep": {"table": {"tolerance": 0.04}}}, "Creep table", "Contact geometry without load")]
+
+
+@pytest.mark.parametrize("changes", [CHANGES, ALONE], ids=["by themselves", "creep table"])
+def test_a_changed_setting_runs_again_what_it_concerns(smoke, tmp_path, changes):
+    files = [tmp_path / f"{k}.yaml" for k in range(len(changes))]
+    for path, (change, _, _) in zip(files, changes, strict=True):
+        path.write_text(yaml.safe_dump(change))
+    plan = snakemake("-n", "--configfile", "config/smoke.yaml", *files)
     assert plan.returncode == 0
-    assert again in plan.stdout
-    assert kept not in plan.stdout
+    for _, again, kept in changes:
+        assert re.search(rf"{again}.*\nReason: .*Params have changed", plan.stdout), plan.stdout
+        assert kept not in plan.stdout
 
 
 @pytest.fixture(scope="module")
