@@ -27,25 +27,20 @@ from study.creep.smoothness import error_map, sized_creepages, smoothness, smoot
 from tests.conftest import ROOT
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import scales
-from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases
+from wrcore.creep.build import Resolution
 from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at, kalker_data
-from wrcore.creep.table import CreepTable, build_table, ensure_table, table_path
+from wrcore.creep.table import build_table, ensure_table, table_path
 from wrcore.errors import InputError
 
 DATA = ROOT / "tests" / "data" / "creep"
 NU = 0.28
 
 
-def coarse_table(planes):
-    resolution = RESOLUTIONS[planes][0][1]
-    data = build_data(NU, planes, resolution)
-    return CreepTable(data, planes, 0.015, resolution, count_cases(data.axes), (0.0,) * 4, (0.0,) * 4)
-
-
 @pytest.fixture(scope="module")
 def tables():
-    return {planes: coarse_table(planes) for planes in ("ellipse", "sdec")}
+    """The coarse ones of the tests' runs: they are in the cache."""
+    return {planes: ensure_table(NU, planes, 0.05) for planes in ("ellipse", "sdec")}
 
 
 @pytest.fixture(scope="module")
