@@ -1,11 +1,11 @@
 # Checks of the configuration, and which sources each family of rules stands on.
 from pathlib import Path
 
-import jsonschema
 import yaml
 from snakemake.exceptions import WorkflowError
 
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import _validator
 from wrcore.scene.description import load_scene
 
 HERE = Path(workflow.basedir)
@@ -14,7 +14,11 @@ HERE = Path(workflow.basedir)
 def check_config():
     """Stop before any job, with one line that names the key, if the configuration cannot be used."""
     schema = yaml.safe_load((HERE / "workflow/schemas/config.schema.yaml").read_text())
-    error = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(config))
+    validator = _validator()(schema)  # imports jsonschema, without a grammar that would take most of a second
+
+    from jsonschema.exceptions import best_match
+
+    error = best_match(validator.iter_errors(config))
     if error is not None:
         key = ".".join(map(str, error.absolute_path)) or "top level"
         meaning = error.schema.get("description", "see workflow/schemas/config.schema.yaml")
