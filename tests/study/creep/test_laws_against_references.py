@@ -50,8 +50,8 @@ def models(tables):
 
 @pytest.fixture(scope="module")
 def reference():
-    """Every eighth case of each file."""
-    return {name: ReferenceCases(*(v[::8] for v in cases)) for name, cases in read_reference(DATA).items()}
+    """Every fourth case of each file."""
+    return {name: ReferenceCases(*(v[::4] for v in cases)) for name, cases in read_reference(DATA).items()}
 
 
 @pytest.fixture(scope="module")
