@@ -32,7 +32,7 @@ def look_up(table, g, psi, creepages, forces):
     outside = 0
     for i in range(g.size):
         xi, eta, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, g[i], psi[i], xi, eta, phi)
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, np.log(g[i]), g[i], psi[i], xi, eta, phi)
         outside += flag
     return outside
 
