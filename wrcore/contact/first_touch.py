@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wrcore.contact.strip import cubic_at
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import Within, checked
-from wrcore.kernels.jit import jit
+from wrcore.kernels.jit import FAST, jit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,13 +36,24 @@ _ROLL_STEPS = 40
 _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
 
 
+@jit(fastmath=FAST, inline="always")
+def _hermite(nodes, start, step, u):
+    """Value and slope of the cubic Hermite polynomial; end cells are continued outwards."""
+    position = (u - start) / step
+    i = min(max(int(position), 0), nodes.shape[0] - 2)
+    t = position - i
+    d0, d1, rise = nodes[i, 1] * step, nodes[i + 1, 1] * step, nodes[i + 1, 0] - nodes[i, 0]
+    c2, c3 = 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
+    return nodes[i, 0] + t * (d0 + t * (c2 + t * c3)), (d0 + t * (2.0 * c2 + 3.0 * t * c3)) / step
+
+
 @jit
 def _height(side, u, y, cosine, sine):
     """Height (m) asked of the wheelset's centre by wheel coordinate ``u``, its slope over u, u_r, f' and r."""
-    extra, slope, _ = cubic_at(side.wheel, side.wheel_start, side.wheel_step, u)
+    extra, slope = _hermite(side.wheel, side.wheel_start, side.wheel_step, u)
     radius, reach = side.rolling_radius + extra, side.half_distance + u
     u_rail = y + reach * cosine + radius * sine - side.rail_distance
-    f, df, _ = cubic_at(side.rail, side.rail_start, side.rail_step, u_rail)
+    f, df = _hermite(side.rail, side.rail_start, side.rail_step, u_rail)
     rate = df * (cosine + slope * sine) - (sine - slope * cosine)
     return f - reach * sine + radius * cosine, rate, u_rail, df, radius
 
