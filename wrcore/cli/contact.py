@@ -92,7 +92,7 @@ def add(commands):
 def run(options):
     """Do what the options say."""
     from wrcore.analysis.contact.poses import loaded_poses
-    from wrcore.contact.poses import read_poses
+    from wrcore.contact.pose_file import read_poses
     from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 
     out = output(options.out)

@@ -20,7 +20,7 @@ from wrcore.contact.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHEEL
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics.modes import FRESH
-from wrcore.dynamics.wheel import FRICTION, contact_of, find_overlaps, patch_wrench
+from wrcore.dynamics.wheel import FRICTION, contact_of, detect_patches, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -70,7 +70,7 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
             m, w, rows = motions[i, wheel], wrenches[i, wheel], patches[i, wheel]
             side, ex, ey, ez = m[0], m[0] * m[3], m[0] * m[4], m[0] * m[5]
             own = contact_of(model, i, wheel)
-            count, bound, spatial = find_overlaps(own, side, m[1], m[2], m[3], m[4], m[5], rows)
+            count, bound, spatial = detect_patches(own, side, m[1], m[2], m[3], m[4], m[5], rows)
             counts[i, wheel], bounds[i, wheel] = count, bound
             pose = make_pose(side, m[1], m[2], ex, ey, ez, spatial)
             for k in range(6):

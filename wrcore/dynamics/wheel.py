@@ -29,7 +29,7 @@ from wrcore.contact.reduction import (
 )
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
-from wrcore.kernels.handles import one_of
+from wrcore.kernels.handles import member_of
 from wrcore.kernels.jit import FUSED, jit
 
 MOTION_COLUMNS = 15
@@ -77,7 +77,7 @@ class ContactModel(NamedTuple):
 @jit(allocates=False, inline="always")
 def contact_of(model, wheelset, wheel):
     """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
-    return one_of(model, "wheels", 2 * wheelset + wheel)
+    return member_of(model, "wheels", 2 * wheelset + wheel)
 
 
 def shaped(contact):
@@ -107,7 +107,7 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def find_overlaps(model, side, y, z, ex, ey, ez, rows):
+def detect_patches(model, side, y, z, ex, ey, ez, rows):
     """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
     detection was spatial."""
     bound, spatial = 0.0, model.detection == SPATIAL
@@ -185,7 +185,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
         for i in range(motions.shape[0]):
             for wheel in range(2):
                 m, own = motions[i, wheel], contact_of(model, i, wheel)
-                count, bound, _ = find_overlaps(own, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+                count, bound, _ = detect_patches(own, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):

@@ -28,7 +28,7 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.detection import PLANAR
-from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, VALUE, YAW_STRAY
+from wrcore.contact.geometry import CURVATURE, LARGEST_OFFSET, OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE, SLOPE, VALUE
 
 WIDEST = 1.0 / 3.0
 """Largest semi-axis across rolling over the smaller radius of curvature."""
@@ -76,13 +76,13 @@ def exceeded(contact, patches, roll, yaw):
     ahead = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # sin^2(chi)
     hollow = (geometry.rolling_radius + larger) * wheel * np.sqrt(1.0 + slope**2)
     flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
-    stray = ROLL_STRAY * np.abs(np.sin(roll)) + YAW_STRAY * tilt**2  # as the search sees it
+    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * tilt**2  # as the search sees it
     return {
         "patches": len(rows),
         "half_space": int(np.sum(width * np.maximum(abs(wheel), abs(rail)) > WIDEST)),
         "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
         "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
-        "search_fallback": 2 * int(np.sum(stray > STRAY)),
+        "search_fallback": 2 * int(np.sum(offset > LARGEST_OFFSET)),
         "hollow_ahead": int(np.sum(1.0 - ahead + hollow * ahead < 0.0)),
         "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }

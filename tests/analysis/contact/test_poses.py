@@ -15,7 +15,7 @@ from wrcore.analysis.contact.poses import ROLLING_FIELDS, loaded_poses
 from wrcore.cli import main
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.poses import PATCH_FIELDS, read_poses
+from wrcore.contact.pose_file import PATCH_FIELDS, read_poses
 from wrcore.contact.statics import wheel_at_rest
 from wrcore.geometry.track import SIDES
 

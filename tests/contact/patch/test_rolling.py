@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch
+from study.patch.rolling import solve_patch
+from wrcore.contact.patch.library import ellipse_strips, make_library
 from wrcore.contact.patch.rolling import (
     AUTO,
     BAND,
@@ -16,8 +17,8 @@ from wrcore.contact.patch.rolling import (
     LIBRARY,
     LIMIT,
     Level,
-    make_workspace,
     rolling_force,
+    rolling_work,
 )
 from wrcore.contact.patch.rolling_influence import _add_strip, _add_strip_exactly
 from wrcore.creep.cases import check_cases
@@ -410,7 +411,7 @@ def solve_twice(one, slip_one, two, slip_two, library, work):
 
 
 def test_no_history():
-    library, work = make_library("coarse"), make_workspace(16, 8)
+    library, work = make_library("coarse"), rolling_work(16, 8)
     one, two = sdec(8, 5e-3, 3e-3, 0.2), lobes(8, 2.5e-3, 0.6)
     first, again = solve_twice(one, slip_of(one, 3e-4, 0, 0.1), two, slip_of(two, 0, 3e-4, 0.3), library, work)
     assert first == again

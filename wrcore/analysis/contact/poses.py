@@ -6,7 +6,7 @@ import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
-from wrcore.contact.poses import PATCH_FIELDS
+from wrcore.contact.pose_file import PATCH_FIELDS
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
 
@@ -29,9 +29,9 @@ def loaded_poses(
     Parameters
     ----------
     poses : pandas.DataFrame
-        As from :func:`wrcore.contact.poses.read_poses`. z given: forces at that height (roll left out: 0). Roll given,
-        z not: each side is solved for the load by itself. Neither: both are solved so that each wheel carries it. With
-        V_m_per_s above 0 the wheelset rolls, freely where omega_rad_per_s is not given; else it stands.
+        As from :func:`wrcore.contact.pose_file.read_poses`. z given: forces at that height (roll left out: 0). Roll
+        given, z not: each side is solved for the load by itself. Neither: both are solved so that each wheel carries
+        it. With V_m_per_s above 0 the wheelset rolls, freely where omega_rad_per_s is not given; else it stands.
     geometry : ContactGeometry
     wheel_load : float
         N per wheel, above 0 and up to 1e6.

@@ -25,8 +25,7 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 def read_poses(path):
     """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m,
     V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the file, the
-    column, the row and what was expected.
-    """
+    column, the row and what was expected."""
     import pandas as pd
 
     frame = read_csv_table(path, "pose_id")
