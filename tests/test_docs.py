@@ -127,7 +127,7 @@ def test_numbers_in_the_theory_are_those_of_the_code():
         ],
         "integration": [
             f"${choice.STABLE}/", f"{tolerances.LENGTH}\\ \\mathrm m",
-            f"({choice.STEPS_PER_METRE} steps per metre, {choice.ON_GIVING_RAILS:g} on rails that give)",
+            f"({choice.STEPS_PER_METRE} steps per metre, {choice.ON_FLEXIBLE_TRACK:g} on rails that give)",
             f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
             f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", "a tenth of the last",
         ],

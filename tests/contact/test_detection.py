@@ -326,7 +326,7 @@ def test_force_is_continuous_with_moments(benchmark_pair):
     modulus, rows = contact_modulus(8.2e10, 0.28), np.zeros((MAX_PATCHES, PATCH_COLUMNS))
     worst = {}
     for reduction in (MAXIMUM, MOMENT):
-        z = settle(benchmark_pair, hertz_table(), modulus, 0.0, 0.0, True, reduction, 54546.0, 0.46)[1]
+        z = settle(benchmark_pair, benchmark_pair, hertz_table(), modulus, 0.0, 0.0, True, reduction, 54546.0, 0.46)[1]
         force = [
             sum(
                 wheel_at_rest(benchmark_pair, hertz_table(), modulus, s, y, z, 0.0, 0.0, True, reduction, rows)[1]

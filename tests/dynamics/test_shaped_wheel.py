@@ -23,6 +23,7 @@ from wrcore.contact.reduction import (
 )
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics import shaped_wheel
+from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.shaped_wheel import STEPS, overlap_skewness, shape_number
 from wrcore.dynamics.wheel import patch_wrench
 from wrcore.errors import InputError
@@ -73,8 +74,10 @@ def test_force_of_two_half_ellipses_against_the_solution_on_strips(psi, creepage
     model, _ = compile_scene(wr.load_scene(SCENE, SDEC))
     speed, (xi, eta, phi), row = 20.0, creepages, np.zeros(PATCH_COLUMNS)
     row[[Z, PENETRATION, CURVATURE_X, CURVATURE_Y, COSINE]] = -0.46, 6e-5, 1.1, 1.4, 1.0
-    motion = speed, eta * speed, 0.0, 0.0, (1.0 - xi) * speed / 0.46, phi * speed, 0.0, 0.0, 0.3
-    patch_wrench(Handle(model.contact), 0.0, 0.0, *motion, row, psi)
+    velocity = speed, eta * speed, 0.0, 0.0, (1.0 - xi) * speed / 0.46, phi * speed
+    patch_wrench(
+        Handle(model.contact), WheelMotion(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, *velocity, 0.0, 0.0, 0.3), 0.0, 0.0, row, psi
+    )
     a, b, load, limit = row[SEMI_A], row[SEMI_B], row[NORMAL], 0.3 * row[NORMAL]
     edges = np.linspace(-1.0, 1.0, 25) * b + 0.25 * b * psi  # the middle, seen from the load's centroid
     centre, crest = 0.5 * (edges[1:] + edges[:-1]), -0.75 * b * psi

@@ -10,7 +10,10 @@ from tests.conftest import SCENES
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.contact import reduction as columns
+from wrcore.contact.patch.gap import Frame
+from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.strip_wheel import solve_on_grid
 from wrcore.dynamics.system import Equations
 from wrcore.kernels.handles import Handle
@@ -136,18 +139,16 @@ def test_creep_power_is_what_friction_takes_from_the_wheelset(patch, slip):
 def test_the_grid_gives_the_same_forces(exact):
     equations, model, state = exact
     row, _ = left_row(equations, state)
-    work = equations.work
-    place = np.zeros(16)
-    place[:3] = state[1], state[2], 1.0
-    place[3], place[4] = row[columns.COSINE], row[columns.SINE]
-    place[5] = row[columns.X]
-    place[11] = model.contact.friction
-    place[6], place[7] = row[columns.Y] - model.contact.geometry.rail_distance, row[columns.Z]
-    solve_on_grid(Handle(model.contact), work.motions[0, 0], place)
-    limit = model.contact.friction * row[columns.NORMAL]
-    assert place[3] == pytest.approx(row[columns.NORMAL], rel=3e-3)
-    np.testing.assert_allclose(place[:2], row[[columns.FX, columns.FY]], atol=0.015 * limit)
-    np.testing.assert_allclose(place[6:8], row[[columns.SEMI_A, columns.SEMI_B]], rtol=0.03)
+    contact, m, found = model.contact, WheelMotion(*equations.work.motions[0, 0]), np.zeros(columns.PATCH_COLUMNS)
+    pose = make_pose(1.0, *m[1:6], True)
+    across = row[columns.Y] - contact.geometry.rail_distance
+    frame = Frame(*row[[columns.COSINE, columns.SINE, columns.X]], across, row[columns.Z], 0.0)
+    solve_on_grid(Handle(contact), m, pose, frame, (0.0, 0.0, 0.0), contact.friction, found)
+    limit = contact.friction * row[columns.NORMAL]
+    assert found[columns.NORMAL] == pytest.approx(row[columns.NORMAL], rel=3e-3)
+    forces, axes = [columns.FX, columns.FY], [columns.SEMI_A, columns.SEMI_B]
+    np.testing.assert_allclose(found[forces], row[forces], atol=0.015 * limit)
+    np.testing.assert_allclose(found[axes], row[axes], rtol=0.03)
 
 
 def test_damping_presses_an_ellipse_and_strips_alike():

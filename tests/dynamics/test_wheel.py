@@ -8,7 +8,8 @@ from wrcore.contact import reduction as columns
 from wrcore.contact.normal import damping_factor, hertz_ellipse
 from wrcore.contact.patch.model import strip_work
 from wrcore.creep.laws import LAWS, creep_force
-from wrcore.dynamics.wheel import MOTION_COLUMNS, wheel_wrenches
+from wrcore.dynamics.motion import MOTION
+from wrcore.dynamics.wheel import OUT_OF_RANGE, wheel_wrenches
 from wrcore.geometry.track import rotation
 from wrcore.scene.description import compile_scene, load_scene
 
@@ -58,7 +59,7 @@ def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
 def one_wheel(model, motion):
     """Wrench, patches and bound of a wheel whose neighbour is far above its rail."""
     motions = np.array([[motion, motion]])
-    motions[0, 1, 2] += 1.0
+    motions[0, 1, MOTION.z] += 1.0
     patches = np.zeros((1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((1, 2), int), np.zeros((1, 2)), np.zeros((1, 2, 6))
     wheel_wrenches(model, motions, patches, counts, bounds, wrenches, np.zeros(3, int), strip_work(model.strips, 1))
@@ -76,7 +77,7 @@ def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
     overrides = [f"contact.detection={detection}", f"contact.patch={patch}", f"contact.creep.model={creep}"]
     model = compile_scene(load_scene(SCENES / "wheelset.yaml", overrides))[0].contact
     rng = np.random.default_rng(0)
-    motions = np.empty((40, MOTION_COLUMNS))
+    motions = np.empty((40, len(MOTION)))
     for m in motions:
         axle = rotation(1e-3 * rng.normal(), 5e-3 * rng.normal())[:, 1]
         position = [rng.choice([-1.0, 1.0]), rng.uniform(-0.008, 0.008), 0.46 + rng.uniform(-1e-3, 5e-4)]
@@ -90,12 +91,12 @@ def test_many_wheels_at_once_are_the_single_ones(detection, patch, creep):
             1e-4,
             0.3,
         )
-    motions = motions.reshape(20, 2, MOTION_COLUMNS)
+    motions = motions.reshape(20, 2, len(MOTION))
     patches = np.zeros((20, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     counts, bounds, wrenches = np.zeros((20, 2), int), np.zeros((20, 2)), np.zeros((20, 2, 6))
     counters = np.zeros(3, int)
     wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, strip_work(model.strips, len(motions)))
-    assert counters[1] == 0
+    assert counters[OUT_OF_RANGE] == 0
     for place in np.ndindex(20, 2):
         wrench, rows, bound = one_wheel(model, motions[place])
         assert (len(rows), bound) == (counts[place], bounds[place])

@@ -5,7 +5,7 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.system import Equations, own_states
+from wrcore.dynamics.system import Equations, internal_states
 from wrcore.integrate.blocks import factorise, new_system, solve_stage
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.jacobian import joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
@@ -155,7 +155,7 @@ def test_refreshed_in_axes_that_have_turned(moving):
     refreshed(moving, aside)
     c, s = np.cos(0.3), np.sin(0.3)
     axes = np.kron(np.eye(2 * n), [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    own = np.eye(own_states(model))
+    own = np.eye(internal_states(model))
     whole = np.block([[axes, np.zeros((6 * n, len(own)))], [np.zeros((len(own), 6 * n)), own]])
     for found, known, left in (
         (aside.by_position, straight.by_position, axes),
@@ -173,7 +173,7 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
     axles = np.array([matrix_of(part[3:7])[:, 1] for part in state[: 13 * n].reshape(n, 13)])
     frames = omegas - np.sum(omegas * axles, axis=1, keepdims=True) * axles  # a wheelset's frame does not spin
     jacobian, system = refreshed(moving), new_system(model)
-    size, rate = 12 * n + own_states(model), jacobian.turn[0]
+    size, rate = 12 * n + internal_states(model), jacobian.turn[0]
     matrix = np.zeros((size + n,) * 2)  # last the lengths of p
     for b in range(n):
         q, v = 6 * b, 6 * n + 6 * b

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE, angles, euler_parameters, matrix_of
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_parameters, matrix_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import centreline, frame_turn
 
@@ -31,13 +31,13 @@ def put_bodies(bodies, vehicle, state, path):
         part = state[at : at + STATE_SIZE]
         part[:3] = [values.get(key, now) for key, now in zip(PLACES, part[:3], strict=True)]
         if values.keys() & set(ANGLES):
-            turned = np.array(angles(part[3:7]))
-            part[3:7] = euler_parameters(*(values.get(key, now) for key, now in zip(ANGLES, turned, strict=True)))
+            turned = dict(zip(ANGLES, angles(part[EULER:VELOCITY]), strict=True))
+            part[EULER:VELOCITY] = euler_parameters(*(values.get(key, turned[key]) for key in ANGLES))
         turn = np.array(frame_turn(centreline(path, part[0])))
         carried = np.concatenate([np.cross(turn, [0.0, part[1], part[2]]), turn])  # by the axes, per m/s along the path
-        part[7] = values["vx"] / (1.0 + carried[0]) if "vx" in values else part[7]
+        part[VELOCITY] = values["vx"] / (1.0 + carried[0]) if "vx" in values else part[VELOCITY]
         for i, key in enumerate(RATES[1:], start=1):
-            part[7 + i] = values[key] - part[7] * carried[i] if key in values else part[7 + i]
+            part[VELOCITY + i] = values[key] - part[VELOCITY] * carried[i] if key in values else part[VELOCITY + i]
         _carry_boxes(name, vehicle, state)
 
 
@@ -45,10 +45,10 @@ def _carry_boxes(wheelset, vehicle, state):
     """Let the axle boxes of a wheelset go along with its axle, without turning about it."""
     parts = dict(zip(vehicle.body_names, state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, 13), strict=True))
     places, axle = dict(zip(vehicle.body_names, vehicle.positions, strict=True)), parts[wheelset]
-    axes = matrix_of(axle[3:7])
-    turn = axle[10:13] - (axle[10:13] @ axes[:, 1]) * axes[:, 1]
+    axes = matrix_of(axle[EULER:VELOCITY])
+    turn = axle[OMEGA:] - (axle[OMEGA:] @ axes[:, 1]) * axes[:, 1]
     for name, box in parts.items():
         if vehicle.data["bodies"][name].get("wheelset") == wheelset:
             arm = axes @ (places[name] - places[wheelset])
-            box[:3], box[3:7] = axle[:3] + arm, axle[3:7]
-            box[7:10], box[10:13] = axle[7:10] + np.cross(turn, arm), turn
+            box[:3], box[EULER:VELOCITY] = axle[:3] + arm, axle[EULER:VELOCITY]
+            box[VELOCITY:OMEGA], box[OMEGA:] = axle[VELOCITY:OMEGA] + np.cross(turn, arm), turn

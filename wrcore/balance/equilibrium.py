@@ -1,19 +1,20 @@
-"""Static equilibrium: the vehicle rolls straight ahead at constant speed and nothing accelerates.
+"""Static equilibrium: the vehicle rolls straight on at constant speed and nothing accelerates.
 
 Unknown are small displacements of all bodies (three translations, three rotations in track axes) but for a wheelset's
-rotation about its axle, which its frame does not have, and the force elements' own states. Newton's method on the
+rotation about its axle, which its frame does not have, and the force elements' internal states. Newton's method on the
 accelerations, without a wheelset's about its axle; directions in which nothing holds a body (along the track, say) stay
 as they are.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
 from wrcore.dynamics.suspension import pack_elements
-from wrcore.dynamics.system import Equations, frictionless, own_states
+from wrcore.dynamics.system import Equations, frictionless, internal_states
 from wrcore.geometry.irregularity import irregularity_at
 from wrcore.geometry.path import tangent_path
 
@@ -38,13 +39,13 @@ class Equilibrium:
 
 def displaced(state, model, displacement):
     """A state with displaced bodies: ``displacement`` (6 n + states,) has each body's translation (m) and rotation
-    vector (rad) in track axes, then changes of the elements' own states (m)."""
+    vector (rad) in track axes, then changes of the elements' internal states (m)."""
     out = state.copy()
     n = len(model.bodies.mass)
     for b in range(n):
         at, q = STATE_SIZE * b, displacement[6 * b : 6 * b + 6]
         out[at : at + 3] += q[:3]
-        out[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], q[3:])
+        out[at + EULER : at + VELOCITY] = _turned(state[at + EULER : at + VELOCITY], q[3:])
     out[STATE_SIZE * n :] += displacement[6 * n :]
     return out
 
@@ -64,15 +65,15 @@ def _turned(p, turn):
 
 def _unknowns(model):
     """Mask (6 n + states,) of the displacements that are unknown: all but a wheelset's rotation about its axle."""
-    unknown = np.ones(6 * len(model.bodies.mass) + own_states(model), bool)
+    unknown = np.ones(6 * len(model.bodies.mass) + internal_states(model), bool)
     unknown[6 * np.flatnonzero(model.bodies.spins) + 4] = False
     return unknown
 
 
 def _accelerations(rates, model):
-    """Rows of accelerations, six per body, and rates of the elements' own states, from rows of state rates."""
+    """Rows of accelerations, six per body, and rates of the elements' internal states, from rows of state rates."""
     n = len(model.bodies.mass)
-    bodies = rates[:, : STATE_SIZE * n].reshape(len(rates), n, STATE_SIZE)[:, :, 7:].reshape(len(rates), 6 * n)
+    bodies = rates[:, : STATE_SIZE * n].reshape(len(rates), n, STATE_SIZE)[:, :, VELOCITY:].reshape(len(rates), 6 * n)
     return np.hstack([bodies, rates[:, STATE_SIZE * n :]])
 
 
@@ -135,27 +136,23 @@ def stand_on_rails(model, state, loads):
         irregularity_at(track.irregularity, state[at], deviations)
         if deviations[0].any():
             state[at + 1] += 0.5 * (deviations[0, 0] + deviations[0, 2])
-            carried = _loads_when_lifted(equations, state, at, k, base)
+            carried = partial(_loads_when_lifted, equations, state, at, k, base)
             _lift(state, at, _lifts_for(carried, load, deviations[0, 1::2].copy()), base)
 
 
 def _lift(state, at, lifts, base):
     """Lift the axle of a wheelset over the left and over the right rail, m."""
     state[at + 2] += 0.5 * (lifts[0] + lifts[1])
-    state[at + 3 : at + 7] = _turned(state[at + 3 : at + 7], np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0]))
+    euler, turn = slice(at + EULER, at + VELOCITY), np.array([0.5 * (lifts[0] - lifts[1]) / base, 0.0, 0.0])
+    state[euler] = _turned(state[euler], turn)
 
 
-def _loads_when_lifted(equations, state, at, k, base):
-    """Loads (N) of the k-th wheelset's wheels at rest as a function of the lifts of its ends."""
-
-    def carried(lifts):
-        """Loads, shape (2,), with the ends lifted by ``lifts`` (m)."""
-        lifted = state.copy()
-        _lift(lifted, at, lifts, base)
-        lifted[at + 7 : at + 13] = 0.0
-        return wheel_loads(equations, lifted)[k]
-
-    return carried
+def _loads_when_lifted(equations, state, at, k, base, lifts):
+    """Loads (N) of the k-th wheelset's wheels at rest, shape (2,), with its ends lifted by ``lifts`` (m)."""
+    lifted = state.copy()
+    _lift(lifted, at, lifts, base)
+    lifted[at + VELOCITY : at + STATE_SIZE] = 0.0
+    return wheel_loads(equations, lifted)[k]
 
 
 def _lifts_for(carried, load, lifts):

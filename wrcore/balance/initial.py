@@ -16,12 +16,12 @@ from wrcore.balance.equilibrium import Equilibrium, solve_equilibrium, stand_on_
 from wrcore.balance.linear import cleared, steady_running
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus
-from wrcore.contact.statics import settle, settle_apart
-from wrcore.dynamics.body import STATE_SIZE, angles, euler_of, euler_parameters, matrix_of
+from wrcore.contact.statics import settle
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
 from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.flexible_track import rails_at
 from wrcore.dynamics.series import equations_of
-from wrcore.dynamics.support import rails_at
-from wrcore.dynamics.system import frictionless, independent_at, own_states, state_size
+from wrcore.dynamics.system import frictionless, independent_at, internal_states, state_size
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
@@ -36,14 +36,14 @@ LARGEST_REST = 1e-6 * GRAVITY
 LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
 """The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
 
-LARGEST_SLIP, NEARBY = 0.01, 5e-3
+LARGEST_SLIP, LARGEST_SHIFT = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
 
-BESIDE = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
+START_OFFSETS = 1e-3, -1e-3, 2e-3, -2e-3, 3e-3, -3e-3, 4e-3, -4e-3
 """Where wheels or rails differ, equilibrium is sought from these places, too, m: they need not rest in the middle, and
 between worn profiles little tells where."""
 
-NOISE = 1e-9
+ROUNDING = 1e-9
 """Accelerations of wheelsets below this may be rounding, m/s^2 or rad/s^2."""
 
 REST_SPEED = 20.0
@@ -52,7 +52,7 @@ REST_SPEED = 20.0
 
 @np.errstate(all="ignore")  # what overflows is no equilibrium
 def rest(scene, model):
-    """Where the bodies of a scene's vehicle stand in static equilibrium, moving ahead together without rotation; speed
+    """Where the bodies of a scene's vehicle stand in static equilibrium, moving along together without rotation; speed
     and friction do not matter for it. An InputError if there is none near the nominal position."""
     vehicle, model = scene.vehicle, undriven(model)
     unit = _unit(vehicle, model)
@@ -63,9 +63,9 @@ def rest(scene, model):
     level = frictionless(model)._replace(track=track, speed=REST_SPEED)
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
     limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
-    for aside in (0.0, *(BESIDE if model.contact.geometries else ())):
+    for offset in (0.0, *(START_OFFSETS if model.contact.geometries else ())):
         try:
-            equilibrium = solve_equilibrium(level, _standing(scene, model, aside))
+            equilibrium = solve_equilibrium(level, _standing(scene, model, offset))
         except np.linalg.LinAlgError as error:
             raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
         if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
@@ -76,35 +76,34 @@ def rest(scene, model):
     )  # fmt: skip
 
 
-def _standing(scene, model, aside):
-    """State of the bodies at their nominal places, moved to the left by ``aside`` (m), wheels on their rails."""
+def _standing(scene, model, offset):
+    """State of the bodies at their nominal places, moved to the left by an offset (m), wheels on their rails."""
     vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
     state = np.zeros(state_size(model))
     for body, (x, y, z) in enumerate(vehicle.positions):
         at = STATE_SIZE * body
-        state[at : at + 8] = x, y + aside, z, 1.0, 0.0, 0.0, 0.0, REST_SPEED
+        state[at : at + 8] = x, y + offset, z, 1.0, 0.0, 0.0, 0.0, REST_SPEED
         if body in wheelsets:
             load = vehicle.nominal_wheel_load(body)
             if load <= 0.0:
-                raise InputError(
-                    scene.source, "vehicle", f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
-                )
+                got = f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
+                raise InputError(scene.source, "vehicle", got)
             k = int(np.flatnonzero(wheelsets == body)[0])
-            roll, state[at + 2] = _settled(scene, model, k, aside, 0.0, load, state)
+            roll, state[at + 2] = _settled(scene, model, k, offset, 0.0, load, state)
             if model.contact.geometries:
-                state[at + 3 : at + 7] = euler_of(rotation(roll, 0.0))
+                state[at + EULER : at + VELOCITY] = euler_of(rotation(roll, 0.0))
     return state
 
 
 def static_equilibrium(scene, model):
     """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
-    load of each wheel; all bodies move ahead at the scene's speed, wheelsets roll without slip.
+    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip.
 
     Its state is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`). An InputError if there is
     none near the nominal position.
     """
     at_rest = rest(scene, model)
-    state = _moving_ahead(model, at_rest)
+    state = _moving(model, at_rest)
     for k in range(len(model.bodies.wheelsets)):
         _roll_as_it_stands(scene, model, k, state)
     return dataclasses.replace(at_rest, state=state)
@@ -112,13 +111,13 @@ def static_equilibrium(scene, model):
 
 def _unit(vehicle, model):
     """The vehicle that a train has several times, where its own stands for all: all have wheels and track alike."""
-    return None if model.contact.geometries or len(model.support.mass) else vehicle.unit
+    return None if model.contact.geometries or len(model.flexible_track.mass) else vehicle.unit
 
 
-def _moving_ahead(model, at_rest):
+def _moving(model, at_rest):
     """State of the bodies at rest with the speed of the moving frame."""
     state = at_rest.state.copy()
-    state[7 : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] = model.speed
+    state[VELOCITY : STATE_SIZE * len(model.bodies.mass) : STATE_SIZE] = model.speed
     return state
 
 
@@ -126,10 +125,10 @@ def _roll_as_it_stands(scene, model, k, state):
     """Let the k-th wheelset roll without slip in its pose in the state, independent wheels each by itself."""
     body = model.bodies.wheelsets[k]
     part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-    roll, _, yaw = angles(part[3:7])
+    roll, _, yaw = angles(part[EULER:VELOCITY])
     left, right = _radii(scene, model, k, state, float(roll), float(yaw))
     radius = sum(left + right) / len(left + right)
-    part[10:13] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
+    part[OMEGA:] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
     for j in np.flatnonzero(model.bodies.independent[:, 0] == k):
         half = 0.5 * (len(left) / sum(left) - len(right) / sum(right)) if left and right else 0.0
         state[independent_at(model.bodies, j)] = model.speed * half
@@ -156,20 +155,17 @@ def _radii(scene, model, k, state, roll, yaw):
 
 def _settled(scene, model, k, y, yaw, load, state):
     """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest. Rails
-    that give are where the state has them."""
+    of a flexible track are where the state has them."""
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
-    if sides[0] is sides[1]:
-        roll, z = settle(Handle(sides[0]), contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
-    else:
-        roll, z = settle_apart(sides, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
+    roll, z = settle(*map(Handle, sides), contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
     if not math.isfinite(z):
         raise InputError(
             scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
             f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
         )  # fmt: skip
-    if len(model.support.mass):
+    if len(model.flexible_track.mass):
         roll, z = roll + 0.5 * (left[1] - right[1]) / contact.geometry.rail_distance, z + 0.5 * (left[1] + right[1])
     return roll, z
 
@@ -186,7 +182,7 @@ def initial_state(scene, model, at_rest=None, shared=None):
     at_rest, driven = at_rest or rest(scene, model), model
     model = undriven(model)
     y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
-    state = _moving_ahead(model, at_rest)
+    state = _moving(model, at_rest)
     level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
     for k, body in enumerate(vehicle.bodies.wheelsets):
         part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
@@ -208,22 +204,22 @@ def initial_state(scene, model, at_rest=None, shared=None):
     put_bodies(moved, vehicle, state, model.track.path)
     if not model.track.tangent:
         parts = dict(zip(vehicle.body_names, _parts(vehicle, state), strict=True))
-        moves = {name: (part[0], part[7]) for name, part in parts.items()}
+        moves = {name: (part[0], part[VELOCITY]) for name, part in parts.items()}
         for name, part in parts.items():  # an axle box is where its wheelset is
             part[:] = _on_path(model.track.path, *moves[vehicle.data["bodies"][name].get("wheelset", name)], part)
-    return np.concatenate([state, np.zeros(own_states(driven) - own_states(model))])
+    return np.concatenate([state, np.zeros(internal_states(driven) - internal_states(model))])
 
 
 def _move(scene, model, moved, at_rest, state):
     """Put bodies where the scene wants them; wheelsets that are moved stand on the rails, and all still roll."""
     for k, body in enumerate(scene.vehicle.bodies.wheelsets):
-        part, own = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
-        if own.keys() & {"y", "yaw"}:
-            y, yaw = own.get("y", part[1]), own.get("yaw", float(angles(part[3:7])[2]))
+        part, values = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
+        if values.keys() & {"y", "yaw"}:
+            y, yaw = values.get("y", part[1]), values.get("yaw", float(angles(part[EULER:VELOCITY])[2]))
             roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
             part[1:7] = y, z, *euler_of(rotation(roll, yaw))
             _roll_as_it_stands(scene, model, k, state)
-        part[10:13] *= own.get("vx", part[7]) / part[7]
+        part[OMEGA:] *= values.get("vx", part[VELOCITY]) / part[VELOCITY]
     put_bodies(moved, scene.vehicle, state, model.track.path)
 
 
@@ -240,10 +236,10 @@ def _with_axle_boxes(vehicle, state):
     for name, part in parts.items():
         described = vehicle.data["bodies"][name]
         if described["kind"] == "axle_box":
-            axle, (_, pitch, _) = parts[described["wheelset"]], angles(part[3:7])
-            axes = matrix_of(axle[3:7])
+            axle, (_, pitch, _) = parts[described["wheelset"]], angles(part[EULER:VELOCITY])
+            axes = matrix_of(axle[EULER:VELOCITY])
             part[:3] = axle[:3] + axes @ (places[name] - places[described["wheelset"]])
-            part[3:7] = euler_of(axes @ matrix_of(euler_parameters(0.0, float(pitch), 0.0)))
+            part[EULER:VELOCITY] = euler_of(axes @ matrix_of(euler_parameters(0.0, float(pitch), 0.0)))
     return state
 
 
@@ -252,8 +248,8 @@ def _steady(vehicle, model, state):
     do not act on each other: the first one's is that of all."""
     unit = _unit(vehicle, model)
     if unit is not None:
-        size, own = state_size(model._replace(bodies=unit.bodies, elements=unit.elements)), unit.elements.states
-        first = np.concatenate([state[: size - own], state[STATE_SIZE * len(vehicle.body_names) :][:own]])
+        bodies, inner = STATE_SIZE * len(unit.body_names), STATE_SIZE * len(vehicle.body_names)
+        first = np.concatenate([state[:bodies], state[inner:][: unit.elements.states]])
         alone = model._replace(bodies=unit.bodies, elements=unit.elements, joints=unit.joints)
         return repeated_equilibrium(Equilibrium(_steady(unit, alone, first), np.zeros((0, 2)), 0.0), vehicle).state
     try:
@@ -261,9 +257,10 @@ def _steady(vehicle, model, state):
     except np.linalg.LinAlgError:
         return state
     wheelsets = [_parts(vehicle, row)[model.bodies.wheelsets] for row in (found, state)]
-    turning, moving = (np.linalg.norm(rows[:, 10:13], axis=1) for rows in wheelsets)
-    aside = np.abs(wheelsets[0][:, 1] - wheelsets[1][:, 1])
-    return found if np.all(np.abs(turning - moving) < LARGEST_SLIP * moving) and np.all(aside < NEARBY) else state
+    turning, moving = (np.linalg.norm(rows[:, OMEGA:], axis=1) for rows in wheelsets)
+    shifts = np.abs(wheelsets[0][:, 1] - wheelsets[1][:, 1])
+    near = np.all(np.abs(turning - moving) < LARGEST_SLIP * moving) and np.all(shifts < LARGEST_SHIFT)
+    return found if near else state
 
 
 @np.errstate(all="ignore")  # what overflows is no better
@@ -273,9 +270,9 @@ def _balanced(vehicle, model, equations, state):
     wheelsets = model.bodies.wheelsets
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
-    rolls, _, yaws = angles(parts[:, 3:7])
-    axles = np.array([matrix_of(part[3:7])[:, 1] for part in parts])
-    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, 10:13], axis=1)])
+    rolls, _, yaws = angles(parts[:, EULER:VELOCITY])
+    axles = np.array([matrix_of(part[EULER:VELOCITY])[:, 1] for part in parts])
+    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, OMEGA:], axis=1)])
 
     def standing(stands):
         """The state with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
@@ -283,10 +280,10 @@ def _balanced(vehicle, model, equations, state):
         axes = [rotation(roll, yaw) for roll, yaw in zip(stands[:, 1], yaws, strict=True)]
         for body, turned, (z, _, rate) in zip(wheelsets, axes, stands, strict=True):
             part = new[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-            part[2:7], part[10:13] = (z, *euler_of(turned)), rate * turned[:, 1]
+            part[2:7], part[OMEGA:] = (z, *euler_of(turned)), rate * turned[:, 1]
         new = _with_axle_boxes(vehicle, new) if boxes else new
         rates = _parts(vehicle, equations(0.0, new))[wheelsets]
-        about = [row[10:13] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
+        about = [row[OMEGA:] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
         return new, np.column_stack([rates[:, 9:11], about])
 
     for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
@@ -298,25 +295,25 @@ def _balanced(vehicle, model, equations, state):
 
 def _improved(standing, stands, steps):
     """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
-    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``NOISE`` is rounding."""
-    own, slopes = slice(len(steps)), None
-    left = standing(stands)[1][:, own]
+    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``ROUNDING`` is rounding."""
+    unknown, slopes = slice(len(steps)), None
+    left = standing(stands)[1][:, unknown]
     for _ in range(20):
         if slopes is None:
             ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
-            slopes = np.stack([(high - low)[:, own] / width for high, low, width in ends], axis=-1)
+            slopes = np.stack([(high - low)[:, unknown] / width for high, low, width in ends], axis=-1)
         new = stands.copy()
         try:
-            new[:, own] -= np.linalg.solve(slopes, left[..., None])[..., 0]
+            new[:, unknown] -= np.linalg.solve(slopes, left[..., None])[..., 0]
         except np.linalg.LinAlgError:
             break
-        still_left = standing(new)[1][:, own]
+        still_left = standing(new)[1][:, unknown]
         part = np.max(np.abs(still_left)) / np.max(np.abs(left))
         if not part < 1.0:
             break
         stands, left = new, still_left
         if part > 0.1:
-            if np.max(np.abs(left)) < NOISE:
+            if np.max(np.abs(left)) < ROUNDING:
                 break
             slopes = None
     return stands
@@ -330,5 +327,6 @@ def _on_path(path, s, speed, part):
     turn = frame @ np.array(frame_turn(station)) * speed
     arm = frame @ np.array([part[0] - s, part[1], part[2]])
     position = np.array([station.x, station.y, station.z]) + arm
-    velocity = frame @ part[7:10] + np.cross(turn, arm)
-    return np.concatenate([position, euler_of(frame @ matrix_of(part[3:7])), velocity, frame @ part[10:13] + turn])
+    velocity = frame @ part[VELOCITY:OMEGA] + np.cross(turn, arm)
+    euler = euler_of(frame @ matrix_of(part[EULER:VELOCITY]))
+    return np.concatenate([position, euler, velocity, frame @ part[OMEGA:] + turn])

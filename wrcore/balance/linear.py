@@ -2,7 +2,7 @@
 
 Coordinates of a body are the displacement of its centre (track axes) and the small rotation of its frame about its own
 axes; with them go the velocity of its centre (track axes) and its angular velocity (body axes). Displacements q and
-velocities u are then related by q' = u, and only accelerations and the rates of the force elements' own states need
+velocities u are then related by q' = u, and only accelerations and the rates of the elements' internal states need
 difference quotients. The frame of a wheelset does not spin (see wrcore.dynamics.body): a wheelset has no rotation about
 its axle, and its spin rate is a velocity alone.
 
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wrcore.balance.equilibrium import RESIDUAL
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.joint import joint_jacobian
-from wrcore.dynamics.system import Equations, own_states
+from wrcore.dynamics.system import Equations, internal_states
 
 DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Coordinates of a body; pitch of a wheelset is its spin."""
@@ -37,7 +37,7 @@ class Linearisation:
     """x' = A x for small motions about a steady state."""
 
     matrix: np.ndarray
-    """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' own states."""
+    """(m, m): A, in independent coordinates: displacements, velocities, then the force elements' internal states."""
     basis: np.ndarray
     """(12 n + states, m): turns independent coordinates into the moves of the n bodies, see :func:`moved_states`."""
     state: np.ndarray
@@ -59,7 +59,7 @@ def linearise(model, state):
     equations = Equations(model)
     equations(0.0, state)  # leaves the joints' Jacobian
     places, speeds = _independent_motions(model, state, equations.work)
-    basis = block_diag(places, speeds, np.eye(own_states(model)))
+    basis = block_diag(places, speeds, np.eye(internal_states(model)))
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
@@ -82,8 +82,7 @@ def steady_running(model, state, iterations=10):
     """
     best = linearise(model, cleared(model, state))
     places, size = best.places, len(best.matrix)
-    own = size - own_states(model)
-    columns = np.r_[:places, own - np.count_nonzero(model.bodies.spins) : own, own:size]
+    columns = np.r_[:places, size - internal_states(model) - np.count_nonzero(model.bodies.spins) : size]
     last = np.inf
     for _ in range(iterations):
         left = np.max(np.abs(best.residual))
@@ -114,16 +113,16 @@ def cleared(model, state):
 def moved_states(model, state, moves):
     """States (k, size) with displaced bodies and changed velocities. A row of ``moves`` (k, 12 n + states):
     displacement (m, track axes) and rotation vector (rad, body axes) of body after body; change of velocity (m/s, track
-    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' own states."""
+    axes) and of angular velocity (rad/s, body axes) of body after body; changes of the elements' internal states."""
     n = len(model.bodies.mass)
     states = np.tile(state, (len(moves), 1))
     parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
     place, speed = moves[:, : 12 * n].reshape(-1, 2, n, 6).swapaxes(0, 1)
-    turning = _into_body(parts[..., 3:7], parts[..., 10:13])
+    turning = _into_body(parts[..., EULER:VELOCITY], parts[..., OMEGA:])
     parts[..., :3] += place[..., :3]
-    parts[..., 3:7] = _turned(parts[..., 3:7], place[..., 3:])
-    parts[..., 7:10] += speed[..., :3]
-    parts[..., 10:13] = _out_of_body(parts[..., 3:7], turning + speed[..., 3:])
+    parts[..., EULER:VELOCITY] = _turned(parts[..., EULER:VELOCITY], place[..., 3:])
+    parts[..., VELOCITY:OMEGA] += speed[..., :3]
+    parts[..., OMEGA:] = _out_of_body(parts[..., EULER:VELOCITY], turning + speed[..., 3:])
     states[:, STATE_SIZE * n :] += moves[:, 12 * n :]
     return states
 
@@ -147,13 +146,13 @@ def _into_body(p, vector):
 
 
 def _accelerations(model, states, rates):
-    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of the elements' own states."""
+    """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
     n = len(model.bodies.mass)
     parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))
-    turning, change = (_into_body(parts[..., 3:7], rows[..., 10:13]) for rows in (parts, slopes))
+    turning, change = (_into_body(parts[..., EULER:VELOCITY], rows[..., OMEGA:]) for rows in (parts, slopes))
     frame = turning.copy()
     frame[:, model.bodies.spins == 1, 1] = 0.0
-    both = np.concatenate([slopes[..., 7:10], change - np.cross(frame, turning)], axis=-1)
+    both = np.concatenate([slopes[..., VELOCITY:OMEGA], change - np.cross(frame, turning)], axis=-1)
     return np.hstack([both.reshape(-1, 6 * n), rates[:, STATE_SIZE * n :]])
 
 
@@ -163,7 +162,7 @@ def _independent_motions(model, state, work):
     spins = 6 * np.flatnonzero(model.bodies.spins) + 4
     turning = np.delete(np.arange(6 * n), spins)
     jacobian = joint_jacobian(model.joints, work.constraints.joints, n)
-    jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, 3:7], jacobian[..., 3:])
+    jacobian[..., 3:] = _into_body(state[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, EULER:VELOCITY], jacobian[..., 3:])
     places = np.eye(6 * n)[:, turning]
     if len(jacobian):
         _, values, vectors = np.linalg.svd(jacobian.reshape(-1, 6 * n)[:, turning])

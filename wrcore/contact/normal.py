@@ -134,3 +134,17 @@ def inverse_cube_root(x):
         rest = 1.0 - x * y * y * y
         y += y * rest * (1.0 / 3.0 + rest * (2.0 / 9.0 + rest * (14.0 / 81.0)))
     return y
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def loaded_ellipse(table, modulus, c_e, v0, penetration, A, B, approach_speed):
+    """Normal force (N) by Eq. (7), semi-axes (m) of the ellipse that carries it, their ratio a/b and its logarithm, for
+    relative curvatures A and B (1/m); ``c_e`` and ``v0`` of `damping_factor`."""
+    stiffness, a, b, log_axis_ratio = hertz_shape_at(table, A, B)
+    factor = damping_factor(approach_speed, c_e, v0)
+    root = math.sqrt(penetration)
+    force = factor * modulus * stiffness * penetration * root
+    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
+    inverse = inverse_cube_root(factor)
+    root *= factor * inverse * inverse
+    return force, a * root, b * root, a / b, log_axis_ratio

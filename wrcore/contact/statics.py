@@ -4,20 +4,9 @@ import math
 
 import numpy as np
 
+from wrcore.contact import reduction as columns
 from wrcore.contact.detection import find_patches
-from wrcore.contact.normal import hertz_ellipse
-from wrcore.contact.reduction import (
-    ANGLE,
-    CURVATURE_X,
-    CURVATURE_Y,
-    MAX_PATCHES,
-    NORMAL,
-    PATCH_COLUMNS,
-    PENETRATION,
-    SEMI_A,
-    SEMI_B,
-)
-from wrcore.kernels.handles import Handle
+from wrcore.contact.normal import loaded_ellipse
 from wrcore.kernels.jit import jit
 
 Z_RANGE = 0.03
@@ -40,11 +29,11 @@ def wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, redu
     force = 0.0
     for k in range(count):
         row = patches[k]
-        stiffness, a_factor, b_factor = hertz_ellipse(hertz, row[CURVATURE_X], row[CURVATURE_Y])
-        root = math.sqrt(row[PENETRATION])
-        row[SEMI_A], row[SEMI_B] = a_factor * root, b_factor * root
-        row[NORMAL] = modulus * stiffness * row[PENETRATION] * root
-        force += row[NORMAL] * math.cos(row[ANGLE])
+        normal, row[columns.SEMI_A], row[columns.SEMI_B], _, _ = loaded_ellipse(
+            hertz, modulus, 1.0, 1.0, row[columns.PENETRATION], row[columns.CURVATURE_X], row[columns.CURVATURE_Y], 0.0
+        )
+        row[columns.NORMAL] = normal
+        force += normal * math.cos(row[columns.ANGLE])
     return count, force
 
 
@@ -117,68 +106,46 @@ def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reductio
 
 
 @jit(allocates=False)
-def _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
+def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
     """As `settle`, by secants: far faster. NaN where it is lost."""
     roll = before = difference = 0.0
-    slope, left, right = ROLL_SLOPE, nominal, nominal
+    slope, z, other = ROLL_SLOPE, nominal, nominal
     for k in range(25):
-        left = _height_near(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, left, patches)
-        right = _height_near(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, right, patches)
+        z = _height_near(left, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, z, patches)
+        other = _height_near(right, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, other, patches)
         if k > 0 and roll != before:
-            slope = (left - right - difference) / (roll - before)
-        difference, before = left - right, roll
+            slope = (z - other - difference) / (roll - before)
+        difference, before = z - other, roll
         step = difference / slope
         if abs(step) < 1e-13:
-            return roll, 0.5 * (left + right)
+            return roll, 0.5 * (z + other)
         if not abs(step) < LARGEST_TURN:
             break
         roll -= step
-        left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
+        z, other = z - 0.5 * slope * step, other + 0.5 * slope * step
     return np.nan, np.nan
 
 
 @jit(nogil=True)
-def settle(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """Roll (rad) and height (m) at which each wheel carries ``load`` (N) vertically; NaN where there is none. The left
-    wheel's own height falls and the right wheel's rises with roll, so bisection on their difference is safe; it runs
-    where secants do not get there."""
-    patches = np.empty((MAX_PATCHES, PATCH_COLUMNS))
-    roll, z = _settle_near(geometry, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
+def settle(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
+    """Roll (rad) and height (m) at which each wheel, of `ContactGeometry` ``left`` and ``right``, carries ``load`` (N)
+    vertically; NaN where there is none. The left wheel's own height falls and the right wheel's rises with roll, so
+    bisection on their difference is safe; it runs where secants do not get there."""
+    patches = np.empty((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
+    roll, z = _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
     if not np.isnan(z):
         return roll, z
     low, high = -ROLL_RANGE, ROLL_RANGE
-    left = right = 0.0
+    z = other = 0.0
     for _ in range(60):
         roll = 0.5 * (low + high)
-        left = height_at_load(geometry, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
-        right = height_at_load(geometry, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
+        z = height_at_load(left, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
+        other = height_at_load(right, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
         # roll lifts the left wheel: too much of it and the left wheel must come down further than the right one
-        if left < right or (np.isnan(left) and roll > 0.0) or (np.isnan(right) and roll > 0.0):
+        if z < other or (np.isnan(z) and roll > 0.0) or (np.isnan(other) and roll > 0.0):
             high = roll
         else:
             low = roll
         if high - low < 1e-13:
             break
-    return 0.5 * (low + high), 0.5 * (left + right)
-
-
-def settle_apart(geometries, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
-    """As `settle`, for a left and a right wheel, or rail, that differ: ``geometries`` of both."""
-    from scipy.optimize import brentq  # its import takes longer than most starts
-
-    handles, patches = [Handle(geometry) for geometry in geometries], np.empty((MAX_PATCHES, PATCH_COLUMNS))
-
-    def heights(roll):
-        return [
-            height_at_load(handle, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches)
-            for handle, side in zip(handles, (1.0, -1.0), strict=True)
-        ]
-
-    def difference(roll):
-        left, right = heights(roll)
-        return left - right if math.isfinite(left - right) else -roll
-
-    if difference(-ROLL_RANGE) * difference(ROLL_RANGE) > 0.0:
-        return math.nan, math.nan
-    roll = brentq(difference, -ROLL_RANGE, ROLL_RANGE, xtol=1e-14)
-    return roll, float(np.mean(heights(roll)))
+    return 0.5 * (low + high), 0.5 * (z + other)

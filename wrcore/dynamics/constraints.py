@@ -34,20 +34,13 @@ class ConstraintWork(NamedTuple):
     joints: JointState
     multipliers: np.ndarray
     """(n, 5): Lagrange multipliers of the last evaluation, N or N m; the first body feels -[S, R]^T lambda."""
-    redundant: np.ndarray
-    """(1,) int: redundant equations in the last evaluation."""
-    inverse_mass: np.ndarray
-    """(bodies + 1,), 1/kg."""
-    inverse_inertia: np.ndarray
-    """(bodies + 1, 3, 3): in track axes, 1/(kg m^2)."""
-    accelerations: np.ndarray
-    """(bodies + 1, 6): without reactions, m/s^2 and rad/s^2."""
-    mobile: np.ndarray
-    """(n, 2, 5, 3): R J^-1 of the first and the second body."""
-    tiles: np.ndarray
-    """(tiles, 5, 5): lower envelope of D M^-1 D^T, then of L."""
-    pivots: np.ndarray
-    """(n, 5): diagonal of D M^-1 D^T, then 1/d."""
+    redundant: np.ndarray  # (1,) int: redundant equations in the last evaluation
+    inverse_mass: np.ndarray  # (bodies + 1,), 1/kg
+    inverse_inertia: np.ndarray  # (bodies + 1, 3, 3): in track axes, 1/(kg m^2)
+    accelerations: np.ndarray  # (bodies + 1, 6): without reactions, m/s^2 and rad/s^2
+    mobile: np.ndarray  # (n, 2, 5, 3): R J^-1 of the first and the second body
+    tiles: np.ndarray  # (tiles, 5, 5): lower envelope of D M^-1 D^T, then of L
+    pivots: np.ndarray  # (n, 5): diagonal of D M^-1 D^T, then 1/d
 
 
 def constraint_workspace(joints):
@@ -112,15 +105,10 @@ def invert_masses(bodies, joints, rotations, scratch):
 def apply_inverse_masses(joints, scratch, wrenches):
     """accelerations = M^-1 wrenches, of the bodies that joints hold."""
     for b in joints.order.moving:
-        inverse_mass, inverse_inertia, out = (
-            scratch.inverse_mass[b],
-            scratch.inverse_inertia[b],
-            scratch.accelerations[b],
-        )
-        moment = load(wrenches[b], 3)
+        out, moment = scratch.accelerations[b], load(wrenches[b], 3)
         for i in range(3):
-            out[i] = inverse_mass * wrenches[b, i]
-            out[3 + i] = dot(inverse_inertia[i], moment)
+            out[i] = scratch.inverse_mass[b] * wrenches[b, i]
+            out[3 + i] = dot(scratch.inverse_inertia[b, i], moment)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

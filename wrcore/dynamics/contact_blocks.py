@@ -12,8 +12,10 @@ import math
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.dynamics.constraints import apply_inverse_inertia
 from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
+from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
 from wrcore.dynamics.vector import copy_into
+from wrcore.dynamics.wheel import press_wheels
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -21,7 +23,8 @@ DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 """Differences: m, rad, m/s and rad/s."""
 
 DIRECTIONS = 12
-"""Columns of a body: displacement, rotation, velocity, angular velocity."""
+ALONG, ROLL, PITCH, YAW = 0, 3, 4, 5
+"""Columns of a body: displacement, rotation, velocity, angular velocity; and some of them."""
 
 UNIT = 1e3
 """Wrench whose accelerations are looked at, N and N m."""
@@ -30,11 +33,11 @@ UNIT = 1e3
 @jit(allocates=False, inline="always")
 def contacts_alone(model):
     """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
-    independently and rails that give are own states, whose rows and columns these do not tell."""
+    independently and a flexible track have internal states, whose rows and columns these do not tell."""
     return (
         model.bodies.wheelsets.shape[0] > 0
         and model.bodies.independent.shape[0] == 0
-        and model.support.mass.shape[0] == 0
+        and model.flexible_track.mass.shape[0] == 0
     )
 
 
@@ -74,25 +77,16 @@ def _accelerations(t, state, model, work, body, direction, out):
         apply_inverse_inertia(bodies.inertia[b], work.rotations[b], wrenches[b], out[6 * b + 3 : 6 * b + 6])
 
 
-@jit(allocates=False)
-def _wrenches(model, work, mode):
-    call_address(
-        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, work.strips, mode,
-    )  # fmt: skip
-
-
 @jit(allocates=False, fastmath=FUSED)
 def _moved(base, direction, difference, row):
     """Write a wheel's motion with a difference in one direction of its rail's frame into ``row``."""
+    m = motion_of(base)
     copy_into(row, base)
-    if direction < 3:
-        row[direction] += difference
-    elif direction == 3:
-        row[4], row[5] = base[4] - difference * base[5], base[5] + difference * base[4]
-    elif direction == 5:
-        row[3], row[4] = base[3] - difference * base[4], base[4] + difference * base[3]
-    else:
+    if direction == ROLL:
+        row[MOTION.ey], row[MOTION.ez] = m.ey - difference * m.ez, m.ez + difference * m.ey
+    elif direction == YAW:
+        row[MOTION.ex], row[MOTION.ey] = m.ex - difference * m.ey, m.ey + difference * m.ex
+    else:  # y, z and velocities: columns have the numbers of the directions
         row[direction] += difference
 
 
@@ -110,17 +104,15 @@ def _add_column(rail, direction, base, wrench, scale, columns):
 
 
 @jit(allocates=False)
-def _take_rails(jacobian, angle, model, work):
+def _take_rails(jacobian, angle, work):
     """Write the axes of all rails' frames in the axes in which increments are counted."""
-    c, s, tangent = math.cos(angle), math.sin(angle), model.track.tangent
+    c, s = math.cos(angle), math.sin(angle)
     for k in range(jacobian.rails.shape[0]):
         for wheel in range(2):
-            rail = jacobian.rails[k, wheel]
+            rail, axes = jacobian.rails[k, wheel], work.rails[k, wheel]
             for j in range(3):
-                x = work.rails[k, wheel, 0, j] if not tangent else (1.0 if j == 0 else 0.0)
-                y = work.rails[k, wheel, 1, j] if not tangent else (1.0 if j == 1 else 0.0)
-                rail[0, j], rail[1, j] = c * x + s * y, c * y - s * x
-                rail[2, j] = work.rails[k, wheel, 2, j] if not tangent else (1.0 if j == 2 else 0.0)
+                rail[0, j], rail[1, j] = c * axes[0, j] + s * axes[1, j], c * axes[1, j] - s * axes[0, j]
+                rail[2, j] = axes[2, j]
 
 
 @jit(allocates=False)
@@ -132,8 +124,8 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
     wheel_motions(model, state, work)
-    _take_rails(jacobian, angle, model, work)
-    _wrenches(model, work, mode)
+    _take_rails(jacobian, angle, work)
+    press_wheels(model, work, mode)
     for k in range(wheelsets.shape[0]):
         for wheel in range(2):
             copy_into(base[k, wheel], work.motions[k, wheel])
@@ -142,7 +134,7 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     for step in range(DIRECTIONS):
         direction = (step + 6) % DIRECTIONS  # velocities first: the patches are those of the pose
         mode = ELLIPSES | PATCHES_HELD if direction >= 6 else ELLIPSES
-        if direction == 0 or direction == 4:
+        if direction == ALONG or direction == PITCH:
             continue
         difference = DISPLACEMENT if direction < 3 else TURN
         if direction >= 6:
@@ -150,14 +142,14 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
         for k in range(base.shape[0]):
             for wheel in range(2):
                 _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
-        _wrenches(model, work, mode)
+        press_wheels(model, work, mode)
         for k in range(base.shape[0]):
             for wheel in range(2):
-                rail, row, axle = jacobian.rails[k, wheel], work.rail_wrenches[k, wheel], base[k, wheel, 3:6]
+                rail, row, m = jacobian.rails[k, wheel], work.rail_wrenches[k, wheel], motion_of(base[k, wheel])
                 _add_column(rail, direction, found[k, wheel], row, 1.0 / difference, columns[k])
-                if direction == 3 or direction == 5:  # a turn about the axle changes nothing
-                    share = -axle[direction - 3] / axle[1]
-                    _add_column(rail, 4, found[k, wheel], row, share / difference, columns[k])
+                if direction == ROLL or direction == YAW:  # a turn about the axle changes nothing
+                    share = -(m.ex if direction == ROLL else m.ez) / m.ey
+                    _add_column(rail, PITCH, found[k, wheel], row, share / difference, columns[k])
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -190,13 +182,13 @@ def renew_contacts(joined, whole, jacobian, angle, t, state, model, work, fine):
         take_mobility(jacobian, t, state, model, work)
     c, s = math.cos(angle), math.sin(angle)
     for k in range(columns.shape[0]):
-        own = model.bodies.wheelsets[k]
+        wheelset = model.bodies.wheelsets[k]
         for direction in range(DIRECTIONS):
-            column = jacobian.by_position[6 * own + direction] if direction < 6 else \
-                jacobian.by_velocity[6 * own + direction - 6]  # fmt: skip
+            column = jacobian.by_position[6 * wheelset + direction] if direction < 6 else \
+                jacobian.by_velocity[6 * wheelset + direction - 6]  # fmt: skip
             for j in range(joined.starts[k], joined.starts[k + 1]):
                 body = joined.bodies[j]
-                _respond(jacobian.mobility[k], work.rotations[own], c, s, columns[k, direction], body, out)
+                _respond(jacobian.mobility[k], work.rotations[wheelset], c, s, columns[k, direction], body, out)
                 for row in range(6):
                     known = jacobian.contact[k, direction, 6 * body + row]
                     jacobian.contact[k, direction, 6 * body + row] = out[row]

@@ -14,7 +14,7 @@ Which unknowns act on which is in :mod:`wrcore.dynamics.links`, the part of the 
 
 import math
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.vector import copy_into
 from wrcore.geometry.path import arc_length_of, track_frame
@@ -98,6 +98,6 @@ def turn_rate(state, model, work):
         at = STATE_SIZE * wheelsets[k]
         s = arc_length_of(model.track.path, state[at], state[at + 1], state[at + 2], work.arc_lengths[k])
         station = track_frame(model.track.path, s, frame)
-        total += station.curvature * (station.tx * state[at + 7] + station.ty * state[at + 8])
+        total += station.curvature * (station.tx * state[at + VELOCITY] + station.ty * state[at + VELOCITY + 1])
     total /= wheelsets.shape[0]
     return total if math.isfinite(total) else 0.0

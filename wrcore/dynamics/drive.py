@@ -1,8 +1,8 @@
 """Motors, brakes and a speed controller: torques about axles, against the bodies that carry motors and calipers.
 
-A torque M along the axle e (pointing left: M > 0 drives ahead) acts on a wheelset, its opposite on the body that takes
-the reaction, so that the pair gains no angular momentum, and the power put in is M times the relative rotation rate
-omega = e . (w_wheelset - w_body). With the moving frame as that body the reaction leaves the vehicle.
+A torque M along the axle e (pointing left: M > 0 drives forward) acts on a wheelset, its opposite on the body that
+takes the reaction, so that the pair gains no angular momentum, and the power put in is M times the relative rotation
+rate omega = e . (w_wheelset - w_body). With the moving frame as that body the reaction leaves the vehicle.
 
 *Motor*: M by a table. *Brake*: M = -M_b tanh(omega/`GRIP`), with M_b by a table: a friction brake whose sign changes
 within some `GRIP`, so that it holds at standstill and takes energy at every instant. *Controller*: proportional and
@@ -24,14 +24,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.rail_friction import arc_length_at
 from wrcore.dynamics.schedule import Schedules, pack_schedules, scheduled
+from wrcore.dynamics.track import arc_length_at
+from wrcore.dynamics.vector import load
 from wrcore.kernels.jit import jit
 
 MOTOR, BRAKE, CONTROLLED = range(3)
 """Kinds of actuators."""
+
+WHEELSET, REACTION, NUMBER, KIND, TABLE, OVER = range(6)
+"""Columns of ``Drive.rows``."""
+
+BODY, FOREMOST, SPEED, SPEED_OVER = range(4)
+"""Columns of ``Drive.control``."""
+
+PROPORTIONAL, INTEGRAL, LEAST, MOST = range(4)
+"""Columns of ``Drive.gains``."""
 
 TIME, ARC_LENGTH = range(2)
 """What a table is over."""
@@ -46,13 +56,11 @@ class Drive(NamedTuple):
     rows: np.ndarray
     """(m, 6) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
     kind, table, what that is over."""
-    lever: np.ndarray
-    """(m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)."""
+    lever: np.ndarray  # (m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)
     control: np.ndarray
     """(c, 4) int, c = 0 or 1: body whose speed counts, number of the wheelset whose arc length does, table, what that
     is over."""
-    gains: np.ndarray
-    """(c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)."""
+    gains: np.ndarray  # (c, 4): Kp (N s/m), Ki (N/m), least and largest force (N)
     tables: Schedules
 
 
@@ -77,20 +85,21 @@ def drive_links(model):
     """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration. A speed
     profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link from one
     wheelset to all others would double the cost of a Jacobian."""
-    pairs = [(row[0], row[1]) for row in model.drive.rows if row[1] != FRAME]
-    for body in model.drive.control[:, 0]:
+    pairs = [(row[WHEELSET], row[REACTION]) for row in model.drive.rows if row[REACTION] != FRAME]
+    for body in model.drive.control[:, BODY]:
         pairs += [(body, end) for end in _controlled(model) if end != body]
     return pairs
 
 
 def drive_state_bodies(model):
     """For the controller's integral, if there is one, the set of bodies that it acts on or follows."""
-    return [{int(body)} | _controlled(model) for body in model.drive.control[:, 0]]
+    return [{int(body)} | _controlled(model) for body in model.drive.control[:, BODY]]
 
 
 def _controlled(model):
     """Bodies that the controller's force acts on."""
-    return {int(end) for row in model.drive.rows if row[3] == CONTROLLED for end in row[:2] if end != FRAME}
+    rows = model.drive.rows
+    return set(rows[rows[:, KIND] == CONTROLLED][:, [WHEELSET, REACTION]].ravel().tolist()) - {FRAME}
 
 
 @jit(allocates=False)
@@ -105,27 +114,29 @@ def controlled_force(model, t, state, work):
     if model.drive.control.shape[0] == 0:
         return 0.0, 0.0, 0.0
     row, gains, n = model.drive.control[0], model.drive.gains[0], model.bodies.mass.shape[0]
-    axes, at = work.rotations[row[0]], STATE_SIZE * row[0] + 7
-    speed = axes[0, 0] * state[at] + axes[1, 0] * state[at + 1] + axes[2, 0] * state[at + 2]
-    wanted = _table_value(model, row[2], row[3], row[1], t, state, work)
-    asked = gains[0] * (wanted - speed) + gains[1] * state[STATE_SIZE * n + model.elements.states]
-    force = min(max(asked, gains[2]), gains[3])
-    return force, wanted, wanted - speed - (asked - force) / gains[0]
+    axes, (vx, vy, vz) = work.rotations[row[BODY]], load(state, STATE_SIZE * row[BODY] + VELOCITY)
+    speed = axes[0, 0] * vx + axes[1, 0] * vy + axes[2, 0] * vz
+    wanted = _table_value(model, row[SPEED], row[SPEED_OVER], row[FOREMOST], t, state, work)
+    asked = gains[PROPORTIONAL] * (wanted - speed) + gains[INTEGRAL] * state[STATE_SIZE * n + model.elements.states]
+    force = min(max(asked, gains[LEAST]), gains[MOST])
+    return force, wanted, wanted - speed - (asked - force) / gains[PROPORTIONAL]
 
 
 @jit(allocates=False)
 def actuator(model, i, force, t, state, work):
     """Torque of the i-th actuator along the axle of its wheelset (N m), and the relative rotation rate (rad/s)."""
-    row, axes = model.drive.rows[i], work.rotations[model.drive.rows[i, 0]]
-    rate = 0.0
+    row = model.drive.rows[i]
+    axes, kind, rate = work.rotations[row[WHEELSET]], row[KIND], 0.0
     for k in range(3):
-        turn = state[STATE_SIZE * row[0] + 10 + k]
-        if row[1] != FRAME:
-            turn -= state[STATE_SIZE * row[1] + 10 + k]
+        turn = state[STATE_SIZE * row[WHEELSET] + OMEGA + k]
+        if row[REACTION] != FRAME:
+            turn -= state[STATE_SIZE * row[REACTION] + OMEGA + k]
         rate += axes[k, 1] * turn
-    value = force if row[3] == CONTROLLED else _table_value(model, row[4], row[5], row[2], t, state, work)
+    value = force
+    if kind != CONTROLLED:
+        value = _table_value(model, row[TABLE], row[OVER], row[NUMBER], t, state, work)
     torque = model.drive.lever[i] * value
-    return (-torque * math.tanh(rate / GRIP) if row[3] == BRAKE else torque), rate
+    return (-torque * math.tanh(rate / GRIP) if kind == BRAKE else torque), rate
 
 
 @jit(allocates=False)
@@ -136,19 +147,10 @@ def add_drive(model, t, state, work, rate):
     if model.drive.control.shape[0] > 0:
         rate[STATE_SIZE * model.bodies.mass.shape[0] + model.elements.states] = change
     for i in range(model.drive.rows.shape[0]):
-        wheelset, body = model.drive.rows[i, 0], model.drive.rows[i, 1]
+        wheelset, body = model.drive.rows[i, WHEELSET], model.drive.rows[i, REACTION]
         torque, _ = actuator(model, i, force, t, state, work)
         for k in range(3):
             moment = torque * work.rotations[wheelset, k, 1]
             work.wrenches[wheelset, 3 + k] += moment
             if body != FRAME:
                 work.wrenches[body, 3 + k] -= moment
-
-
-@jit(allocates=False)
-def fill_drive(model, t, state, work, torques, rates, control):
-    """Fill ``torques`` (N m) and relative rotation ``rates`` (rad/s) of all actuators, and ``control`` with the
-    controller's force at the rims (N) and the speed that it wants (m/s), right after an evaluation."""
-    control[0], control[1], _ = controlled_force(model, t, state, work)
-    for i in range(torques.shape[0]):
-        torques[i], rates[i] = actuator(model, i, control[0], t, state, work)

@@ -6,8 +6,8 @@ equations of motion have the powers
     E' = P_frame + P_joints + P_motors - P_brakes - P_dampers - P_creep - P_contact damping + (U_contact' - P_elastic).
 
 Rigid rails are at rest: nothing comes in through the track, whatever its irregularity, but what the moving frame pulls.
-Of a track that gives (:mod:`wrcore.dynamics.support`) masses, springs and dampers count with those of the vehicle, and
-the power of the contacts is that on both sides: between a wheel and a rail that moves.
+Of a flexible track (:mod:`wrcore.dynamics.flexible_track`) masses, springs and dampers count with those of the vehicle,
+and the power of the contacts is that on both sides: between a wheel and a rail that moves.
 
 *Elastic contact.* Eq. (7) is a spring N_el = c_d(0) K delta^1.5 and a damping N - N_el. The spring's power P_elastic =
 N_el (approach speed) is the rate of U_contact = 2/5 N_el delta where K is constant and the approach speed the rate of
@@ -23,13 +23,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.drive import BRAKE, undriven
+from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY
+from wrcore.dynamics.drive import BRAKE, KIND, undriven
+from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.outputs import drive_history
-from wrcore.dynamics.support import support_places
 from wrcore.dynamics.suspension import element_energies, pack_elements
 from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at
-from wrcore.dynamics.wheel import normal_contact
+from wrcore.dynamics.wheel import OUT_OF_RANGE, normal_contact
 from wrcore.kernels.jit import jit
 
 CHANNELS = (
@@ -64,10 +64,10 @@ def _wheels_inertia(bodies, j):
 def _fill_powers(times, states, equations, model, work, rate, powers):
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rate)
-        powers[i] = work.support.power[0]
+        powers[i] = work.flexible_track.power[0]
         for b in range(work.wrenches.shape[0]):
             for k in range(6):
-                powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + 7 + k]
+                powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + VELOCITY + k]
         for j in range(model.bodies.independent.shape[0]):
             inertia, at = _wheels_inertia(model.bodies, j), independent_at(model.bodies, j)
             powers[i] += inertia * states[i, at] * rate[at]
@@ -86,9 +86,9 @@ def _kinetic_and_gravitational(model, rotations, state):
     kinetic = height = rise = 0.0
     for b in range(model.bodies.mass.shape[0]):
         at, mass = STATE_SIZE * b, model.bodies.mass[b]
-        local = rotations[b].T.copy() @ state[at + 10 : at + 13]
-        kinetic += 0.5 * mass * np.sum(state[at + 7 : at + 10] ** 2) + 0.5 * np.sum(model.bodies.inertia[b] * local**2)
-        height, rise = height + mass * state[at + 2], rise + mass * state[at + 9]
+        local, velocity = rotations[b].T.copy() @ state[at + OMEGA : at + STATE_SIZE], state[at + VELOCITY : at + OMEGA]
+        kinetic += 0.5 * mass * np.sum(velocity**2) + 0.5 * np.sum(model.bodies.inertia[b] * local**2)
+        height, rise = height + mass * state[at + 2], rise + mass * state[at + VELOCITY + 2]
     for j in range(model.bodies.independent.shape[0]):
         kinetic += 0.5 * _wheels_inertia(model.bodies, j) * state[independent_at(model.bodies, j)] ** 2
     return kinetic, model.gravity * height, model.gravity * rise
@@ -106,8 +106,8 @@ def _elastic_contact_energy(contact, work):
                 if contact.strips.strips > 0:  # no potential is known: that of an ellipse under the same force
                     force = row[reduction.NORMAL]
                 else:
-                    curvatures = row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y]
-                    force = normal_contact(contact, delta, curvatures[0], curvatures[1], 0.0)[0]
+                    along, across = row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y]
+                    force = normal_contact(contact, delta, along, across, 0.0)[0]
                 energy += 0.4 * force * delta
     return energy
 
@@ -124,9 +124,10 @@ def _energies(times, states, evaluation, work):
         stored, stretching, damped, driven = element_energies(
             model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns, rate
         )
-        rows[i, 0], rows[i, 1], rows[i, 2] = kinetic, height, stored
-        rows[i, 3] = _elastic_contact_energy(model.contact, work)
-        rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7] = stretching, rise, damped, driven
+        pressed = _elastic_contact_energy(model.contact, work)
+        found = kinetic, height, stored, pressed, stretching, rise, damped, driven
+        for k in range(len(found)):
+            rows[i, k] = found[k]
     return rows
 
 
@@ -134,9 +135,9 @@ def energy_channels(model, work, times, states):
     """Energies (J; gravitational from z = 0, springs from nominal position) and powers (W) along a run, channels (n,)
     by name with their unit, from ``times`` (s) and ``states`` (n, size). ``work`` is overwritten, but for its counters
     of creep look-ups; its arc lengths are those near which the first ones are sought."""
-    times, states, outside = np.asarray(times, float), np.ascontiguousarray(states, float), int(work.counters[1])
-    begin, gives = work.arc_lengths.copy(), len(model.support.mass) > 0
-    if gives:
+    times, states = np.asarray(times, float), np.ascontiguousarray(states, float)
+    begin, outside = work.arc_lengths.copy(), int(work.counters[OUT_OF_RANGE])
+    if flexible := len(model.flexible_track.mass) > 0:
         model, states, track = _track_energies(model, states, work)
     loose = model.joints._replace(equations=0)
     touching = undriven(model)._replace(elements=pack_elements(), joints=loose, gravity=0.0)
@@ -152,11 +153,11 @@ def energy_channels(model, work, times, states):
     kinetic, height, stored, pressed, stretching, rise, damped, driven = rows.T
     work.arc_lengths[:] = begin
     drives = _drive_powers(model, work, times, states) if len(model.drive.rows) else {}
-    work.counters[1] = outside
+    work.counters[OUT_OF_RANGE] = outside
     elastic = -0.5 * (1.0 + model.contact.damping) * hertz
     torques = sum(drives[name] * (1.0 if name.startswith("input") else -1.0) for name in drives)
     joints = whole + rise - contact - (driven - stretching - damped) - torques
-    if gives:
+    if flexible:
         kinetic, stored, stretching, damped = track + (kinetic, stored, stretching, damped)
     rows = (kinetic, height, stored, pressed, driven, joints, damped, normal - contact, -normal - elastic,
             stretching, rise, elastic)  # fmt: skip
@@ -164,28 +165,28 @@ def energy_channels(model, work, times, states):
 
 
 def _track_energies(model, states, work):
-    """Kinetic energy, energy of the springs, its rate and the loss of a track that gives, shape (4, n). Before them the
+    """Kinetic energy, energy of the springs, its rate and the loss of a flexible track, shape (4, n). Before them the
     model and the states, in which rails without mass have velocities, too: as found by this model, for variants of
     it."""
-    support, places, d = model.support, support_places(model), len(model.support.mass)
-    if support.mass[0] == 0.0:
+    track, places, d = model.flexible_track, track_places(model), len(model.flexible_track.mass)
+    if track.mass[0] == 0.0:
         rates = Equations(model, work).at(0.0, states)
-        own = np.concatenate([states[:, places], rates[:, places]], axis=-1)
-        parts = states[:, : places[0, 0]], own.reshape(len(states), -1), states[:, places[-1, -1] + 1 :]
+        moving = np.concatenate([states[:, places], rates[:, places]], axis=-1)
+        parts = states[:, : places[0, 0]], moving.reshape(len(states), -1), states[:, places[-1, -1] + 1 :]
         states, elements = np.hstack(parts), model.elements
         elements = elements._replace(states=elements.states + places.size)
-        model = model._replace(support=support._replace(mass=np.ones(d)), elements=elements)
-        places = support_places(model)
+        model = model._replace(flexible_track=track._replace(mass=np.ones(d)), elements=elements)
+        places = track_places(model)
     q, v = states[:, places[:, :d]], states[:, places[:, d:]]
-    pulls = q @ support.stiffness, v @ support.damping
-    terms = 0.5 * support.mass * v * v, 0.5 * q * pulls[0], v * pulls[0], v * pulls[1]
+    pulls = q @ track.stiffness, v @ track.damping
+    terms = 0.5 * track.mass * v * v, 0.5 * q * pulls[0], v * pulls[0], v * pulls[1]
     return model, states, np.array([term.sum(axis=(1, 2)) for term in terms])
 
 
 def _drive_powers(model, work, times, states):
     """Channels `DRIVE_CHANNELS`."""
     torques, rates, _ = drive_history(model, work, times, states)
-    powers, brakes = torques * rates, model.drive.rows[:, 3] == BRAKE
+    powers, brakes = torques * rates, model.drive.rows[:, KIND] == BRAKE
     return dict(zip(DRIVE_CHANNELS, (powers[:, ~brakes].sum(axis=1), -powers[:, brakes].sum(axis=1)), strict=True))
 
 

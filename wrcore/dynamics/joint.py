@@ -73,22 +73,15 @@ class Joint(NamedTuple):
 class Joints(NamedTuple):
     """Joints of a model in the order of the solver, for kernels."""
 
-    kind: np.ndarray
-    """(n,) int."""
+    kind: np.ndarray  # (n,) int
     bodies: np.ndarray
     """(n, 2) int: first and second body; FRAME can only be the second, a wheelset in a revolute joint the first."""
-    markers: np.ndarray
-    """(n, 2, 3): marker positions in body axes, m."""
-    axis: np.ndarray
-    """(n,) int."""
-    length: np.ndarray
-    """(n,), m."""
-    size: np.ndarray
-    """(n,) int: equations of each joint."""
-    listed: np.ndarray
-    """(n,) int: place of each joint in the list that :func:`build_joints` was given."""
-    equations: int
-    """Number of constraint equations in all."""
+    markers: np.ndarray  # (n, 2, 3): marker positions in body axes, m
+    axis: np.ndarray  # (n,) int
+    length: np.ndarray  # (n,), m
+    size: np.ndarray  # (n,) int: equations of each joint
+    listed: np.ndarray  # (n,) int: place of each joint in the list that :func:`build_joints` was given
+    equations: int  # number of constraint equations in all
     order: JointOrder
 
 
@@ -137,16 +130,11 @@ def _checked(item, spins, field, source):
 class JointState(NamedTuple):
     """All joints at one state, for kernels. Rows beyond a joint's own equations stay zero."""
 
-    phi: np.ndarray
-    """(n, 5): Phi, m or rad."""
-    rate: np.ndarray
-    """(n, 5): Phi'."""
-    gamma: np.ndarray
-    """(n, 5): right-hand side of D v' = gamma."""
-    along: np.ndarray
-    """(n, 5, 3): S."""
-    about: np.ndarray
-    """(n, 2, 5, 3): R of the first and the second body."""
+    phi: np.ndarray  # (n, 5): Phi, m or rad
+    rate: np.ndarray  # (n, 5): Phi'
+    gamma: np.ndarray  # (n, 5): right-hand side of D v' = gamma
+    along: np.ndarray  # (n, 5, 3): S
+    about: np.ndarray  # (n, 2, 5, 3): R of the first and the second body
 
 
 def joint_state(joints):

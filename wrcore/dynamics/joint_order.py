@@ -21,20 +21,14 @@ from wrcore.dynamics.marker import FRAME
 class JointOrder(NamedTuple):
     """Structure of D M^-1 D^T, for kernels; joints are counted in the order of the solver."""
 
-    clusters: np.ndarray
-    """(c, 3) int: first joint, one past the last, equations of its largest joint."""
-    first: np.ndarray
-    """(n,) int: first joint in each joint's row of the envelope."""
-    base: np.ndarray
-    """(n,) int: tile (p, q) of the envelope is number base[p] + q."""
-    tiles: int
-    """Number of tiles in all."""
-    first_pair: np.ndarray
-    """(n + 1,) int: pairs of joint p start here."""
+    clusters: np.ndarray  # (c, 3) int: first joint, one past the last, equations of its largest joint
+    first: np.ndarray  # (n,) int: first joint in each joint's row of the envelope
+    base: np.ndarray  # (n,) int: tile (p, q) of the envelope is number base[p] + q
+    tiles: int  # number of tiles in all
+    first_pair: np.ndarray  # (n + 1,) int: pairs of joint p start here
     pairs: np.ndarray
     """(k, 4) int: for each coupling of p to an earlier joint: that joint, the shared body, its end of p and of q."""
-    moving: np.ndarray
-    """Bodies that joints hold."""
+    moving: np.ndarray  # bodies that joints hold
 
 
 def order_joints(bodies, size):

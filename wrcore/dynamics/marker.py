@@ -1,10 +1,11 @@
-"""Markers: points fixed to a body or to the frame that runs ahead along the track."""
+"""Markers: points fixed to a body or to the frame that runs along the track."""
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY
+from wrcore.dynamics.vector import load
 from wrcore.kernels.jit import jit
 
 FRAME = -1
-"""Body number of the frame that runs ahead along the track at the scene's speed."""
+"""Body number of the frame that runs along the track at the scene's speed."""
 
 
 @jit(allocates=False, inline="always")
@@ -17,9 +18,6 @@ def marker_motion(speed, t, state, rotations, body, local_x, local_y, local_z):
     ax = rotations[body, 0, 0] * local_x + rotations[body, 0, 1] * local_y + rotations[body, 0, 2] * local_z
     ay = rotations[body, 1, 0] * local_x + rotations[body, 1, 1] * local_y + rotations[body, 1, 2] * local_z
     az = rotations[body, 2, 0] * local_x + rotations[body, 2, 1] * local_y + rotations[body, 2, 2] * local_z
-    wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
-    return (
-        (state[at] + ax, state[at + 1] + ay, state[at + 2] + az),
-        (ax, ay, az),
-        (state[at + 7] + wy * az - wz * ay, state[at + 8] + wz * ax - wx * az, state[at + 9] + wx * ay - wy * ax),
-    )
+    (vx, vy, vz), (wx, wy, wz) = load(state, at + VELOCITY), load(state, at + OMEGA)
+    place = state[at] + ax, state[at + 1] + ay, state[at + 2] + az
+    return place, (ax, ay, az), (vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax)

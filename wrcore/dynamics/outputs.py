@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.dynamics.drive import fill_drive
+from wrcore.dynamics.drive import actuator, controlled_force
 from wrcore.dynamics.system import Equations, derivatives_at
 from wrcore.kernels.jit import jit
 
@@ -25,7 +25,10 @@ def evaluations_at(times, states, equations, model, work, rates, patches, bounds
 def _fill_drives(times, states, equations, model, work, rate, torques, rates, control):
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rate)
-        fill_drive(model, times[i], states[i], work, torques[i], rates[i], control[i])
+        force, wanted, _ = controlled_force(model, times[i], states[i], work)
+        control[i, 0], control[i, 1] = force, wanted
+        for k in range(torques.shape[1]):
+            torques[i, k], rates[i, k] = actuator(model, k, force, times[i], states[i], work)
 
 
 def drive_history(model, work, times, states):

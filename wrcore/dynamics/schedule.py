@@ -10,10 +10,8 @@ from wrcore.kernels.jit import jit
 class Schedules(NamedTuple):
     """Several tables, for kernels."""
 
-    starts: np.ndarray
-    """(n + 1,) int: points of table k are starts[k] <= i < starts[k + 1]."""
-    points: np.ndarray
-    """(p, 2): abscissa (s or m), strictly rising in a table, and value."""
+    starts: np.ndarray  # (n + 1,) int: points of table k are starts[k] <= i < starts[k + 1]
+    points: np.ndarray  # (p, 2): abscissa (s or m), strictly rising in a table, and value
 
 
 def pack_schedules(tables):

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 
 from wrcore.dynamics.suspension import with_laws
-from wrcore.dynamics.system import Equations, own_states, with_wheels, workspace
+from wrcore.dynamics.system import Equations, internal_states, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
 from wrcore.kernels.handles import Kind
 
@@ -33,9 +33,9 @@ def structure(model):
     contact, strips = model.contact, model.contact.strips
     sizes = tuple(array.shape for array in _arrays(strips)) if strips.strips else ()
     return (
-        Kind(model)._numba_type_, id(model.bodies), id(model.joints), own_states(model), len(model.drive.rows),
-        len(model.friction.points), len(model.support.mass), len(contact.geometries), shaped(contact), strips[:4],
-        sizes,
+        Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
+        len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
+        strips[:4], sizes,
     )  # fmt: skip
 
 

@@ -20,7 +20,8 @@ from wrcore.contact.reduction import CURVATURE_Y, PENETRATION, PSI, U_WHEEL
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics.modes import FRESH
-from wrcore.dynamics.wheel import FRICTION, contact_of, detect_patches, patch_wrench
+from wrcore.dynamics.motion import motion_of
+from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, detect_patches, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -67,23 +68,19 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
     """As `wrcore.dynamics.wheel.wheel_wrenches`, whose arguments it takes, with the patches' shape numbers."""
     for i in range(motions.shape[0]):
         for wheel in range(2):
-            m, w, rows = motions[i, wheel], wrenches[i, wheel], patches[i, wheel]
-            side, ex, ey, ez = m[0], m[0] * m[3], m[0] * m[4], m[0] * m[5]
-            own = contact_of(model, i, wheel)
-            count, bound, spatial = detect_patches(own, side, m[1], m[2], m[3], m[4], m[5], rows)
+            m, wrench, rows = motion_of(motions[i, wheel]), wrenches[i, wheel], patches[i, wheel]
+            contact = contact_of(model, i, wheel)
+            count, bound, spatial = detect_patches(contact, m, rows)
             counts[i, wheel], bounds[i, wheel] = count, bound
-            pose = make_pose(side, m[1], m[2], ex, ey, ez, spatial)
+            pose = make_pose(m.side, m.y, m.z, m.side * m.ex, m.side * m.ey, m.side * m.ez, spatial)
             for k in range(6):
-                w[k] = 0.0
+                wrench[k] = 0.0
             for k in range(count):
                 row = rows[k]
-                slope = gap_at(own.geometry, pose, row[U_WHEEL])[1]
+                slope = gap_at(contact.geometry, pose, row[U_WHEEL])[1]
                 half = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
-                skewness = overlap_skewness(own.geometry, pose, row[U_WHEEL], half / STEPS)
-                row[PSI] = side * shape_number(skewness)
-                gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], m[12], m[13], m[FRICTION], row, row[PSI]
-                )
-                w[0], w[1], w[2] = w[0] + gx, w[1] + gy, w[2] + gz
-                w[3], w[4], w[5] = w[3] + nx, w[4] + ny, w[5] + nz
-                counters[1] += missed
+                row[PSI] = m.side * shape_number(overlap_skewness(contact.geometry, pose, row[U_WHEEL], half / STEPS))
+                gx, gy, gz, nx, ny, nz, missed = patch_wrench(model, m, m.bend_y, m.bend_z, row, row[PSI])
+                wrench[0], wrench[1], wrench[2] = wrench[0] + gx, wrench[1] + gy, wrench[2] + gz
+                wrench[3], wrench[4], wrench[5] = wrench[3] + nx, wrench[4] + ny, wrench[5] + nz
+                counters[OUT_OF_RANGE] += missed

@@ -27,43 +27,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.track import moving_frame, turned_back, turned_into
-from wrcore.dynamics.vector import cross, dot
-from wrcore.elements.law import (
-    AXIS,
-    INNER,
-    LAW,
-    LAWS,
-    LENGTH,
-    MOST_NUMBERS,
-    NUMBERS,
-    ON_LINE,
-    PRESSING,
-    PRESSING_SPRING,
-)
+from wrcore.dynamics.vector import cross, dot, load, minus
+from wrcore.elements import law
 from wrcore.kernels.handles import FOUR, Kernel, Kind, four_at
 from wrcore.kernels.jit import FUSED, jit
+
+STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
+"""Columns of a row of ``Elements.springs``, which begins as one of ``Elements.directed``."""
 
 
 class Elements(NamedTuple):
     """Force elements of a model, sorted by pair, for kernels."""
 
-    pairs: np.ndarray
-    """(p, 2) int: first and second body; FRAME as the second one for the moving frame."""
-    ahead: np.ndarray
-    """(p,): for the moving frame, arc length of its cross-section ahead of the frame's origin, m."""
+    pairs: np.ndarray  # (p, 2) int: first and second body; FRAME as the second one for the moving frame
+    offset: np.ndarray  # (p,): for the moving frame, arc length of its cross-section from the frame's origin, m
     turning: np.ndarray
     """(p, 3, 3): factors c of the energy U(R) (N m/rad), damping (N m s/rad) and cubic stiffness (N m/rad^3) about
     the second body's axes."""
-    first_spring: np.ndarray
-    """(p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]."""
+    first_spring: np.ndarray  # (p + 1,) int: springs k of pair p have first_spring[p] <= k < first_spring[p + 1]
     springs: np.ndarray
     """(n, 15): along all three axes; marker of i, position relative to j at which the element is at rest (m),
     stiffness (N/m), damping (N s/m), preload (N, on i)."""
-    first_directed: np.ndarray
-    """(p + 1,) int, as first_spring."""
+    first_directed: np.ndarray  # (p + 1,) int, as first_spring
     directed: np.ndarray
     """(m, 16): along one direction; marker of i, marker of j or rest position (m), length at rest (m) on a line, unit
     vector in j's axes elsewhere, and six numbers that its law reads."""
@@ -75,12 +63,11 @@ class Elements(NamedTuple):
     states: int
     """Number of internal states: displacements (m) of dampers that act in series with a spring; and what else is
     counted with them, see `wrcore.dynamics.system.fill_derivatives`."""
-    laws: np.ndarray = np.zeros(0, np.int64)
-    """Addresses of the laws by their number, see `with_laws`."""
+    laws: np.ndarray = np.zeros(0, np.int64)  # addresses of the laws by their number, see `with_laws`
 
 
 def pack_elements(springs=(), directed=(), turning=()):
-    """Sort elements by pair (first body, second body, ahead).
+    """Sort elements by pair (first body, second body, offset).
 
     ``springs``: (pair, the 15 numbers of a row of ``Elements.springs``). ``directed``: (pair, the first 10 of
     ``Elements.directed``, law, at most six numbers for it, points (q, 2) of the characteristic or None, whether it has
@@ -95,15 +82,16 @@ def pack_elements(springs=(), directed=(), turning=()):
     for pair, stiffness, damping, cubic in turning:
         rotational[pairs.index(pair)] += (0.5 * np.sum(stiffness) - np.asarray(stiffness, float), damping, cubic)
     tables, rows, laws, length, states = [np.zeros((0, 3))], [], [], 0, 0
-    for _, row, law, numbers, points, inner, presses in directed:
+    for _, row, kernel, numbers, points, inner, presses in directed:
         tables.append(_with_integral(points))
         pressing = [-1, -1]
         if presses is not None:
             pressing[presses[0]] = orders[presses[0]].index(presses[1])
         end = length + len(tables[-1])
-        laws.append((not np.any(row[AXIS:]), LAWS.index(law), length, end, states if inner else -1, *pressing))
+        on_line, number = not np.any(row[law.AXIS :]), law.LAWS.index(kernel)
+        laws.append((on_line, number, length, end, states if inner else -1, *pressing))
         length, states = end, states + inner
-        rows.append([*row, *numbers, *[0.0] * (MOST_NUMBERS - len(numbers))])
+        rows.append([*row, *numbers, *[0.0] * (law.MOST_NUMBERS - len(numbers))])
     first_spring, first_directed = (
         np.array([sum(item[0] < pair for item in group) for pair in pairs] + [len(group)], np.int64)
         for group in (springs, directed)
@@ -112,7 +100,7 @@ def pack_elements(springs=(), directed=(), turning=()):
         np.array([pair[:2] for pair in pairs], np.int64).reshape(-1, 2), np.array([pair[2] for pair in pairs], float),
         rotational,
         first_spring, np.array([row for _, row in springs], float).reshape(-1, 15),
-        first_directed, np.array(rows, float).reshape(-1, NUMBERS + MOST_NUMBERS),
+        first_directed, np.array(rows, float).reshape(-1, law.NUMBERS + law.MOST_NUMBERS),
         np.array(laws, np.int64).reshape(-1, 7), np.vstack(tables), states,
     )  # fmt: skip
 
@@ -130,9 +118,9 @@ def _with_integral(points):
 
 def with_laws(elements):
     """The elements with the addresses of the laws that they follow: these alone are compiled."""
-    addresses, example = np.zeros(len(LAWS), np.int64), Kind(elements)
-    for number in np.unique(elements.law[:, LAW]):
-        addresses[number] = Kernel(LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
+    addresses, example = np.zeros(len(law.LAWS), np.int64), Kind(elements)
+    for number in np.unique(elements.law[:, law.LAW]):
+        addresses[number] = Kernel(law.LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
     return elements._replace(laws=addresses)
 
 
@@ -145,20 +133,19 @@ def relative_motion(elements, p, track, t, speed, state, rotations, turns):
     if j == FRAME:
         axes = rotations[rotations.shape[0] - 1]
         if track.tangent:
-            origin, velocity, turn = (speed * t + elements.ahead[p], 0.0, 0.0), (speed, 0.0, 0.0), (0.0, 0.0, 0.0)
+            origin, velocity, turn = (speed * t + elements.offset[p], 0.0, 0.0), (speed, 0.0, 0.0), (0.0, 0.0, 0.0)
         else:
-            origin, velocity, turn = moving_frame(track, speed, t, elements.ahead[p], axes)
+            origin, velocity, turn = moving_frame(track, speed, t, elements.offset[p], axes)
     else:
         axes = rotations[j]
         other = STATE_SIZE * j
-        origin = (state[other], state[other + 1], state[other + 2])
-        velocity = (state[other + 7], state[other + 8], state[other + 9])
-        turn = (turns[j, 0], turns[j, 1], turns[j, 2])
-    dx, dy, dz = state[at] - origin[0], state[at + 1] - origin[1], state[at + 2] - origin[2]
-    vx = state[at + 7] - velocity[0] - turn[1] * dz + turn[2] * dy
-    vy = state[at + 8] - velocity[1] - turn[2] * dx + turn[0] * dz
-    vz = state[at + 9] - velocity[2] - turn[0] * dy + turn[1] * dx
-    wx, wy, wz = turns[i, 0] - turn[0], turns[i, 1] - turn[1], turns[i, 2] - turn[2]
+        origin, velocity, turn = load(state, other), load(state, other + VELOCITY), load(turns[j], 0)
+    dx, dy, dz = minus(load(state, at), origin)
+    ux, uy, uz = minus(load(state, at + VELOCITY), velocity)
+    vx = ux - turn[1] * dz + turn[2] * dy
+    vy = uy - turn[2] * dx + turn[0] * dz
+    vz = uz - turn[0] * dy + turn[1] * dx
+    wx, wy, wz = minus(load(turns[i], 0), turn)
     body = rotations[i]
     rotation = (
         turned_into(axes, body[0, 0], body[1, 0], body[2, 0]),
@@ -173,10 +160,11 @@ def relative_motion(elements, p, track, t, speed, state, rotations, turns):
 def _marker_motion(row, motion):
     """R m, d and d' of a part from the beginning of its row, m and n."""
     (c0, c1, c2), (px, py, pz), (ux, uy, uz), (ox, oy, oz) = motion
-    bx = c0[0] * row[0] + c1[0] * row[1] + c2[0] * row[2]
-    by = c0[1] * row[0] + c1[1] * row[1] + c2[1] * row[2]
-    bz = c0[2] * row[0] + c1[2] * row[1] + c2[2] * row[2]
-    apart = px + bx - row[3], py + by - row[4], pz + bz - row[5]
+    (mx, my, mz), (nx, ny, nz) = load(row, law.MARKER), load(row, law.REST)
+    bx = c0[0] * mx + c1[0] * my + c2[0] * mz
+    by = c0[1] * mx + c1[1] * my + c2[1] * mz
+    bz = c0[2] * mx + c1[2] * my + c2[2] * mz
+    apart = px + bx - nx, py + by - ny, pz + bz - nz
     return (bx, by, bz), apart, (ux + oy * bz - oz * by, uy + oz * bx - ox * bz, uz + ox * by - oy * bx)
 
 
@@ -185,29 +173,29 @@ def _along(elements, k, motion):
     """R m, direction, stretch and its rate of the k-th element along one direction."""
     row = elements.directed[k]
     arm, (ex, ey, ez), (vx, vy, vz) = _marker_motion(row, motion)
-    nx, ny, nz = row[AXIS], row[AXIS + 1], row[AXIS + 2]
-    if elements.law[k, ON_LINE]:
+    nx, ny, nz = load(row, law.AXIS)
+    if elements.law[k, law.ON_LINE]:
         length = math.sqrt(ex * ex + ey * ey + ez * ez)
         nx, ny, nz = ex / length, ey / length, ez / length
-    return arm, (nx, ny, nz), nx * ex + ny * ey + nz * ez - row[LENGTH], nx * vx + ny * vy + nz * vz
+    return arm, (nx, ny, nz), nx * ex + ny * ey + nz * ez - row[law.LENGTH], nx * vx + ny * vy + nz * vz
 
 
 @jit(allocates=False, forceinline=True)
 def _by_law(elements, k, stretch, speed, inner, press):
     """What the k-th element's law returns, see `wrcore.elements.law`."""
-    return four_at(elements.laws[elements.law[k, LAW]], elements, k, stretch, speed, inner, press)
+    return four_at(elements.laws[elements.law[k, law.LAW]], elements, k, stretch, speed, inner, press)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _pressing_force(elements, k, motion):
     """Force with which another element presses the k-th one along one direction, N: a spring's along z, or that of an
     element along one direction."""
-    other = elements.law[k, PRESSING_SPRING]
+    other = elements.law[k, law.PRESSING_SPRING]
     if other >= 0:
         row = elements.springs[other]
         _, apart, rate = _marker_motion(row, motion)
-        return row[14] - row[8] * apart[2] - row[11] * rate[2]
-    other = elements.law[k, PRESSING]
+        return row[PRELOAD + 2] - row[STIFFNESS + 2] * apart[2] - row[DAMPING + 2] * rate[2]
+    other = elements.law[k, law.PRESSING]
     _, _, stretch, speed = _along(elements, other, motion)
     return -_by_law(elements, other, stretch, speed, 0.0, 0.0)[0]
 
@@ -233,25 +221,23 @@ def pair_forces(elements, p, motion, state, inner_at, rate):
     for k in range(elements.first_spring[p], elements.first_spring[p + 1]):
         row = elements.springs[k]
         (bx, by, bz), (ex, ey, ez), (vx, vy, vz) = _marker_motion(row, motion)
-        gx = row[12] - row[6] * ex - row[9] * vx
-        gy = row[13] - row[7] * ey - row[10] * vy
-        gz = row[14] - row[8] * ez - row[11] * vz
+        (kx, ky, kz), (dx, dy, dz), (px, py, pz) = load(row, STIFFNESS), load(row, DAMPING), load(row, PRELOAD)
+        gx, gy, gz = px - kx * ex - dx * vx, py - ky * ey - dy * vy, pz - kz * ez - dz * vz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx
-        stored += 0.5 * (row[6] * (ex * ex) + row[7] * (ey * ey) + row[8] * (ez * ez))
-        stored -= row[12] * ex + row[13] * ey + row[14] * ez
-        lost += row[9] * (vx * vx) + row[10] * (vy * vy) + row[11] * (vz * vz)
+        stored += 0.5 * (kx * (ex * ex) + ky * (ey * ey) + kz * (ez * ez))
+        stored -= px * ex + py * ey + pz * ez
+        lost += dx * (vx * vx) + dy * (vy * vy) + dz * (vz * vz)
     for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
-        law = elements.law[k]
         (bx, by, bz), (nx, ny, nz), stretch, along = _along(elements, k, motion)
-        inner, press, at = 0.0, 0.0, inner_at + law[INNER]
-        if law[PRESSING_SPRING] >= 0 or law[PRESSING] >= 0:
+        inner, press, place = 0.0, 0.0, elements.law[k, law.INNER]
+        if elements.law[k, law.PRESSING_SPRING] >= 0 or elements.law[k, law.PRESSING] >= 0:
             press = _pressing_force(elements, k, motion)
-        if law[INNER] >= 0:
-            inner = state[at]
+        if place >= 0:
+            inner = state[inner_at + place]
         force, inner_rate, energy, loss = _by_law(elements, k, stretch, along, inner, press)
-        if law[INNER] >= 0:
-            rate[at] = inner_rate
+        if place >= 0:
+            rate[inner_at + place] = inner_rate
         gx, gy, gz = -force * nx, -force * ny, -force * nz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx
@@ -272,24 +258,16 @@ def element_forces(elements, track, t, speed, state, rotations, turns, wrenches,
         i, j = elements.pairs[p, 0], elements.pairs[p, 1]
         motion, (axes, (dx, dy, dz), _, _) = relative_motion(elements, p, track, t, speed, state, rotations, turns)
         (fx, fy, fz), (mx, my, mz), _, _ = pair_forces(elements, p, motion, state, inner_at, rate)
-        # back to track axes: on i at its centre, and the opposite on j
-        gx, gy, gz = turned_back(axes, fx, fy, fz)
-        tx, ty, tz = turned_back(axes, mx, my, mz)
-        wrench = wrenches[i]
-        wrench[0] += gx
-        wrench[1] += gy
-        wrench[2] += gz
-        wrench[3] += tx
-        wrench[4] += ty
-        wrench[5] += tz
-        if j != FRAME:
-            wrench = wrenches[j]
-            wrench[0] -= gx
-            wrench[1] -= gy
-            wrench[2] -= gz
-            wrench[3] -= tx + dy * gz - dz * gy
-            wrench[4] -= ty + dz * gx - dx * gz
-            wrench[5] -= tz + dx * gy - dy * gx
+        # back to track axes: on i about its centre, and the opposite on j
+        gx, gy, gz = force = turned_back(axes, fx, fy, fz)
+        tx, ty, tz = moment = turned_back(axes, mx, my, mz)
+        about = tx + dy * gz - dz * gy, ty + dz * gx - dx * gz, tz + dx * gy - dy * gx
+        for k in range(3):
+            wrenches[i, k] += force[k]
+            wrenches[i, 3 + k] += moment[k]
+            if j != FRAME:
+                wrenches[j, k] -= force[k]
+                wrenches[j, 3 + k] -= about[k]
 
 
 @jit(allocates=False)

@@ -12,20 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.strip import Pose
 from wrcore.creep.laws import LAWS
-from wrcore.dynamics.body import STATE_SIZE, euler_rates, rotation_matrix
+from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
+from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.modes import FRESH, WRENCHES_HELD
-from wrcore.dynamics.rail_friction import fill_rail_friction
+from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.schedule import Schedules, pack_schedules
-from wrcore.dynamics.support import Support, SupportWork, no_support, support_work, support_wrenches
 from wrcore.dynamics.suspension import Elements, element_forces, with_laws
-from wrcore.dynamics.track import TrackModel, rail_motions, turn_back_wrenches
-from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS, ContactModel, contact_of, shaped, wheel_wrenches
+from wrcore.dynamics.track import TrackModel, fill_rail_friction, rail_motions, turn_back_wrenches
+from wrcore.dynamics.vector import load
+from wrcore.dynamics.wheel import EVALUATIONS, ContactModel, contact_of, press_wheels, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -36,17 +39,13 @@ FRICTIONLESS = 1e-9
 class Bodies(NamedTuple):
     """Rigid bodies, for kernels."""
 
-    mass: np.ndarray
-    """(n,), kg."""
-    inertia: np.ndarray
-    """(n, 3): principal moments about the body's x, y, z axes, kg m^2."""
-    spins: np.ndarray
-    """(n,) int: 1 for a body of revolution about its y axis whose frame does not spin along."""
-    wheelsets: np.ndarray
-    """(k,) int: bodies with wheels."""
+    mass: np.ndarray  # (n,), kg
+    inertia: np.ndarray  # (n, 3): principal moments about the body's x, y, z axes, kg m^2
+    spins: np.ndarray  # (n,) int: 1 for a body of revolution about its y axis whose frame does not spin along
+    wheelsets: np.ndarray  # (k,) int: bodies with wheels
     independent: np.ndarray = np.zeros((0, 2), np.int64)
     """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
-    difference of their rolling rates, left less right (rad/s), among the own states."""
+    difference of their rolling rates, left less right (rad/s), among the internal states."""
 
 
 class Model(NamedTuple):
@@ -57,72 +56,50 @@ class Model(NamedTuple):
     elements: Elements
     joints: Joints
     track: TrackModel
-    speed: float
-    """Speed of the moving frame, m/s."""
-    gravity: float
-    """m/s^2, downwards."""
+    speed: float  # speed of the moving frame, m/s
+    gravity: float  # m/s^2, downwards
     alpha: float
     beta: float
     """Baumgarte's parameters, 1/s."""
-    wheels: int = 0
-    """Address of the kernel that finds the rails' wrenches, see `with_kernels`."""
-    reactions: int = 0
-    """Address of the kernel that adds the joints' reactions."""
+    wheels: int = 0  # address of the kernel that finds the rails' wrenches, see `with_kernels`
+    reactions: int = 0  # address of the kernel that adds the joints' reactions
     friction: Schedules = pack_schedules([])
     """Over arc length, for the left and the right rail, where friction is not the same everywhere; else empty."""
-    rail_friction: int = 0
-    """Address of the kernel that looks it up."""
-    drive: Drive = no_drive()
-    """Motors, brakes and speed controller."""
-    torques: int = 0
-    """Address of the kernel that adds their torques."""
-    support: Support = no_support()
-    """The track under each wheelset, if it gives."""
-    rails: int = 0
-    """Address of the kernel that finds the wrenches of rails that give."""
+    rail_friction: int = 0  # address of the kernel that looks it up
+    drive: Drive = no_drive()  # motors, brakes and speed controller
+    torques: int = 0  # address of the kernel that adds their torques
+    flexible_track: FlexibleTrack = rigid_track()  # the track under each wheelset, if it is flexible
+    rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
 
 
 class Workspace(NamedTuple):
     """Scratch arrays of one evaluation, and what it leaves for output."""
 
-    rotations: np.ndarray
-    """(n + 1, 3, 3): of the bodies, and of the moving frame on a curved track."""
-    arc_lengths: np.ndarray
-    """(k,): last arc length of each wheelset, m; where the search for the next one starts."""
-    turns: np.ndarray
-    """(n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin."""
-    wrenches: np.ndarray
-    """(n, 6): force and moment about the centre of mass of each body."""
-    patches: np.ndarray
-    """(k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right."""
-    counts: np.ndarray
-    """(k, 2) int: patches in contact."""
-    motions: np.ndarray
-    """(k, 2, MOTION_COLUMNS): motion of each wheel in its rail's frame."""
-    rail_wrenches: np.ndarray
-    """(k, 2, 6): force and moment of the rails on each wheelset."""
-    rails: np.ndarray
-    """(k, 2, 3, 3): axes of the rails' frames, unless the track is tangent."""
-    shifts: np.ndarray
-    """(k, 2, 2): where rails are off their nominal places, m, unless the track is tangent."""
-    bounds: np.ndarray
-    """(k, 2): bound of planar detection's error (detection ``auto`` only), m."""
-    counters: np.ndarray
-    """(3,) int: evaluations, creep look-ups out of range, patches solved on a grid."""
+    rotations: np.ndarray  # (n + 1, 3, 3): of the bodies, and of the moving frame on a curved track
+    arc_lengths: np.ndarray  # (k,): last arc length of each wheelset, m; where the search for the next one starts
+    turns: np.ndarray  # (n, 3): angular velocities of the bodies' frames, rad/s; a wheelset's frame does not spin
+    wrenches: np.ndarray  # (n, 6): force and moment about the centre of mass of each body
+    patches: np.ndarray  # (k, 2, MAX_PATCHES, PATCH_COLUMNS): patches of each wheelset, left and right
+    counts: np.ndarray  # (k, 2) int: patches in contact
+    motions: np.ndarray  # (k, 2, 15): `WheelMotion` of each wheel in its rail's frame
+    rail_wrenches: np.ndarray  # (k, 2, 6): force and moment of the rails on each wheelset
+    rails: np.ndarray  # (k, 2, 3, 3): axes of the rails' frames
+    shifts: np.ndarray  # (k, 2, 2): where rails are off their nominal places, m
+    bounds: np.ndarray  # (k, 2): bound of planar detection's error (detection ``auto`` only), m
+    counters: np.ndarray  # (3,) int, see `wrcore.dynamics.wheel`
     constraints: ConstraintWork
-    frame: np.ndarray
-    """(3, 3): axes of the track's frame."""
+    frame: np.ndarray  # (3, 3): axes of the track's frame
     irregularity: np.ndarray
     strips: StripWork
-    support: SupportWork
+    flexible_track: FlexibleTrackWork
 
 
 def state_size(model):
     """Length of the state vector: 13 numbers per body, then all states that belong to no body."""
-    return STATE_SIZE * len(model.bodies.mass) + own_states(model)
+    return STATE_SIZE * len(model.bodies.mass) + internal_states(model)
 
 
-def own_states(model):
+def internal_states(model):
     """Number of states that belong to no body: of force elements and the track, then that of the speed controller."""
     return model.elements.states + len(model.drive.control)
 
@@ -132,18 +109,17 @@ def workspace(model):
     n, k = len(model.bodies.mass), len(model.bodies.wheelsets)
     return Workspace(
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
-        np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)),
-        np.zeros((k, 2), np.int64), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)), np.zeros((k, 2, 3, 3)),
-        np.zeros((k, 2, 2)), np.full((k, 2), np.nan), np.zeros(3, np.int64),
-        constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)), strip_work(model.contact.strips, k),
-        support_work(model.support, k),
+        np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
+        np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
+        np.zeros(3, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
+        strip_work(model.contact.strips, k), track_work(model.flexible_track, k),
     )  # fmt: skip
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
     """Subtract w x J w from the moment part of a wrench (6,)."""
-    wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
+    wx, wy, wz = load(state, at + OMEGA)
     hx = hy = hz = 0.0
     for k in range(3):
         h = inertia[k] * (matrix[0, k] * wx + matrix[1, k] * wy + matrix[2, k] * wz)
@@ -180,24 +156,23 @@ def wheel_motions(model, state, work):
     """Fill the motions of all wheels in their rails' frames; the wheelsets' rotations are in ``work``."""
     wheelsets, tangent = model.bodies.wheelsets, model.track.tangent
     for k in range(wheelsets.shape[0]):
-        b = wheelsets[k]
-        at, axle = STATE_SIZE * b, work.rotations[b]
+        at, axle = STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]]
         if not tangent:
             left, right = contact_of(model.contact, k, 0), contact_of(model.contact, k, 1)
             work.arc_lengths[k] = rail_motions(
                 model.track, (left.geometry.rail_distance, right.geometry.rail_distance), state, at, axle,
                 work.arc_lengths[k], work.frame, work.irregularity, work.rails[k], work.shifts[k], work.motions[k],
             )  # fmt: skip
-            work.motions[k, 0, FRICTION] = work.motions[k, 1, FRICTION] = model.contact.friction
-            continue
         for wheel in range(2):
             row = work.motions[k, wheel]
-            row[0], row[1], row[2] = 1.0 - 2.0 * wheel, state[at + 1], state[at + 2]
-            for i in range(3):
-                row[3 + i] = axle[i, 1]
-            for i in range(6):
-                row[6 + i] = state[at + 7 + i]
-            row[12], row[13], row[FRICTION] = 0.0, 0.0, model.contact.friction
+            row[MOTION.friction] = model.contact.friction
+            if tangent:
+                row[MOTION.side], row[MOTION.y], row[MOTION.z] = 1.0 - 2.0 * wheel, state[at + 1], state[at + 2]
+                for i in range(3):
+                    row[MOTION.ex + i] = axle[i, 1]
+                for i in range(6):
+                    row[MOTION.vx + i] = state[at + VELOCITY + i]
+                row[MOTION.bend_y] = row[MOTION.bend_z] = 0.0
     if model.rail_friction != 0:
         call_address(model.rail_friction, model, state, work)
     for j in range(model.bodies.independent.shape[0]):
@@ -205,7 +180,7 @@ def wheel_motions(model, state, work):
         for wheel in range(2):
             row = work.motions[k, wheel]
             for i in range(3):
-                row[9 + i] += row[0] * half * row[3 + i]
+                row[MOTION.wx + i] += row[MOTION.side] * half * row[MOTION.ex + i]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -217,10 +192,7 @@ def _add_rail_wrenches(model, state, work, rate, mode):
         if model.rails != 0:
             call_address(model.rails, model, state, work, rate, mode)
         else:
-            call_address(
-                model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-                work.counters, work.strips, mode,
-            )  # fmt: skip
+            press_wheels(model, work, mode)
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
@@ -235,17 +207,17 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
     evaluation afterwards. The ``mode`` is one of `wrcore.dynamics.modes`.
 
     The state: per body position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the
-    force elements' own states (m), those of wheels that turn independently (rad/s) and of a track that gives (m, m/s,
-    :mod:`wrcore.dynamics.support`), and the speed controller's integral (m).
+    internal states of force elements (m), of wheels that turn independently (rad/s) and of a flexible track (m, m/s,
+    :mod:`wrcore.dynamics.flexible_track`), and the speed controller's integral (m).
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
-    work.counters[0] += 1
+    work.counters[EVALUATIONS] += 1
     for b in range(n):
         at = STATE_SIZE * b
         matrix, turn, wrench = work.rotations[b], work.turns[b], work.wrenches[b]
         rotation_matrix(state, at, matrix)
-        wx, wy, wz = state[at + 10], state[at + 11], state[at + 12]
+        wx, wy, wz = load(state, at + OMEGA)
         spin = 0.0
         if bodies.spins[b] == 1:
             spin = wx * matrix[0, 1] + wy * matrix[1, 1] + wz * matrix[2, 1]
@@ -266,9 +238,9 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
         at = STATE_SIZE * b
         euler_rates(state, at, work.turns[b, 0], work.turns[b, 1], work.turns[b, 2], model.alpha, rate)
         for i in range(3):
-            rate[at + i] = state[at + 7 + i]
-            rate[at + 7 + i] = work.wrenches[b, i] / bodies.mass[b]
-        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + 10 : at + 13])
+            rate[at + i] = state[at + VELOCITY + i]
+            rate[at + VELOCITY + i] = work.wrenches[b, i] / bodies.mass[b]
+        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + OMEGA :])
 
 
 @jit(allocates=False, forceinline=True)
@@ -295,14 +267,18 @@ def with_wheels(contact):
     if not contact.geometries:
         return contact
     alone = contact._replace(geometries=())
-    return alone._replace(wheels=tuple(alone._replace(geometry=own) for own in contact.geometries))
+    return alone._replace(wheels=tuple(alone._replace(geometry=each) for each in contact.geometries))
 
 
-def with_fallback(contact, motion, strips):
+def with_fallback(contact):
     """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
     from wrcore.dynamics.strip_wheel import solve_on_grid
 
-    fallback = Kernel(solve_on_grid, Kind(contact._replace(geometries=())), motion, strips.force)
+    m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
+    fallback = Kernel(
+        solve_on_grid, Kind(contact._replace(geometries=())), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
+        np.zeros(PATCH_COLUMNS),
+    )  # fmt: skip
     return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
 
 
@@ -313,32 +289,28 @@ def with_kernels(model, work):
     if contact.strips.strips and len(work.motions):
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
-        wrenches, contact = strip_wrenches, with_fallback(contact, work.motions[0, 0], work.strips)
+        wrenches, contact = strip_wrenches, with_fallback(contact)
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 
         wrenches = shaped_wrenches
     # what follows is compiled for the model as it will be
     model = model._replace(contact=with_wheels(contact), elements=with_laws(model.elements))
+    kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
     if model.joints.equations:
-        kernel = Kernel(add_reactions, Kind(model), 0.0, np.empty(0), Kind(work))
-        model = model._replace(reactions=kernel.address)
+        kernels["reactions"] = Kernel(add_reactions, kind, 0.0, state, scratch)
     if len(model.drive.rows):
-        kernel = Kernel(add_drive, Kind(model), 0.0, np.empty(0), Kind(work), np.empty(0))
-        model = model._replace(torques=kernel.address)
+        kernels["torques"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
     if len(model.friction.points):
-        kernel = Kernel(fill_rail_friction, Kind(model), np.empty(0), Kind(work))
-        model = model._replace(rail_friction=kernel.address)
-    if not len(model.bodies.wheelsets):
-        return model
-    if len(model.support.mass):
-        kernel = Kernel(support_wrenches, Kind(model), np.empty(0), Kind(work), np.empty(0), FRESH)
-        model = model._replace(rails=kernel.address)
-    kernel = Kernel(
-        wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
-        work.counters, Kind(work.strips), FRESH,
-    )  # fmt: skip
-    return model._replace(wheels=kernel.address)
+        kernels["rail_friction"] = Kernel(fill_rail_friction, kind, state, scratch)
+    if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
+        kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
+    if len(model.bodies.wheelsets):
+        kernels["wheels"] = Kernel(
+            wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+            work.counters, Kind(work.strips), FRESH,
+        )  # fmt: skip
+    return model._replace(**{name: kernel.address for name, kernel in kernels.items()})
 
 
 class Equations:

@@ -3,38 +3,20 @@
 import math
 from typing import NamedTuple
 
+from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
 from wrcore.contact.geometry import ContactGeometry
-from wrcore.contact.normal import HertzTable, damping_factor, hertz_shape_at, inverse_cube_root
+from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
-from wrcore.contact.reduction import (
-    COSINE,
-    CURVATURE_X,
-    CURVATURE_Y,
-    ETA,
-    FX,
-    FY,
-    MZ,
-    NORMAL,
-    PENETRATION,
-    PHI,
-    SEMI_A,
-    SEMI_B,
-    SINE,
-    XI,
-    X,
-    Y,
-    Z,
-)
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
-from wrcore.kernels.handles import member_of
+from wrcore.dynamics.motion import MOTION, motion_of
+from wrcore.kernels.handles import call_address, member_of
 from wrcore.kernels.jit import FUSED, jit
 
-MOTION_COLUMNS = 15
-FRICTION = 14
-"""Column of a wheel's motion with the coefficient of friction of the rail under it."""
+EVALUATIONS, OUT_OF_RANGE, ON_GRID = range(3)
+"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid."""
 
 
 class ContactModel(NamedTuple):
@@ -42,42 +24,39 @@ class ContactModel(NamedTuple):
 
     geometry: ContactGeometry
     hertz: HertzTable
-    law: int
-    """Creep law, see wrcore.creep.laws.LAWS."""
+    law: int  # creep law, see wrcore.creep.laws.LAWS
     creep: CreepData
-    detection: int
-    """PLANAR, SPATIAL or AUTO of wrcore.contact.detection."""
-    detection_tolerance: float
-    """AUTO: normal penetration that planar detection may miss, m."""
-    reduction: int
-    """MAXIMUM or MOMENT of wrcore.contact.reduction."""
-    shear_modulus: float
-    """G, Pa."""
+    detection: int  # PLANAR, SPATIAL or AUTO of wrcore.contact.detection
+    detection_tolerance: float  # AUTO: normal penetration that planar detection may miss, m
+    reduction: int  # MAXIMUM or MOMENT of wrcore.contact.reduction
+    shear_modulus: float  # G, Pa
     poisson_ratio: float
     friction: float
     """Coulomb's mu at no slip; of rails that differ, or along which it changes, the largest one."""
-    damping: float
-    """c_e of Eq. (7)'s damping factor; 1 means none."""
-    damping_speed: float
-    """v0 of the damping factor, m/s."""
-    least_speed: float
-    """Rolling speed is not taken smaller than this in creepages, m/s."""
-    strips: StripModel
-    """Patches on strips, if the scene asks for them."""
-    friction_ratio: float = 1.0
-    """A: friction at large slip velocity over that at none; 1: it does not fall."""
-    friction_decay: float = 0.0
-    """B: rate at which friction falls with slip velocity, s/m."""
+    damping: float  # c_e of Eq. (7)'s damping factor; 1 means none
+    damping_speed: float  # v0 of the damping factor, m/s
+    least_speed: float  # rolling speed is not taken smaller than this in creepages, m/s
+    strips: StripModel  # patches on strips, if the scene asks for them
+    friction_ratio: float = 1.0  # A: friction at large slip velocity over that at none; 1: it does not fall
+    friction_decay: float = 0.0  # B: rate at which friction falls with slip velocity, s/m
     geometries: tuple = ()
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
-    wheels: tuple = ()
-    """The same as contact models, see `wrcore.dynamics.system.with_kernels`."""
+    wheels: tuple = ()  # the same as contact models, see `wrcore.dynamics.system.with_kernels`
 
 
 @jit(allocates=False, inline="always")
 def contact_of(model, wheelset, wheel):
     """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
     return member_of(model, "wheels", 2 * wheelset + wheel)
+
+
+@jit(allocates=False, forceinline=True)
+def press_wheels(model, work, mode):
+    """Find the wrenches of the rails on all wheels for their motions in ``work``, by the model's kernel."""
+    call_address(
+        model.wheels, model.contact, work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
+        work.counters, work.strips, mode,
+    )  # fmt: skip
 
 
 def shaped(contact):
@@ -88,15 +67,10 @@ def shaped(contact):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """`normal_contact`, and a/b and its logarithm."""
-    stiffness, a, b, log_axis_ratio = hertz_shape_at(model.hertz, curvature_x, curvature_y)
-    factor = damping_factor(approach_speed, model.damping, model.damping_speed)
-    root = math.sqrt(penetration)
-    modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
-    force = factor * modulus * stiffness * penetration * root
-    # The ellipse belongs to the force, that is to the elastic approach c_d^(2/3) delta.
-    inverse = inverse_cube_root(factor)
-    root *= factor * inverse * inverse
-    return force, a * root, b * root, a / b, log_axis_ratio
+    return loaded_ellipse(
+        model.hertz, model.shear_modulus / (1.0 - model.poisson_ratio), model.damping, model.damping_speed, penetration,
+        curvature_x, curvature_y, approach_speed,
+    )  # fmt: skip
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -107,15 +81,16 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def detect_patches(model, side, y, z, ex, ey, ez, rows):
+def detect_patches(model, m, rows):
     """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
     detection was spatial."""
     bound, spatial = 0.0, model.detection == SPATIAL
+    ex, ey, ez = m.side * m.ex, m.side * m.ey, m.side * m.ez
     if model.detection == AUTO:
-        bound = planar_error_bound(model.geometry, side, y, z, side * ex, side * ey, side * ez)
+        bound = planar_error_bound(model.geometry, m.side, m.y, m.z, ex, ey, ez)
         spatial = bound > model.detection_tolerance
-    ex, ey, ez = side * ex, side * ey, side * ez
-    return find_patches(model.geometry, side, y, z, ex, ey, ez, spatial, model.reduction, rows), bound, spatial
+    count = find_patches(model.geometry, m.side, m.y, m.z, ex, ey, ez, spatial, model.reduction, rows)
+    return count, bound, spatial
 
 
 @jit(allocates=False, forceinline=True)
@@ -130,37 +105,37 @@ def falling(model, friction, xi, eta, speed):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, friction, row, psi):
+def patch_wrench(model, m, bend_y, bend_z, row, psi):
     """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
 
-    ``friction`` is the rail's coefficient at no slip, ``psi`` the patch's shape number, 0 for an ellipse; see
-    `wrcore.dynamics.shaped_wheel`. Creep laws and tables are those of a wheel that rolls ahead; one that rolls back is
-    the mirror image of one that rolls ahead with the opposite spin. Below the least speed spin goes to and fro through
-    zero, so that nothing jumps at standstill.
+    The rail bends by the curvatures ``bend_y`` and ``bend_z``, if the patch does not know yet; ``psi`` is its shape
+    number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`. Creep laws and tables are
+    those of a wheel that rolls forward; one that rolls back is the mirror image of one that rolls forward with the
+    opposite spin. Below the least speed spin goes to and fro through zero, so that nothing jumps at standstill.
     """
-    px, py, pz = row[X], row[Y] - y, row[Z] - z
-    cosine, sine = row[COSINE], row[SINE]
-    speed = max(abs(vx), model.least_speed)
-    xi, eta, phi, approach = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed)
-    row[CURVATURE_X] += 0.5 * (curvature_y * sine - curvature_z * cosine)  # rail bending away from the wheel
+    px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
+    cosine, sine = row[reduction.COSINE], row[reduction.SINE]
+    speed = max(abs(m.vx), model.least_speed)
+    xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
+    row[reduction.CURVATURE_X] += 0.5 * (bend_y * sine - bend_z * cosine)  # rail bending away from the wheel
     normal, a, b, axis_ratio, log_axis_ratio = _normal_contact(
-        model, row[PENETRATION], row[CURVATURE_X], row[CURVATURE_Y], approach
+        model, row[reduction.PENETRATION], row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], approach
     )
-    limit = falling(model, friction, xi, eta, speed) * normal
-    ahead = 1.0 if vx >= speed else vx / speed
+    limit = falling(model, m.friction, xi, eta, speed) * normal
+    forward = 1.0 if m.vx >= speed else m.vx / speed
     square = a * b
     c = math.sqrt(square)
     scale, aside = model.shear_modulus * square / limit, 0.25 * psi * b
     f1, f2, m3, missed = creep_force_at(
-        model.law, model.creep, log_axis_ratio, axis_ratio, ahead * psi if psi != 0.0 else 0.0,
-        (xi - phi * aside) * scale, eta * scale, ahead * phi * scale * c,
+        model.law, model.creep, log_axis_ratio, axis_ratio, forward * psi if psi != 0.0 else 0.0,
+        (xi - phi * aside) * scale, eta * scale, forward * phi * scale * c,
     )  # fmt: skip
-    f1, f2, m3 = limit * f1, limit * f2, ahead * limit * c * m3
+    f1, f2, m3 = limit * f1, limit * f2, forward * limit * c * m3
     m3 -= aside * f1
     gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
-    row[SEMI_A], row[SEMI_B], row[NORMAL] = a, b, normal
-    row[FX], row[FY], row[MZ] = f1, f2, m3
-    row[XI], row[ETA], row[PHI] = xi, eta, phi
+    row[reduction.SEMI_A], row[reduction.SEMI_B], row[reduction.NORMAL] = a, b, normal
+    row[reduction.FX], row[reduction.FY], row[reduction.MZ] = f1, f2, m3
+    row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = xi, eta, phi
     mx, my, mz = py * gz - pz * gy, pz * f1 - px * gz - m3 * sine, px * gy - py * f1 + m3 * cosine
     return f1, gy, gz, mx, my, mz, missed
 
@@ -169,13 +144,10 @@ def patch_wrench(model, y, z, vx, vy, vz, wx, wy, wz, curvature_y, curvature_z, 
 def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """Force and moment of the rails on all wheels, and the wheels' patches, in frames in which the rail runs along x.
 
-    A row of ``motions`` (k, 2, MOTION_COLUMNS), left and right: side (+1 left, -1 right); y and z of the wheelset's
-    centre (m); axle direction, pointing left (3); velocity of the centre (m/s, 3) and angular velocity (rad/s, 3);
-    curvature of the rail's line towards y and towards z (1/m; 0 on a tangent track); the rail's coefficient of friction
-    at no slip. Fills ``patches`` (k, 2, MAX_PATCHES, PATCH_COLUMNS), rows beyond their ``counts`` keep old content;
-    AUTO's ``bounds`` of planar detection's error (m); ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's
-    centre (N m). The second of the ``counters`` counts creep look-ups out of the table's range. The ``mode`` is
-    one of `wrcore.dynamics.modes`; ``work`` is for patches on strips.
+    A row of ``motions`` (k, 2, 15), left and right, is a `WheelMotion`. Fills ``patches`` (k, 2, MAX_PATCHES,
+    PATCH_COLUMNS), rows beyond their ``counts`` keep old content; AUTO's ``bounds`` of planar detection's error (m);
+    ``wrenches`` (k, 2, 6), force (N) and moment about the wheelset's centre (N m). The ``mode`` is one of
+    `wrcore.dynamics.modes`; ``work`` is for patches on strips.
 
     One wheel's arithmetic is a chain in which each step waits for the one before: with all wheels in one call the
     chains of neighbours overlap.
@@ -184,20 +156,20 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     if not held:
         for i in range(motions.shape[0]):
             for wheel in range(2):
-                m, own = motions[i, wheel], contact_of(model, i, wheel)
-                count, bound, _ = detect_patches(own, m[0], m[1], m[2], m[3], m[4], m[5], patches[i, wheel])
+                m, contact = motion_of(motions[i, wheel]), contact_of(model, i, wheel)
+                count, bound, _ = detect_patches(contact, m, patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):
-            m, w = motions[i, wheel], wrenches[i, wheel]
-            bend, bend_vertical = (0.0, 0.0) if held else (m[12], m[13])  # patches that are held have it already
+            row, wrench, bend_y, bend_z = motions[i, wheel], wrenches[i, wheel], 0.0, 0.0
+            if not held:  # else the patches have it already
+                bend_y, bend_z = row[MOTION.bend_y], row[MOTION.bend_z]
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, m[1], m[2], m[6], m[7], m[8], m[9], m[10], m[11], bend, bend_vertical, m[FRICTION],
-                    patches[i, wheel, k], 0.0,
-                )  # fmt: skip
+                    model, motion_of(row), bend_y, bend_z, patches[i, wheel, k], 0.0
+                )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz
-                counters[1] += missed
-            w[0], w[1], w[2], w[3], w[4], w[5] = fx, fy, fz, mx, my, mz
+                counters[OUT_OF_RANGE] += missed
+            wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = fx, fy, fz, mx, my, mz

@@ -26,7 +26,9 @@ LAWS: list = []
 def numbers(elements, k):
     """The six numbers of an element along one direction that its law reads."""
     row = elements.directed[k]
-    return row[10], row[11], row[12], row[13], row[14], row[15]
+    return (
+        row[NUMBERS], row[NUMBERS + 1], row[NUMBERS + 2], row[NUMBERS + 3], row[NUMBERS + 4], row[NUMBERS + 5],
+    )  # fmt: skip
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -1,9 +1,9 @@
 """The linear system of a Rosenbrock step: 1/(h gamma) - J, body by body.
 
-With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v, those that belong to no body
-their own state x. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body,
-and go first: q = (sigma - Q)^-1 (g + R v). Own states that act on bodies alone go next, one number each. What is left
-has a block of 6 x 6 for each pair of bodies that elements or joints link. Own states that act on one another, those of
+With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its velocity v; the internal states belong
+to no body. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body, and go
+first: q = (sigma - Q)^-1 (g + R v). Internal states that act on bodies alone go next, one number each. What is left has
+a block of 6 x 6 for each pair of bodies that elements or joints link. Internal states that act on one another, those of
 the track under a wheelset, stand there as bodies do, by up to six. The blocks are eliminated in an order that creates
 few others (track, wheelsets, bogies, car body). All loops are written out, without a linear algebra library: a step is
 the same to the bit on every run.
@@ -13,69 +13,51 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.links import own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
+from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, packed, reached_bodies
 from wrcore.dynamics.vector import dot
 from wrcore.integrate.moving_axes import RATE
 from wrcore.kernels.jit import jit
 
 
 class Pattern(NamedTuple):
-    """Which blocks there are, and the order in which nodes, bodies and then own states by up to six, are eliminated.
-    Unknowns have the numbers of the Jacobian's ``by_velocity``."""
+    """Which blocks there are, and the order in which nodes, bodies and then internal states by up to six, are
+    eliminated. Unknowns have the numbers of the Jacobian's ``by_velocity``."""
 
-    first: np.ndarray
-    """(m,) int: first unknown of each node."""
-    width: np.ndarray
-    """(m,) int: number of its unknowns."""
-    order: np.ndarray
-    """(m,) int: nodes."""
+    first: np.ndarray  # (m,) int: first unknown of each node
+    width: np.ndarray  # (m,) int: number of its unknowns
+    order: np.ndarray  # (m,) int: nodes
     place: np.ndarray
     """(m, m) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
-    later_starts: np.ndarray
-    """(m + 1,) int."""
-    later: np.ndarray
-    """(p,) int: nodes linked to the k-th one of the order and eliminated later, later_starts[k] <= p."""
-    pairs: np.ndarray
-    """(q, 2) int: rows and columns of the Jacobian's own blocks."""
-    states: np.ndarray
-    """(s,) int: unknowns that act on bodies alone."""
-    state_starts: np.ndarray
-    """(s + 1,) int."""
-    state_bodies: np.ndarray
-    """(r,) int: bodies of the k-th one of these, state_starts[k] <= r."""
+    later_starts: np.ndarray  # (m + 1,) int
+    later: np.ndarray  # (p,) int: nodes linked to the k-th one of the order and eliminated later, later_starts[k] <= p
+    pairs: np.ndarray  # (q, 2) int: rows and columns of the Jacobian's own blocks
+    states: np.ndarray  # (s,) int: unknowns that act on bodies alone
+    state_starts: np.ndarray  # (s + 1,) int
+    state_bodies: np.ndarray  # (r,) int: bodies of the k-th one of these, state_starts[k] <= r
 
 
 class System(NamedTuple):
     """The factorised system."""
 
     pattern: Pattern
-    inverse: np.ndarray
-    """(n, 2, 3, 3): (sigma - Q)^-1 of positions and of rotations."""
-    carried: np.ndarray
-    """(n, 2, 3, 3): (sigma - Q)^-1 R of positions and of rotations."""
-    blocks: np.ndarray
-    """(b, 6, 6): on the diagonal the inverse, below it L, above it U."""
-    pivot: np.ndarray
-    """(s,): diagonal entries of own states that act on bodies alone."""
-    force: np.ndarray
-    """(r, 6): column of such a state in the rows of its bodies."""
-    drive: np.ndarray
-    """(r, 6): row of such a state in the columns of its bodies."""
-    right: np.ndarray
-    """(m, 6): right-hand side, then velocities and own states."""
-    shift: np.ndarray
-    """(n, 6): displacements that do not depend on the velocities sought."""
-    scratch: np.ndarray
-    """(6, 6)."""
+    inverse: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 of positions and of rotations
+    carried: np.ndarray  # (n, 2, 3, 3): (sigma - Q)^-1 R of positions and of rotations
+    blocks: np.ndarray  # (b, 6, 6): on the diagonal the inverse, below it L, above it U
+    pivot: np.ndarray  # (s,): diagonal entries of internal states that act on bodies alone
+    force: np.ndarray  # (r, 6): column of such a state in the rows of its bodies
+    drive: np.ndarray  # (r, 6): row of such a state in the columns of its bodies
+    right: np.ndarray  # (m, 6): right-hand side, then velocities and internal states
+    shift: np.ndarray  # (n, 6): displacements that do not depend on the velocities sought
+    scratch: np.ndarray  # (6, 6)
 
 
 def plan_elimination(model):
     """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
     them."""
-    n, reached, own = len(model.bodies.mass), reached_bodies(model), own_state_bodies(model)
+    n, reached, linked = len(model.bodies.mass), reached_bodies(model), internal_state_bodies(model)
     pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
-    together = own_state_groups(model)
+    together = internal_state_groups(model)
     for states in together:
         packs: list[list[int]] = []
         for state in sorted(states):  # one after the other in the state vector
@@ -83,13 +65,13 @@ def plan_elimination(model):
                 packs[-1].append(state)
             else:
                 packs.append([state])
-        ends = [*own[states[0]], *range(len(nodes), len(nodes) + len(packs))]
+        ends = [*linked[states[0]], *range(len(nodes), len(nodes) + len(packs))]
         pairs |= {pair for pack in ends[-len(packs) :] for k in ends for pair in ((pack, k), (k, pack))}
         nodes += [[6 * n + state for state in pack] for pack in packs]
-    alone = [state for state in range(len(own)) if not any(state in states for states in together)]
+    alone = [state for state in range(len(linked)) if not any(state in states for states in together)]
     m, order, later = len(nodes), [], []
     left = {node: set() for node in range(m)}
-    for ends in [*pairs, *(own[state] for state in alone)]:
+    for ends in [*pairs, *(linked[state] for state in alone)]:
         for node in ends:
             left[node] |= {*ends} - {node}
     place = np.full((m, m), -1)
@@ -106,14 +88,10 @@ def plan_elimination(model):
             place[i, j] = number
             number += 1
 
-    def packed(lists):
-        starts = np.cumsum([0] + [len(items) for items in lists])
-        return starts, np.array([item for items in lists for item in sorted(items)], np.int64)
-
     return Pattern(
         *(np.array(items) for items in zip(*((node[0], len(node)) for node in nodes), strict=True)),
         np.array(order), place, *packed(later), np.array(sorted(pairs)),
-        6 * n + np.array(alone, np.int64), *packed([own[state] for state in alone]),
+        6 * n + np.array(alone, np.int64), *packed([sorted(linked[state]) for state in alone]),
     )  # fmt: skip
 
 
@@ -201,11 +179,11 @@ def _subtract_product(target, left, right):
 def _carry(jacobian, system, sigma):
     """Eliminate the positions, u' = v - omega x u, the lengths of p, then the rotations."""
     rate, share = jacobian.turn[RATE], 1.0 / (sigma - jacobian.length[0])
-    ahead, aside = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
+    along, across = sigma / (sigma * sigma + rate * rate), rate / (sigma * sigma + rate * rate)
     for b in range(system.carried.shape[0]):
         for slide in (system.inverse[b, 0], system.carried[b, 0]):
-            slide[0, 0] = slide[1, 1] = ahead
-            slide[0, 1], slide[1, 0], slide[2, 2] = aside, -aside, 1.0 / sigma
+            slide[0, 0] = slide[1, 1] = along
+            slide[0, 1], slide[1, 0], slide[2, 2] = across, -across, 1.0 / sigma
         turning, by_length = jacobian.turning[b], jacobian.spin[b]
         inverse, carried = system.inverse[b, 1], system.carried[b, 1]
         for i in range(3):
@@ -286,14 +264,14 @@ def factorise(jacobian, system, sigma):
 def _eliminate(pattern, blocks, scratch):
     for k in range(pattern.order.shape[0]):
         body = pattern.order[k]
-        own = blocks[pattern.place[body, body]]
-        if not _invert_block(own, scratch):
+        pivot = blocks[pattern.place[body, body]]
+        if not _invert_block(pivot, scratch):
             return False
         first, last = pattern.later_starts[k], pattern.later_starts[k + 1]
         for p in range(first, last):
             i = pattern.later[p]
             left = blocks[pattern.place[i, body]]
-            _multiply_right(left, own, scratch)
+            _multiply_right(left, pivot, scratch)
             for q in range(first, last):
                 j = pattern.later[q]
                 _subtract_product(blocks[pattern.place[i, j]], left, blocks[pattern.place[body, j]])
@@ -301,14 +279,13 @@ def _eliminate(pattern, blocks, scratch):
 
 
 @jit(allocates=False)
-def _substitute(system, own):
-    """Solve for velocities and own states, in ``system.right`` and, by the number of the unknown, in ``own``, in
-    place."""
+def _substitute(system, unknowns):
+    """Solve for velocities and internal states, in ``system.right`` and, by their number, in ``unknowns``, in place."""
     pattern, blocks, right = system.pattern, system.blocks, system.right
     n = pattern.order.shape[0]
     for s in range(system.pivot.shape[0]):
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
-            to, share = right[pattern.state_bodies[q]], own[pattern.states[s]] / system.pivot[s]
+            to, share = right[pattern.state_bodies[q]], unknowns[pattern.states[s]] / system.pivot[s]
             for k in range(6):
                 to[k] -= system.force[q, k] * share
     for k in range(n):
@@ -336,11 +313,11 @@ def _substitute(system, own):
         for i in range(6):
             at[i] = result[i]
     for s in range(system.pivot.shape[0]):
-        total = own[pattern.states[s]]
+        total = unknowns[pattern.states[s]]
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
             for k in range(6):
                 total -= system.drive[q, k] * right[pattern.state_bodies[q], k]
-        own[pattern.states[s]] = total / system.pivot[s]
+        unknowns[pattern.states[s]] = total / system.pivot[s]
 
 
 @jit(allocates=False)
@@ -349,25 +326,25 @@ def solve_stage(jacobian, system, sigma, increment):
     parameters go as rotation vector 2 E dp and length p . dp, and come back as 1/2 E^T theta + length p."""
     pattern, right, shift = system.pattern, system.right, system.shift
     n = shift.shape[0]
-    own = increment[(STATE_SIZE - 6) * n :]  # by the number of the unknown
+    unknowns = increment[(STATE_SIZE - 6) * n :]  # by their number
     for b in range(n):
         at, axes, inverse, to = STATE_SIZE * b, jacobian.axes[b], system.inverse[b], shift[b]
         length = 0.0
         for j in range(4):
-            length += axes[3, j] * increment[at + 3 + j]
+            length += axes[3, j] * increment[at + EULER + j]
         length /= sigma - jacobian.length[0]
         for i in range(6):
-            to[i], right[b, i] = 0.0, increment[at + 7 + i]
+            to[i], right[b, i] = 0.0, increment[at + VELOCITY + i]
         for k in range(3):
             turn = length * jacobian.spin[b, k]
             for j in range(4):
-                turn += 2.0 * axes[k, j] * increment[at + 3 + j]
+                turn += 2.0 * axes[k, j] * increment[at + EULER + j]
             for i in range(3):
                 to[i] += inverse[0, i, k] * increment[at + k]
                 to[3 + i] += inverse[1, i, k] * turn
     for node in range(n, right.shape[0]):
         for k in range(pattern.width[node]):
-            right[node, k] = own[pattern.first[node] + k]
+            right[node, k] = unknowns[pattern.first[node] + k]
     for q in range(pattern.pairs.shape[0]):
         i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
         if j < n and i < n:
@@ -377,19 +354,19 @@ def solve_stage(jacobian, system, sigma, increment):
     for s in range(pattern.states.shape[0]):
         state = pattern.states[s]
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
-            _add_shift(jacobian, shift, state, 1, pattern.state_bodies[q], own[state : state + 1])
-    _substitute(system, own)
+            _add_shift(jacobian, shift, state, 1, pattern.state_bodies[q], unknowns[state : state + 1])
+    _substitute(system, unknowns)
     for node in range(n, right.shape[0]):
         for k in range(pattern.width[node]):
-            own[pattern.first[node] + k] = right[node, k]
+            unknowns[pattern.first[node] + k] = right[node, k]
     for b in range(n):
         at, axes, turning = STATE_SIZE * b, jacobian.axes[b], jacobian.turning[b]
         carried, to, velocity = system.carried[b], shift[b], right[b]
         length = 0.0
         for j in range(4):
-            length += axes[3, j] * increment[at + 3 + j]
+            length += axes[3, j] * increment[at + EULER + j]
         for i in range(6):
-            increment[at + 7 + i] = velocity[i]
+            increment[at + VELOCITY + i] = velocity[i]
         for i in range(3):
             increment[at + i] = to[i] + dot(carried[0, i], velocity)
             for j in range(3):
@@ -397,6 +374,6 @@ def solve_stage(jacobian, system, sigma, increment):
         for j in range(3):
             length += turning[3, j] * to[3 + j] + turning[3, 3 + j] * velocity[3 + j]
         for j in range(4):
-            increment[at + 3 + j] = axes[3, j] * length / (sigma - jacobian.length[0])
+            increment[at + EULER + j] = axes[3, j] * length / (sigma - jacobian.length[0])
             for i in range(3):
-                increment[at + 3 + j] += 0.5 * axes[i, j] * to[3 + i]
+                increment[at + EULER + j] += 0.5 * axes[i, j] * to[3 + i]

@@ -1,7 +1,7 @@
 """Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
 
 Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites
-motion on and on, Rodas4 takes six or seven steps per metre (nine on rails that give), else few more than the longest
+motion on and on, Rodas4 takes six or seven steps per metre (nine on a flexible track), else few more than the longest
 step asks for. A step costs as much as four of Tsit5, and more where the whole Jacobian is renewed each time.
 `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
 """
@@ -23,7 +23,7 @@ STABLE = 2.5
 EXPLICIT_PER_STIFF, OF_EVALUATIONS = 4.0, 1.0 / 6.0
 """Cost of a step of Rodas4, in steps of Tsit5, and of each evaluation on top for a whole Jacobian."""
 
-STEPS_PER_METRE, ON_GIVING_RAILS = 6.5, 9.0
+STEPS_PER_METRE, ON_FLEXIBLE_TRACK = 6.5, 9.0
 """Of Rodas4, on irregular rails or with wheelsets that may hunt."""
 
 PASSES, SETTLED, DISTURBANCE = 30, 10, 1e-8
@@ -36,14 +36,14 @@ def fastest_rate(model, equations, t, state):
     the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
     work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
     unit = unit[0] + pace(model, state, state) * unit[1]
-    kept = [(own, own.copy()) for own in (*places(work), work.counters)]
+    kept = [(array, array.copy()) for array in (*places(work), work.counters)]
     base, direction, growths = equations(t, state, ELLIPSES), np.random.default_rng(0).normal(size=len(state)), []
     for _ in range(PASSES):
         direction /= math.sqrt(np.mean(direction**2)) or 1.0
         direction = (equations(t, state + unit * direction, ELLIPSES) - base) / unit
         growths.append(math.sqrt(np.mean(direction**2)))
-    for own, before in kept:
-        own[:] = before
+    for array, before in kept:
+        array[:] = before
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
 
 
@@ -54,7 +54,7 @@ def cheaper_method(model, equations, t, state, longest_step):
         return "rodas4"
     rough, cost = model.track.irregularity.coefficients.shape[0] > 0, EXPLICIT_PER_STIFF
     excited = rough or len(bodies.wheelsets) == len(bodies.mass)
-    per_metre = ON_GIVING_RAILS if rough and len(model.support.mass) else STEPS_PER_METRE
+    per_metre = ON_FLEXIBLE_TRACK if rough and len(model.flexible_track.mass) else STEPS_PER_METRE
     steps = 1.0 / longest_step + (per_metre * model.speed if excited else 0.0)
     if rough and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps than that
         cost += OF_EVALUATIONS * len(plan_sweep(model).starts)

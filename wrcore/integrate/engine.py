@@ -56,12 +56,9 @@ class Control(NamedTuple):
 
     tolerances: np.ndarray
     """(2, n): error of a step that each component of the state is allowed, see `wrcore.integrate.tolerances`."""
-    fixed_step: float
-    """s; 0 for steps by the error estimate."""
-    longest_step: float
-    """s."""
-    limit: float
-    """A state `outside` of it ends the run, m."""
+    fixed_step: float  # s; 0 for steps by the error estimate
+    longest_step: float  # s
+    limit: float  # a state `outside` of it ends the run, m
 
 
 class Memory(NamedTuple):
@@ -71,10 +68,8 @@ class Memory(NamedTuple):
     counters: np.ndarray
     state: np.ndarray
     """(n,): state reached."""
-    rate: np.ndarray
-    """(n,): its derivative, if known."""
-    old: np.ndarray
-    """(n,): state before the last step."""
+    rate: np.ndarray  # (n,): its derivative, if known
+    old: np.ndarray  # (n,): state before the last step
     stages: np.ndarray
     """(s, n): derivatives (explicit pairs) or increments (Rosenbrock methods) of the last step's stages."""
 
@@ -82,27 +77,19 @@ class Memory(NamedTuple):
 class Scratch(NamedTuple):
     """Arrays that hold nothing between two attempts."""
 
-    trial: np.ndarray
-    """(n,)."""
-    slope: np.ndarray
-    """(n,)."""
-    defect: np.ndarray
-    """(n,)."""
-    still: np.ndarray
-    """(n,): zeros."""
-    places: np.ndarray
-    """(k,): where searches started before the attempt."""
+    trial: np.ndarray  # (n,)
+    slope: np.ndarray  # (n,)
+    defect: np.ndarray  # (n,)
+    still: np.ndarray  # (n,): zeros
+    places: np.ndarray  # (k,): where searches started before the attempt
 
 
 class Record(NamedTuple):
     """Output times and the states there."""
 
-    times: np.ndarray
-    """(m,), s."""
-    states: np.ndarray
-    """(m, n)."""
-    reached: np.ndarray
-    """(1,) int: outputs written."""
+    times: np.ndarray  # (m,), s
+    states: np.ndarray  # (m, n)
+    reached: np.ndarray  # (1,) int: outputs written
 
 
 def new_memory(state, start, stages, first_step):
@@ -122,8 +109,8 @@ def new_scratch(size, places):
 @jit(allocates=False)
 def error_size(tolerances, rate, bodies, new, errors):
     """Largest error of any body, the root mean square of its 13 components in units of what they are allowed. ``rate``
-    is the step's `pace`. The force elements' own states make one more body. NaN or infinite if any number of the state
-    is not finite."""
+    is the step's `pace`. The internal states make one more body. NaN or infinite if any number of the state is not
+    finite."""
     largest, size = 0.0, new.shape[0]
     for b in range(bodies + 1):
         first = STATE_SIZE * b
@@ -189,7 +176,7 @@ def accept(control, memory, trial, step):
 
 
 @jit(allocates=False)
-def take_stock(control, dense, scale, turn, drift, memory, record, model, work):
+def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
     stages at the step's end, see `wrcore.integrate.moving_axes`."""
@@ -231,7 +218,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
     n, last = state.shape[0], stages.shape[0] - 1
     while True:
         last_step = clock[T] - clock[T_OLD]
-        outcome = take_stock(control, tableau.dense, last_step, STILL, scratch.still, memory, record, model, work)
+        outcome = write_outputs(control, tableau.dense, last_step, STILL, scratch.still, memory, record, model, work)
         if outcome != RUNNING or budget == 0:
             return outcome
         budget -= 1

@@ -27,6 +27,7 @@ import numpy as np
 from wrcore.dynamics.contract import begin, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
+from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE
 from wrcore.errors import InputError
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import new_system
@@ -40,10 +41,8 @@ from wrcore.integrate.trajectory import Checkpoint, Trajectory
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""
 
-
 REFERENCES = ("scipy_rk45", "scipy_rk23", "scipy_dop853", "scipy_radau", "scipy_bdf", "scipy_lsoda", "cvode")
 """Methods of other libraries."""
-
 
 STALL_ATTEMPTS, STALL_STEP = 20_000, 2e-8
 """So many steps (tried ones) in a row that are this short on average, s, are no headway: some 0.1 s of work for a
@@ -51,7 +50,6 @@ wheelset, and at this pace a simulated second takes fifty million steps. The sho
 10 us, and explicit methods take steps of 5 us at 0.1 m/s and of 50 ns at the least speed of creepages, 1 mm/s. Steps of
 a stated length, or bounded by ``longest_step``, may be as short as they are asked to be.
 """
-
 
 CHUNK = 2000
 """Attempts between two returns to Python, for progress and interrupts."""
@@ -132,11 +130,11 @@ def integrate(
     return Trajectory(
         method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
         int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
-        int(counters[engine.FACTORISATIONS]), int(work.counters[1]), float(memory.clock[engine.SMALLEST]), wall,
-        Checkpoint(method, float(last), memory, linear, *(place.copy() for place in places(work))),
+        int(counters[engine.FACTORISATIONS]), int(work.counters[OUT_OF_RANGE]), float(memory.clock[engine.SMALLEST]),
+        wall, Checkpoint(method, float(last), memory, linear, *(place.copy() for place in places(work))),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
-        int(work.counters[2]), int(work.support.unbalanced[0]),
+        int(work.counters[ON_GRID]), int(work.flexible_track.unbalanced[0]),
     )  # fmt: skip
 
 
@@ -189,13 +187,13 @@ def _take_over(fresh, kept, planned=False):
     """Copy the numbers of a checkpoint into arrays made for the model, whose own ``planned`` indices stay."""
     if type(fresh) is not type(kept):
         raise InputError("start", "checkpoint", f"expected a {type(fresh).__name__}, got a {type(kept).__name__}")
-    for own, other in zip(fresh or (), kept or (), strict=True):
-        if isinstance(own, tuple):
-            _take_over(own, other, planned)
-        elif np.shape(other) != own.shape or np.asarray(other).dtype != own.dtype:
-            raise InputError("start", "checkpoint", f"expected {own.dtype} {own.shape}, got {np.shape(other)}")
-        elif own.dtype.kind == "f" or not planned:
-            own[...] = other
+    for array, other in zip(fresh or (), kept or (), strict=True):
+        if isinstance(array, tuple):
+            _take_over(array, other, planned)
+        elif np.shape(other) != array.shape or np.asarray(other).dtype != array.dtype:
+            raise InputError("start", "checkpoint", f"expected {array.dtype} {array.shape}, got {np.shape(other)}")
+        elif array.dtype.kind == "f" or not planned:
+            array[...] = other
 
 
 def _ending(outcome, given_up, model, memory, work):

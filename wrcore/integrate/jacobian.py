@@ -1,14 +1,14 @@
 """The Jacobian of the equations of motion by finite differences, in blocks that make use of their structure.
 
 Unknown are, per body, a displacement (r, and a rotation vector in track axes that turns the Euler parameters by
-``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the force elements' own states. Only the accelerations and the
-rates of the elements' own states need differences; how velocities change positions is known.
+``p += 1/2 E(p)^T theta``) and a velocity (r', w); then the internal states. Only the accelerations and the rates of
+internal states need differences; how velocities change positions is known.
 
 A body's columns meet rows of the bodies that elements or joints link it to. One evaluation therefore serves several
 bodies at once (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117-119). They keep the rails' wrenches as
 they are; what the contacts add, and bring up to date more often, is in :mod:`wrcore.dynamics.contact_blocks`.
 
-All bodies run ahead at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
+All bodies run along at some 20 m/s. What columns of different age make of that, where they should cancel, would be the
 greatest error of all. Positions are therefore counted from a motion at constant velocity, the ``drift`` of when the
 Jacobian was taken, and the derivative with respect to time is the one along that drift.
 """
@@ -18,23 +18,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.contact_blocks import (
-    DIRECTIONS,
-    DISPLACEMENT,
-    SPEED,
-    SPIN,
-    TURN,
-    contacts_alone,
-    renew_contacts,
-)
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
+from wrcore.dynamics.contact_blocks import DIRECTIONS, DISPLACEMENT, SPEED, SPIN, TURN, contacts_alone, renew_contacts
 from wrcore.dynamics.contract import turn_rate
-from wrcore.dynamics.links import joined_sets, own_state_bodies, own_state_groups, reached_bodies
+from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
 from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
+from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import copy_into, cross, dot
-from wrcore.dynamics.wheel import MOTION_COLUMNS
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
 from wrcore.kernels.jit import jit
 
@@ -52,51 +44,39 @@ MOMENT = 1e-7
 class Sweep(NamedTuple):
     """Which columns one evaluation each perturbs together, and the rows that each column reaches."""
 
-    starts: np.ndarray
-    """(e + 1,) int: evaluation i perturbs the columns starts[i] <= k < starts[i + 1]."""
+    starts: np.ndarray  # (e + 1,) int: evaluation i perturbs the columns starts[i] <= k < starts[i + 1]
     columns: np.ndarray
-    """(p,) int: displacements of all bodies (6 each), velocities of all bodies (6 each), elements' own states."""
-    row_starts: np.ndarray
-    """(p + 1,) int."""
-    rows: np.ndarray
-    """(q,) int: accelerations of all bodies (6 each), rates of the elements' own states."""
+    """(p,) int: displacements of all bodies (6 each), velocities of all bodies (6 each), elements' internal states."""
+    row_starts: np.ndarray  # (p + 1,) int
+    rows: np.ndarray  # (q,) int: accelerations of all bodies (6 each), rates of the elements' internal states
 
 
 class Joined(NamedTuple):
     """Bodies that accelerate together with each wheelset: itself and those that joints hold to it."""
 
-    starts: np.ndarray
-    """(k + 1,) int."""
-    bodies: np.ndarray
-    """(p,) int."""
+    starts: np.ndarray  # (k + 1,) int
+    bodies: np.ndarray  # (p,) int
 
 
 class Jacobian(NamedTuple):
     """Blocks of the Jacobian, stored column by column; columns and rows as in `Sweep`."""
 
-    by_position: np.ndarray
-    """(6 n, m): with respect to displacements."""
-    by_velocity: np.ndarray
-    """(m, m): with respect to velocities and the elements' own states."""
+    by_position: np.ndarray  # (6 n, m): with respect to displacements
+    by_velocity: np.ndarray  # (m, m): with respect to velocities and the elements' internal states
     turning: np.ndarray
     """(n, 4, 6): rate of the rotation vector, and of the length of p, with respect to rotation and angular velocity."""
     length: np.ndarray
     """(1,): rate of the length of p with respect to itself, which is that of Baumgarte's feedback, 1/s."""
     spin: np.ndarray
     """(n, 3): rate of the rotation vector with respect to the length of p: the frame's angular velocity, rad/s."""
-    by_time: np.ndarray
-    """(size,): time derivative of the state's rate at positions that move with the drift."""
-    drift: np.ndarray
-    """(size,): velocities of all bodies at the places of their positions, zero elsewhere."""
-    axes: np.ndarray
-    """(n, 4, 4): rows of E(p), then p, where the Jacobian was taken."""
+    by_time: np.ndarray  # (size,): time derivative of the state's rate at positions that move with the drift
+    drift: np.ndarray  # (size,): velocities of all bodies at the places of their positions, zero elsewhere
+    axes: np.ndarray  # (n, 4, 4): rows of E(p), then p, where the Jacobian was taken
     turn: np.ndarray
     """(2,): turn rate of the axes that increments are counted in (rad/s), and their turn since they were those of the
     track (rad); see `wrcore.integrate.moving_axes`."""
-    contact: np.ndarray
-    """(k, 12, 6 n): what is in it of each wheelset's contacts."""
-    mobility: np.ndarray
-    """(k, 6, 6 n): accelerations of all bodies by a wrench on a wheelset, in the wheelset's axes."""
+    contact: np.ndarray  # (k, 12, 6 n): what is in it of each wheelset's contacts
+    mobility: np.ndarray  # (k, 6, 6 n): accelerations of all bodies by a wrench on a wheelset, in the wheelset's axes
     columns: np.ndarray
     rails: np.ndarray
     motions: np.ndarray
@@ -119,27 +99,15 @@ def _groups(reach):
     return [members for members, _ in groups]
 
 
-def _sweep(evaluations):
-    """Sweep from a list of evaluations, each a list of (column, rows)."""
-    columns = [item for evaluation in evaluations for item in evaluation]
-    return Sweep(
-        np.cumsum([0] + [len(evaluation) for evaluation in evaluations]),
-        np.array([column for column, _ in columns], np.int64),
-        np.cumsum([0] + [len(rows) for _, rows in columns]),
-        np.array([row for _, rows in columns for row in sorted(rows)], np.int64),
-    )  # fmt: skip
-
-
 def plan_sweep(model):
     """Plan the evaluations for the whole Jacobian."""
-    n, own = len(model.bodies.mass), own_state_bodies(model)
-    reached = reached_bodies(model)
+    n, linked, reached = len(model.bodies.mass), internal_state_bodies(model), reached_bodies(model)
 
     def column(body, direction):
         return 6 * body + direction if direction < 6 else 6 * n + 6 * body + direction - 6
 
     rows = [{6 * b + k for b in reached[body] for k in range(6)} for body in range(n)]
-    for state, ends in enumerate(own):
+    for state, ends in enumerate(linked):
         for body in ends:
             rows[body].add(6 * n + state)
     full = [
@@ -147,21 +115,19 @@ def plan_sweep(model):
         for group in _groups(rows)
         for direction in range(DIRECTIONS)
     ]
-    own_rows = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(own)]
-    for states in own_state_groups(model):
+    inner = [{6 * n + state} | {6 * body + k for body in ends for k in range(6)} for state, ends in enumerate(linked)]
+    for states in internal_state_groups(model):
         for state in states:
-            own_rows[state] |= {6 * n + other for other in states}
-    full += [[(12 * n + state, own_rows[state]) for state in group] for group in _groups(own_rows)]
-    return _sweep(full)
+            inner[state] |= {6 * n + other for other in states}
+    full += [[(12 * n + state, inner[state]) for state in group] for group in _groups(inner)]
+    columns = [[k for k, _ in evaluation] for evaluation in full]
+    return Sweep(*packed(columns), *packed([sorted(rows) for evaluation in full for _, rows in evaluation]))
 
 
 def joined_bodies(model):
     """Bodies that accelerate together with each wheelset."""
-    joined = [sorted(joined_sets(model)[b]) for b in model.bodies.wheelsets]
-    return Joined(
-        np.cumsum([0] + [len(bodies) for bodies in joined]),
-        np.array([b for bodies in joined for b in bodies], np.int64),
-    )
+    joined = joined_sets(model)
+    return Joined(*packed([sorted(joined[body]) for body in model.bodies.wheelsets]))
 
 
 def new_jacobian(model):
@@ -171,15 +137,9 @@ def new_jacobian(model):
     return Jacobian(
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
         np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
-        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, MOTION_COLUMNS)), np.zeros((k, 2, 6)),
+        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)),
         np.zeros(6 * n),
     )  # fmt: skip
-
-
-@jit(allocates=False, inline="always")
-def turn_of(jacobian):
-    """Turn rate and angle of the axes, see `Jacobian`."""
-    return jacobian.turn[RATE], jacobian.turn[ANGLE]
 
 
 @jit(allocates=False)
@@ -187,9 +147,9 @@ def _take_axes(jacobian, state, rate):
     """Write E(p), p, and the frames' angular velocities 2 E(p) p' of all bodies, see :class:`Jacobian`."""
     c, s = math.cos(0.5 * jacobian.turn[ANGLE]), math.sin(0.5 * jacobian.turn[ANGLE])
     for b in range(jacobian.axes.shape[0]):
-        at, rows = STATE_SIZE * b, jacobian.axes[b]
-        e0, e3 = c * state[at + 3] + s * state[at + 6], c * state[at + 6] - s * state[at + 3]
-        e1, e2 = c * state[at + 4] + s * state[at + 5], c * state[at + 5] - s * state[at + 4]
+        at, rows = STATE_SIZE * b + EULER, jacobian.axes[b]
+        e0, e3 = c * state[at] + s * state[at + 3], c * state[at + 3] - s * state[at]
+        e1, e2 = c * state[at + 1] + s * state[at + 2], c * state[at + 2] - s * state[at + 1]
         rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = -e1, e0, -e3, e2
         rows[1, 0], rows[1, 1], rows[1, 2], rows[1, 3] = -e2, e3, e0, -e1
         rows[2, 0], rows[2, 1], rows[2, 2], rows[2, 3] = -e3, -e2, e1, e0
@@ -197,7 +157,7 @@ def _take_axes(jacobian, state, rate):
         for i in range(3):
             jacobian.spin[b, i] = 0.0
             for j in range(4):
-                jacobian.spin[b, i] += 2.0 * rows[i, j] * rate[at + 3 + j]
+                jacobian.spin[b, i] += 2.0 * rows[i, j] * rate[at + j]
 
 
 @jit(allocates=False)
@@ -206,11 +166,11 @@ def _take_turning(jacobian, spins, state):
 
     With p' = 1/2 Omega p (quaternions; Omega = w, or w - (w a) a for a body of revolution about a, whose frame does not
     spin) and p + 1/2 theta p in place of p: the rotation vector's rate changes by dOmega + 1/2 Omega x theta, the rate
-    of the length of p by -1/4 Omega theta. In axes that turn, Omega is relative to them.
+    of the length of p by -1/4 Omega theta. In rotating axes, Omega is relative to them.
     """
     c, s = math.cos(jacobian.turn[ANGLE]), math.sin(jacobian.turn[ANGLE])
     for b in range(jacobian.axes.shape[0]):
-        at, p, omega, out = STATE_SIZE * b + 10, jacobian.axes[b, 3], jacobian.spin[b], jacobian.turning[b]
+        at, p, omega, out = STATE_SIZE * b + OMEGA, jacobian.axes[b, 3], jacobian.spin[b], jacobian.turning[b]
         w = c * state[at] + s * state[at + 1], c * state[at + 1] - s * state[at], state[at + 2]
         a = (
             2.0 * (p[1] * p[2] - p[0] * p[3]),
@@ -247,13 +207,13 @@ def _perturb(trial, column, axes, fine):
         at, difference = STATE_SIZE * n + column - 12 * n, DISPLACEMENT
     elif column >= 6 * n:
         k = (column - 6 * n) % 6
-        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + 7 + k, fine * (SPEED if k < 3 else SPIN)
+        at, difference = STATE_SIZE * ((column - 6 * n) // 6) + VELOCITY + k, fine * (SPEED if k < 3 else SPIN)
     else:
         k = column % 6
         at, difference = STATE_SIZE * (column // 6) + k, DISPLACEMENT
         if k >= 3:
             for i in range(4):
-                trial[at - k + 3 + i] += 0.5 * TURN * axes[column // 6, k - 3, i]
+                trial[at - k + EULER + i] += 0.5 * TURN * axes[column // 6, k - 3, i]
             return TURN
     trial[at] += difference
     return difference
@@ -278,7 +238,7 @@ def _take_column(sweep, jacobian, k, difference, bodies, base, slope):
     column = sweep.columns[k]
     for j in range(sweep.row_starts[k], sweep.row_starts[k + 1]):
         row = sweep.rows[j]
-        at = STATE_SIZE * (row // 6) + 7 + row % 6 if row < 6 * bodies else 7 * bodies + row
+        at = STATE_SIZE * (row // 6) + VELOCITY + row % 6 if row < 6 * bodies else 7 * bodies + row
         value = (slope[at] - base[at]) / difference
         if column < 6 * bodies:
             jacobian.by_position[column, row] = value

@@ -1,8 +1,8 @@
-"""Axes that turn with a vehicle in a curve, for methods that keep a Jacobian for more than a moment.
+"""Rotating axes, which turn with a vehicle in a curve, for methods that keep a Jacobian for more than a moment.
 
 In a curve all forces turn with the vehicle. In resting axes the Jacobian of what is stiff is wrong after a turn of
 1 mrad, and a method that holds on to it must follow that turn with short steps although nothing moves in the vehicle.
-Increments of a step are therefore counted in axes that turn about the vertical at the constant rate omega, from a
+Increments of a step are therefore counted in axes that rotate about the vertical at the constant rate omega, from a
 motion in which each body goes round a circle with its own velocity, the ``drift`` d. With Q(t) the turn since the
 Jacobian was taken, the state at a time t after the step's start (subscript 0) is
 
@@ -23,6 +23,12 @@ from wrcore.kernels.jit import jit
 
 RATE, ANGLE = range(2)
 """Places in ``turn``: turn rate (rad/s), turn since the Jacobian was taken (rad)."""
+
+
+@jit(allocates=False, inline="always")
+def turn_of(jacobian):
+    """Turn rate and angle of a Jacobian's axes."""
+    return jacobian.turn[RATE], jacobian.turn[ANGLE]
 
 
 @jit(allocates=False, inline="always")
@@ -47,9 +53,9 @@ def _circle(turn, t):
 def carry(bodies, turn, drift, t, start, trial):
     """Turn increments in ``trial`` (size,) into the state that they lead to, t (s) after the step's ``start``. ``turn``
     is rate and angle at the step's start, ``drift`` d at the places of positions, zero elsewhere."""
-    ahead, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
-    c0, s0, c, s = math.cos(ahead), math.sin(ahead), math.cos(whole), math.sin(whole)
-    hc0, hs0, hc, hs = math.cos(0.5 * ahead), math.sin(0.5 * ahead), math.cos(0.5 * whole), math.sin(0.5 * whole)
+    turned, whole = turn[RATE] * t, turn[ANGLE] + turn[RATE] * t
+    c0, s0, c, s = math.cos(turned), math.sin(turned), math.cos(whole), math.sin(whole)
+    hc0, hs0, hc, hs = math.cos(0.5 * turned), math.sin(0.5 * turned), math.cos(0.5 * whole), math.sin(0.5 * whole)
     dc, ds = _circle(turn, t)
     for b in range(bodies):
         at = STATE_SIZE * b

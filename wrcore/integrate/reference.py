@@ -16,7 +16,6 @@ SOLVERS = {
 }  # fmt: skip
 """scipy's classes by method name."""
 
-
 LEAST_RTOL = 3e-14
 """Tolerance by the size of a component, as small as scipy allows: what counts are the tolerances of each."""
 
@@ -57,18 +56,9 @@ def integrate_function(
 
     times, started = np.asarray(times, float), time.perf_counter()
     run = _by_cvode if method == "cvode" else _by_scipy
+    start = np.array(state, float)
     reached, states, status, reason, counts = run(
-        counted,
-        np.array(state, float),
-        times,
-        method,
-        rtol,
-        atol,
-        longest_step,
-        stop,
-        progress,
-        halt,
-        most_steps,
+        counted, start, times, method, rtol, atol, longest_step, stop, progress, halt, most_steps
     )
     if method in ("scipy_rk45", "scipy_rk23"):  # two evaluations to start with, as many as stages for each attempt
         counts["rejected"] = (evaluations - 2) // (6 if method == "scipy_rk45" else 3) - counts["steps"]
@@ -118,10 +108,8 @@ def _by_scipy(function, state, times, method, rtol, atol, longest_step, stop, pr
             status = "stalled"
             break
         if most_steps and steps >= most_steps and solver.status == "running":
-            status, reason = (
-                "stalled",
-                f"{steps} steps, as many as integration.most_steps allows, at t = {solver.t:.6g} s",
-            )
+            status = "stalled"
+            reason = f"{steps} steps, as many as integration.most_steps allows, at t = {solver.t:.6g} s"
             break
     counts = {"steps": steps, "jacobians": solver.njev, "factorisations": solver.nlu, "smallest_step": smallest}
     return reached, states, status, reason, counts

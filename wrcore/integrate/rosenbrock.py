@@ -14,37 +14,11 @@ from wrcore.dynamics.contract import after_rejection, before_attempt, touching
 from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
+from wrcore.integrate import engine
 from wrcore.integrate.blocks import factorise, solve_stage
-from wrcore.integrate.engine import (
-    AGE,
-    EVALUATIONS,
-    FACTORISATIONS,
-    HAS_RATE,
-    JACOBIANS,
-    MATRIX_STEP,
-    NEXT,
-    NOT_FINITE,
-    RETRY,
-    RUNNING,
-    SINCE_FULL,
-    TOUCHING,
-    T,
-    accept,
-    error_size,
-    judge,
-    take_stock,
-)
-from wrcore.integrate.jacobian import (
-    Jacobian,
-    Joined,
-    Sweep,
-    joined_bodies,
-    new_jacobian,
-    plan_sweep,
-    refresh_jacobian,
-    turn_of,
-)
-from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
+from wrcore.integrate.engine import accept, error_size, judge, write_outputs
+from wrcore.integrate.jacobian import Jacobian, Joined, Sweep, joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import pace
 from wrcore.kernels.jit import jit
 
@@ -62,8 +36,7 @@ class Linear(NamedTuple):
     sweep: Sweep
     joined: Joined
     jacobian: Jacobian
-    differences: np.ndarray
-    """(p,): scratch of the Jacobian."""
+    differences: np.ndarray  # (p,): scratch of the Jacobian
 
 
 def new_linear(model):
@@ -77,22 +50,22 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
     """Refresh the Jacobian if it is too old and factorise the matrix if it is not that of the step; False if singular.
     After a rejected step a Jacobian from an earlier state is refreshed first."""
     clock, counters = memory.clock, memory.counters
-    age, step = counters[AGE], clock[NEXT]
-    if age < 0 or age >= tableau.reuse or (age > 0 and counters[RETRY]):
-        whole = age < 0 or not contacts_alone(model) or counters[SINCE_FULL] >= CONTACT_REFRESHES
+    age, step = counters[engine.AGE], clock[engine.NEXT]
+    if age < 0 or age >= tableau.reuse or (age > 0 and counters[engine.RETRY]):
+        whole = age < 0 or not contacts_alone(model) or counters[engine.SINCE_FULL] >= CONTACT_REFRESHES
         if whole:
-            counters[SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
-        counters[EVALUATIONS] += refresh_jacobian(
-            linear.sweep, linear.joined, whole, linear.jacobian, clock[T], memory.state, memory.rate, scratch.trial,
-            scratch.slope, linear.differences, equations, model, work,
+            counters[engine.SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
+        counters[engine.EVALUATIONS] += refresh_jacobian(
+            linear.sweep, linear.joined, whole, linear.jacobian, clock[engine.T], memory.state, memory.rate,
+            scratch.trial, scratch.slope, linear.differences, equations, model, work,
         )  # fmt: skip
-        counters[JACOBIANS] += 1
-        counters[SINCE_FULL] += 1
-        counters[AGE] = 0
-        clock[MATRIX_STEP] = 0.0
-    if clock[MATRIX_STEP] != step:
-        clock[MATRIX_STEP] = step
-        counters[FACTORISATIONS] += 1
+        counters[engine.JACOBIANS] += 1
+        counters[engine.SINCE_FULL] += 1
+        counters[engine.AGE] = 0
+        clock[engine.MATRIX_STEP] = 0.0
+    if clock[engine.MATRIX_STEP] != step:
+        clock[engine.MATRIX_STEP] = step
+        counters[engine.FACTORISATIONS] += 1
         return factorise(linear.jacobian, system, 1.0 / (step * tableau.gamma))
     return True
 
@@ -105,7 +78,7 @@ def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
     embedded method compares is blind to it at any tolerance, and the impact would give energy. The system damps what
     is stiff.
     """
-    step, stages, defect = memory.clock[NEXT], memory.stages, scratch.defect
+    step, stages, defect = memory.clock[engine.NEXT], memory.stages, scratch.defect
     bodies, turn, drift = model.bodies.mass.shape[0], turn_of(linear.jacobian), linear.jacobian.drift
     copy_into(defect, scratch.slope)
     rates_of_increments(bodies, turn, drift, step, memory.state, scratch.trial, defect)
@@ -127,15 +100,16 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
     hold = HOLD if tableau.reuse > 1 else 1.0
-    if clock[MATRIX_STEP] > 0.0:
-        factorise(linear.jacobian, system, 1.0 / (clock[MATRIX_STEP] * tableau.gamma))
+    if clock[engine.MATRIX_STEP] > 0.0:
+        factorise(linear.jacobian, system, 1.0 / (clock[engine.MATRIX_STEP] * tableau.gamma))
     while True:
-        outcome = take_stock(control, tableau.dense, 1.0, turn_of(linear.jacobian), drift, memory, record, model, work)
-        if outcome != RUNNING or budget == 0:
+        axes = turn_of(linear.jacobian)
+        outcome = write_outputs(control, tableau.dense, 1.0, axes, drift, memory, record, model, work)
+        if outcome != engine.RUNNING or budget == 0:
             return outcome
         budget -= 1
         before_attempt(work, scratch.places)
-        step, regular = clock[NEXT], True
+        step, regular = clock[engine.NEXT], True
         for i in range(last + 1):
             trial[:] = 0.0
             for j in range(i):
@@ -145,13 +119,13 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                         trial[k] += weight * stages[j, k]
             moment = tableau.nodes[i] * step
             carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
-            if i > 0 or not counters[HAS_RATE]:
-                derivatives_at(equations, clock[T] + moment, trial, model, work, slope, WARM)
-                counters[EVALUATIONS] += 1
+            if i > 0 or not counters[engine.HAS_RATE]:
+                derivatives_at(equations, clock[engine.T] + moment, trial, model, work, slope, WARM)
+                counters[engine.EVALUATIONS] += 1
             if i == 0:
-                if not counters[HAS_RATE]:
+                if not counters[engine.HAS_RATE]:
                     copy_into(memory.rate, slope)
-                    counters[HAS_RATE], counters[TOUCHING] = 1, touching(work)
+                    counters[engine.HAS_RATE], counters[engine.TOUCHING] = 1, touching(work)
                 regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
@@ -172,21 +146,21 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
         rate = pace(model, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
-        looked_ahead, contacts = error <= 1.0, 0
-        if looked_ahead:  # the next step's first rate
-            derivatives_at(equations, clock[T] + step, trial, model, work, slope, WARM)
-            counters[EVALUATIONS] += 1
+        fresh, contacts = error <= 1.0, 0
+        if fresh:  # the next step's first rate
+            derivatives_at(equations, clock[engine.T] + step, trial, model, work, slope, WARM)
+            counters[engine.EVALUATIONS] += 1
             contacts = touching(work)
-            if contacts > counters[TOUCHING]:
+            if contacts > counters[engine.TOUCHING]:
                 error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, system, model))
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
             linear.jacobian.turn[ANGLE] += linear.jacobian.turn[RATE] * step
-            counters[AGE] += 1
-            counters[HAS_RATE], counters[TOUCHING] = looked_ahead, contacts
-            if looked_ahead:
+            counters[engine.AGE] += 1
+            counters[engine.HAS_RATE], counters[engine.TOUCHING] = fresh, contacts
+            if fresh:
                 copy_into(memory.rate, slope)
         elif control.fixed_step > 0.0:
-            return NOT_FINITE
+            return engine.NOT_FINITE
         else:
             after_rejection(work, scratch.places)

@@ -27,39 +27,26 @@ import numpy as np
 class ExplicitTableau(NamedTuple):
     """An embedded pair whose last stage is the first one of the next step."""
 
-    nodes: np.ndarray
-    """(s,): c."""
-    stages: np.ndarray
-    """(s, s): a, strictly lower; the last row holds the weights b."""
-    error: np.ndarray
-    """(s,): b less the embedded weights."""
-    dense: np.ndarray
-    """(s, d): weight of stage i at theta is the sum of dense[i, k] theta^(k + 1)."""
-    exponent: float
-    """The error estimate is of this order in h."""
+    nodes: np.ndarray  # (s,): c
+    stages: np.ndarray  # (s, s): a, strictly lower; the last row holds the weights b
+    error: np.ndarray  # (s,): b less the embedded weights
+    dense: np.ndarray  # (s, d): weight of stage i at theta is the sum of dense[i, k] theta^(k + 1)
+    exponent: float  # the error estimate is of this order in h
 
 
 class RosenbrockTableau(NamedTuple):
     """An embedded Rosenbrock method in the form without products of matrices and vectors."""
 
-    nodes: np.ndarray
-    """(s,)."""
-    by_time: np.ndarray
-    """(s,): factors d_i of h df/dt."""
-    stages: np.ndarray
-    """(s, s): a."""
-    couplings: np.ndarray
-    """(s, s): c_ij."""
-    weights: np.ndarray
-    """(s,): m."""
-    error: np.ndarray
-    """(s,)."""
-    dense: np.ndarray
-    """(s, d), as for explicit pairs, for weights of u_i."""
+    nodes: np.ndarray  # (s,)
+    by_time: np.ndarray  # (s,): factors d_i of h df/dt
+    stages: np.ndarray  # (s, s): a
+    couplings: np.ndarray  # (s, s): c_ij
+    weights: np.ndarray  # (s,): m
+    error: np.ndarray  # (s,)
+    dense: np.ndarray  # (s, d), as for explicit pairs, for weights of u_i
     exponent: float
     gamma: float
-    reuse: int
-    """Steps for which a Jacobian serves: 1 where the order rests on an exact one."""
+    reuse: int  # steps for which a Jacobian serves: 1 where the order rests on an exact one
 
 
 def _lower(*rows):

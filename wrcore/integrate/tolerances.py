@@ -18,8 +18,9 @@ the motion is not unstable, and contact forces by less than 1 % in the root mean
 import numpy as np
 
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.support import RAILS, support_places
-from wrcore.dynamics.system import own_states
+from wrcore.dynamics.flexible_track import RAILS, track_places
+from wrcore.dynamics.system import internal_states
+from wrcore.dynamics.vector import load
 from wrcore.kernels.jit import jit
 
 LENGTH = 0.01
@@ -43,10 +44,10 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
     ``rtol`` is the part of `LENGTH`, ``atol`` (m) comes on top; a method in `SHARE` counts with that. Units: m, 1, m/s,
     rad/s, and m for the states that belong to no body (rad/s for wheels that turn independently, m/s for the velocities
-    of a track that gives; its sleeper's roll counts at the rails).
+    of a flexible track; its sleeper's roll counts at the rails).
     """
     n = len(model.bodies.mass)
-    weights, lever = np.ones(STATE_SIZE * n + own_states(model)), gyration(model.bodies)[:, None]
+    weights, lever = np.ones(STATE_SIZE * n + internal_states(model)), gyration(model.bodies)[:, None]
     fast, bodies = np.zeros(weights.shape, bool), weights[: STATE_SIZE * n].reshape(n, STATE_SIZE)
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2
     bodies[:, OMEGA:] = 1.0 / lever
@@ -54,9 +55,9 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     for wheelset, state in model.bodies.independent:
         weights[STATE_SIZE * n + state] = 1.0 / lever[model.bodies.wheelsets[wheelset], 0]
         fast[STATE_SIZE * n + state] = True
-    freedoms = len(model.support.mass)
+    freedoms = len(model.flexible_track.mass)
     if freedoms:
-        places = support_places(model)
+        places = track_places(model)
         fast[places[:, freedoms:]] = True
         if freedoms > RAILS:  # roll of the sleeper
             weights[places[:, RAILS + 2 :: freedoms]] /= HALF_GAUGE
@@ -64,10 +65,9 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
 
 
 @jit(allocates=False, inline="always")
-def _ahead(state, at):
+def _forward_speed(state, at):
     """Speed (m/s) of the body whose state starts at ``at`` along its own x axis, either way."""
-    e0, e1, e2, e3 = state[at + 3], state[at + 4], state[at + 5], state[at + 6]
-    vx, vy, vz = state[at + 7], state[at + 8], state[at + 9]
+    e0, (e1, e2, e3), (vx, vy, vz) = state[at + EULER], load(state, at + EULER + 1), load(state, at + VELOCITY)
     return abs(vx + 2.0 * ((e1 * e2 + e0 * e3) * vy + (e1 * e3 - e0 * e2) * vz - (e2 * e2 + e3 * e3) * vx))
 
 
@@ -77,7 +77,7 @@ def pace(model, old, new):
     rate = RATE
     for wheelset in model.bodies.wheelsets:
         at = STATE_SIZE * wheelset
-        speed = max(min(_ahead(old, at), _ahead(new, at)), model.contact.least_speed)
+        speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), model.contact.least_speed)
         rate = min(rate, speed / HALF_GAUGE)
     return rate
 

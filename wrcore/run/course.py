@@ -13,8 +13,8 @@ import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.energy import energy_channels
+from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.outputs import drive_history, evaluations_at
-from wrcore.dynamics.support import support_places
 from wrcore.dynamics.system import Equations, Model, Workspace, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
@@ -47,7 +47,7 @@ TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
     "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
 )  # fmt: skip
-"""Of a track that gives, in the order of its freedoms (:mod:`wrcore.dynamics.support`)."""
+"""Of a flexible track, in the order of its freedoms (:mod:`wrcore.dynamics.flexible_track`)."""
 
 
 class Places(NamedTuple):
@@ -166,7 +166,7 @@ class Course:
             groups[name] = _body_channels(states[:, own], rates[:, own], place, turned, wanted, pitches)
             if "pose" in wanted and not model.track.tangent:
                 groups[name]["s_m"] = place[:, 0]
-            if "pose" in wanted and body in wheelsets and len(model.support.mass):
+            if "pose" in wanted and body in wheelsets and len(model.flexible_track.mass):
                 groups[name] |= self._track_places(states, body)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
@@ -214,7 +214,7 @@ class Course:
     def _track_places(self, states, body):
         """Channels of the displacements of rails and sleeper under a wheelset, m and rad."""
         k = int(np.flatnonzero(self.model.bodies.wheelsets == body)[0])
-        places = support_places(self.model)[k, : len(self.model.support.mass)]
+        places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
     def _drive_channels(self, trajectory):

@@ -332,7 +332,7 @@ def compile_scene(
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source), support=support,
+        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source), flexible_track=support,
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wrcore.dynamics.drive import BRAKE, CONTROLLED, MOTOR, Drive, no_drive
+from wrcore.dynamics.drive import BRAKE, CONTROLLED, KIND, MOTOR, NUMBER, Drive, no_drive
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.schedule import pack_schedules
 from wrcore.errors import InputError, one_of
@@ -28,7 +28,7 @@ def read_drive(spec, vehicle, source):
         row, lever = _actuator(group, item, vehicle, source, tables)
         rows.append(row)
         levers.append(lever)
-    controlled = [row[3] == CONTROLLED for row in rows]
+    controlled = [row[KIND] == CONTROLLED for row in rows]
     if any(controlled) != ("controller" in spec):
         expected = "expected a controller exactly where motors state neither torque nor force"
         raise InputError(source, "drive.controller", expected)
@@ -68,7 +68,7 @@ def _controller(spec, rows, vehicle, source, tables):
     body = _body(spec["body"], vehicle, source, "drive.controller.body")
     over, points = read_schedule(spec["speed"], "speed", OVER, source, "drive.controller.speed")
     tables.append(points)
-    foremost = min(row[2] for row in rows if row[3] == CONTROLLED)
+    foremost = min(row[NUMBER] for row in rows if row[KIND] == CONTROLLED)
     return [body, foremost, len(tables) - 1, over], [
         spec["proportional"], spec["integral"], -spec.get("brake_limit", spec["limit"]), spec["limit"],
     ]  # fmt: skip

@@ -1,8 +1,8 @@
-"""The track that gives under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
+"""The flexible track under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
 
 import numpy as np
 
-from wrcore.dynamics.support import RAILS, Support, no_support, support_size
+from wrcore.dynamics.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
 from wrcore.errors import InputError
 
 SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2
@@ -26,7 +26,7 @@ def track_support(spec, half_distance, elements, wheelsets):
     that of the rails from the track's centre line (m), where the halves of the ballast are taken to carry the
     sleeper."""
     if spec is None:
-        return no_support(), elements
+        return rigid_track(), elements
     rail, sleeper = spec["rail"], spec.get("sleeper")
     d = RAILS + (3 if sleeper else 0)
     mass, matrices = np.full(d, float(rail["mass"])), (np.zeros((d, d)), np.zeros((d, d)))
@@ -39,8 +39,8 @@ def track_support(spec, half_distance, elements, wheelsets):
         if sleeper:
             _add(matrices, sleeper["vertical"], foot, 0.5)
             _add(matrices, sleeper["lateral"], {SLEEPER_Y: 1.0}, 0.5)
-    support = Support(mass, *matrices, elements.states)
-    return support, elements._replace(states=elements.states + wheelsets * support_size(support))
+    support = FlexibleTrack(mass, *matrices, elements.states)
+    return support, elements._replace(states=elements.states + wheelsets * track_size(support))
 
 
 def _add(matrices, spring, stretch, share=1.0):

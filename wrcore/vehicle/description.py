@@ -7,7 +7,7 @@ import numpy as np
 
 from wrcore.dynamics.joint import Joint, Joints, build_joints
 from wrcore.dynamics.marker import FRAME
-from wrcore.dynamics.suspension import Elements
+from wrcore.dynamics.suspension import PRELOAD, Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
@@ -65,7 +65,7 @@ class Vehicle:
             carried = np.sum(self.bodies.mass[[name not in held for name in self.body_names]])
             return float(carried) * GRAVITY / (2 * len(self.bodies.wheelsets))
         pair = np.repeat(self.elements.pairs[:, 0], np.diff(self.elements.first_spring))
-        return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, 14]))
+        return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, PRELOAD + 2]))
 
 
 def load_vehicle(path, axle_boxes=True):
@@ -104,11 +104,11 @@ def compile_vehicle(data, source):
     ]  # fmt: skip
     compiled = _joints(joints, layout, source)
     elements = compile_elements(data["elements"], layout, joints, GRAVITY)
-    own = np.stack((np.array(apart, np.int64), elements.states + np.arange(len(apart))), axis=-1)
+    independent = np.stack((np.array(apart, np.int64), elements.states + np.arange(len(apart))), axis=-1)
     bodies = Bodies(
         layout.mass,
         np.array([[part["inertia"][k] for k in ("roll", "pitch", "yaw")] for part in parts], float),
-        layout.spins.astype(np.int64), wheelsets, own,
+        layout.spins.astype(np.int64), wheelsets, independent,
     )  # fmt: skip
     return Vehicle(
         data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
@@ -175,9 +175,9 @@ def _lumped(bodies):
             wheelset = bodies[part["wheelset"]]
             wheelset["mass"] += part["mass"]
             across = part["mass"] * (part["position"][1] - wheelset["position"][1]) ** 2
-            own = 0.5 * (part["inertia"]["roll"] + part["inertia"]["yaw"])  # a body of revolution again
+            along = 0.5 * (part["inertia"]["roll"] + part["inertia"]["yaw"])  # a body of revolution again
             for key in ("roll", "yaw"):
-                wheelset["inertia"][key] += across + own
+                wheelset["inertia"][key] += across + along
             part["kind"] = "lumped"
     return bodies
 

@@ -14,14 +14,14 @@ def check_element(item, source):
     field = f"elements.{item['name']}"
     if item["kind"] not in KINDS:
         raise InputError(source, f"{field}.kind", one_of(KINDS, item["kind"]))
-    kind, own = KINDS[item["kind"]], {key: item[key] for key in item if key not in ("name", "kind", "bodies")}
+    kind, given = KINDS[item["kind"]], {key: item[key] for key in item if key not in ("name", "kind", "bodies")}
     for key in kind.needed:
-        if key not in own:
+        if key not in given:
             raise InputError(source, f"{field}.{key}", f"expected a value, as kind {item['kind']} needs one")
-    for key in own:
+    for key in given:
         if key not in kind.keys:
             raise InputError(source, f"{field}.{key}", f"unknown for kind {item['kind']}; {one_of(kind.keys, key)}")
-    check(own, {"properties": kind.keys}, source, field)
+    check(given, {"properties": kind.keys}, source, field)
     for key, expected in kind.check(item):
         raise InputError(source, f"{field}.{key}".rstrip("."), expected)
 
@@ -29,11 +29,9 @@ def check_element(item, source):
 class Part(NamedTuple):
     """A part of a force element on two bodies."""
 
-    name: str
-    """Of the element."""
+    name: str  # of the element
     bodies: tuple[int, int]
-    does: Any
-    """`wrcore.elements.kind.Spring`, `Turning` or `Along`, seen from the first body."""
+    does: Any  # `wrcore.elements.kind.Spring`, `Turning` or `Along`, seen from the first body
 
 
 def parts_of(item, layout, load=None):

@@ -23,30 +23,30 @@ def compile_elements(items, layout, joints, gravity):
     parts, found = _loaded(items, layout, joints, gravity)
     for name, bodies, does in parts:
         field = f"elements.{name}"
-        (here, there), ahead = does.ends, 0.0
-        if bodies[1] == FRAME:
-            ahead, there = float(there[0]), there - [there[0], 0.0, 0.0]
-        pair = (*bodies, ahead)
+        (here, there), offset, (first, second) = does.ends, 0.0, bodies
+        if second == FRAME:
+            offset, there = float(there[0]), there - [there[0], 0.0, 0.0]
+        pair = first, second, offset
         if isinstance(does, Turning):
             rows = does.stiffness, does.damping, does.cubic
             turning += [(pair, *rows)] if np.any(rows) else []
             continue
-        marker, other = layout.marker(here, bodies[0], field), layout.marker(there, bodies[1], field)
-        rest = layout.rest(marker, *bodies, ahead)
+        marker, other = layout.marker(here, first, field), layout.marker(there, second, field)
+        rest = layout.rest(marker, *pair)
         if isinstance(does, Spring):
             preload = [0.0, 0.0, found[name]] if does.preload is None else does.preload
             pressing[name] = pair, (0, len(springs)), preload[2]
             springs.append((pair, [*marker, *rest, *does.stiffness, *does.damping, *preload]))
             continue
-        place = other, float(np.linalg.norm(rest - other)), [0.0, 0.0, 0.0]
+        origin, length, axis = other, float(np.linalg.norm(rest - other)), [0.0, 0.0, 0.0]
         if does.axis is not None:
-            place = rest, 0.0, does.axis
-        elif place[1] < 1e-3:
+            origin, length, axis = rest, 0.0, does.axis
+        elif length < 1e-3:
             expected = "expected two points at least 1 mm apart for an element on a line"
             raise InputError(layout.source, f"{field}.at", expected)
         if does.presses is not None:
             pressing[name] = pair, (1, len(directed)), does.presses
-        waiting.append((name, pair, does, [*marker, *place[0], place[1], *place[2]]))
+        waiting.append((name, pair, does, [*marker, *origin, length, *axis]))
         directed.append(None)
     for k, (name, pair, does, row) in enumerate(waiting):
         by, numbers = _pressed(name, pair, does, pressing, layout.source)

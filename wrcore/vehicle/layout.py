@@ -14,17 +14,12 @@ FRAME_NAME = "frame"
 class Layout:
     """Bodies of a vehicle in nominal position, all with their axes along the track's."""
 
-    source: str
-    """Named in errors."""
+    source: str  # named in errors
     names: tuple
-    positions: np.ndarray
-    """(n, 3): centres of mass, m."""
-    mass: np.ndarray
-    """(n,), kg."""
-    spins: np.ndarray
-    """(n,): True for wheelsets, whose frame does not spin with them."""
-    aliases: dict
-    """Names of bodies that are part of another one."""
+    positions: np.ndarray  # (n, 3): centres of mass, m
+    mass: np.ndarray  # (n,), kg
+    spins: np.ndarray  # (n,): True for wheelsets, whose frame does not spin with them
+    aliases: dict  # names of bodies that are part of another one
 
     def ends(self, item, field):
         """Body numbers of the two ends of an element or joint; the moving frame can only be the second one."""
@@ -53,7 +48,7 @@ class Layout:
             raise InputError(self.source, f"{field}.at", f"{expected}, got {[float(value) for value in point]}")
         return marker
 
-    def rest(self, marker, first, second, ahead):
+    def rest(self, marker, first, second, offset):
         """Nominal position of a marker of the first body relative to the second one, m."""
         point = self.positions[first] + marker
-        return point - (np.array([ahead, 0.0, 0.0]) if second == FRAME else self.positions[second])
+        return point - (np.array([offset, 0.0, 0.0]) if second == FRAME else self.positions[second])

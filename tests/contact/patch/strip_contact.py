@@ -11,7 +11,7 @@ from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import group_end, rigid_slip
 from wrcore.contact.patch.normal_influence import influence_table
-from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, normal_work
+from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, normal_work
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import make_pose
@@ -98,11 +98,11 @@ class NormalContact:
     def solve(self, side, pose, first, last, velocity, memory):
         """`StripPatch` of the overlaps from ``first`` to before ``last``."""
         windows, frame, strips, sums = self._on_strips(pose, first, last, memory)
-        share = self._work.more[1]
+        share = self._work.more[WEIGHT]
         if share > 0.0:  # the mean with a solution on more strips; the strips of the one that weighs more
-            self._work.more[0] = MORE
+            self._work.more[WIDENED] = MORE
             more, _, finer, others = self._on_strips(pose, first, last, memory)
-            self._work.more[0] = 1.0
+            self._work.more[WIDENED] = 1.0
             if more:
                 load = (others if share > 0.5 else sums)[solve.LOAD]
                 sums, strips = (1.0 - share) * sums + share * others, finer if share > 0.5 else strips

@@ -200,7 +200,7 @@ def lateral_sweep(geometry, reach, step, load, detection="spatial"):
     count = round(reach / step)
     table = pd.DataFrame({"y_m": step * np.arange(-count, count + 1)})
     for name, reduction in REDUCTIONS.items():
-        z = settle(geometry, hertz, modulus, 0.0, 0.0, spatial, reduction, load, geometry.rolling_radius)[1]
+        z = settle(geometry, geometry, hertz, modulus, 0.0, 0.0, spatial, reduction, load, geometry.rolling_radius)[1]
         force = np.empty(len(table))
         _sweep(geometry, hertz, modulus, table.y_m.to_numpy(), z, spatial, reduction, force)
         table[f"{name}_N"] = force

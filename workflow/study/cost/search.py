@@ -11,7 +11,7 @@ from wrcore.contact.detection import PLANAR, SPATIAL, axle_direction
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, REDUCTIONS
 from wrcore.contact.statics import height_at_load
-from wrcore.dynamics.wheel import FRICTION, MOTION_COLUMNS
+from wrcore.dynamics.motion import MOTION
 from wrcore.kernels.handles import Handle
 
 PLACES = {"tread": ((-0.003, 0.003), (-0.003, 0.003)), "flange": ((0.0068, 0.0078), (-0.015, 0.015))}
@@ -23,7 +23,7 @@ LOAD = 5e4
 
 def loaded_wheels(contact, place, count):
     """Left wheels at rest, in random order, that carry `LOAD` at a place (key of `PLACES`): motions
-    (count, MOTION_COLUMNS), as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
+    (count, 15), as `wrcore.dynamics.wheel.wheel_wrenches` takes them.
     """
     rng, rows, motions = np.random.default_rng(0), np.empty((MAX_PATCHES, PATCH_COLUMNS)), []
     (low, high), (least, most) = PLACES[place]
@@ -35,8 +35,8 @@ def loaded_wheels(contact, place, count):
             contact.geometry.rolling_radius, rows,
         )  # fmt: skip
         motions.append([1.0, y, z, *axle_direction(0.0, yaw)])
-    padded = np.pad(motions, ((0, 0), (0, MOTION_COLUMNS - len(motions[0]))))
-    padded[:, FRICTION] = contact.friction
+    padded = np.pad(motions, ((0, 0), (0, len(MOTION) - len(motions[0]))))
+    padded[:, MOTION.friction] = contact.friction
     return padded
 
 

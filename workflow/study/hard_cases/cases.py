@@ -95,7 +95,7 @@ def with_forces(setting, body, markers):
     rows[:, :3] = markers
     first = len(elements.springs)
     elements = elements._replace(
-        pairs=np.vstack([elements.pairs, [[body, FRAME]]]), ahead=np.append(elements.ahead, setting.state[0] * 0.0),
+        pairs=np.vstack([elements.pairs, [[body, FRAME]]]), offset=np.append(elements.offset, setting.state[0] * 0.0),
         turning=np.concatenate([elements.turning, np.zeros((1, 3, 3))]),
         springs=np.vstack([elements.springs, rows]),
         first_spring=np.append(elements.first_spring, first + len(markers)),

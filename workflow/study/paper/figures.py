@@ -164,7 +164,9 @@ def fig3_detection(scene, y, yaw, load, lowered, side="left", window=0.006):
 def _resting_pose(scene, geometry, y, yaw, load, lowered):
     material = scene.data["contact"]["material"]
     modulus = contact_modulus(material["shear_modulus"], material["poisson_ratio"])
-    roll, z = settle(geometry, hertz_table(), modulus, y, yaw, True, MAXIMUM, load, scene.vehicle.rolling_radius)
+    roll, z = settle(
+        geometry, geometry, hertz_table(), modulus, y, yaw, True, MAXIMUM, load, scene.vehicle.rolling_radius
+    )
     return {"y": y, "z": z - lowered, "roll": roll, "yaw": yaw}
 
 

@@ -42,9 +42,10 @@ from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle
 from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
-from wrcore.dynamics.strip_wheel import FELL_BACK, group_wrench, mirror
+from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
+from wrcore.dynamics.strip_wheel import group_wrench, mirror
 from wrcore.dynamics.system import with_fallback
-from wrcore.dynamics.wheel import MOTION_COLUMNS, ContactModel, wheel_wrenches
+from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.handles import Handle
@@ -137,7 +138,7 @@ class LoadedWheels:
             REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, SLOWEST, strips,
         )  # fmt: skip
         if strips.strips:
-            contact = with_fallback(contact, np.zeros(MOTION_COLUMNS), self._work)
+            contact = with_fallback(contact)
         self._still = contact._replace(strips=contact.strips._replace(rolling=0))
         self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), None
         self._exact = contact if strips.rolling else None
@@ -183,13 +184,13 @@ class LoadedWheels:
         """`Found` of each patch by the kernels of runs; without fields (None) not even on grids of this class."""
         side, y, z, roll, yaw = pose
         velocity = motion[:6] if motion else (0.0,) * 6
-        row = np.array([SIDES[side], y, z, *axle_direction(roll, yaw), *velocity, 0.0, 0.0, friction])
+        m = WheelMotion(*map(float, (SIDES[side], y, z, *axle_direction(roll, yaw), *velocity, 0.0, 0.0, friction)))
         if self._still.strips.strips:
-            yield from self._on_strips(contact, row, pose, motion, friction, fields)
+            yield from self._on_strips(contact, as_left(m), pose, motion, friction, fields)
             return
-        motions, counts = np.stack([row, row])[None], np.zeros((1, 2), np.int64)
+        motions, counts = np.array([[m, m]]), np.zeros((1, 2), np.int64)
         rows, wheel = np.zeros((1, 2, MAX_PATCHES, PATCH_COLUMNS)), int(SIDES[side] < 0.0)
-        motions[0, 1 - wheel, 2] += 1.0  # the other wheel is out of reach
+        motions[0, 1 - wheel, MOTION.z] += 1.0  # the other wheel is out of reach
         wheel_wrenches(contact, motions, rows, counts, np.zeros((1, 2)), np.zeros((1, 2, 6)), self._counters,
                        self._work_handle)  # fmt: skip
         for one in rows[0, wheel, : counts[0, wheel]]:
@@ -197,29 +198,28 @@ class LoadedWheels:
             one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
             yield Found(one, (x - a, x + a, 2.0 * b), float(one[columns.NORMAL]), float(one[columns.XI]))
 
-    def _on_strips(self, contact, row, pose, motion, friction, fields):
+    def _on_strips(self, contact, left, pose, motion, friction, fields):
         """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
         sign, work, overlaps = SIDES[pose[0]], self._work, self._rows
-        row[[0, 1, 3, 5, 7, 9, 11]] *= sign
-        count = find_patches(self.geometry, *row[:6], self.spatial, MOMENT, overlaps)
+        count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
-            last, before = group_end(overlaps, count, first), self._counters[FELL_BACK]
+            last, before = group_end(overlaps, count, first), self._counters[ON_GRID]
             work.spare[0] = 0.0
-            group_wrench(contact, row, self.spatial, overlaps, first, last, out[0], wrench, self._counters, work.spare,
-                         self._work_handle)  # fmt: skip
-            (slip, _, _, load), x, sums = work.force[:4].tolist(), out[0, columns.X] - work.sums[MEAN_X], work.sums
+            found = group_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench, self._counters,
+                                 work.spare, self._work_handle)  # fmt: skip
+            x, sums = out[0, columns.X] - work.sums[MEAN_X], work.sums
             extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
-            if fields is not None and (self.always or self._counters[FELL_BACK] > before):
-                yield self._on_grid(out[0].copy(), row, first, last, pose, motion, friction)._replace(slip=slip)
+            if fields is not None and (self.always or self._counters[ON_GRID] > before):
+                yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
-                patch = self._fields(out[0], pose, friction) if fields and self._exact else None
-                yield Found(out[0].copy(), tuple(map(float, extent)), load, slip, patch)
+                patch = self._fields(out[0], found.load, pose, friction) if fields and self._exact else None
+                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, patch)
             first = last
 
-    def _fields(self, row, pose, friction):
+    def _fields(self, row, load, pose, friction):
         """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid."""
         work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
         count, slender = work.solved
@@ -229,7 +229,7 @@ class LoadedWheels:
         tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
         centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, OWN_WIDTH, HALF_LENGTH, MIDDLE))
         even = even_length(half, width, work.strips[WINDOW, :count])  # strips as rectangles with the areas they have
-        longer = work.force[3] / work.sums[LOAD] * (half / even)[:, None]
+        longer = load / work.sums[LOAD] * (half / even)[:, None]
         edges = middle[:, None] + even[:, None] * library.panels.edges
         like, mean_x, mean_s = np.ones(pressure.shape), work.sums[MEAN_X], work.sums[MEAN_S]
         slips = slides > 0.0
@@ -309,8 +309,8 @@ class LoadedWheels:
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
         """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
-        roll, z = settle(self.geometry, self._still.hertz, self.modulus, y, yaw, self.spatial, self._still.reduction,
-                         load, self.geometry.rolling_radius)  # fmt: skip
+        roll, z = settle(self.geometry, self.geometry, self._still.hertz, self.modulus, y, yaw, self.spatial,
+                         self._still.reduction, load, self.geometry.rolling_radius)  # fmt: skip
         if math.isnan(z) or (not self._still.strips.strips and rolling is None and vertical):
             return roll if not math.isnan(z) else math.nan, z
         before = difference = math.nan

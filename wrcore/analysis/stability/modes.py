@@ -29,7 +29,7 @@ import pandas as pd
 
 from wrcore.balance.linear import DIRECTIONS
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.support import RAILS, no_support, support_size
+from wrcore.dynamics.flexible_track import RAILS, rigid_track, track_size
 
 NEUTRAL = 1e-3
 """Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
@@ -53,7 +53,7 @@ Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
 
 TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
 TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
-"""Which of `TRACK` each freedom of a :class:`wrcore.dynamics.support.Support` belongs to."""
+"""Which of `TRACK` each freedom of a :class:`wrcore.dynamics.flexible_track.FlexibleTrack` belongs to."""
 
 
 def families(vehicle):
@@ -144,7 +144,7 @@ class _Track:
     """The track under all wheelsets in one mode: its energy, and what of it moves."""
 
     def __init__(self, support, own):
-        d, size = len(support.mass), support_size(support)
+        d, size = len(support.mass), track_size(support)
         rows = own[support.first :][: size * (len(own[support.first :]) // size)].reshape(-1, size) if d else own[:0]
         self.massless = size == d
         self.place = rows[:, :d] if d else np.zeros((0, 0))
@@ -195,7 +195,7 @@ def linear_modes(vehicle, linearisation, support=None):
     rows, shapes, energies = [], np.zeros((len(kept), n, 6), complex), np.zeros((len(kept), n, 6))
     for k, (value, vector) in enumerate(zip(values[kept], vectors, strict=True)):
         place, speed = vector[: 12 * n].reshape(2, n, 6)
-        whole, track = np.sum(namer.mass * np.abs(speed) ** 2), _Track(support or no_support(), vector[12 * n :])
+        whole, track = np.sum(namer.mass * np.abs(speed) ** 2), _Track(support or rigid_track(), vector[12 * n :])
         if np.any(speed):
             energies[k] = namer.energies(speed) * (whole / (whole + track.energy))
         body, direction = np.unravel_index(np.argmax(energies[k]), (n, 6))

@@ -91,7 +91,7 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     """
     scene, (speed,) = as_scene(scene), rising([speed])
     model, state = straight_ahead(scene)
-    table, shapes, energies = linear_modes(scene.vehicle, steady_motion(model, state, speed), model.support)
+    table, shapes, energies = linear_modes(scene.vehicle, steady_motion(model, state, speed), model.flexible_track)
     full = pd.concat([table, energy_table(scene.vehicle, energies)], axis=1)
     return full, shape_table(scene.vehicle, table, shapes)
 
@@ -104,7 +104,7 @@ def root_locus(vehicle, model, state, speeds):
     for speed in speeds:
         motion = steady_motion(model, state, speed)
         model, state = model._replace(speed=float(speed)), motion.state  # the next one is found from here at once
-        table, _, _ = linear_modes(vehicle, motion, model.support)
+        table, _, _ = linear_modes(vehicle, motion, model.flexible_track)
         table.insert(0, "speed_m_per_s", float(speed))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
@@ -144,7 +144,7 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
         return {"critical_speed_m_per_s": -np.inf, **nothing}
     found = brentq(growth_at, before, speed, xtol=tolerance)
     motion = motions[found] if found in motions else steady_motion(model, state, found)
-    table, _, _ = linear_modes(vehicle, motion, model.support)
+    table, _, _ = linear_modes(vehicle, motion, model.flexible_track)
     lost = table.loc[table["real_per_s"].where(table["damping_ratio"].notna()).idxmax()]
     with np.errstate(divide="ignore"):
         wavelength = np.float64(found) / lost["frequency_Hz"]

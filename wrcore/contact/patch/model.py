@@ -19,7 +19,6 @@ PATCHES = ("maximum", "moment", "strips", "exact")
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
-FORCE_ROWS, MOTION = 24, 15
 
 
 class StripModel(NamedTuple):
@@ -55,8 +54,6 @@ class StripWork(NamedTuple):
     """(MEMORY,): a memory of nothing."""
     rows: np.ndarray
     out: np.ndarray
-    motion: np.ndarray
-    """Of the wheel, as a left one."""
     strips: np.ndarray
     slip: np.ndarray
     friction: np.ndarray
@@ -64,7 +61,6 @@ class StripWork(NamedTuple):
     wrench: np.ndarray
     """(2, 6): of pressure and of friction."""
     sums: np.ndarray
-    force: np.ndarray
     solved: np.ndarray
     """(2,) int: strips of the last solution, and 1 if they are slender."""
     normal: NormalWork
@@ -103,9 +99,9 @@ def strip_work(model, wheelsets):
     count, wheels = (MAX_STRIPS, (wheelsets, 2, MAX_PATCHES)) if model.strips else (1, (0, 0, 0))
     return StripWork(
         np.zeros((*wheels, MEMORY)), np.zeros(MEMORY),
-        np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(MOTION),
+        np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
-        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(FORCE_ROWS), np.zeros(2, np.int64),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64),
         normal_work(),
         *(rolling_work(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip

@@ -49,6 +49,10 @@ MEMORY = 4 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
 tips of its windows; Q, c and X of its strips."""
 
 
+WIDENED, WEIGHT, GUESS = range(3)
+"""Places of a workspace's ``more``."""
+
+
 class NormalWork(NamedTuple):
     """Arrays that a solution works in; lateral coordinates count outwards, strips by increasing s."""
 

@@ -9,7 +9,7 @@ import math
 from wrcore.contact.normal import hertz_ellipse
 from wrcore.contact.patch.gap import CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
 from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
-from wrcore.contact.patch.strips import MAX_STRIPS, MAX_WINDOWS, gap_under_load, place_strips
+from wrcore.contact.patch.strips import GUESS, MAX_STRIPS, MAX_WINDOWS, WEIGHT, WIDENED, gap_under_load, place_strips
 from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y, PENETRATION
 from wrcore.kernels.jit import FUSED, jit
 
@@ -97,11 +97,11 @@ def count_strips(width, length, resolution, more):
 
     Just below a width at which the number steps ``more`` (see `NormalWork`) gets the weight of the larger number: it
     rises from 0 to 1, so that forces do not step. It is the largest over the windows."""
-    ratio = more[0] * width / length
+    ratio = more[WIDENED] * width / length
     for step in _STEPS:
         t = (MORE * ratio / step - 1.0) / (MORE - 1.0)
-        if 0.0 < t <= 1.0 and more[0] == 1.0 and (step >= 1.0 or resolution != FEWEST_STRIPS):
-            more[1] = max(more[1], t * t * (3.0 - 2.0 * t))
+        if 0.0 < t <= 1.0 and more[WIDENED] == 1.0 and (step >= 1.0 or resolution != FEWEST_STRIPS):
+            more[WEIGHT] = max(more[WEIGHT], t * t * (3.0 - 2.0 * t))
     if ratio < _STEPS[0]:
         return FEWEST_STRIPS
     halves = 2 if ratio <= _STEPS[1] else 3 if ratio <= _STEPS[2] else 4
@@ -112,7 +112,7 @@ def count_strips(width, length, resolution, more):
 def guess_windows(work, stretches, resolution):
     """Windows where the guess of c is positive. Returns their number."""
     nodes, count, windows = work.nodes, work.ends[stretches - 1], 0
-    inside, largest, work.more[1] = False, 0.0, 0.0
+    inside, largest, work.more[WEIGHT] = False, 0.0, 0.0
     for i in range(count):
         c = nodes[NODE_SQUARE, i]
         fresh = i == 0
@@ -135,7 +135,7 @@ def guess_windows(work, stretches, resolution):
             windows += 1
         if inside:
             largest = max(largest, c)
-    work.guessed[0], work.more[2] = windows, work.more[1]
+    work.guessed[0], work.more[GUESS] = windows, work.more[WEIGHT]
     for k in range(1, windows + 1):
         work.guessed[k] = work.start[k]
     _number(work, windows)
@@ -221,7 +221,7 @@ def merge_close(work, windows, resolution):
 def take_fresh(work, found, largest, resolution):
     """Windows from their tips in ``work.fresh``: as many strips as guessed if they are as many as were guessed."""
     known, length = found == work.guessed[0], 2.0 * math.sqrt(largest)
-    work.more[1] = work.more[2] if known else 0.0
+    work.more[WEIGHT] = work.more[GUESS] if known else 0.0
     for k in range(found):
         work.low[k], work.high[k] = work.fresh[0, k], work.fresh[1, k]
         width = work.high[k] - work.low[k]

@@ -56,12 +56,12 @@ def approach(elements, k, stretch, speed, inner, press):
 
 def parts(item):
     """One part that slips, by one of the laws."""
-    mu, alone, own = item.get("mu", 0.0), item.get("force", 0.0), (item.get("series_stiffness"), 0.0)
+    mu, alone, slip = item.get("mu", 0.0), item.get("force", 0.0), (item.get("series_stiffness"), 0.0)
     if "approach" in item:
-        own = item["approach"], 1.0 / (mu * item["pendulum"]) if "pendulum" in item else 0.0
+        slip = item["approach"], 1.0 / (mu * item["pendulum"]) if "pendulum" in item else 0.0
 
     def numbers(press):
-        return alone, alone + mu * abs(press), mu * (press >= 0.0), mu * (press <= 0.0), *own
+        return alone, alone + mu * abs(press), mu * (press >= 0.0), mu * (press <= 0.0), *slip
 
     held_by = approach if "approach" in item else slider
     return [Along(ends_of(item), held_by, axis_of(item), numbers, inner=True, normal=item.get("normal"))]

@@ -35,7 +35,9 @@ def random_state(rng, model, state, y, yaw):
     """A loaded wheelset at a lateral position (m) and yaw angle, creeping, off its nominal motion."""
     contact = model.contact
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio)
-    roll, z = settle(contact.geometry, contact.hertz, modulus, y, yaw, True, contact.reduction, LOAD, 0.46)
+    roll, z = settle(
+        contact.geometry, contact.geometry, contact.hertz, modulus, y, yaw, True, contact.reduction, LOAD, 0.46
+    )
     state = state.copy()
     state[:7] = 3.0, y, z, *euler_of(rotation(roll, yaw))
     state[7:10] += rng.normal(size=3) * [0.01, 0.02, 0.005]

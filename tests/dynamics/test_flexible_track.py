@@ -14,8 +14,8 @@ from wrcore.analysis.stability.stability import modes
 from wrcore.contact.reduction import Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import energy_balance
-from wrcore.dynamics.support import RAILS, support_places
-from wrcore.dynamics.system import Equations, own_states
+from wrcore.dynamics.flexible_track import RAILS, track_places
+from wrcore.dynamics.system import Equations, internal_states
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import simulate
@@ -37,7 +37,7 @@ def unloaded(support):
     """Matrix A (14, 14) of q and q' of a track whose wheelset hangs in the air, by the engine's equations."""
     model, state = compile_scene(scene_on(support))
     state[2] += 0.1
-    places, equations = support_places(model)[0], Equations(model)
+    places, equations = track_places(model)[0], Equations(model)
     state[places] = 0.0
     moved = state + 1e-3 * np.eye(len(state))[places]
     rates = 1e3 * equations.at(0.0, np.vstack([moved, state]))[:, places]
@@ -100,7 +100,7 @@ def test_natural_frequencies_are_those_of_two_masses():
 def test_a_track_let_go_swings_as_two_masses_do(method):
     model, state = compile_scene(scene_on(MASSES))
     state[2] += 0.1
-    places = support_places(model)[0]
+    places = track_places(model)[0]
     state[places] = [1e-3, 2e-3, 0.0, 2e-3, *np.zeros(10)]
     times = np.linspace(0.0, 0.02, 21)
     found = integrate(model, state, times, method, 1e-9, 0.0).states[:, places]
@@ -114,7 +114,7 @@ def test_at_rest_the_springs_carry_the_wheels(support):
     scene = scene_on(support, initial__y=0.0)
     model, _ = compile_scene(scene)
     found = static_equilibrium(scene, model)
-    q = found.state[support_places(model)[0, : len(model.support.mass)]]
+    q = found.state[track_places(model)[0, : len(model.flexible_track.mass)]]
     softness = 1.0 / support["rail"]["vertical"]["stiffness"]
     if "sleeper" in support:
         softness += 2.0 / support["sleeper"]["vertical"]["stiffness"]
@@ -205,14 +205,14 @@ def test_methods_agree_on_rough_track(support):
 @pytest.mark.parametrize("patch", ["moment", "strips", "exact"])
 def test_rails_without_mass_are_in_balance(patch):
     model, state = compile_scene(scene_on(MASSLESS, contact__patch=patch))
-    places, equations = support_places(model)[0], Equations(model)
+    places, equations = track_places(model)[0], Equations(model)
     random = np.random.default_rng(1)
     for _ in range(5):
         moved = state.copy()
         moved[1:3] += random.normal(0.0, [2e-3, 3e-5])
         moved[7:13] += random.normal(0.0, 0.1, 6)
-        rate, forces = equations(0.0, moved), equations.work.support.forces[0].ravel()
-        left = model.support.damping @ rate[places] + model.support.stiffness @ moved[places] - forces
+        rate, forces = equations(0.0, moved), equations.work.flexible_track.forces[0].ravel()
+        left = model.flexible_track.damping @ rate[places] + model.flexible_track.stiffness @ moved[places] - forces
         assert np.abs(left).max() < 1e-6 * np.abs(forces).max() and np.abs(rate[places]).max() > 1e-3
 
 
@@ -231,9 +231,9 @@ def test_a_wheelset_that_moves_with_its_rails_feels_rigid_ones():
     found = []
     for support in (None, MASSES):
         model, _ = compile_scene(load_scene(SCENE, {"track": {"support": support} if support else {}}))
-        state = np.concatenate([start, np.zeros(own_states(model))])
+        state = np.concatenate([start, np.zeros(internal_states(model))])
         if support:
-            q = support_places(model)[0]
+            q = track_places(model)[0]
             state[1:3] += aside, up
             state[8:10] += moving, rising
             state[q[:RAILS]], state[q[7 : 7 + RAILS]] = [aside, up] * 2, [moving, rising] * 2
@@ -296,7 +296,7 @@ def test_methods_agree_with_independent_wheels_a_controller_and_a_curve(support,
 def test_a_scene_without_has_none():
     model, state = compile_scene(load_scene(SCENE))
     compiled = Equations(model).arguments[1].value
-    assert own_states(model) == 0 and len(state) == STATE_SIZE and compiled.wheels
+    assert internal_states(model) == 0 and len(state) == STATE_SIZE and compiled.wheels
     for kernel in ("rails", "torques", "rail_friction", "reactions"):  # what a scene leaves out is not even compiled
         assert getattr(compiled, kernel) == 0, kernel
     assert not compiled.contact.geometries and not compiled.contact.strips.strips
