@@ -1,4 +1,4 @@
-"""What a vehicle's runs say: wheel loads, guiding forces, wear, ride and hunting, per wheel and over speed.
+"""What a run says of its wheels: loads, guiding forces, wear, pressure.
 
 Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
 """
@@ -14,13 +14,9 @@ from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import forces_on_rail, quotient, rolling_speed
-from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.run import Run
 
 Side = Annotated[str, OneOf(SIDES)]
-
-SMALLEST = 1e-6
-"""Motions below this are not asked for a frequency or a damping, m."""
 
 
 def wheelsets_of(run):
@@ -213,13 +209,3 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows)
-
-
-def hunting(t, y):
-    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion y (m) over t (s)
-    from release on; NaN once the motion has died before it has swung.
-    """
-    swinging = np.flatnonzero(np.abs(y) > SMALLEST)
-    end = swinging[-1] + 1 if swinging.size else 0
-    frequency, growth = hunting_frequency(t[:end], y[:end]), growth_rate(t[:end], y[:end])
-    return frequency, growth, -growth / np.hypot(growth, 2.0 * np.pi * frequency)

@@ -200,20 +200,10 @@ def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.
     return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in rows_of(folder)]
 
 
-def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """u and what the ordinate has lost there since new, m, at the last step in a folder of `evolve`."""
-    profiles = profiles_over_distance(folder)
-    return profiles[-1][1], profiles[-1][2] - profiles[0][2]
-
-
 def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
-    """What the vehicle of a plan takes off the rails of each of its scenes, from a folder of `evolve`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per step and scene: step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and
-        right_m2_per_Mt, the area that the rail's section loses per million gross tonnes of such vehicles.
+    """What the vehicle of a plan takes off the rails of its scenes, from a folder of `evolve`: a row per step and scene
+    with step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and right_m2_per_Mt, the area that the
+    rail's section loses per million gross tonnes of such vehicles.
     """
     folder = Path(folder)
     parts = [
