@@ -16,26 +16,13 @@ from wrcore.contact import reduction as columns
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import DETECTIONS, axle_direction, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import frame_of_overlaps, group_end
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
 from wrcore.contact.patch.normal import even_length, height_of_zero
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.rolling import read_field
-from wrcore.contact.patch.solve import (
-    CENTRE,
-    HALF_LENGTH,
-    LOAD,
-    MEAN_S,
-    MEAN_X,
-    MIDDLE,
-    OWN_WIDTH,
-    S_MAX,
-    S_MIN,
-    WINDOW,
-    X_MAX,
-    X_MIN,
-)
 from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle
@@ -208,8 +195,9 @@ class LoadedWheels:
             work.spare[0] = 0.0
             group_wrench(contact, row, self.spatial, overlaps, first, last, out[0], wrench, self._counters, work.spare,
                          self._work_handle)  # fmt: skip
-            (slip, _, _, load), x, sums = work.force[:4].tolist(), out[0, columns.X] - work.sums[MEAN_X], work.sums
-            extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
+            (slip, _, _, load), sums = work.force[:4].tolist(), work.sums
+            x = out[0, columns.X] - sums[solve.MEAN_X]
+            extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
             if fields is not None and (self.always or self._counters[FELL_BACK] > before):
@@ -227,19 +215,20 @@ class LoadedWheels:
         field = np.empty((9, count * library.panels.n))
         read_field(library.panels, count, rolling, field)
         tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
-        centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, OWN_WIDTH, HALF_LENGTH, MIDDLE))
-        even = even_length(half, width, work.strips[WINDOW, :count])  # strips as rectangles with the areas they have
-        longer = work.force[3] / work.sums[LOAD] * (half / even)[:, None]
+        rows = (solve.CENTRE, solve.OWN_WIDTH, solve.HALF_LENGTH, solve.MIDDLE, solve.WINDOW)
+        centre, width, half, middle, window = work.strips[list(rows), :count]
+        even = even_length(half, width, window)  # strips as rectangles with the areas they have
+        longer = work.force[3] / work.sums[solve.LOAD] * (half / even)[:, None]
         edges = middle[:, None] + even[:, None] * library.panels.edges
-        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[MEAN_X], work.sums[MEAN_S]
+        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[solve.MEAN_X], work.sums[solve.MEAN_S]
         slips = slides > 0.0
         cells = (
             0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, sign * like * (centre - mean_s)[:, None],
             edges[:, :-1] - edges[:, 1:], like * width[:, None], pressure * longer, tx * longer, sign * ts * longer,
             np.where(slips, sx, 0.0), np.where(slips, sign * ss, 0.0), ~slips,
         )  # fmt: skip
-        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (S_MIN, S_MAX))
-        ends = (*(work.sums[k] - mean_x for k in (X_MIN, X_MAX)), *s_ends)
+        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (solve.S_MIN, solve.S_MAX))
+        ends = (*(work.sums[k] - mean_x for k in (solve.X_MIN, solve.X_MAX)), *s_ends)
         return Patch(
             *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
             *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
@@ -279,12 +268,24 @@ class LoadedWheels:
         extent = origin[0] + x_min, origin[0] + x_max, s_max - s_min
         return Found(row, extent, patch.normal, math.nan, patch, True)
 
-    def check_depth(self, side, y, z, roll, yaw, source, field):
-        """Refuse a height at which a wheel lies deeper in its rail than `DEEPEST`."""
-        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
-        lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
-        if find_patches(self.geometry, *lifted, MOMENT, self._rows) or z < self.geometry.rolling_radius - LOWEST:
-            raise InputError(source, field, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
+    def placed(self, sides, y, yaw, roll, z, load, how, told):
+        """Roll, and height of the wheelset by side, in a pose whose z, or z and roll, may be NaN: sought for the load
+        as `loaded_poses` says, with arguments ``how`` of `height`. A height at which a wheel lies deeper in its rail
+        than `DEEPEST` is refused; ``told``: source and field.
+        """
+        if math.isnan(z) and math.isnan(roll):
+            roll, z = self.settled(y, load, yaw, **how)
+        elif math.isnan(z):
+            return roll, {side: self.height(side, y, load, roll, yaw, **how) for side in sides}
+        else:
+            roll = 0.0 if math.isnan(roll) else roll
+            for side in sides:
+                axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+                lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
+                low = z < self.geometry.rolling_radius - LOWEST
+                if low or find_patches(self.geometry, *lifted, MOMENT, self._rows):
+                    raise InputError(*told, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
+        return roll, dict.fromkeys(sides, z)
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal

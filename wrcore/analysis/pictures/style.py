@@ -1,5 +1,4 @@
-"""One style for all figures. Units change in the functions that draw and nowhere before: m to mm, rad to mrad, N to kN.
-"""
+"""One style for all figures; units change in the functions that draw them, and nowhere before."""
 
 from functools import wraps
 from pathlib import Path

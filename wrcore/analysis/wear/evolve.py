@@ -25,30 +25,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wrcore.analysis.wear import worn_profiles, worn_rails
 from wrcore.analysis.wear.local_wear import BIN, local_wear
 from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear.wear_laws import check_friction, wear_law
-from wrcore.analysis.wear.worn_profiles import (
-    across,
-    file_of,
-    flange,
-    hollow,
-    limits_reached,
-    onto_points,
-    points_of,
-    read_points,
-    smooth,
-    write_points,
-)
-from wrcore.analysis.wear.worn_rails import (
-    LaidRails,
-    falls_of,
-    keep_rails,
-    laid_rails,
-    lay_rails,
-    to_renewal,
-    wear_rails,
-)
+from wrcore.analysis.wear.worn_profiles import file_of, points_of, read_points, write_points
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
@@ -165,7 +146,7 @@ def _evolve(data, scenes, folder, say, threads, spent):
     if not rows:
         write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
         if data["rails"]:
-            lay_rails(folder, scenes)
+            worn_rails.lay_rails(folder, scenes)
     while not rows or _goes_on(data, rows[-1]):
         step = len(rows)
         if step >= MOST_STEPS:
@@ -174,7 +155,7 @@ def _evolve(data, scenes, folder, say, threads, spent):
         u, f = read_points(file_of(folder, "profile", step))
         left, worn, length = data["distance"] - gone, STILL, 0.0
         row = profile_row(scenes[0], folder, step, gone)
-        reached = limits_reached(data["limits"], row)
+        reached = worn_profiles.limits_reached(data["limits"], row)
         if left > 1e-9 * data["distance"] and not reached:
             worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, spent)
             length = _step_length(data, gone, worn)
@@ -182,7 +163,8 @@ def _evolve(data, scenes, folder, say, threads, spent):
         elif reached and data["turning"]:
             write_points(file_of(folder, "profile", step + 1), *read_points(file_of(folder, "profile", 0)))
         if data["rails"]:
-            _next_rails(data, folder, step, worn, gone, length)
+            renewed = length == worn_rails.to_renewal(gone, data["rails"].get("renewal"))
+            worn_rails.next_rails(folder, step, worn.falls or UNWORN * len(scenes), length, renewed)
         row |= {"step_m": length, "rate_max": worn.deepest, "volume_m3_per_m": worn.volume}
         rows.append(row | {"worn_volume_m3": worn.volume * length, "at_limit": len(reached)})
         for scene in scenes:
@@ -226,8 +208,8 @@ def profile_row(scene, folder, step, gone):
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
     conicity = float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0])
     return {
-        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)), **flange(curve),
-        "hollow_m": hollow(now), "equivalent_conicity": conicity,
+        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)),
+        **worn_profiles.flange(curve), "hollow_m": worn_profiles.hollow(now), "equivalent_conicity": conicity,
     }  # fmt: skip
 
 
@@ -240,18 +222,8 @@ def _goes_on(data, row):
 
 def _step_length(data, gone, worn):
     """How far the rates of a step hold, m."""
-    length = min(data["distance"] - gone, to_renewal(gone, data["rails"].get("renewal")))
+    length = min(data["distance"] - gone, worn_rails.to_renewal(gone, data["rails"].get("renewal")))
     return min(length, data["largest_step"], data["largest_wear"] / worn.fastest) if worn.volume else length
-
-
-def _next_rails(data, folder, step, worn, gone, length):
-    """Store the rails for the step that follows."""
-    if length == to_renewal(gone, data["rails"].get("renewal")):
-        keep_rails(folder, step, data["scenes"], renewed=True)
-    elif worn.falls:
-        wear_rails(folder, step, worn.falls, length)
-    else:
-        keep_rails(folder, step, data["scenes"], renewed=False)
 
 
 class StepWear(NamedTuple):
@@ -269,8 +241,8 @@ class StepWear(NamedTuple):
     """The same of wheels and rails."""
 
 
-STILL = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0)
-"""A step of no length."""
+STILL, UNWORN = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0), [dict.fromkeys(SIDES, 0.0)]
+"""A step of no length, and what it takes off the rails of a scene."""
 
 
 class SceneWear(NamedTuple):
@@ -284,7 +256,7 @@ class SceneWear(NamedTuple):
     """Area of each rail's section, m^2 per million gross tonnes."""
     falls: dict[str, np.ndarray]
     """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
-    laid: LaidRails | None
+    laid: worn_rails.LaidRails | None
     """The rails, if they wear."""
     seconds: tuple[float, float]
     """Processor time of simulating and of local wear."""
@@ -301,22 +273,22 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
             if worn.laid:
-                fall = {side: smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
-                fastest = max(fastest, *(across(*worn.laid.points[side], fall[side]) for side in SIDES))
+                fall = {side: worn_profiles.smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
+                fastest = max(fastest, *(worn_profiles.across(*worn.laid.points[side], fall[side]) for side in SIDES))
                 falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
     with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
-    total = smooth(total, data["smoothing"])
-    deepest = across(*profile, total)
+    total = worn_profiles.smooth(total, data["smoothing"])
+    deepest = worn_profiles.across(*profile, total)
     return StepWear(total, volume, falls, deepest, max(deepest, fastest))
 
 
 def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
     path = file_of(folder, "profile", step).resolve()
-    laid = laid_rails(folder, step, place, scene) if data["rails"] else None
+    laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
         run = simulate(load_scene(scene, changes), progress=False if quiet else None)
@@ -327,12 +299,12 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
         raise InputError(path, f"scenes.{place}", expected)
     simulated = time.thread_time()
     wheels = local_wear(run, data["begin"], data["law"])
-    rise = sum(onto_points(u, wheel.wheel_edges, wheel.wheel_depth) for wheel in wheels.values()) / len(wheels)
+    rise = sum(worn_profiles.onto_points(u, w.wheel_edges, w.wheel_depth) for w in wheels.values()) / len(wheels)
     volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
-    falls = falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
+    falls = worn_rails.falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
     return SceneWear(rise, volume, rails, falls, laid, (simulated - began, time.thread_time() - simulated))
 
 
