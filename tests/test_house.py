@@ -114,7 +114,7 @@ def test_every_question_has_its_drawers():
 @pytest.mark.parametrize(
     ("file", "line", "expected"),
     [
-        ("run/course.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
+        ("run/simulation.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
         ("geometry/path.py", "def f():\n    import wrcore.contact.scan", "geometry imports wrcore.contact.scan"),
         ("creep/laws.py", "from study.creep import laws", "the core imports study.creep"),
         (

@@ -6,7 +6,6 @@ import hashlib
 import itertools
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -23,6 +22,7 @@ from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
 from wrcore.scene.description import Scene, load_scene
+from wrcore.scene.pairs import find_file
 from wrcore.sweep.measures import MEASURES
 
 MOST_RUNS = 10_000_000
@@ -115,7 +115,7 @@ def load_sweep(
     for measure in data["measures"]:
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
-    scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
+    scene = load_scene(load_scene(find_file(data["scene"], folder, name, "scene"), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     read = scene.files | _check_values(scene, data["keys"], name)
     grid = data["sampling"]["kind"] == "grid"
@@ -131,13 +131,6 @@ def load_sweep(
         least = math.ceil(len(runs) / MOST_BATCHES)
         raise InputError(name, "batch", f"expected at least {least} runs per batch: a batch is a process of its own")
     return sweep
-
-
-def _scene_file(path, folder, source):
-    for base in (folder, folder.parent, Path()):
-        if os.path.isfile(base / path):
-            return base / path
-    raise InputError(source, "scene", f"expected an existing file, got {path!r}")
 
 
 def _values(entry, sampling, field, source):
@@ -163,12 +156,8 @@ def _check_values(scene, entries, source):
     """Try each key by itself: at its bounds, or at each of its values. Returns the digests of the files read."""
     files: dict[str, str] = {}
     for key, entry in entries.items():
-        tried = entry.get("values") or [
-            entry["from"],
-            entry["to"],
-            entry["from"] + 0.4142 * (entry["to"] - entry["from"]),
-        ]
-        for value in tried:
+        low, high = entry.get("from", 0.0), entry.get("to", 0.0)
+        for value in entry.get("values") or (low, high, low + 0.4142 * (high - low)):
             try:
                 changed = load_scene(scene, {key: value})
             except InputError as error:
@@ -180,8 +169,7 @@ def _check_values(scene, entries, source):
 
 
 def _grid(values):
-    rows = itertools.product(*values.values())
-    return pd.DataFrame(list(rows), columns=list(values))
+    return pd.DataFrame(list(itertools.product(*values.values())), columns=list(values))
 
 
 def _hypercube(values, sampling, source):

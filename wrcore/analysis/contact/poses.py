@@ -6,18 +6,15 @@ import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
-from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
 
-ROLLING_FIELDS = {
-    "xi": columns.XI, "eta": columns.ETA, "phi_per_m": columns.PHI, "Fx_N": columns.FX, "Fy_N": columns.FY,
-    "Mz_Nm": columns.MZ,
-}  # fmt: skip
+ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
 """Columns of rolling, empty where the wheelset does not move."""
 
-AT_REST = ("pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m")
-FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING_FIELDS)
+STILL = tuple(name for name in columns.CHANNELS if name not in ROLLING)
+AT_REST = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m")
+FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING)
 
 
 def loaded_poses(
@@ -54,9 +51,9 @@ def loaded_poses(
             for number, one in enumerate(found, start=1):
                 on_grid += one.on_grid
                 rows.append([
-                    pose.pose_id, side, number, *(one.row[column] for column in PATCH_FIELDS.values()),
+                    pose.pose_id, side, number, *(one.row[columns.CHANNELS[name]] for name in STILL),
                     one.row[columns.P_MAX], roll, z, *one.extent,
-                    *(math.nan if rolling is None else one.row[column] for column in ROLLING_FIELDS.values()),
+                    *(math.nan if rolling is None else one.row[columns.CHANNELS[name]] for name in ROLLING),
                 ])  # fmt: skip
     table = pd.DataFrame(rows, columns=list(FIELDS))
     table.attrs["on_grid"] = on_grid

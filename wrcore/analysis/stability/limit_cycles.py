@@ -20,7 +20,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.run.motion import hunting_frequency
-from wrcore.run.simulate import DERAILED_Y
+from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import Source, as_scene
 
 CYCLES = ("limit cycle", "irregular")

@@ -33,15 +33,13 @@ from wrcore.scene.description import Scene, compile_scene
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
 
-CONTACT_CHANNELS = {
-    "u_wheel_m": reduction.U_WHEEL, "s_wheel_rad": reduction.S_WHEEL, "u_rail_m": reduction.U_RAIL,
-    "x_m": reduction.X, "y_m": reduction.Y, "z_m": reduction.Z, "contact_angle_rad": reduction.ANGLE,
-    "penetration_m": reduction.PENETRATION, "a_m": reduction.SEMI_A, "b_m": reduction.SEMI_B,
-    "N_N": reduction.NORMAL, "Fx_N": reduction.FX, "Fy_N": reduction.FY, "Mz_Nm": reduction.MZ,
-    "xi": reduction.XI, "eta": reduction.ETA, "phi_per_m": reduction.PHI,
+COUNTERS = {
+    "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
+    "factorisations": "factorisations", "smallest_step_s": "smallest_step", "step_collapses": "collapses",
+    "table_out_of_range": "out_of_range", "patches_on_grid": "on_grid", "rails_unbalanced": "unbalanced",
+    "wall_s": "wall_s",
 }  # fmt: skip
-"""Contact channels and their columns in the patch array."""
-
+"""Counters of a run, and what a `Trajectory` calls them."""
 
 TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
@@ -50,7 +48,13 @@ TRACK_CHANNELS = (
 """Of a track that gives, in the order of its freedoms (:mod:`wrcore.dynamics.support`)."""
 
 
-class Places(NamedTuple):
+def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
+    """Counters of a trajectory from a time (s) on by the names that they have in runs and sweeps."""
+    simulated = float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0
+    return {name: getattr(trajectory, own) for name, own in COUNTERS.items()} | {"simulated_s": simulated}
+
+
+class ArcLengths(NamedTuple):
     """Arc lengths from which those of the next output are sought on a curved track, m."""
 
     wheelsets: np.ndarray
@@ -59,9 +63,9 @@ class Places(NamedTuple):
     """(n,)."""
 
 
-class Course:
+class Simulation:
     """A compiled scene and where it has got to: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or state
-    (size,)) of the next stretch and the ``places`` for its channels.
+    (size,)) of the next stretch and the ``arc_lengths`` for its channels.
 
     InputError if it cannot begin there. ``progress`` wraps the patches of a creep table that has to be built,
     ``shared`` is that of :func:`wrcore.scene.description.compile_scene`.
@@ -80,11 +84,11 @@ class Course:
         self.mark = model_fingerprint(self.model)
         self.start, self._moved = state, 0.0
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
-        self.places = Places(unknown, scene.vehicle.positions[:, 0].astype(float))
+        self.arc_lengths = ArcLengths(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
             self.begin_at(start)
 
-    def begin_at(self, start: Checkpoint | np.ndarray, places: Places | None = None) -> None:
+    def begin_at(self, start: Checkpoint | np.ndarray, arc_lengths: ArcLengths | None = None) -> None:
         """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
         if isinstance(start, Checkpoint):
             method = self.scene.data["integration"]["method"]
@@ -98,10 +102,10 @@ class Course:
         elif (begun := from_state(self.model, self.scene.vehicle, start, self.scene.source)) is not self.model:
             self.model, self.mark = begun, model_fingerprint(begun)
             self._moved = start.frame - begun.speed * start.t
-        if places is not None:
-            if [place.shape for place in places] != [place.shape for place in self.places]:
+        if arc_lengths is not None:
+            if [known.shape for known in arc_lengths] != [known.shape for known in self.arc_lengths]:
                 raise InputError(self.scene.source, "start", "expected as many places as wheelsets and bodies")
-            self.places = places
+            self.arc_lengths = arc_lengths
         self.start = start
 
     def advance(
@@ -120,14 +124,7 @@ class Course:
             settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
         )  # fmt: skip
         compiled = time.perf_counter() - self._began - trajectory.wall_s
-        counters = {
-            "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
-            "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
-            "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses,
-            "table_out_of_range": trajectory.out_of_range, "patches_on_grid": trajectory.on_grid,
-            "rails_unbalanced": trajectory.unbalanced, "wall_s": trajectory.wall_s, "compile_s": compiled,
-            "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
-        }  # fmt: skip
+        counters = counters_of(trajectory, begin) | {"compile_s": compiled}
         groups, limits = self._channels(trajectory)
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
         record["method_used"] = trajectory.method
@@ -141,13 +138,11 @@ class Course:
 
     def _end_state(self, trajectory: Trajectory) -> State | None:
         """Where the stretch ended, with what belongs to it."""
-        scene, t = self.scene, trajectory.end_t
-        names = scene.vehicle.name, *scene.vehicle.body_names
-        return (
-            None
-            if trajectory.end_state is None
-            else State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
-        )
+        if trajectory.end_state is None:
+            return None
+        t, vehicle = trajectory.end_t, self.scene.vehicle
+        names = vehicle.name, *vehicle.body_names
+        return State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
 
     def _channels(self, trajectory: Trajectory):
         """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs."""
@@ -158,7 +153,7 @@ class Course:
         poses, axes = self._poses(states)
         energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
         if len(states):
-            self.places = Places(work.arc_lengths.copy(), poses[-1, :, 0].copy())
+            self.arc_lengths = ArcLengths(work.arc_lengths.copy(), poses[-1, :, 0].copy())
         groups = {}
         for body, name in enumerate(scene.vehicle.body_names):
             own, pitches = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), not model.bodies.spins[body]
@@ -194,7 +189,7 @@ class Course:
         """Channels of the contacts of a wheelset's wheels by group."""
         groups = {}
         for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
-            channels = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+            channels = {key: rows[..., column] for key, column in reduction.CHANNELS.items()}
             if self.model.contact.strips.strips:
                 channels["p_max_Pa"] = rows[..., reduction.P_MAX]
             if shaped(self.model.contact):
@@ -233,7 +228,7 @@ class Course:
 
     def _workspace(self):
         work = workspace(self.model)
-        work.arc_lengths[:] = self.places.wheelsets
+        work.arc_lengths[:] = self.arc_lengths.wheelsets
         return work
 
     def _poses(self, states):
@@ -248,7 +243,7 @@ class Course:
                 roll, pitch, yaw = angles(states[:, at + 3 : at + 7])
                 poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw, pitch])
             else:
-                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.places.bodies[body])
+                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.arc_lengths.bodies[body])
         return poses, axes
 
 
