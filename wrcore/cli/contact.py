@@ -1,7 +1,7 @@
 """``wrcore contact``: the patches of a wheelset in given poses."""
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, profile_of
+from wrcore.cli.options import add_pair, columns, pair_of
 from wrcore.errors import InputError
 
 ABOUT = """
@@ -56,7 +56,6 @@ FILES = columns(
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "contact", help="contact of a wheelset in given poses", description=ABOUT, epilog=f"{POSES}\n\n{FILES}"
     )
@@ -90,17 +89,13 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.analysis.contact.poses import loaded_poses
     from wrcore.contact.poses import read_poses
-    from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 
     out = output(options.out)
     poses = read_poses(options.poses)
-    wheel, rail = profile_of(options, options.wheel, "wheel"), profile_of(options, options.rail, "rail")
-    pair = WheelsetOnTrack.alike(wheel, rail, options.gauge, options.rolling_radius, options.tape_circle_half_distance)
     table = loaded_poses(
-        poses, pair.left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
+        poses, pair_of(options).left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
         options.load_by, options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
     )  # fmt: skip
     if table.empty:

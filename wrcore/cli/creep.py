@@ -38,7 +38,6 @@ def _law(name):
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "creep", help="creep forces of given cases", description=ABOUT, epilog=f"{CASES}\n\n{FILES}"
     )
@@ -53,7 +52,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.creep.cases import read_cases, solve_cases
     from wrcore.creep.table import show_progress
 

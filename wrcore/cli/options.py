@@ -70,6 +70,19 @@ def add_pair(command):
     )
 
 
+def pair_of(options):
+    """`WheelsetOnTrack` of the options of `add_pair`, and of those of a right wheel that differs."""
+    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+
+    given = {"right_wheel": None, "right_rolling_radius": None} | vars(options)
+    wheel = profile_of(options, options.wheel, "wheel")
+    right = profile_of(options, given["right_wheel"], "wheel") if given["right_wheel"] else wheel
+    rail, radius = profile_of(options, options.rail, "rail"), options.rolling_radius
+    other = radius if given["right_rolling_radius"] is None else given["right_rolling_radius"]
+    sides = WheelOnRail(wheel, rail, radius), WheelOnRail(right, rail, other)
+    return WheelsetOnTrack(*sides, options.tape_circle_half_distance, options.gauge)
+
+
 def profile_of(options, spec, kind):
     """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply."""
     from wrcore.geometry.standards import named_profile

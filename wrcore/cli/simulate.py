@@ -22,7 +22,6 @@ wr.load_run("run.h5") lists and explains; .to_pandas() makes one table of them.
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser("simulate", help="run a scene", description=ABOUT, epilog=FILES)
     command.add_argument("scene", metavar="SCENE.yaml", help="'wrcore init FOLDER' makes some to start from")
     command.add_argument(
@@ -48,7 +47,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.run.progress import simulated_time
     from wrcore.run.streaming import simulate_to
     from wrcore.scene.description import load_scene
