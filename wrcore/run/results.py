@@ -27,11 +27,8 @@ FORMAT_VERSION = 3
 KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
 RECORDS = ("scene", "settings", "counters")
-END = "end"
-"""Group that is no body: the last valid state."""
-
-ROWS = 8192
-"""Output times of a joined run that are in memory at once."""
+END = "end"  # group that is no body: the last valid state
+ROWS = 8192  # output times of a joined run that are in memory at once
 
 COMPRESSION = {"compression": "gzip", "shuffle": True}
 

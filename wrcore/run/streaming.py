@@ -38,11 +38,8 @@ from wrcore.scene.description import Scene
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
 """Size of a block's channels in memory, bytes, and its number of output times at most."""
 
-PLAIN = {"compression": None, "shuffle": False}
-"""Blocks are compressed when they are joined."""
-
-WHOLE = 2**62
-"""Output times in a block that holds all of them."""
+PLAIN = {"compression": None, "shuffle": False}  # blocks are compressed when they are joined
+WHOLE = 2**62  # output times in a block that holds all of them
 
 STOP, INTERRUPTED = "stop", "interrupted"
 """Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""

@@ -30,14 +30,9 @@ from wrcore.contact import reduction
 from wrcore.contact.detection import PLANAR
 from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, VALUE, YAW_STRAY
 
-WIDEST = 1.0 / 3.0
-"""Largest semi-axis across rolling over the smaller radius of curvature."""
-
-WIDEST_TURN = 0.35
-"""Largest turn of the normal over a patch in a hollow, rad."""
-
-FLANGE = 0.5
-"""Contact angle from which a wheel touches with its flange, rad."""
+WIDEST = 1.0 / 3.0  # largest semi-axis across rolling over the smaller radius of curvature
+WIDEST_TURN = 0.35  # largest turn of the normal over a patch in a hollow, rad
+FLANGE = 0.5  # contact angle from which a wheel touches with its flange, rad
 
 LIMITS = {
     "half_space": "patches too wide for a half-space",

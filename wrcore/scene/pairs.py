@@ -15,11 +15,8 @@ from wrcore.geometry.track import SIDES
 POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
 
-LARGEST_WEAR = 0.05
-"""Radii that differ by more than this from the vehicle's are taken for a mistake, m."""
-
-NAMED_BY = ("parameters", "profile", "points", "table")
-"""Keys of a scene whose values name files."""
+LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
+NAMED_BY = ("parameters", "profile", "points", "table")  # keys of a scene whose values name files
 
 
 def find_file(path, folder, source, field):

@@ -25,11 +25,8 @@ from wrcore.scene.description import Scene, load_scene
 from wrcore.scene.pairs import find_file
 from wrcore.sweep.measures import MEASURES
 
-MOST_RUNS = 10_000_000
-"""Runs of a sweep."""
-
-MOST_BATCHES = 500
-"""A sweep with more batches than this would be many short processes."""
+MOST_RUNS = 10_000_000  # runs of a sweep
+MOST_BATCHES = 500  # a sweep with more batches than this would be many short processes
 
 OF_PARTS = ("name", "description", "vehicle", "wheel", "rail", "track", "contact.creep.table")
 """Keys that decide what a scene is made of: a run that changes one of them needs the scene read anew."""

@@ -23,11 +23,8 @@ from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import build_track
 from wrcore.vehicle.description import GRAVITY
 
-BLOCK = 5.0
-"""Length of the stretches that comfort is evaluated over, s."""
-
-LEAST_RATE = 200.0
-"""Weightings end at 100 Hz, 1/s."""
+BLOCK = 5.0  # length of the stretches that comfort is evaluated over, s
+LEAST_RATE = 200.0  # weightings end at 100 Hz, 1/s
 
 
 class Weighting(NamedTuple):

@@ -41,23 +41,12 @@ MODELS = (*PATCHES, "grid")
 GRIDS = {"coarse": ((32, 24),), "middle": ((32, 24), (40, 32)), "fine": FINE}
 """Grids of each resolution (elements along x, across)."""
 
-DEEPEST = 1e-3
-"""Overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread."""
-
-LOWEST = 0.1
-"""A wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot."""
-
-SMOOTH = 1e-9
-"""Coefficient of friction where the normal forces alone are looked at."""
-
-SLOWEST = 1e-9
-"""Creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at."""
-
-_CARRIED = 1e-9
-"""Relative error of F^(2/3) that ends the search for a height."""
-
-_LEVEL = 1e-10
-"""Step in roll that ends the search for it, rad."""
+DEEPEST = 1e-3  # overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread
+LOWEST = 0.1  # a wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot
+SMOOTH = 1e-9  # coefficient of friction where the normal forces alone are looked at
+SLOWEST = 1e-9  # creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at
+_CARRIED = 1e-9  # relative error of F^(2/3) that ends the search for a height
+_LEVEL = 1e-10  # step in roll that ends the search for it, rad
 
 _MOST_ROLLS = 25
 

@@ -88,16 +88,11 @@ def _values(run: Run, channel: str) -> np.ndarray:
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
     """Panels (quantity, lines by label) that say most about a run with the channels that it has."""
-    panels = []
     names = wheelsets_of(run) or [name for name, group in run.groups.items() if "y_m" in group]
-    for quantity in ("y_m", "yaw_rad"):
-        lines = {name: run.groups[name][quantity] for name in names if quantity in run.groups[name]}
-        if lines:
-            panels.append((quantity, lines))
-    wheels = {(name, side): wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
-    for at, quantity in enumerate(("Q_N", "Y_N")):
-        if wheels:
-            panels.append((quantity, {f"{name} {side}": forces[at] for (name, side), forces in wheels.items()}))
+    motion = {q: {name: run.groups[name][q] for name in names if q in run.groups[name]} for q in ("y_m", "yaw_rad")}
+    wheels = {f"{name} {side}": wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
+    forces = {q: {label: pair[at] for label, pair in wheels.items()} for at, q in enumerate(("Q_N", "Y_N"))}
+    panels = [(quantity, lines) for quantity, lines in (motion | forces).items() if lines]
     if not panels:
         first = next(((group, name) for group, names in run.groups.items() for name in names), None)
         if first is None:

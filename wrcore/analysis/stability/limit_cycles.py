@@ -23,8 +23,8 @@ from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import Source, as_scene
 
-CYCLES = ("limit cycle", "irregular")
-"""Status of motions that do not die away."""
+CYCLES = ("limit cycle", "irregular")  # status of motions that do not die away
+DISTURBANCES = (0.006, 0.0065, 0.007, 0.008, 0.009)  # sideways shifts that may end on a cycle, m
 
 
 @checked
@@ -171,13 +171,7 @@ def limit_cycles(
     scene: Source,
     speeds: Iterable[float],
     settling: Settling | None = None,
-    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = (
-        0.006,
-        0.0065,
-        0.007,
-        0.008,
-        0.009,
-    ),
+    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = DISTURBANCES,
     resolution: Annotated[float, Within(1e-3, 150.0, "m/s")] = 0.25,
 ) -> pd.DataFrame:
     """Both branches of a scene's vehicle.

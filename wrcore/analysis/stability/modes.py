@@ -31,25 +31,15 @@ from wrcore.balance.linear import DIRECTIONS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.support import RAILS, no_support, support_size
 
-NEUTRAL = 1e-3
-"""Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
-
-OVERDAMPED = 0.95
-"""Damping ratio above which a mode hardly oscillates."""
-
-LIGHT = 0.7
-"""Damping ratio below which a mode can be hunting; the other lateral motions of wheelsets creep back faster."""
-
-HUNTING = 0.05
-"""Least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode."""
-
-ALONE = 0.9
-"""Part of a family's motion that makes the front or the rear the only one that moves."""
+NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change
+OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
+LIGHT = 0.7  # damping ratio below which a mode can be hunting; other lateral motions of wheelsets creep back faster
+HUNTING = 0.05  # least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode
+ALONE = 0.9  # part of a family's motion that makes the front or the rear the only one that moves
 
 WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
 CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
 Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
-
 
 TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
 TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])

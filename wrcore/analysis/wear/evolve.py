@@ -44,11 +44,8 @@ from wrcore.scene.description import Scene, load_scene
 from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
 
-AMPLITUDE = 3e-3
-"""Of the equivalent conicity in the table, m."""
-
-MT = 1e9
-"""A million gross tonnes, kg."""
+AMPLITUDE = 3e-3  # of the equivalent conicity in the table, m
+MT = 1e9  # a million gross tonnes, kg
 
 MOST_STEPS = 10_000
 

@@ -30,11 +30,8 @@ from wrcore.run.derived import rolling_speed
 from wrcore.run.run import Run
 from wrcore.scene.friction import read_friction
 
-BIN = 2.5e-4
-"""Width of the bins of depth over a profile, m."""
-
-STRIPS, STEPS = 25, 20
-"""Strips across and steps along a patch."""
+BIN = 2.5e-4  # width of the bins of depth over a profile, m
+STRIPS, STEPS = 25, 20  # strips across and steps along a patch
 
 
 @dataclass(frozen=True, eq=False)
