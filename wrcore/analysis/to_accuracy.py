@@ -166,7 +166,8 @@ def difference(one: Run, other: Run, of: str = "y") -> float:
     count = min(len(one.t), len(other.t))
     if count == 0:
         return math.inf
-    apart = np.subtract(*([series[:count] for series in _series(run, of)] for run in (one, other)))
+    first, second = (np.array([series[:count] for series in _series(run, of)]) for run in (one, other))
+    apart = first - second
     if of == "wear":
         apart = np.nanmean(apart, axis=1)
     return float(np.sqrt(np.nanmean(apart**2)))

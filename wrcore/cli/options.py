@@ -56,6 +56,11 @@ def columns(title, **texts):
     return "\n".join(lines)
 
 
+def as_runs(*names):
+    """Columns that are a run's channels of these names, for `columns`."""
+    return dict.fromkeys(names, "")
+
+
 def add_pair(command):
     """Options of a wheel on a rail."""
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")

@@ -114,15 +114,15 @@ class WheelsetOnTrack:
         return cls(side, side, half_distance, gauge)
 
     @property
-    def base(self):
+    def base(self) -> float:
         """Distance of the tape circles, m: the standard's e = 1500 mm at standard gauge."""
         return 2.0 * self.half_distance
 
     @property
-    def mean_radius(self):
+    def mean_radius(self) -> float:
         """Mean of both rolling radii, m."""
         return 0.5 * (self.left.rolling_radius + self.right.rolling_radius)
 
-    def rail_distance(self, side):
+    def rail_distance(self, side: WheelOnRail) -> float:
         """Origin of a side's rail from the centre line, m, positive."""
         return 0.5 * self.gauge + side.rail.gauge_offset(self.gauge_depth)

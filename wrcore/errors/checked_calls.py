@@ -47,7 +47,6 @@ ARRAY = {*typing.get_args(ArrayLike)}
 ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
-
 UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
 """What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
 

@@ -63,7 +63,9 @@ def write_run(
     completed
     """
     with new_hdf5(path) as file:
-        _write_attributes(file, run)
+        file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, wrcore_version=__version__)
+        file.attrs.update(status=run.status, reason=run.reason)
+        file.attrs.update({name: _record(getattr(run, name)) for name in RECORDS})
         time = _create_dataset(file, "t", data=run.t, **options)
         time.make_scale("t")
         for group in sorted(run.groups):
@@ -74,12 +76,6 @@ def write_run(
             _write_end(file.create_group(END), run)
         if also is not None:
             also(file, run)
-
-
-def _write_attributes(file, run):
-    file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, wrcore_version=__version__)
-    file.attrs.update(status=run.status, reason=run.reason)
-    file.attrs.update({name: _record(getattr(run, name)) for name in RECORDS})
 
 
 def _record(values):

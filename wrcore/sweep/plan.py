@@ -118,7 +118,10 @@ def load_sweep(
     grid = data["sampling"]["kind"] == "grid"
     if grid and (count := math.prod(map(len, values.values()))) > MOST_RUNS:
         raise InputError(name, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
-    runs = _grid(values) if grid else _hypercube(values, data["sampling"], name)
+    if grid:
+        runs = pd.DataFrame(list(itertools.product(*values.values())), columns=list(values))
+    else:
+        runs = _hypercube(values, data["sampling"], name)
     runs.index.name = "run"
     shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
     if data["begin"] >= shortest:
@@ -163,10 +166,6 @@ def _check_values(scene, entries, source):
                 raise InputError(source, f"keys.{key}", one_of(("auto", *METHODS), value))
             files |= changed.files
     return files
-
-
-def _grid(values):
-    return pd.DataFrame(list(itertools.product(*values.values())), columns=list(values))
 
 
 def _hypercube(values, sampling, source):

@@ -257,11 +257,12 @@ class LoadedWheels:
         extent = origin[0] + x_min, origin[0] + x_max, s_max - s_min
         return Found(row, extent, patch.normal, math.nan, patch, True)
 
-    def placed(self, sides, y, yaw, roll, z, load, how, told):
-        """Roll, and height of the wheelset by side, in a pose whose z, or z and roll, may be NaN: sought for the load
-        as `loaded_poses` says, with arguments ``how`` of `height`. A height at which a wheel lies deeper in its rail
-        than `DEEPEST` is refused; ``told``: source and field.
+    def placed(self, sides, y, yaw, known, load, how, told):
+        """Roll, and height of the wheelset by side, in a pose: what is NaN of ``known``, its roll and z, is sought for
+        the load as `loaded_poses` says, with arguments ``how`` of `height`. A height at which a wheel lies deeper in
+        its rail than `DEEPEST` is refused; ``told``: source and field.
         """
+        roll, z = known
         if math.isnan(z) and math.isnan(roll):
             roll, z = self.settled(y, load, yaw, **how)
         elif math.isnan(z):

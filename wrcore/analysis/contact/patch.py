@@ -94,8 +94,9 @@ def patch(
     how = {"rolling": rolling, "friction": float(mu)}
     if z is None:
         check_number(load, 1e-9, 1e6, "patch", "load", "N")
-    pose = y, yaw, *(math.nan if value is None else value for value in (roll, z))
-    turned, heights = wheels.placed((side,), *pose, load, how | {"vertical": load_by == "vertical"}, ("patch", "z"))
+    known = [math.nan if value is None else value for value in (roll, z)]
+    to_load = how | {"vertical": load_by == "vertical"}
+    turned, heights = wheels.placed((side,), y, yaw, known, load, to_load, ("patch", "z"))
     if math.isnan(heights[side]):
         raise InputError("patch", "load", f"expected a load that the wheel finds at y = {y:g} m, got {load:g} N")
     return [one.patch for one in wheels.at_height(side, y, heights[side], turned, yaw, fields=True, **how)]

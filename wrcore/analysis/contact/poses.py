@@ -45,7 +45,7 @@ def loaded_poses(
                               _given(pose, "yaw_rate_rad_per_s", 0.0))  # fmt: skip
         how = {"rolling": rolling, "friction": mu}
         to_load = how | {"vertical": load_by == "vertical"}
-        roll, heights = wheels.placed(SIDES, y, yaw, pose.roll_rad, pose.z_m, wheel_load, to_load, ("contact", "z_m"))
+        roll, heights = wheels.placed(SIDES, y, yaw, (pose.roll_rad, pose.z_m), wheel_load, to_load, ("contact", "z_m"))
         for side, z in heights.items():
             found = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
             for number, one in enumerate(found, start=1):

@@ -10,10 +10,7 @@ from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
 
-LIFT = 0.020
-"""Height by which the wheel is drawn above the rail, m."""
-
-
+LIFT = 0.020  # height by which the wheel is drawn above the rail, m
 _LABEL_WIDTH = 3.5  # mm
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -132,16 +132,17 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     tried as well and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
     Where every disturbance derails, the next lower speed is tried.
     """
-    rows, lost, carried, below, queue = [], [], None, None, list(speeds)
+    rows: list[dict[str, Any]] = []
+    lost, carried, below, queue = [], [], None, list(speeds)
     while queue:
         there, straight = at_speed(model, state, queue.pop())
-        tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
+        tried = [settle_motion(there, at_speed(*one, there.speed)[1], settling) for one in carried]
         if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
             tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
         row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
         if row["status"] in CYCLES:
             rows.append(row)
-            carried = there, end
+            carried = [(there, end)]
         elif row["status"] == "derailed":
             lost.append(row)
         else:

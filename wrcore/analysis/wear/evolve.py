@@ -262,7 +262,9 @@ class SceneWear(NamedTuple):
 def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
     """`StepWear` of the profile (u and f) at the start of a step."""
     one = partial(_scene_wear, data, folder, step, profile[0], threads > 1)
-    total, volume, rails, falls, fastest = np.zeros(len(profile[0])), 0.0, [], [], 0.0
+    total, volume, fastest = np.zeros(len(profile[0])), 0.0, 0.0
+    rails: list[dict[str, float]] = []
+    falls: list[dict[str, np.ndarray]] = []
     with ThreadPoolExecutor(threads) as pool:
         found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
         for share, worn in zip(shares, found, strict=True):
@@ -271,14 +273,15 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
             rails.append({"scene": len(rails), "share": share} | worn.rails)
             if worn.laid:
                 fall = {side: worn_profiles.smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
-                fastest = max(fastest, *(worn_profiles.across(*worn.laid.points[side], fall[side]) for side in SIDES))
+                depths = [worn_profiles.across(u, f, fall[side]) for side, (u, f) in worn.laid.points.items()]
+                fastest = max(fastest, *depths)
                 falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
     with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
     total = worn_profiles.smooth(total, data["smoothing"])
-    deepest = worn_profiles.across(*profile, total)
+    deepest = worn_profiles.across(profile[0], profile[1], total)
     return StepWear(total, volume, falls, deepest, max(deepest, fastest))
 
 

@@ -122,7 +122,7 @@ def _wheel_wear(run, name, side, late, loss, width):
     speed = np.broadcast_to(rolling_speed(body, scene["speed"]), late.shape)[late][times]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
-    places, dy, dx, work = friction_work(rows, friction, *_material(scene))
+    places, dy, dx, work = friction_work(rows, friction, **scene["contact"]["material"])
     share = way_shares(run, name, late)[times][:, None]
     taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
     across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the way
@@ -140,11 +140,6 @@ def _wheel_wear(run, name, side, late, loss, width):
 
 _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",
            "contact_angle_rad"}  # fmt: skip
-
-
-def _material(scene):
-    material = scene["contact"]["material"]
-    return material["shear_modulus"], material["poisson_ratio"]
 
 
 def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, steps=STEPS):

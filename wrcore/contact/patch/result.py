@@ -87,37 +87,37 @@ class Patch:
     pose: tuple = ()
 
     @property
-    def cell_area(self):
+    def cell_area(self) -> np.ndarray:
         """Of each cell, m^2, shape (n,)."""
         return self.dx * self.ds
 
     @property
-    def touching(self):
+    def touching(self) -> np.ndarray:
         """Cells with pressure, shape (n,)."""
         return self.pressure > 0.0
 
     @property
-    def p_max(self):
+    def p_max(self) -> float:
         """Greatest pressure, Pa; of a grid: the greatest mean of a cell."""
         return float(self.pressure.max(initial=0.0)) if math.isnan(self.peak) else self.peak
 
     @property
-    def area(self):
+    def area(self) -> float:
         """m^2."""
         return float(self.cell_area[self.touching].sum())
 
     @property
-    def stick_area(self):
+    def stick_area(self) -> float:
         """Area of adhesion, m^2."""
         return float(self.cell_area[self.touching & self.stick].sum())
 
     @property
-    def slip_area(self):
+    def slip_area(self) -> float:
         """Area of slip, m^2."""
         return self.area - self.stick_area
 
     @property
-    def extent(self):
+    def extent(self) -> tuple[float, ...]:
         """x_min, x_max, s_min, s_max, m: outer edges of cells with pressure; NaN without contact."""
         if self.ends:
             return self.ends
@@ -128,14 +128,14 @@ class Patch:
         return tuple(float(end) for c, half in sides for end in ((c - half).min(), (c + half).max()))
 
     @property
-    def centroid(self):
+    def centroid(self) -> tuple[float, float]:
         """x and s of the pressure's centroid, m; NaN without contact."""
         load = self.pressure * self.cell_area
         total = load.sum()
         return (float(load @ self.x / total), float(load @ self.s / total)) if total > 0.0 else (math.nan, math.nan)
 
     @property
-    def track_force(self):
+    def track_force(self) -> np.ndarray:
         """Force on the wheel in the track frame (forward, left, up), N, shape (3,)."""
         cosine, sine = math.cos(self.contact_angle), math.sin(self.contact_angle)
         lateral, vertical = self.fs * cosine - self.normal * sine, self.fs * sine + self.normal * cosine
