@@ -179,7 +179,7 @@ def named_profile(
     spec = str(spec) if isinstance(spec, Path) else spec
     upright = isinstance(spec, dict) and spec.get("inclined") is False
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
-        name = spec["points"] if upright and "points" in spec else spec
+        name = spec["points"] if isinstance(spec, dict) and "points" in spec else spec
         raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
     inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}

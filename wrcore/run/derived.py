@@ -17,8 +17,7 @@ import numpy as np
 from wrcore.geometry.track import SIDES
 from wrcore.run.wear import creep_work
 
-UNLOADED = 1e3
-"""Below this Q counts as no contact and Y/Q is left out, N."""
+UNLOADED = 1e3  # below this Q counts as no contact and Y/Q is left out, N
 
 OF_WHEELS = {
     "Q": "Q_N", "Y": "Y_N", "Y_over_Q": "Y_over_Q", "T_gamma": "T_gamma_N", "T_gamma_spin": "T_gamma_spin_N",

@@ -21,8 +21,7 @@ from wrcore.run.run import Run
 from wrcore.run.state import State
 
 FORMAT = "wrcore run"
-FORMAT_VERSION = 3
-"""Up to version 2 velocities and accelerations stood in the ground's axes."""
+FORMAT_VERSION = 3  # up to version 2 velocities and accelerations stood in the ground's axes
 
 KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")

@@ -122,8 +122,7 @@ def simulate_many(
         return [run for _, run in zip(bar(scenes), runs, strict=True)]
 
 
-LARGEST_RUN = 4e9
-"""Channels of a run that is kept in memory take no more than this, bytes."""
+LARGEST_RUN = 4e9  # channels of a run that is kept in memory take no more than this, bytes
 
 
 def bytes_per_time(vehicle):

@@ -44,8 +44,7 @@ WHOLE = 2**62  # output times in a block that holds all of them
 STOP, INTERRUPTED = "stop", "interrupted"
 """Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""
 
-CHECKPOINT_S = 60.0
-"""Wall time between two checkpoints at most, s."""
+CHECKPOINT_S = 60.0  # wall time between two checkpoints at most, s
 
 
 class Interrupts:

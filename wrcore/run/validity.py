@@ -48,8 +48,7 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
-_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")
-"""Those that look at the profiles."""
+_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # those that look at the profiles
 
 
 def exceeded(contact, patches, roll, yaw):

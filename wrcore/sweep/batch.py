@@ -42,8 +42,7 @@ from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 _SEALED = "# seal of this part: "
 _KIND = "a sweep's table (CSV or HDF5)"
 
-CHUNK = 200
-"""Runs whose motions are held at a time."""
+CHUNK = 200  # runs whose motions are held at a time
 
 
 def column_unit(name: str) -> str:

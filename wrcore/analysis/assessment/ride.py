@@ -79,14 +79,12 @@ WEIGHTINGS = {
 DIRECTIONS = {"ax_m_per_s2": "Wd", "ay_m_per_s2": "Wd", "az_m_per_s2": "Wb"}
 """Weighting of each acceleration in EN 12299."""
 
-DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}
-"""The same in ISO 2631-1."""
+DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}  # the same in ISO 2631-1
 
 NEEDED = (*DIRECTIONS, "roll_rad", "pitch_rad", "yaw_rad")
 """Channels of a body whose ride is evaluated; one that spins has no pitch."""
 
-RUNNING = 1.0
-"""Time of the running rms of ISO 2631-1, s."""
+RUNNING = 1.0  # time of the running rms of ISO 2631-1, s
 
 SETTLED = 1.0
 """From this time after its start on a signal under Sperling's weighting has settled (slowest decay: 4 1/s), s."""

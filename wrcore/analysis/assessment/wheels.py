@@ -148,7 +148,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
     ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
-    columns = {}
+    columns: dict[str, np.ndarray] = {}
     for side in SIDES:
         vertical, lateral = wheel_forces(run, wheelset, side)
         columns |= {
@@ -194,18 +194,12 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
         for side in SIDES:
             vertical, lateral = (force[late] for force in wheel_forces(run, wheelset, side))
             ratio = np.abs(quotient(vertical, lateral))
-            rows.append(
-                {
-                    "wheelset": wheelset,
-                    "side": side,
-                    "Q_mean_N": np.mean(vertical),
-                    "Q_min_N": np.min(vertical),
-                    "Q_max_N": np.max(vertical),
-                    "Y_max_N": np.max(np.abs(lateral)),
-                    "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
-                    "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
-                    "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
-                    "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
-                }
-            )
+            rows.append({
+                "wheelset": wheelset, "side": side, "Q_mean_N": np.mean(vertical), "Q_min_N": np.min(vertical),
+                "Q_max_N": np.max(vertical), "Y_max_N": np.max(np.abs(lateral)),
+                "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
+                "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
+                "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
+                "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
+            })  # fmt: skip
     return pd.DataFrame(rows)

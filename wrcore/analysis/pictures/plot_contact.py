@@ -49,7 +49,7 @@ def _location(axes, pair, table, side):
 
 def _label_shifts(axes, shifts, across, height):
     """Write whole millimetres of shift above the wheel, small shifts first; leave out what would overlap."""
-    written = []
+    written: list[float] = []
     for k in np.argsort(np.abs(shifts)):
         whole = abs(shifts[k] - round(shifts[k])) < 1e-6 and np.isfinite(across[k])
         if whole and all(abs(across[k] - other) > _LABEL_WIDTH for other in written):

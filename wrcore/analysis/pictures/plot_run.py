@@ -23,8 +23,7 @@ PRINTED = {
 }  # fmt: skip
 """Factor to the printed unit, and that unit; other units are printed as they are."""
 
-LARGE = ("x_m", "s_m", "z_m")
-"""Channels in m that are printed in m."""
+LARGE = ("x_m", "s_m", "z_m")  # channels in m that are printed in m
 
 WIDTH, HEIGHT = 7.2, 1.7
 COLORS = ("0.1", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7", "0.6")
@@ -33,8 +32,7 @@ COLORS = ("0.1", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7", "0.6")
 DASHES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 1, 1, 1)))
 """A wheelset's left wheel has full lines, its right one dashes."""
 
-MOST_ENTRIES = 8
-"""In one column of a legend."""
+MOST_ENTRIES = 8  # in one column of a legend
 
 
 @checked

@@ -133,10 +133,11 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     Where every disturbance derails, the next lower speed is tried.
     """
     rows: list[dict[str, Any]] = []
-    lost, carried, below, queue = [], [], None, list(speeds)
+    lost, below, queue = [], None, list(speeds)
+    carried: list[Any] = []
     while queue:
         there, straight = at_speed(model, state, queue.pop())
-        tried = [settle_motion(there, at_speed(*one, there.speed)[1], settling) for one in carried]
+        tried = [settle_motion(there, at_speed(before, end, there.speed)[1], settling) for before, end in carried]
         if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
             tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
         row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))

@@ -186,5 +186,6 @@ def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], spee
         scene = as_scene(scenes)
         scenes = {scene.data["name"]: scene}
     for variant, scene in scenes.items():
-        rows.append({"variant": variant, **critical_speed(scene.vehicle, *straight_ahead(scene), speeds=speeds)})
+        model, state = straight_ahead(scene)
+        rows.append({"variant": variant, **critical_speed(scene.vehicle, model, state, speeds)})
     return pd.DataFrame(rows)

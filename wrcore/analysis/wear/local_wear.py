@@ -130,12 +130,14 @@ def _wheel_wear(run, name, side, late, loss, width):
     slope = np.cos(rows["contact_angle_rad"])[:, None]
     low, high = (outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0))
     low, high = np.minimum(low, high), np.maximum(low, high)
-    found = []
-    for u, factor in ((rows["u_wheel_m"], 1.0 / (2.0 * np.pi * radius)), (rows["u_rail_m"], np.ones_like(radius))):
-        # the volume of a strip, spread evenly over its width on the profile; the ordinate's change holds for du
+
+    def depth(u, factor):  # a strip's volume spread evenly over its width on the profile; the ordinate changes over du
         edges, area = _gathered(u[:, None] + low, u[:, None] + high, across * dy * factor[:, None], width)
-        found += [edges, area / width]
-    return WheelWear(*found, volume, float(np.sum(work * (dx * dy * share)[..., None])))
+        return edges, area / width
+
+    wheel, rail = depth(rows["u_wheel_m"], 1.0 / (2.0 * np.pi * radius)), depth(rows["u_rail_m"], np.ones_like(radius))
+    spent = float(np.sum(work * (dx * dy * share)[..., None]))
+    return WheelWear(wheel[0], wheel[1], rail[0], rail[1], volume, spent)
 
 
 _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",

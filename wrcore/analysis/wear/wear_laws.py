@@ -29,8 +29,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import validate
 
-DENSITY = 7850.0
-"""Of steel, kg/m^3."""
+DENSITY = 7850.0  # of steel, kg/m^3
 
 _MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
 """kg/m/m^2 per N/m^2, and the two bounds in N/m^2: 1 ug/m/mm^2 is 1e-3 kg/m/m^2."""
@@ -75,8 +74,7 @@ def energy(work):
     return _MILD * np.asarray(work)
 
 
-LAWS = {"sheffield": sheffield, "energy": energy}
-"""Those that need nothing but the work."""
+LAWS = {"sheffield": sheffield, "energy": energy}  # those that need nothing but the work
 
 
 def archard(sliding, hardness, coefficients, speeds, pressures):

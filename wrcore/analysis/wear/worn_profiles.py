@@ -8,8 +8,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing
 
-POINTS = 2.5e-4
-"""Distance of the points of a stored profile, m."""
+POINTS = 2.5e-4  # distance of the points of a stored profile, m
 
 
 def flange(curve):

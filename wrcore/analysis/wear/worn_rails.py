@@ -28,8 +28,7 @@ class LaidRails(NamedTuple):
     """What brings u of a run to that of the points, m: a run counts from the rail's highest point."""
 
 
-DEPTH = 0.010
-"""Below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge."""
+DEPTH = 0.010  # below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge
 
 
 def _new_rails(scene):

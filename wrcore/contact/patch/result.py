@@ -1,11 +1,17 @@
 """One loaded contact patch with all its fields, whichever method has solved it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wrcore.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MM, _MPA = 1e3, 1e-6
 _MOST_ARROWS = 18
@@ -141,7 +147,7 @@ class Patch:
         lateral, vertical = self.fs * cosine - self.normal * sine, self.fs * sine + self.normal * cosine
         return np.array([self.fx, lateral, vertical])
 
-    def plot(self, axes=None):
+    def plot(self, axes: Any = None) -> Figure:
         """Draw pressure, tractions, and areas of adhesion and slip.
 
         Parameters
@@ -182,13 +188,13 @@ class Patch:
         at = self.touching
         x, s, dx, ds = (_MM * values[at] for values in (self.x, self.s, 0.5 * self.dx, 0.5 * self.ds))
         corners = [np.column_stack([x + a * dx, s + b * ds]) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        boxes, slips = np.stack(corners, axis=1), ~self.stick[at]
+        boxes: Any = np.stack(corners, axis=1)
         shades = ListedColormap(colormaps["Greys"](np.linspace(0.05, 0.65, 256)))  # light: arrows stand out
         cells = PolyCollection(boxes, array=_MPA * self.pressure[at], cmap=shades, edgecolors="face", linewidths=0.2)
         cells.set_clim(0.0, _MPA * max(self.p_max, 1.0))
         axes.add_collection(cells)
-        style = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
-        axes.add_collection(PolyCollection(boxes[slips], hatch="////", **style))
+        style: dict[str, Any] = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
+        axes.add_collection(PolyCollection(boxes[~self.stick[at]], hatch="////", **style))
         figure.colorbar(cells, ax=axes, label="pressure / MPa")
         swatches = Swatch(fc="0.8", label="adhesion"), Swatch(fc="0.8", ec="C0", lw=0.0, hatch="////", label="slip")
         below = axes.transAxes + ScaledTranslation(0.0, _LEGEND_BELOW, figure.dpi_scale_trans)
