@@ -51,7 +51,7 @@ TRACK_CHANNELS = (
 def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
     """Counters of a trajectory from a time (s) on by the names that they have in runs and sweeps."""
     simulated = float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0
-    return {name: getattr(trajectory, own) for name, own in COUNTERS.items()} | {"simulated_s": simulated}
+    return {name: getattr(trajectory, attribute) for name, attribute in COUNTERS.items()} | {"simulated_s": simulated}
 
 
 class ArcLengths(NamedTuple):
@@ -154,29 +154,29 @@ class Simulation:
         energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
         if len(states):
             self.arc_lengths = ArcLengths(work.arc_lengths.copy(), poses[-1, :, 0].copy())
-        groups = {}
+        groups, numbers = {}, {int(body): k for k, body in enumerate(wheelsets)}
         for body, name in enumerate(scene.vehicle.body_names):
-            own, pitches = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), not model.bodies.spins[body]
-            place, turned = poses[:, body], axes[:, body]
-            groups[name] = _body_channels(states[:, own], rates[:, own], place, turned, wanted, pitches)
+            part, k = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), numbers.get(body)
+            motion = states[:, part], rates[:, part], poses[:, body], axes[:, body]
+            groups[name] = _body_channels(*motion, wanted, pitches=not model.bodies.spins[body])
             if "pose" in wanted and not model.track.tangent:
-                groups[name]["s_m"] = place[:, 0]
-            if "pose" in wanted and body in wheelsets and len(model.support.mass):
-                groups[name] |= self._track_places(states, body)
+                groups[name]["s_m"] = poses[:, body, 0]
+            if "pose" in wanted and k is not None and len(model.support.mass):
+                groups[name] |= self._track_places(states, k)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
-            if body in wheelsets and not {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
-                k = int(np.flatnonzero(wheelsets == body)[0])
-                contacts = self._contact_channels(name, patches[:, k])
-                if "contact" in wanted:
-                    groups |= contacts
-                moving = {name: _body_channels(states[:, own], rates[:, own], place, turned, ("velocity",))}
-                for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
-                    groups[group] = groups.get(group, {}) | channels
-                if "contact" in wanted and scene.detection == "auto":
-                    groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
-                    spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
-                    groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
+            if k is None or {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
+                continue
+            contacts = self._contact_channels(name, patches[:, k])
+            if "contact" in wanted:
+                groups |= contacts
+            moving = {name: _body_channels(*motion, ("velocity",))}
+            for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
+                groups[group] = groups.get(group, {}) | channels
+            if "contact" in wanted and scene.detection == "auto":
+                groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
+                spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
+                groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
         if energies is not None:
             groups["energy"] = energies
         groups |= self._drive_channels(trajectory)
@@ -201,14 +201,13 @@ class Simulation:
         """Channels of the rolling rates of wheels that turn independently, rad/s."""
         bodies = self.model.bodies
         j = int(np.flatnonzero(bodies.wheelsets[bodies.independent[:, 0]] == body)[0])
-        own = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        mean = np.array([matrix_of(part[3:7])[:, 1] @ part[10:13] for part in own])
+        part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        mean = np.array([matrix_of(one[3:7])[:, 1] @ one[10:13] for one in part])
         half = states[:, independent_at(bodies, j)]
         return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
 
-    def _track_places(self, states, body):
-        """Channels of the displacements of rails and sleeper under a wheelset, m and rad."""
-        k = int(np.flatnonzero(self.model.bodies.wheelsets == body)[0])
+    def _track_places(self, states, k):
+        """Channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
         places = support_places(self.model)[k, : len(self.model.support.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 

@@ -35,10 +35,9 @@ from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import track_poses
 from wrcore.integrate.trajectory import Trajectory
-from wrcore.run.derived import UNLOADED
+from wrcore.run.derived import UNLOADED, creep_work
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulation import evaluated
-from wrcore.run.wear import creep_work
 
 
 @dataclass(frozen=True)

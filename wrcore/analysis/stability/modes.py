@@ -54,6 +54,15 @@ def families(vehicle):
     return found
 
 
+def _phase(first, second, names):
+    """How two parts move: one of them alone, by its name, or both in phase or in antiphase."""
+    squares = [np.sum(np.abs(part) ** 2) for part in (first, second)]
+    share = squares[0] / sum(squares)
+    if share > ALONE or share < 1.0 - ALONE:
+        return names[0 if share > ALONE else 1]
+    return f"in {'phase' if np.real(np.sum(first) * np.conj(np.sum(second))) > 0.0 else 'antiphase'}"
+
+
 class _Namer:
     """Names modes of one vehicle about one steady motion."""
 
@@ -74,7 +83,7 @@ class _Namer:
         energy = self.mass * np.abs(speed) ** 2
         return energy / np.sum(energy)
 
-    def __call__(self, eigenvalue, place, speed, own):
+    def __call__(self, eigenvalue, place, speed, internal):
         """Name of a mode: displacements and velocities (n, 6) of the bodies, displacements of dampers."""
         if abs(eigenvalue) < NEUTRAL:
             return "neutral"
@@ -83,7 +92,7 @@ class _Namer:
         family = max(energy, key=lambda name: np.sum(energy[name]))
         direction = int(np.argmax(energy[family]))
         if -eigenvalue.real / abs(eigenvalue) > OVERDAMPED:
-            if np.max(np.abs(own), initial=0.0) > np.max(np.abs(place)):
+            if np.max(np.abs(internal), initial=0.0) > np.max(np.abs(place)):
                 return "series damper"
             if family == self.rolling and direction in CREEP:
                 return self._with_phase(f"{family} {CREEP[direction]} creep", family, direction, speed)
@@ -104,12 +113,12 @@ class _Namer:
         if self.rolling is None or -eigenvalue.real > LIGHT * abs(eigenvalue):
             return False
         sideways = {name: part[Y] + part[YAW] for name, part in energy.items()}
-        own = energy[self.rolling]
+        rolling = energy[self.rolling]
         others = [part for name, part in sideways.items() if name not in (self.heaviest, self.rolling)]
         drift, heading = eigenvalue * place[self.wheelsets, Y], self.speed * place[self.wheelsets, YAW]
         rolls = np.linalg.norm(drift - heading) < 0.5 * (np.linalg.norm(drift) + np.linalg.norm(heading))
         leads = sideways[self.rolling] >= max(others, default=0.0) / 1.5
-        return bool(rolls and own[Y] > own[YAW] and leads and sideways[self.rolling] >= HUNTING)
+        return bool(rolls and rolling[Y] > rolling[YAW] and leads and sideways[self.rolling] >= HUNTING)
 
     def _carrier(self, direction, speed, leaders):
         """The heaviest family that moves at least half as much as the one of the leaders that moves most."""
@@ -123,19 +132,16 @@ class _Namer:
         if np.ptp(self.along[members]) < 1e-6:
             return name
         front, rear = (speed[members[half], direction] for half in (ahead, ~ahead))
-        part = np.sum(np.abs(front) ** 2) / np.sum(np.abs(speed[members, direction]) ** 2)
-        if part > ALONE or part < 1.0 - ALONE:
-            return f"{name}, {'front' if part > ALONE else 'rear'}"
-        together = np.real(np.sum(front) * np.conj(np.sum(rear))) > 0.0
-        return f"{name}, in {'phase' if together else 'antiphase'}"
+        return f"{name}, {_phase(front, rear, ('front', 'rear'))}"
 
 
 class _Track:
     """The track under all wheelsets in one mode: its energy, and what of it moves."""
 
-    def __init__(self, support, own):
+    def __init__(self, support, internal):
         d, size = len(support.mass), support_size(support)
-        rows = own[support.first :][: size * (len(own[support.first :]) // size)].reshape(-1, size) if d else own[:0]
+        rows = internal[support.first :] if d else internal[:0]
+        rows = rows[: size * (len(rows) // size)].reshape(-1, size) if d else rows
         self.massless = size == d
         self.place = rows[:, :d] if d else np.zeros((0, 0))
         weight = np.abs(self.place) ** 2 if self.massless else support.mass * np.abs(rows[:, d:]) ** 2
@@ -157,11 +163,7 @@ class _Track:
         name, part = TRACK[kind], self.shares[kind] / self.shares.sum()
         if kind < 2:
             sides = self.place[:, kind:RAILS:2]
-            left, right = sides[np.argmax(np.sum(np.abs(sides) ** 2, axis=1))]
-            one = abs(left) ** 2 / (abs(left) ** 2 + abs(right) ** 2)
-            if one > ALONE or one < 1.0 - ALONE:
-                return f"{name}, {'left' if one > ALONE else 'right'}", part
-            return f"{name}, in {'phase' if np.real(left * np.conj(right)) > 0.0 else 'antiphase'}", part
+            name += f", {_phase(*sides[np.argmax(np.sum(np.abs(sides) ** 2, axis=1))], ('left', 'right'))}"
         return name, part
 
 

@@ -2,8 +2,8 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.wear`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is
-lost per metre rolled and area of contact.
+forces and creepages (:mod:`wrcore.run.derived`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what
+is lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
 
