@@ -15,9 +15,8 @@ class _Help(argparse.RawDescriptionHelpFormatter):
     def _get_help_string(self, action):
         text = action.help or ""
         value = action.default
-        if action.required or not action.option_strings or value in (None, [], argparse.SUPPRESS) or "default" in text:
-            return text
-        if isinstance(value, bool):
+        said = action.required or not action.option_strings or "default" in text
+        if said or value in (None, [], argparse.SUPPRESS) or isinstance(value, bool):
             return text
         return f"{text} (default: {value:g})" if isinstance(value, float) else f"{text} (default: {value})"
 

@@ -89,11 +89,9 @@ def _print_run(done, as_json):
     factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0
     summary = {
         "status": done.status, "reason": done.reason, "simulated_s": counters["simulated_s"],
-        "wall_s": counters["wall_s"], "real_time_factor": factor, "steps": counters["steps"],
-        "rejected": counters["rejected"], "rhs_evaluations": counters["rhs_evaluations"],
-        "compile_s": counters["compile_s"], "patches": counters["patches"],
-        **{name: counters[name] for name in LIMITS},
+        "wall_s": counters["wall_s"], "real_time_factor": factor,
     }  # fmt: skip
+    summary |= {n: counters[n] for n in ("steps", "rejected", "rhs_evaluations", "compile_s", "patches", *LIMITS)}
     if as_json:
         print(json.dumps(summary))
         return

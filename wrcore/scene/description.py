@@ -31,7 +31,7 @@ from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
+from wrcore.errors.checked_yaml import parse_value, read_source, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.scene.drive import read_drive
@@ -147,10 +147,8 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     """
     if isinstance(scene, Scene):
         source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
-    elif isinstance(scene, Mapping):
-        source, folder, data = "scene", Path("."), plain_tree(dict(scene), "scene")
     else:
-        source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
+        source, folder, data = read_source(scene, "scene")
     texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
     asked = [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
     for option, key, value in asked:

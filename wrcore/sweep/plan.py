@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import pandas as pd
 from wrcore import __version__
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import checked
-from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
 from wrcore.scene.description import Scene, load_scene
@@ -104,10 +104,7 @@ def load_sweep(
     ... })
     Sweep 'hunting': 15 runs over speed, initial.y; 1 batches
     """
-    if isinstance(source, Mapping):
-        name, folder, data = "sweep", Path(), json.loads(json.dumps(source, default=fspath))
-    else:
-        name, folder, data = str(source), Path(source).parent, read_yaml(source)
+    name, folder, data = read_source(source, "sweep")
     data = validate(data, "sweep", name)
     for measure in data["measures"]:
         if measure not in MEASURES:

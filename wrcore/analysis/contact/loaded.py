@@ -281,7 +281,8 @@ class LoadedWheels:
         """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal
         forces), sought near ``guess`` (m); NaN where there is none.
         """
-        goal, ellipse = load ** (2.0 / 3.0), not self._still.strips.strips
+        goal = load ** (2.0 / 3.0)
+        solved = not self._still.strips.strips and rolling is None and vertical  # by Hertz's law at rest
 
         def excess(z):
             found = self.at_height(side, y, z, roll, yaw, rolling, friction)
@@ -289,14 +290,12 @@ class LoadedWheels:
             rest = max(force, 0.0) ** (2.0 / 3.0) - goal
             return 0.0 if abs(rest) < _CARRIED * goal else rest
 
-        if math.isnan(guess) or (ellipse and rolling is None and vertical):
+        if math.isnan(guess) or solved:
             guess = height_at_load(
                 self.geometry, self._still.hertz, self.modulus, SIDES[side], y, roll, yaw, self.spatial,
                 self._still.reduction, load, self.geometry.rolling_radius, self._rows,
             )  # fmt: skip
-        if math.isnan(guess) or (ellipse and rolling is None and vertical):
-            return guess
-        return height_of_zero(excess, guess)
+        return guess if math.isnan(guess) or solved else height_of_zero(excess, guess)
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
         """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""

@@ -34,7 +34,7 @@ from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
-from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profile import ProfileCurve
@@ -56,10 +56,7 @@ def load_wear_plan(
     """Read and check a plan (a file by the schema ``wear.yaml``, or its content, with paths from the working
     directory), ``changes`` replacing its keys: its data with defaults, and its scenes in order.
     """
-    if isinstance(source, dict):
-        name, folder, data = "plan", Path(), source
-    else:
-        name, folder, data = str(source), Path(source).parent, read_yaml(source)
+    name, folder, data = read_source(source, "plan")
     data = validate({**data, **(changes or {})}, "wear", name)
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:

@@ -49,16 +49,6 @@ class Sliding:
     friction: float
     speed: np.ndarray
 
-    def inside(self) -> np.ndarray:
-        """1 - (x/a)^2 - (y/b)^2 at the cells, shape (m, strips, steps)."""
-        steps = self.work.shape[-1]
-        along = 1.0 - (1.0 - (2.0 * np.arange(steps) + 1.0) / steps) ** 2
-        return (1.0 - (self.y / self.rows["b_m"][:, None]) ** 2)[..., None] * along
-
-    def mean_pressure(self) -> np.ndarray:
-        """N/(pi a b), Pa, shape (m, 1, 1)."""
-        return (self.rows["N_N"] / (np.pi * self.rows["a_m"] * self.rows["b_m"]))[:, None, None]
-
 
 Law = Callable[[Sliding], np.ndarray]
 
@@ -82,7 +72,10 @@ def archard(sliding, hardness, coefficients, speeds, pressures):
     (pressures + 1, speeds + 1) between the rising bounds of speed (m/s) and pressure (Pa).
     """
     pressed = sliding.work / sliding.friction  # p s
-    inside, mean = sliding.inside(), sliding.mean_pressure()
+    rows, steps = sliding.rows, sliding.work.shape[-1]
+    along = 1.0 - (1.0 - (2.0 * np.arange(steps) + 1.0) / steps) ** 2
+    inside = (1.0 - (sliding.y / rows["b_m"][:, None]) ** 2)[..., None] * along  # 1 - (x/a)^2 - (y/b)^2
+    mean = (rows["N_N"] / (np.pi * rows["a_m"] * rows["b_m"]))[:, None, None]  # Pa
     slip = pressed / (2.0 * mean * inside)
     row = np.searchsorted(pressures, 1.5 * mean * np.sqrt(inside), side="right")
     column = np.searchsorted(speeds, sliding.speed[:, None, None] * slip, side="right")
