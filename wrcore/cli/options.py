@@ -92,12 +92,12 @@ def profile_of(options, spec, kind):
     from wrcore.geometry.standards import named_profile
 
     if os.path.isfile(spec):
-        own = {"points": spec}
+        described = {"points": spec}
         if options.unit and Path(spec).suffix.lower() not in (".prw", ".prr"):
-            own["unit"] = options.unit
+            described["unit"] = options.unit
         if options.smoothing is not None:
-            own["smoothing"] = options.smoothing
-        spec = own if len(own) > 1 else spec
+            described["smoothing"] = options.smoothing
+        spec = described if len(described) > 1 else spec
     return named_profile(spec, kind, ratio(options.inclination))
 
 

@@ -139,7 +139,5 @@ def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, 
         if kinds.keys().isdisjoint(wanted):
             continue
         derived = derived_channels(groups, group, speed)
-        own = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
-        if own:
-            found[group] = own
+        found[group] = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
     return found

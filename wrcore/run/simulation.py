@@ -45,7 +45,7 @@ TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
     "sleeper_y_m", "sleeper_z_m", "sleeper_roll_rad",
 )  # fmt: skip
-"""Of a track that gives, in the order of its freedoms (:mod:`wrcore.dynamics.support`)."""
+"""Of a flexible track, in the order of its freedoms (:mod:`wrcore.dynamics.support`)."""
 
 
 def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:

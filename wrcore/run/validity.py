@@ -67,7 +67,7 @@ def exceeded(contact, patches, roll, yaw):
     rail, rail_ends, *_ = _profile(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
     reach = width * np.cos(rows[:, reduction.ANGLE])
     tilt = np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
-    ahead = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # sin^2(chi)
+    sine_square = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # of chi
     hollow = (geometry.rolling_radius + larger) * wheel * np.sqrt(1.0 + slope**2)
     flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
     stray = ROLL_STRAY * np.abs(np.sin(roll)) + YAW_STRAY * tilt**2  # as the search sees it
@@ -77,7 +77,7 @@ def exceeded(contact, patches, roll, yaw):
         "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
         "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
         "search_fallback": 2 * int(np.sum(stray > STRAY)),
-        "hollow_ahead": int(np.sum(1.0 - ahead + hollow * ahead < 0.0)),
+        "hollow_ahead": int(np.sum(1.0 - sine_square + hollow * sine_square < 0.0)),
         "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }
 

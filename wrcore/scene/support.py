@@ -1,4 +1,4 @@
-"""The track that gives under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
+"""The flexible track under each wheelset: masses, springs and dampers from a scene's key ``track.support``."""
 
 import numpy as np
 

@@ -3,7 +3,7 @@
 Bodies form families: those named alike up to a number and a side (``bogie_1`` and ``bogie_2``, or
 ``axle_box_1_left`` and others). Energies are kinetic, as parts of the mode's whole. In this order:
 
-* *rails* or *sleeper* lateral, vertical, roll: the mass of a track that gives has more energy than all bodies together,
+* *rails* or *sleeper* lateral, vertical, roll: the mass of a flexible track has more energy than all bodies together,
   or, of rails without mass, hardly oscillates and rails move more than any body. Both rails of the wheelset that moves
   most go *in phase* or *in antiphase*, or one of them alone;
 * *neutral*: the eigenvalue is below `NEUTRAL`; a displacement that nothing resists, such as that along the track;
@@ -128,10 +128,10 @@ class _Namer:
     def _with_phase(self, name, family, direction, speed):
         """The name, and how the family's front and rear half move."""
         members = np.array(self.groups[family])
-        ahead = self.along[members] > np.mean(self.along[members])
+        leading = self.along[members] > np.mean(self.along[members])
         if np.ptp(self.along[members]) < 1e-6:
             return name
-        front, rear = (speed[members[half], direction] for half in (ahead, ~ahead))
+        front, rear = (speed[members[half], direction] for half in (leading, ~leading))
         return f"{name}, {_phase(front, rear, ('front', 'rear'))}"
 
 
@@ -169,7 +169,7 @@ class _Track:
 
 def linear_modes(vehicle, linearisation, support=None):
     """Table of the modes of small motions of a Vehicle from its `Linearisation` (``support``: the model's track, if it
-    gives), their shapes and energies.
+    is flexible), their shapes and energies.
 
     The table has a row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s,
     imag_rad_per_s (not negative), frequency_Hz, damping_ratio (negative: growing, NaN: neutral), the coordinate with
