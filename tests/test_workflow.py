@@ -131,7 +131,7 @@ def checkout(smoke, tmp_path_factory):
     [
         ("wrcore/creep/laws.py", {"creep_table", "creep_laws", "simulate"}, {"fig2_profiles", "fig_ivp"}),
         (
-            "wrcore/analysis/assessment/motion.py", {"motion_table", "sweep_speeds", "accuracy_study"},
+            "wrcore/analysis/assessment/wheels.py", {"vehicle_lateral_motion", "sweep_speeds", "accuracy_study"},
             {"simulate", "creep_table"},
         ),
         ("workflow/study/paper/figures.py", {"fig1_parametrisation", "fig4_lateral_position"}, {"simulate", "fig_ivp"}),

@@ -93,14 +93,14 @@ def sources(*rooms):
 CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "balance", "scene")
 RUN = (*CONTACT, "creep", "elements", "dynamics", "integrate", *SCENE, "run")
-VEHICLE = ("analysis/assessment/motion", "analysis/assessment/wheels")
+VEHICLE = ("analysis/assessment/wheels",)
 LOADED = (*CONTACT, "creep", "elements", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
-STYLE = ("analysis/pictures/style", "study/report/legible")
+STYLE = ("analysis/pictures/style", "study/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
     "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
-    "geometry": sources(*LOADED, *SCENE, "study/paper/tables"),
+    "geometry": sources(*LOADED, *SCENE, "study/paper/motion", "study/paper/tables"),
     "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN),
@@ -109,8 +109,8 @@ CORE = {
     "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
-    "paper": sources("run", "analysis/assessment/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", "analysis/assessment/motion", *STYLE, "study/paper", "study/contact/surface"),
+    "paper": sources("run", "study/paper/motion", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "study/paper", "study/contact/surface"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

@@ -109,7 +109,8 @@ def _exact(g, psi, nu, creepages, level, progress):
     patches, member = np.unique(np.round(np.stack([g, psi, nu], axis=1), 12), axis=0, return_inverse=True)
     for index in progress(range(len(patches))) if progress else range(len(patches)):
         rows = np.flatnonzero(member.ravel() == index)
-        forces[rows], iterations = RollingContact(*patches[index], level=level).solve_many(creepages[rows])
+        ratio, shape, poisson = patches[index]
+        forces[rows], iterations = RollingContact(ratio, shape, poisson, level=level).solve_many(creepages[rows])
         failed += int((iterations < 0).sum())
     return forces, {"not_converged": failed, "out_of_range": 0}
 
@@ -185,10 +186,9 @@ def creep_force(
     import pandas as pd
 
     given = {"a": a, "b": b, "normal_force": normal_force, "mu": mu, "shear_modulus": shear_modulus, "nu": nu}
-    a, b, *values, psi = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
-    values = a, b * (1.0 - psi), b * (1.0 + psi), *values
+    along, across, *others, shape = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
+    values = along, across * (1.0 - shape), across * (1.0 + shape), *others
     frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(NUMBERS, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))
     forces = solve_cases(frame, model, table, source="creep_force")
-    shape = values[0].shape
-    return tuple(forces[name].to_numpy().reshape(shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))
+    return tuple(forces[name].to_numpy().reshape(along.shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))

@@ -78,7 +78,7 @@ class CreepTable:
     moment_error: tuple
 
     @property
-    def nu(self):
+    def nu(self) -> float:
         """Poisson's ratio."""
         return self.data.kalker.nu
 
@@ -99,7 +99,7 @@ class CreepTable:
             "table", a, b, normal_force, xi, eta, phi, mu, shear_modulus, self.nu, table=self, psi=psi
         )
 
-    def kernel_data(self):
+    def kernel_data(self) -> CreepTableData:
         """The `CreepTableData` to hand to kernels."""
         return self.data
 

@@ -97,7 +97,8 @@ def _closed(polynomial, f0, f1):
 
 def rail_sections(head):
     """Sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
-    right, start, uc, fc, before = [], 0.0, 0.0, 0.0, 0.0
+    right: list = []
+    start = uc = fc = before = 0.0
     ends = [w * _MM for w in head.half_widths] + [None]
     for radius, end in zip((r * _MM for r in head.radii), ends, strict=True):
         # the centre moves along the common normal, so that the arcs are tangent
@@ -174,7 +175,7 @@ def named_profile(
     spec = str(spec) if isinstance(spec, Path) else spec
     upright = isinstance(spec, dict) and spec.get("inclined") is False
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
-        name = spec["points"] if upright and "points" in spec else spec
+        name = spec["points"] if isinstance(spec, dict) and "points" in spec else spec
         raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
     inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}
