@@ -16,6 +16,8 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 DOCS_STAMP := .venv/.docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
+# One worker per core: threads of their BLAS would wait for each other, ten times as long as they calculate.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 
 .PHONY: study test check check-cpus smoke report figures docs lint bench clean
 
@@ -23,17 +25,17 @@ study: $(STAMP)
 	$(SNAKEMAKE)
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile -m "not check"
+	$(PYTEST) -m "not check"
 
 check: $(STAMP) lint
-	$(BIN)/python -m pytest -n $(CORES) --dist loadfile -m check
+	$(PYTEST) -m check
 
 check-cpus: $(STAMP)
 	export NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c \
 	    'import numpy._core._multiarray_umath as m; print(*m.__cpu_dispatch__)')"; \
 	for pair in x86-64-v3:Haswell x86-64-v2:Nehalem; do \
 	    NUMBA_CPU_NAME=$${pair%:*} NUMBA_CPU_FEATURES= OPENBLAS_CORETYPE=$${pair#*:} WRCORE_CACHE=$$(mktemp -d) \
-	    $(BIN)/python -m pytest -n $(CORES) --dist loadfile || exit 1; done
+	    $(PYTEST) || exit 1; done
 
 smoke: $(STAMP)
 	$(SNAKEMAKE) --configfile config/smoke.yaml

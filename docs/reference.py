@@ -34,10 +34,10 @@ GROUPS = {
 """Public names by what a user wants; names that stand nowhere here come last, as "Further"."""
 
 ROOMS = (
-    "analysis.stability.modes", "analysis.assessment.motion", "analysis.assessment.ride",
-    "analysis.stability.stability", "analysis.stability.limit_cycles", "analysis.to_accuracy",
-    "analysis.contact.poses", "analysis.contact.loaded", "contact.wheel_on_rail", "contact.conicity",
-    "contact.first_touch", "contact.poses", "contact.detection", "contact.normal", "creep.cases", "creep.kalker",
+    "analysis.stability.modes", "analysis.assessment.ride", "analysis.stability.stability",
+    "analysis.stability.limit_cycles", "analysis.to_accuracy", "analysis.contact.poses", "analysis.contact.loaded",
+    "contact.wheel_on_rail", "contact.conicity",
+    "contact.first_touch", "contact.pose_file", "contact.detection", "contact.normal", "creep.cases", "creep.kalker",
     "creep.laws", "creep.table", "geometry.profile", "geometry.standards", "geometry.irregularity", "geometry.track",
     "run.channels", "run.validity", "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",
 )  # fmt: skip

@@ -15,10 +15,18 @@ DATA = Path(__file__).parent / "data"
 SCENES = ROOT / "config" / "scenes"
 
 CHECKS = (
-    "study", "test_workflow", "test_workflow_lint", "test_slurm", "test_attack", "test_attack_inputs", "test_fuzz",
-    "test_fuzz_files", "test_bring_your_own", "test_first_result", "test_notebooks", "test_docs", "test_wheel",
+    "study/", "test_workflow", "test_slurm", "test_attack", "test_fuzz", "test_bring_your_own", "test_first_result",
+    "test_notebooks", "test_docs", "test_wheel",
 )  # fmt: skip
-"""Folders and files with the marker ``check``, which are no tests of the core: study, attacks, pages, the package."""
+"""How names of files begin that have the marker ``check``: no tests of the core, but of the study, pages, the package,
+and attacks."""
+
+FIRST = (
+    "test_workflow", "dynamics/test_energy", "contact/patch", "analysis/contact", "creep", "dynamics", "integrate",
+    "run", "vehicle", "balance", "sweep", "analysis", "test_api", "study", "contact", "test_attack", "test_fuzz",
+)  # fmt: skip
+"""The same in the order in which files are tested (``--no-loadscope-reorder``): of two workers one compiles what
+vehicles run with, the other one what patches are solved with; what is quick comes last, when one of them waits."""
 
 # What a command says must not depend on whether its kernels are compiled already; tests of bars and announcements
 # take the variable away for themselves.
@@ -26,9 +34,11 @@ os.environ["WRCORE_PROGRESS"] = "0"
 
 
 def pytest_collection_modifyitems(items):
-    for item in items:
-        if item.path.relative_to(Path(__file__).parent).parts[0].removesuffix(".py") in CHECKS:
+    names = {item: item.path.relative_to(Path(__file__).parent).as_posix() for item in items}
+    for item, name in names.items():
+        if name.startswith(CHECKS):
             item.add_marker("check")
+    items.sort(key=lambda item: next((k for k, begin in enumerate(FIRST) if names[item].startswith(begin)), len(FIRST)))
 
 
 @pytest.fixture(scope="session")

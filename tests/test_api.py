@@ -6,6 +6,7 @@ import inspect
 import subprocess
 import sys
 import time
+import tomllib
 
 import matplotlib
 import numpy as np
@@ -35,6 +36,12 @@ def test_every_public_name_has_an_example_and_types(name):
         parts = {key: part.annotation for key, part in signature.parameters.items()}
         missing = [key for key, part in parts.items() if part is inspect.Parameter.empty]
         assert missing == [] and signature.return_annotation is not inspect.Signature.empty
+
+
+def test_types_are_checked_where_public_names_are_defined():
+    files = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mypy"]["files"]
+    modules = {getattr(wr, name).__module__.replace(".", "/") for name in PUBLIC}
+    assert [m for m in modules if not {f"{m}.py", f"{m}/__init__.py", "/".join(m.split("/")[:2])} & {*files}] == []
 
 
 def test_a_path_a_dict_and_a_scene_with_changes_give_the_same_run():

@@ -96,7 +96,9 @@ def test_the_integrator_knows_no_rail():
 
 def test_the_core_shows_its_rooms_and_nothing_else():
     entries = {p.name for p in (ROOT / "wrcore").iterdir()} - {"__pycache__"}
-    assert {name.removesuffix(".py") for name in entries} == {*ROOMS, "__init__", "__main__", "py.typed"}
+    assert {name.removesuffix(".pyi").removesuffix(".py") for name in entries} == {
+        *ROOMS, "__init__", "__main__", "py.typed"
+    }  # fmt: skip
 
 
 def test_every_question_has_its_drawers():
@@ -111,10 +113,17 @@ def test_every_question_has_its_drawers():
     assert sections == questions - {"report"}
 
 
+def test_tests_stand_in_the_room_that_they_test():
+    tests = ROOT / "tests"
+    folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")} - {Path()}
+    assert {folder.parts[0] for folder in folders} == {*ROOMS, "study"}
+    assert [f for f in folders if not any((ROOT / package / f).is_dir() for package in ("wrcore", "workflow"))] == []
+
+
 @pytest.mark.parametrize(
     ("file", "line", "expected"),
     [
-        ("run/course.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
+        ("run/simulation.py", "from wrcore.analysis.assessment import wheels", "run imports wrcore.analysis"),
         ("geometry/path.py", "def f():\n    import wrcore.contact.scan", "geometry imports wrcore.contact.scan"),
         ("creep/laws.py", "from study.creep import laws", "the core imports study.creep"),
         (

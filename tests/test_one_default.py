@@ -3,9 +3,15 @@
 import json
 
 from tests.conftest import ROOT, SCENES
+from wrcore.analysis.assessment.assess import STANDARDS
+from wrcore.analysis.contact.loaded import GRIDS, MODELS
+from wrcore.analysis.to_accuracy import QUANTITIES
 from wrcore.cli import parser
+from wrcore.contact.detection import DETECTIONS
+from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS
 from wrcore.creep.table import DEFAULT_TOLERANCE
 from wrcore.errors.checked_yaml import read_yaml
+from wrcore.integrate.integrator import METHODS, REFERENCES
 from wrcore.scene.description import load_scene
 
 
@@ -21,3 +27,18 @@ def test_there_is_one_table_tolerance():
     for notebook in (ROOT / "notebooks").glob("*.ipynb"):
         lines = [line for cell in json.loads(notebook.read_text())["cells"] for line in cell["source"]]
         assert not [line for line in lines if "tolerance=" in line.split("#")[0] and "table" in line], notebook
+
+
+def test_words_of_schemas_and_commands_are_those_of_the_code():
+    keys = read_yaml(ROOT / "wrcore" / "scene" / "schemas" / "scene.yaml")["properties"]
+    contact, method = keys["contact"]["properties"], keys["integration"]["properties"]["method"]
+    known = {"patch": PATCHES, "resolution": RESOLUTIONS, "slip": SLIPS, "detection": DETECTIONS}
+    assert {name: contact[name]["enum"] for name in known} == {name: [*words] for name, words in known.items()}
+    assert sorted(method["enum"]) == sorted(["auto", *METHODS, *REFERENCES])
+    commands = next(action for action in parser()._actions if hasattr(action, "add_parser")).choices
+    options = {name: {a.dest: a for a in command._actions} for name, command in commands.items()}
+    asked = {name: [*options["contact"][name].choices] for name in known}
+    wanted = {"patch": MODELS, "resolution": GRIDS, "slip": SLIPS, "detection": ("planar", "spatial")}
+    assert asked == {name: [*words] for name, words in wanted.items()}
+    assert options["simulate"]["accuracy_of"].metavar == "|".join(QUANTITIES)
+    assert options["assess"]["standard"].metavar == "|".join(map(repr, STANDARDS))

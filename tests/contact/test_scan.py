@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from wrcore.contact.geometry import CALM, LANES, RAIL_COSINE, RAIL_RESERVE, STRAY, WHEEL_RESERVE
+from wrcore.contact.geometry import LANES, LARGEST_OFFSET, RAIL_COSINE, RAIL_RESERVE, SMALL_SHARE, WHEEL_RESERVE
 from wrcore.contact.reduction import _arc_sine, _arc_tangent
 from wrcore.contact.scan import (
-    blocks_near_misses,
+    blocks_with_planar_errors,
+    cell_offset,
     deepest_strip,
     first_zone,
     leaves_cells,
     make_window,
     near_blocks,
     scan,
-    stray,
     strip_gap,
 )
 from wrcore.contact.strip import make_pose
@@ -29,8 +29,8 @@ def look(geometry, side, y, z, axle, spatial, gaps):
     window = make_window(geometry, pose)
     for k in range(len(gaps)):
         gaps[k] = strip_gap(window.grid, geometry.scan_wheel, geometry.scan_rail, k)
-    near, misses = near_blocks(geometry, window), blocks_near_misses(geometry, window, axle[0] ** 2)
-    return window.grid.node, window.reserves, near, misses, stray(pose) if not leaves_cells(pose) else np.inf
+    near, misses = near_blocks(geometry, window), blocks_with_planar_errors(geometry, window, axle[0] ** 2)
+    return window.grid.node, window.reserves, near, misses, cell_offset(pose) if not leaves_cells(pose) else np.inf
 
 
 @jit
@@ -80,14 +80,14 @@ def test_no_strip_of_a_far_block_is_close(request, pair, spatial):
     lower = 0.0 if pair == "benchmark_pair" else 3.5e-3  # the cone touches its rail that much deeper
     for side, y, z, axle in random_poses(3000, 0):
         node, reserves, near, misses, strayed = look(geometry, side, y, z - lower, axle, spatial, gaps)
-        if strayed > STRAY:
+        if strayed > LARGEST_OFFSET:
             continue
         reserve = geometry.scan_wheel[WHEEL_RESERVE, node : node + len(gaps)] + geometry.scan_rail[RAIL_RESERVE]
         is_near = np.array([bool(near >> b & 1) for b in range(len(gaps) // geometry.block)])
         needed = (gaps < reserves * reserve).reshape(-1, geometry.block).any(axis=1)
         assert not np.any(needed & ~is_near)
         assert near & ~misses == 0
-        calm = strayed < CALM * STRAY
+        calm = strayed < SMALL_SHARE * LARGEST_OFFSET
         seen[calm] += 1
         near_count += calm * is_near.sum()
         needed_count += calm * needed.sum()
@@ -98,7 +98,7 @@ def test_no_strip_of_a_far_block_is_close(request, pair, spatial):
 def test_bounds_hold_at_the_limits_of_roll_and_yaw(benchmark_pair):
     """Poses that stray as far as is allowed, by roll alone and by yaw alone, with a wheel close to its rail."""
     gaps = np.empty(benchmark_pair.scan_rail.shape[1])
-    for limit in (0.999 * CALM * STRAY, 0.999 * STRAY):
+    for limit in (0.999 * SMALL_SHARE * LARGEST_OFFSET, 0.999 * LARGEST_OFFSET):
         for roll, yaw in ((limit / 0.03, 0.0), (-limit / 0.03, 0.0), (0.0, np.sqrt(limit / 1.5))):
             for y in np.linspace(-0.012, 0.012, 97):
                 z = 0.4605 - 0.75 * roll
@@ -118,7 +118,7 @@ def test_sums_are_those_of_the_strips(benchmark_pair):
     for side, y, z, axle in random_poses(300, 1):
         z -= 1e-3
         node, reserves, _, _, strayed = look(geometry, side, y, z, axle, True, gaps)
-        if strayed > STRAY:
+        if strayed > LARGEST_OFFSET:
             continue
         begin, end = (0, len(gaps)) if several % 2 else (LANES, len(gaps) - LANES)
         sums, overlap, close, deepest = scanned(geometry, side, y, z, axle, begin, end)

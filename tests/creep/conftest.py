@@ -1,4 +1,4 @@
-"""Reference cases of CONTACT, and the two tables, built once per test run."""
+"""Reference cases of CONTACT, and two tables."""
 
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import pytest
 
 from wrcore.creep.build import RESOLUTIONS, build_data
 from wrcore.creep.cases import check_cases, nondimensional
+from wrcore.creep.table import ensure_table
 
 DATA = Path(__file__).parent.parent / "data" / "creep"
 
@@ -51,8 +52,8 @@ def extreme_cases():
 
 @pytest.fixture(scope="session")
 def ellipse_table():
-    """A table coarser than the default one, of 28 080 cases."""
-    return build_data(0.28, "ellipse", RESOLUTIONS["ellipse"][1][1])
+    """The package's own table, that of runs."""
+    return ensure_table().data
 
 
 @pytest.fixture(scope="session")

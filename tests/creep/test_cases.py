@@ -6,7 +6,7 @@ import pytest
 
 from wrcore.creep import cases as cases_module
 from wrcore.creep.cases import MODELS, NUMBERS, creep_force, read_cases, solve_cases
-from wrcore.creep.table import CreepTable
+from wrcore.creep.table import ensure_table
 from wrcore.errors import InputError
 
 GOOD = {
@@ -19,9 +19,10 @@ def frame(**changes):
     return pd.DataFrame([{**GOOD, **changes}])
 
 
-@pytest.fixture
-def table(sdec_table):
-    return CreepTable(sdec_table, "sdec", 0.01, None, 0, (), ())
+@pytest.fixture(scope="module")
+def table():
+    """The one of the tests' runs, too: it is in the cache."""
+    return ensure_table(0.28, "sdec", 0.05)
 
 
 def test_exact_model_gives_contacts_forces(sdec_cases):

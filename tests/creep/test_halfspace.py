@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from wrcore.creep.build import random_creepages
-from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact, solve_field
+from wrcore.creep.halfspace import DEFAULT_LEVEL, RollingContact
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.creep.operator import make_panels, panel_counts, slip_matrix
+from wrcore.creep.operator import panel_counts, patch_panels, slip_matrix
 
 PATCHES = [(0.1, 0.0), (1.0, 0.0), (7.0, 0.0), (0.5, 0.6), (3.0, -0.9)]
 
@@ -158,7 +158,7 @@ def test_missed_tolerance_is_reported():
 @pytest.mark.parametrize("g, psi", PATCHES)
 def test_panels_carry_the_load(g, psi):
     """Bounds sum to mu N; their first moments are those of the SDEC pressure, by quadrature."""
-    panels = make_panels(g, psi, 9, 12)
+    panels = patch_panels(g, psi, 9, 12)
     b = 1 / np.sqrt(g)
     y = np.linspace(-b, b, 200001)
     t = y + psi * b
@@ -170,7 +170,7 @@ def test_panels_carry_the_load(g, psi):
 
 def test_influence_matrix_is_the_kernel_far_away():
     """A distant panel acts like a point force: u_x = 1/pi (1/R - nu y^2/R^3), here as a slip difference (1 %)."""
-    panels, nu = make_panels(0.05, 0.0, 12, 24), 0.3
+    panels, nu = patch_panels(0.05, 0.0, 12, 24), 0.3
     axx, ayy, axy = slip_matrix(panels, nu)
     row, column = 4, 20 * 12 + 7
     x, y = panels.x_slip[row] - panels.x_force[column], panels.y[row] - panels.y[column]
@@ -183,7 +183,7 @@ def test_influence_matrix_is_the_kernel_far_away():
 
 
 def test_field_adds_up_and_obeys_friction():
-    field = solve_field(1.0, 0.3, 0.28, 0.2, 0.1, 0.4, level=14)
+    field = RollingContact(1.0, 0.3, 0.28, 14).field(0.2, 0.1, 0.4)
     area = (-np.diff(field.x_edges, axis=1) * np.diff(field.y_edges)[:, None]).ravel()
     assert (field.px * area).sum() == pytest.approx(field.fx, abs=1e-5)
     assert (field.py * area).sum() == pytest.approx(field.fy, abs=1e-5)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.creep.conftest import read
-from wrcore.creep.kalker import extrapolated_coefficients, kalker_coefficients, kalker_data
+from tests.creep.kalker_grid import extrapolated_coefficients
+from wrcore.creep.kalker import kalker_coefficients, kalker_data
 
 NAMES = ["C11", "C22", "C23", "C33"]
 

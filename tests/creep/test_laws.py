@@ -6,6 +6,7 @@ import pytest
 from wrcore.creep.fastsim import fastsim
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.creep.laws import LAWS, creep_data, creep_force
+from wrcore.creep.table import ensure_table
 
 A, B, N, MU, G = 8e-3, 4e-3, 82e3, 0.3, 82e9
 SIMPLE = [name for name in LAWS if name != "table"]
@@ -19,8 +20,8 @@ def scaled(eta, phi_per_m):
 
 
 @pytest.fixture(scope="module")
-def data(ellipse_table):
-    return creep_data(0.28, ellipse_table, grid=200)
+def data():
+    return creep_data(0.28, ensure_table().kernel_data(), grid=200)
 
 
 def lateral(law, data, eta, phi):

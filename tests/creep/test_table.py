@@ -3,6 +3,7 @@
 import os
 from itertools import product
 
+import h5py
 import numpy as np
 import pytest
 
@@ -32,7 +33,7 @@ def look_up(table, g, psi, creepages, forces):
     outside = 0
     for i in range(g.size):
         xi, eta, phi = creepages[i]
-        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, g[i], psi[i], xi, eta, phi)
+        forces[i, 0], forces[i, 1], forces[i, 2], flag = table_lookup(table, np.log(g[i]), g[i], psi[i], xi, eta, phi)
         outside += flag
     return outside
 
@@ -79,14 +80,14 @@ def test_agrees_with_contact(request, table, cases, median, quantile_99):
 
 def test_five_inputs_are_counted(sdec_table, ellipse_table):
     assert count_cases(sdec_table.axes) == 75231
-    assert sdec_table.coefficients.nbytes < 15e6 and ellipse_table.coefficients.nbytes < 1e6
+    assert sdec_table.coefficients.nbytes < 15e6 and ellipse_table.coefficients.nbytes < 4e6
 
 
 def test_nodes_are_interpolated(any_table):
     """At a node the table gives the exact solution (float32 coefficients, iteration tolerance)."""
     axes = any_table.axes
     log_g, psi, t, alpha, beta = axis_values(axes)
-    level = {1: 16, 4: 14}[axes.n_psi]
+    level = {1: 20, 4: 14}[axes.n_psi]
     for i, j, k, m, n in ((2, 0, 3, axes.n_alpha // 2 + 3, 0), (5, axes.n_psi - 1, 9, axes.n_alpha // 2 + 1, 4)):
         g = np.exp(log_g[i])
         w = creepages_at(g, t[k : k + 1], alpha[m : m + 1], beta[n : n + 1], any_table.kalker)
@@ -293,10 +294,10 @@ def test_killed_write_leaves_nothing_behind(cache, tmp_path, monkeypatch):
     write_table(tmp_path / "t.h5", built)
     before = (tmp_path / "t.h5").read_bytes()
 
-    def fail(file, table):
+    def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(table_module, "_write_datasets", fail)
+    monkeypatch.setattr(h5py.Group, "create_dataset", fail)
     with pytest.raises(KeyboardInterrupt):
         write_table(tmp_path / "t.h5", built)
     assert (tmp_path / "t.h5").read_bytes() == before and len(list(tmp_path.glob("*t.h5*"))) == 1

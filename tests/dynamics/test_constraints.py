@@ -156,18 +156,24 @@ def runge_kutta(model, state, step, duration, projected):
     return worst
 
 
-def test_drift_without_feedback_with_baumgarte_and_with_projection(contact):  # noqa: F811
-    # A chain falls from the horizontal and thrashes for 10 s. Measured: |Phi| 3.5e-4 m without, 2.4e-6 m with Baumgarte
-    # (5 1/s), 1e-14 m with projection; the energy is off by 8.5, 0.44 and 0.16 mJ. Measured bounds are doubled below.
+# A chain falls from the horizontal and thrashes for 10 s. Measured: |Phi| 3.5e-4 m without, 2.4e-6 m with Baumgarte
+# (5 1/s), 1e-14 m with projection; the energy is off by 8.5, 0.44 and 0.16 mJ. Measured bounds are doubled below.
+
+
+def test_drift_without_feedback_and_with_baumgarte(contact):  # noqa: F811
     none = runge_kutta(*hanging_chain(contact), 3e-3, 10.0, False)
     baumgarte = runge_kutta(*hanging_chain(contact, alpha=5.0, beta=5.0), 3e-3, 10.0, False)
-    projected = runge_kutta(*hanging_chain(contact), 3e-3, 10.0, True)
-    assert none[0] > 1e-4
+    assert none[0] > 1e-4 and none[2] > 3.2e-4  # joints that come apart take energy with them
     assert baumgarte[0] < 5e-6 and baumgarte[1] < 6e-5
-    assert projected[0] < 1e-13 and projected[1] < 1e-13
-    assert projected[2] < 3.2e-4 < none[2]  # joints that come apart take energy with them
 
 
+@pytest.mark.check
+def test_drift_with_projection(contact):  # noqa: F811
+    projected = runge_kutta(*hanging_chain(contact), 3e-3, 10.0, True)
+    assert projected[0] < 1e-13 and projected[1] < 1e-13 and projected[2] < 3.2e-4
+
+
+@pytest.mark.check
 def test_projection_is_the_shortest_way_in_the_metric_of_the_masses(contact):  # noqa: F811
     # M (change) must lie in the range of D^T; for positions, that of the first Gauss-Newton step
     rng = np.random.default_rng(5)
@@ -196,6 +202,7 @@ def test_projection_is_the_shortest_way_in_the_metric_of_the_masses(contact):  #
     np.testing.assert_allclose(full.jacobian.T @ shares, left, atol=1e-12)
 
 
+@pytest.mark.check
 def test_projection_closes_the_joints_of_a_spinning_wheelset(contact):  # noqa: F811
     rng = np.random.default_rng(6)
     boxes = [Joint(f"{y}", "revolute", (0, b), [(0, y, 0), (0.1, 0, 0.05)], axis=1) for b, y in ((1, 1.0), (2, -1.0))]

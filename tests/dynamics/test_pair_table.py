@@ -88,9 +88,7 @@ def test_a_wheel_that_rolls_back_is_a_mirror_image_too(rolling_wheels):
     """x and yaw change their sign, and what points along x or turns about y and z."""
     wheels = rolling_wheels[0]["tabulated"]
     (ahead,), (back,) = (
-        wheels.at_height(
-            "left", -1.5e-3, Z, yaw=sign * 1e-3, rolling=Rolling(sign * SPEED, sign * SPEED / 0.459, 0.01)
-        )
+        wheels.at_height("left", -1.5e-3, Z, yaw=sign * 1e-3, rolling=Rolling(sign * SPEED, sign * SPEED / 0.459, 0.01))
         for sign in (1.0, -1.0)
     )
     mirrored = [reduction.X, reduction.FX, reduction.MZ, reduction.XI, reduction.PHI]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from wrcore.contact.patch.library import solve_patch
+from study.patch.rolling import solve_patch
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,

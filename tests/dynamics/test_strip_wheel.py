@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from study.patch.rolling import solve_patch
 from tests.conftest import SCENES
+from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.gap import Frame
-from wrcore.contact.patch.library import solve_patch
-from wrcore.contact.patch.normal import NormalContact
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.motion import WheelMotion

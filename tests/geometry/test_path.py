@@ -220,11 +220,10 @@ def test_series_of_the_cosine_of_the_incline():
 
 @settings(max_examples=200, deadline=None)
 @given(s=st.floats(-30.0, 1200.0), y=st.floats(-3.0, 3.0), z=st.floats(-0.5, 4.0), off=st.floats(-20.0, 20.0))
-def test_arc_length_of_is_the_inverse(s, y, z, off):
-    path = build_track({"path": WINDING}, "test").path
-    station, matrix = frame(path, s)
+def test_arc_length_of_is_the_inverse(winding, s, y, z, off):
+    station, matrix = frame(winding, s)
     point = vector(station) + matrix @ np.array([0.0, y, z])
-    assert arc_length_of(path, *point, s + off) == pytest.approx(s, abs=1e-11)
+    assert arc_length_of(winding, *point, s + off) == pytest.approx(s, abs=1e-11)
 
 
 def test_arc_length_of_finds_its_own_start():

@@ -21,7 +21,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.track import track_poses
 from wrcore.integrate.integrator import METHODS, integrate
-from wrcore.run.course import evaluated
+from wrcore.run.simulation import evaluated
 from wrcore.scene.description import compile_scene, load_scene
 
 RTOLS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)

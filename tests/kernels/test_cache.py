@@ -169,7 +169,8 @@ def test_a_damaged_kernel_is_compiled_anew(tmp_path, ending):
 def test_a_cached_table_is_what_its_name_says(wanted, monkeypatch, capsys, damage):
     built = []
     monkeypatch.setattr(table_module, "build_table", lambda *args: built.append(args) or original(*args))
-    monkeypatch.setattr(table_module, "RESOLUTIONS", {"ellipse": ((1e-9, table_module.Resolution(4, 4, 6, 8, 4, 6)),)})
+    tiny = ((1e-9, table_module.Resolution(4, 4, 6, 8, 4, 6)),)
+    monkeypatch.setattr(table_module, "RESOLUTIONS", dict.fromkeys(table_module.RESOLUTIONS, tiny))
     monkeypatch.setattr(table_module, "CHECK_LEVEL", 6)
     path = table_path(0.28, "ellipse", 0.5)
     if damage == "unwritable":

@@ -19,7 +19,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import sign
 from wrcore.run.results import load_run
 from wrcore.run.simulate import output_blocks, output_times, simulate
-from wrcore.run.streaming import Parts, simulate_to
+from wrcore.run.streaming import Blocks, simulate_to
 from wrcore.scene.description import load_scene
 
 HUNTING = {
@@ -161,7 +161,7 @@ def test_an_interrupted_run_of_something_else_is_not_gone_on_with(tmp_path):
 def test_only_one_process_writes_a_file(tmp_path):
     out = tmp_path / "run.h5"
     (tmp_path / ".run.h5.parts").mkdir()
-    with Parts(out, ""):
+    with Blocks(out, ""):
         with pytest.raises(InputError, match="no other process"):
             simulate_to(scene_of(HUNTING), out)
     simulate_to(scene_of(HUNTING), out)
@@ -231,7 +231,7 @@ def test_a_damaged_interrupted_run_stays_until_another_is_complete(tmp_path, mon
     content = bytearray(out.read_bytes())
     content[-1000] ^= 1
     out.write_bytes(content)
-    monkeypatch.setattr("wrcore.run.course.integrate", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("wrcore.run.simulation.integrate", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         simulate_to(scene_of(HUNTING), out)
     assert out.read_bytes() == content

@@ -352,10 +352,10 @@ def test_wrong_sweeps_are_refused_with_one_line(changes, expected):
 def test_a_damaged_batch_of_an_interrupted_sweep_is_run_again(tmp_path, ending):
     sweep, part = wr.load_sweep(small()), tmp_path / f"part.{ending}"
     sweep_batch.write_table(part, table := sweep_batch.run_rows(sweep, sweep.rows(0)), sweep)
-    pd.testing.assert_frame_equal(sweep_batch.load_part(sweep, part), table, check_dtype=False)
+    pd.testing.assert_frame_equal(sweep_batch.load_table(part, sweep), table, check_dtype=False)
     part.write_bytes(part.read_bytes()[:-3])
     with pytest.raises(InputError):
-        sweep_batch.load_part(sweep, part)
+        sweep_batch.load_table(part, sweep)
     folder = tmp_path / f".table.csv.{sweep.digest()}"
     folder.mkdir()
     (folder / "0000.csv").write_text("run,speed\n0,")

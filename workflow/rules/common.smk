@@ -1,11 +1,11 @@
 # Checks of the configuration, and which sources each family of rules stands on.
 from pathlib import Path
 
-import jsonschema
 import yaml
 from snakemake.exceptions import WorkflowError
 
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import _validator
 from wrcore.scene.description import load_scene
 
 HERE = Path(workflow.basedir)
@@ -14,7 +14,11 @@ HERE = Path(workflow.basedir)
 def check_config():
     """Stop before any job, with one line that names the key, if the configuration cannot be used."""
     schema = yaml.safe_load((HERE / "workflow/schemas/config.schema.yaml").read_text())
-    error = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(config))
+    validator = _validator()(schema)  # imports jsonschema, without a grammar that would take most of a second
+
+    from jsonschema.exceptions import best_match
+
+    error = best_match(validator.iter_errors(config))
     if error is not None:
         key = ".".join(map(str, error.absolute_path)) or "top level"
         meaning = error.schema.get("description", "see workflow/schemas/config.schema.yaml")
@@ -89,14 +93,14 @@ def sources(*rooms):
 CONTACT = ("kernels", "geometry", "contact")
 SCENE = ("vehicle", "balance", "scene")
 RUN = (*CONTACT, "creep", "elements", "dynamics", "integrate", *SCENE, "run")
-VEHICLE = ("analysis/assessment/motion", "analysis/assessment/wheels")
+VEHICLE = ("analysis/assessment/wheels",)
 LOADED = (*CONTACT, "creep", "elements", "dynamics", "analysis/contact/loaded", "analysis/contact/poses")
-STYLE = ("analysis/pictures/style", "study/report/legible")
+STYLE = ("analysis/pictures/style", "study/style", "study/report/legible")
 CORE = {
     "creep": sources("kernels", "creep"),
     "creep_study": sources("kernels", "creep", "study/creep/laws"),
     "creep_figures": sources("kernels", "creep", "study/creep", *STYLE),
-    "geometry": sources(*LOADED, *SCENE, "study/paper/tables"),
+    "geometry": sources(*LOADED, *SCENE, "study/paper/motion", "study/paper/tables"),
     "contact_search": sources(*LOADED, "analysis/contact/contact", "study/contact/tables", "study/contact/search"),
     "contact_figures": sources(*LOADED, "analysis/contact/contact", "analysis/pictures/plot_contact", *STYLE, "study/contact"),
     "simulation": sources(*RUN),
@@ -105,8 +109,8 @@ CORE = {
     "accuracy": sources(*VEHICLE, "study/accuracy/errors", "study/accuracy/models"),
     "accuracy_requests": sources(*VEHICLE, "analysis/to_accuracy", "study/accuracy/requests"),
     "accuracy_figures": sources("run/accuracy", *VEHICLE, *STYLE, "study/accuracy"),
-    "paper": sources("run", "analysis/assessment/motion", "study/paper/tables"),
-    "figures": sources(*CONTACT, *SCENE, "run", "analysis/assessment/motion", *STYLE, "study/paper", "study/contact/surface"),
+    "paper": sources("run", "study/paper/motion", "study/paper/tables"),
+    "figures": sources(*CONTACT, *SCENE, "run", *STYLE, "study/paper", "study/contact/surface"),
 }
 SCENES = sorted(str(p) for folder in ("scenes", "vehicles") for p in Path("config", folder).glob("*.yaml"))
 

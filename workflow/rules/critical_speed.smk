@@ -3,7 +3,8 @@
 CRITICAL = config["critical_speed"]
 HUNTING = list(CRITICAL["vehicles"])
 CORE["critical_speed"] = CORE["simulation"] + sources(
-    "analysis/assessment/motion", "analysis/stability/modes", "analysis/stability/stability", "analysis/stability/limit_cycles"
+    "analysis/stability/modes", "analysis/stability/stability", "analysis/stability/limit_cycles",
+    "study/critical_speed/tables",
 )  # fmt: skip
 CORE["critical_speed_figures"] = CORE["critical_speed"] + sources(*STYLE, "study/critical_speed")
 

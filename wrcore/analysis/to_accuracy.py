@@ -47,30 +47,18 @@ COMPLETE = ("completed", "derailed")
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How a run to an accuracy went.
-
-    Attributes
-    ----------
-    of : str
-        A key of `QUANTITIES`.
-    asked, found : float
-        What was asked for, and the difference between the run and one of ten times its tolerance: nearly always more
-        than its error.
-    reached : bool
-    rtol : float
-        Relative tolerance of the run.
-    cost : float
-        Evaluations of the equations in all runs over those in the one that is handed out.
-    reason : str
-        One line.
-    """
+    """How a run to an accuracy went."""
 
     of: str
+    """A key of `QUANTITIES`."""
     asked: float
     found: float
+    """Difference between the run and one of ten times its tolerance: nearly always more than its error."""
     reached: bool
     rtol: float
+    """Relative tolerance of the run."""
     cost: float
+    """Evaluations of the equations in all runs over those in the one that is handed out."""
     reason: str
 
 
@@ -172,19 +160,14 @@ def _end(run, differences, rtol):
 
 
 def difference(one: Run, other: Run, of: str = "y") -> float:
-    """Difference of two runs of one scene in a quantity of `QUANTITIES`, over the times that both have reached.
-
-    Returns
-    -------
-    float
-        Root mean square over times and wheelsets or wheels; of the mean over time for wear. Infinite where they have
-        no time in common.
+    """Difference of two runs of one scene in a quantity of `QUANTITIES`, over the times that both have reached: root
+    mean square over times and wheelsets or wheels, for wear of the mean over time; infinite without a time in common.
     """
     count = min(len(one.t), len(other.t))
     if count == 0:
         return math.inf
-    values = [[series[:count] for series in _series(run, of)] for run in (one, other)]
-    apart = np.subtract(*values)
+    first, second = (np.array([series[:count] for series in _series(run, of)]) for run in (one, other))
+    apart = first - second
     if of == "wear":
         apart = np.nanmean(apart, axis=1)
     return float(np.sqrt(np.nanmean(apart**2)))

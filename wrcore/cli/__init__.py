@@ -15,7 +15,8 @@ from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
 COMMANDS = (init, simulate, sweep, assess, draw, evolve, contact, conicity, creep, table, profiles, keys)
-"""Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over."""
+"""Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
+what the options say."""
 
 
 def parser():

@@ -25,7 +25,6 @@ FILES = columns(
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "assess", help="assess a stored run by EN 14363, EN 12299 or ISO 2631", description=ABOUT, epilog=FILES
     )
@@ -38,7 +37,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.analysis.assessment.assess import assess
     from wrcore.run.results import load_run
 

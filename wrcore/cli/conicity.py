@@ -3,7 +3,7 @@
 import argparse
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, profile_of
+from wrcore.cli.options import add_pair, columns, pair_of
 from wrcore.errors import InputError
 from wrcore.run.channels import DESCRIPTIONS
 
@@ -32,7 +32,6 @@ TABLE = columns(
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "conicity",
         help="equivalent conicity of a wheelset on its track (EN 15302)",
@@ -55,7 +54,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     import numpy as np
 
     from wrcore.contact.conicity import conicity_curve
@@ -67,7 +65,7 @@ def run(options):
     if not (0.0 < first <= last <= 0.05 and (last - first) / 1e4 <= step < float("inf") and step > 0.0):
         raise InputError("wrcore conicity", "--amplitudes-from", "expected 0 < from <= to <= 0.05 m and a step > 0")
     amplitudes = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
-    pair = _wheelset_on_track(options)
+    pair = pair_of(options)
     curve = conicity_curve(pair, amplitudes, options.roll)
     if curve["equivalent_conicity"].isna().all():
         raise InputError("wrcore conicity", "--to", "expected an amplitude at which the wheelset swings, got none")
@@ -76,15 +74,3 @@ def run(options):
         shifts = 1e-4 * np.arange(-round(last / 1e-4) - 20, round(last / 1e-4) + 21)
         write_csv(first_touch(pair, shifts, options.roll), table_out)
     return 0
-
-
-def _wheelset_on_track(options):
-    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
-
-    wheel = profile_of(options, options.wheel, "wheel")
-    right_wheel = profile_of(options, options.right_wheel, "wheel") if options.right_wheel else wheel
-    rail = profile_of(options, options.rail, "rail")
-    radius = options.rolling_radius
-    right = radius if options.right_rolling_radius is None else options.right_rolling_radius
-    sides = WheelOnRail(wheel, rail, radius), WheelOnRail(right_wheel, rail, right)
-    return WheelsetOnTrack(*sides, options.tape_circle_half_distance, options.gauge)

@@ -1,7 +1,7 @@
 """``wrcore contact``: the patches of a wheelset in given poses."""
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import add_pair, columns, profile_of
+from wrcore.cli.options import add_pair, as_runs, columns, pair_of
 from wrcore.errors import InputError
 
 ABOUT = """
@@ -9,12 +9,10 @@ Patches of both wheels for each pose of IN.csv. z given: forces at that height; 
 load by itself; neither: both are solved. Roll turns the wheelset about x first, then yaw about z.
 """
 
-
 POSES = columns(
     "IN.csv, a row per pose",
     pose_id="any text",
-    y_m="",
-    yaw_rad="",
+    **as_runs("y_m", "yaw_rad"),
     roll_rad="optional",
     z_m="optional",
     V_m_per_s="optional: speed; where it is given creep forces act",
@@ -29,34 +27,21 @@ FILES = columns(
     pose_id="of its pose",
     side="left or right",
     patch="number at its wheel, from 1",
-    u_wheel_m="",
-    s_wheel_rad="",
-    u_rail_m="",
+    **as_runs("u_wheel_m", "s_wheel_rad", "u_rail_m"),
     x_m="point of contact in the track frame, from the wheelset's cross-section; of strips the centroid of pressure",
     y_m="the same, left positive",
     z_m="the same, from the plane of the rails' highest points",
-    contact_angle_rad="",
-    penetration_m="",
-    a_m="",
-    b_m="",
-    N_N="",
-    p_max_Pa="",
+    **as_runs("contact_angle_rad", "penetration_m", "a_m", "b_m", "N_N", "p_max_Pa"),
     roll_rad="of the wheelset",
     z_wheelset_m="height of the wheelset's centre",
     x_min_m="where the patch begins",
     x_max_m="where it ends",
     width_m="of the patch in the contact plane",
-    xi="",
-    eta="",
-    phi_per_m="",
-    Fx_N="",
-    Fy_N="",
-    Mz_Nm="",
+    **as_runs("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm"),
 )
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "contact", help="contact of a wheelset in given poses", description=ABOUT, epilog=f"{POSES}\n\n{FILES}"
     )
@@ -90,17 +75,13 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.analysis.contact.poses import loaded_poses
-    from wrcore.contact.poses import read_poses
-    from wrcore.contact.wheel_on_rail import WheelsetOnTrack
+    from wrcore.contact.pose_file import read_poses
 
     out = output(options.out)
     poses = read_poses(options.poses)
-    wheel, rail = profile_of(options, options.wheel, "wheel"), profile_of(options, options.rail, "rail")
-    pair = WheelsetOnTrack.alike(wheel, rail, options.gauge, options.rolling_radius, options.tape_circle_half_distance)
     table = loaded_poses(
-        poses, pair.left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
+        poses, pair_of(options).left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
         options.load_by, options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
     )  # fmt: skip
     if table.empty:

@@ -3,7 +3,7 @@
 from argparse import ArgumentTypeError
 
 from wrcore.cli.files import output, write_csv
-from wrcore.cli.options import columns
+from wrcore.cli.options import as_runs, columns
 from wrcore.errors import one_of
 
 ABOUT = """
@@ -20,12 +20,10 @@ CASES = columns(
     mu="friction coefficient",
     G_Pa="shear modulus",
     nu="Poisson's ratio",
-    xi="",
-    eta="",
-    phi_per_m="",
+    **as_runs("xi", "eta", "phi_per_m"),
 )
 
-FILES = columns("OUT.csv, a row per case", case_id="of its case", Fx_N="", Fy_N="", Mz_Nm="")
+FILES = columns("OUT.csv, a row per case", case_id="of its case", **as_runs("Fx_N", "Fy_N", "Mz_Nm"))
 
 
 def _law(name):
@@ -38,7 +36,6 @@ def _law(name):
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "creep", help="creep forces of given cases", description=ABOUT, epilog=f"{CASES}\n\n{FILES}"
     )
@@ -53,7 +50,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.creep.cases import read_cases, solve_cases
     from wrcore.creep.table import show_progress
 

@@ -14,7 +14,6 @@ FIGURES = (".svg", ".png")
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "draw", help="picture of a vehicle, animation of a run, profiles over a distance", description=ABOUT
     )
@@ -31,7 +30,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     of_run = Path(options.source).suffix.lower() in (".h5", ".hdf5")
     out = output(options.out, (".html",) if of_run else FIGURES)
     from wrcore.analysis.pictures.animation import Animation

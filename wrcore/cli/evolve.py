@@ -32,7 +32,6 @@ FILES = (
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "evolve", help="wear a wheel profile over the distance of a plan", description=ABOUT, epilog=FILES
     )
@@ -43,7 +42,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.analysis.wear.evolve import evolve
 
     if not 1 <= options.threads <= 1000:

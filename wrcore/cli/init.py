@@ -12,14 +12,12 @@ NEXT = """{folder}: scenes, vehicles, sweeps, wear. To begin with:
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser("init", help="copy scenes, vehicles and a sweep to start from", description=ABOUT)
     command.add_argument("folder", metavar="FOLDER", help="created if needed")
     command.set_defaults(run=run)
 
 
 def run(options):
-    """Copy them."""
     from wrcore.scene.examples import copy_examples
 
     print(NEXT.format(folder=copy_examples(options.folder)))

@@ -15,7 +15,6 @@ below the key track.
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser("keys", help="list the keys of scenes, vehicles, sweeps", description=ABOUT)
     command.add_argument("kind", choices=KINDS, help="kind of file")
     command.add_argument("below", nargs="?", metavar="key.path", help="only this key and those below it")
@@ -23,7 +22,6 @@ def add(commands):
 
 
 def run(options):
-    """Print the list."""
     rows = [row for row in keys_of(options.kind) if _is_below(row[0], options.below)]
     if not rows:
         known = {row[0] for row in keys_of(options.kind)}

@@ -15,9 +15,8 @@ class _Help(argparse.RawDescriptionHelpFormatter):
     def _get_help_string(self, action):
         text = action.help or ""
         value = action.default
-        if action.required or not action.option_strings or value in (None, [], argparse.SUPPRESS) or "default" in text:
-            return text
-        if isinstance(value, bool):
+        said = action.required or not action.option_strings or "default" in text
+        if said or value in (None, [], argparse.SUPPRESS) or isinstance(value, bool):
             return text
         return f"{text} (default: {value:g})" if isinstance(value, float) else f"{text} (default: {value})"
 
@@ -56,6 +55,11 @@ def columns(title, **texts):
     return "\n".join(lines)
 
 
+def as_runs(*names):
+    """Columns that are a run's channels of these names, for `columns`."""
+    return dict.fromkeys(names, "")
+
+
 def add_pair(command):
     """Options of a wheel on a rail."""
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
@@ -70,17 +74,30 @@ def add_pair(command):
     )
 
 
+def pair_of(options):
+    """`WheelsetOnTrack` of the options of `add_pair`, and of those of a right wheel that differs."""
+    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+
+    given = {"right_wheel": None, "right_rolling_radius": None} | vars(options)
+    wheel = profile_of(options, options.wheel, "wheel")
+    right = profile_of(options, given["right_wheel"], "wheel") if given["right_wheel"] else wheel
+    rail, radius = profile_of(options, options.rail, "rail"), options.rolling_radius
+    other = radius if given["right_rolling_radius"] is None else given["right_rolling_radius"]
+    sides = WheelOnRail(wheel, rail, radius), WheelOnRail(right, rail, other)
+    return WheelsetOnTrack(*sides, options.tape_circle_half_distance, options.gauge)
+
+
 def profile_of(options, spec, kind):
     """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply."""
     from wrcore.geometry.standards import named_profile
 
     if os.path.isfile(spec):
-        own = {"points": spec}
+        described = {"points": spec}
         if options.unit and Path(spec).suffix.lower() not in (".prw", ".prr"):
-            own["unit"] = options.unit
+            described["unit"] = options.unit
         if options.smoothing is not None:
-            own["smoothing"] = options.smoothing
-        spec = own if len(own) > 1 else spec
+            described["smoothing"] = options.smoothing
+        spec = described if len(described) > 1 else spec
     return named_profile(spec, kind, ratio(options.inclination))
 
 

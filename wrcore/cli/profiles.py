@@ -2,7 +2,6 @@
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "profiles", help="list the named wheel and rail profiles",
         description="List the named profiles: name, kind, sections from the flange or the crown, source.",
@@ -11,7 +10,6 @@ def add(commands):
 
 
 def run(options):
-    """Print the list."""
     from wrcore.geometry.standards import list_profiles
 
     rows = list_profiles()

@@ -22,7 +22,6 @@ wr.load_run("run.h5") lists and explains; .to_pandas() makes one table of them.
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser("simulate", help="run a scene", description=ABOUT, epilog=FILES)
     command.add_argument("scene", metavar="SCENE.yaml", help="'wrcore init FOLDER' makes some to start from")
     command.add_argument(
@@ -48,7 +47,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.run.progress import simulated_time
     from wrcore.run.streaming import simulate_to
     from wrcore.scene.description import load_scene
@@ -91,11 +89,9 @@ def _print_run(done, as_json):
     factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0
     summary = {
         "status": done.status, "reason": done.reason, "simulated_s": counters["simulated_s"],
-        "wall_s": counters["wall_s"], "real_time_factor": factor, "steps": counters["steps"],
-        "rejected": counters["rejected"], "rhs_evaluations": counters["rhs_evaluations"],
-        "compile_s": counters["compile_s"], "patches": counters["patches"],
-        **{name: counters[name] for name in LIMITS},
+        "wall_s": counters["wall_s"], "real_time_factor": factor,
     }  # fmt: skip
+    summary |= {n: counters[n] for n in ("steps", "rejected", "rhs_evaluations", "compile_s", "patches", *LIMITS)}
     if as_json:
         print(json.dumps(summary))
         return

@@ -22,7 +22,6 @@ FILES = columns(
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser(
         "sweep", help="run a scene many times with other values of its keys", description=ABOUT, epilog=FILES
     )
@@ -35,7 +34,6 @@ def add(commands):
 
 
 def run(options):
-    """Do what the options say."""
     from wrcore.sweep.batch import gather, load_table, run_rows, sweep_to_file, write_table
     from wrcore.sweep.plan import load_sweep
 

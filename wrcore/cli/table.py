@@ -8,7 +8,6 @@ Creep tables: exact rolling contact, solved once on patches of all shapes. Scene
 
 
 def add(commands):
-    """The command's parser."""
     command = commands.add_parser("table", help="build or describe a creep table", description=ABOUT)
     actions = command.add_subparsers(metavar="ACTION", required=True, help="what to do")
     build = actions.add_parser(
@@ -33,7 +32,6 @@ def add(commands):
 
 
 def run_build(options):
-    """Build a table."""
     from wrcore.creep.table import DEFAULT_TOLERANCE, SCHEMA, build_table, show_progress, write_table
 
     out = output(options.out, HDF5)
@@ -45,7 +43,6 @@ def run_build(options):
 
 
 def run_info(options):
-    """Describe a table."""
     from wrcore.creep.table import load_table
 
     return _print_table(load_table(options.file))

@@ -91,8 +91,7 @@ class _Well:
         With T = integral of dy / sqrt(E - Phi), L = 2 T sqrt(e r0 / 2), so that e and r0 cancel: (pi / T)^2.
         In each cell E - Phi = q is quadratic with q'' = -dr' and the integral is 2 atan(w) / sqrt(dr' / 2) with
         w = sqrt(dr' / 2) h / (sqrt(q0) + sqrt(q1)): exact at the turning points, where q = 0, and in steep cells
-        (contact jumps). For dr' < 0 the same with atanh.
-        """
+        (contact jumps). For dr' < 0 the same with atanh."""
         margin = 1e-6 * (end - start)  # a node on a turning point would make a cell without length
         inside = np.flatnonzero((self.y > start + margin) & (self.y < end - margin))
         y = np.concatenate(([start], self.y[inside], [end]))
@@ -121,8 +120,7 @@ def equivalent_conicity(y, difference, amplitudes):
     """Equivalent conicities (m,) by Klingel's integral (EN 15302 annex B, UIC 519) for ``amplitudes`` (m,), m, and
     turning points (m, 2), m, from the difference r_left - r_right (m), linear between increasing positions ``y`` (m).
     The motion swings about the zero nearest to y = 0, between points of equal potential. 0: it crosses play without a
-    difference. NaN: the table does not reach, or a wrong-signed difference lets no such wave exist.
-    """
+    difference. NaN: the table does not reach, or a wrong-signed difference lets no such wave exist."""
     y, difference = np.asarray(y, dtype=float), np.asarray(difference, dtype=float)
     amplitudes = np.atleast_1d(np.asarray(amplitudes, dtype=float))
     if y.ndim != 1 or y.shape != difference.shape or y.size < 2 or not np.all(np.diff(y) > 0.0):

@@ -10,8 +10,7 @@ def creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed):
 
     Velocity of the wheelset's centre (m/s), its angular velocity (rad/s) and the patch relative to the centre (m) are
     given in the track frame. The contact frame is (1) forward, (2) lateral in the tangent plane, (3) normal from rail
-    into wheel: (1, 0, 0), (0, cos, sin), (0, -sin, cos) of the contact angle.
-    """
+    into wheel: (1, 0, 0), (0, cos, sin), (0, -sin, cos) of the contact angle."""
     slowness = 1.0 / speed
     ux = vx + wy * pz - wz * py
     uy = vy + wz * px - wx * pz

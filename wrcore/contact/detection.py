@@ -17,15 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.contact.geometry import (
-    RADIUS,
-    RAIL_COSINE,
-    RAIL_RESERVE,
-    RESERVE_TO_SECOND,
-    SCAN_STEP,
-    WHEEL_RESERVE,
-    YAW_LIMIT,
-)
+from wrcore.contact.geometry import RADIUS, RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, SECOND_BOUND, WHEEL_RESERVE, YAW_LIMIT
 from wrcore.contact.reduction import (
     CURVATURE_Y,
     MAX_PATCHES,
@@ -43,9 +35,9 @@ from wrcore.contact.reduction import (
 )
 from wrcore.contact.scan import (
     MOST_STRIPS,
-    blocks_near_misses,
-    cells_ahead,
+    blocks_with_planar_errors,
     deepest_strip,
+    fine_cell_shift,
     fine_sums,
     first_zone,
     leaves_cells,
@@ -85,8 +77,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
 
     ``outside`` and ``beyond`` are points without overlap next to its ``first`` and ``last`` strip, ``deepest`` and
     ``depth`` (along the normal) its deepest strip; m0, m1, m2 are sums of g^2 over its ``nodes`` scan nodes, positions
-    counted from ``first``.
-    """
+    counted from ``first``."""
     if count == MAX_PATCHES:
         shallowest = 0
         for k in range(1, MAX_PATCHES):
@@ -106,8 +97,8 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
         else:
             fine_nodes, middle = 0, 0.5 * (outside + beyond)
             if not leaves_cells(pose):
-                ahead = cells_ahead(geometry, middle, strip_point(geometry, pose, middle)[0])
-                m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, ahead, outside, beyond)
+                shift = fine_cell_shift(geometry, middle, strip_point(geometry, pose, middle)[0])
+                m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, shift, outside, beyond)
             if fine_nodes < _WIDE:
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
@@ -122,8 +113,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
 
     Only strips from ``first_close`` to ``last_close`` and their neighbours can take part: of those over the rail's
     cells or, where strips leave these, of the whole wheel. Patches are added to the ``count`` there are; returns their
-    new number.
-    """
+    new number."""
     rarely_called()
     wheel, rail = geometry.scan_wheel, geometry.scan_rail
     cells = rail.shape[1]
@@ -151,7 +141,7 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
         cell = rail_cell(geometry, pose, here) if exact else k
         reserve = wheel[WHEEL_RESERVE, grid.node + k] + rail[RAIL_RESERVE, cell]
         if exact:  # yaw draws strips of a curved flange apart along the rail: the gap bends with the square of that
-            second = RESERVE_TO_SECOND * wheel[WHEEL_RESERVE, grid.node + k]
+            second = SECOND_BOUND * wheel[WHEEL_RESERVE, grid.node + k]
             reserve *= (1.0 + grid.tilt_square * wheel[RADIUS, grid.node + k] * second) ** 2
         if abs(coarse) < reserve and not exact:  # the node may have left its rail cell: its sign is not safe
             coarse = gap_at(geometry, pose, here)[0]
@@ -213,7 +203,7 @@ def planar_error_bound(geometry, side, y, z, ex, ey, ez):
     if yaw_square > YAW_LIMIT * YAW_LIMIT or leaves_cells(pose):
         bound = planar_bound(grid, yaw_square, wheel, rail, 0, cells)
     else:
-        near = blocks_near_misses(geometry, window, yaw_square)
+        near = blocks_with_planar_errors(geometry, window, yaw_square)
         while near > 0:
             begin, end, near = first_zone(near, geometry.block)
             bound = max(bound, planar_bound(grid, yaw_square, wheel, rail, begin, end))
@@ -236,8 +226,8 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
     else:
         middle = (overlap.first + overlap.last) // 2
         ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_place(grid, wheel, begin + middle)[0]
-        ahead = cells_ahead(geometry, start + middle * SCAN_STEP, ur)
-        m0, m1, m2, start, nodes = fine_sums(geometry, pose, ahead, outside, beyond)
+        shift = fine_cell_shift(geometry, start + middle * SCAN_STEP, ur)
+        m0, m1, m2, start, nodes = fine_sums(geometry, pose, shift, outside, beyond)
         if nodes < _WIDE:
             return -1
     return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patch))
@@ -271,8 +261,7 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
     ``side`` is +1 left, -1 right; the wheelset's centre y, z (m) and the wheel's outward axle direction ex, ey, ez
     (unit vector) are in the track frame. X counts from the wheelset's cross-section, the curvatures are A and B of the
     gap A x^2 + B y^2 (1/m). Two overlaps separated by less than the scan's step of 0.6 mm count as one: patches so
-    close carry load as one.
-    """
+    close carry load as one."""
     pose = make_pose(side, y, z, ex, ey, ez, spatial)
     window = make_window(geometry, pose)
     node, cells = window.grid.node, geometry.scan_rail.shape[1]
@@ -290,7 +279,7 @@ def find_patches(geometry, side, y, z, ex, ey, ez, spatial, reduction, patches):
 
 
 @dataclass(frozen=True)
-class Patch:
+class HertzPatch:
     """One contact patch in the track frame (x from the wheelset's cross-section); SI units, angles in rad."""
 
     side: str
@@ -312,10 +301,9 @@ def axle_direction(roll, yaw):
 
 
 def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="maximum"):
-    """List of `Patch` of both wheels of a wheelset whose centre is at y, z (m) in the track frame with roll and yaw
+    """List of `HertzPatch` of both wheels of a wheelset, centre at y, z (m) in the track frame, with roll and yaw
     (rad): left wheel first, from flange to field side. ``detection`` is planar or spatial, ``reduction`` maximum or
-    moment.
-    """
+    moment."""
     if detection not in ("planar", "spatial"):
         raise InputError("detect", "detection", f"expected planar or spatial, got {detection!r}")
     if reduction not in REDUCTIONS:
@@ -326,5 +314,5 @@ def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="ma
         rows = np.empty((MAX_PATCHES, PATCH_COLUMNS))
         sided = (sign * c for c in axle)
         count = find_patches(geometry, sign, y, z, *sided, detection == "spatial", REDUCTIONS[reduction], rows)
-        found += [Patch(side, *map(float, row[: CURVATURE_Y + 1])) for row in rows[:count]]
+        found += [HertzPatch(side, *map(float, row[: CURVATURE_Y + 1])) for row in rows[:count]]
     return found

@@ -25,11 +25,11 @@ from wrcore.kernels.jit import FAST, jit
 if TYPE_CHECKING:
     import pandas as pd
 
-SCAN_STEP = 1e-4
+NODE_STEP = 1e-4
 """Distance of the wheel's nodes in the search for the first touch, m."""
 
 _RESERVE = 1e-6
-"""Local maxima this close to the highest node compete, m: above SCAN_STEP^2 / 8 times any curvature up to 800 1/m."""
+"""Local maxima this close to the highest node compete, m: above NODE_STEP^2 / 8 times any curvature up to 800 1/m."""
 
 _ROLL_STEPS = 40
 
@@ -86,7 +86,7 @@ def _touch(side, y, roll, heights, found):
     rail_end = side.rail_start + side.rail_step * (side.rail.shape[0] - 1)
     n, best = heights.shape[0], -np.inf
     for k in range(n):
-        height, _, u_rail, _, _ = _height(side, side.wheel_start + k * SCAN_STEP, y, cosine, sine)
+        height, _, u_rail, _, _ = _height(side, side.wheel_start + k * NODE_STEP, y, cosine, sine)
         heights[k] = height if side.rail_start <= u_rail <= rail_end else -np.inf
         best = max(best, heights[k])
     found[:] = np.nan
@@ -96,17 +96,12 @@ def _touch(side, y, roll, heights, found):
             continue
         if min(before, after) == -np.inf:  # touches with the end of the rail's profile
             continue
-        low = side.wheel_start + (k - 1) * SCAN_STEP
-        u = _summit(side, low, low + 2.0 * SCAN_STEP, y, cosine, sine)
+        low = side.wheel_start + (k - 1) * NODE_STEP
+        u = _summit(side, low, low + 2.0 * NODE_STEP, y, cosine, sine)
         height, _, u_rail, df, radius = _height(side, u, y, cosine, sine)
         if math.isnan(found[_HEIGHT]) or height > found[_HEIGHT]:
-            found[_HEIGHT], found[_U_WHEEL], found[_U_RAIL], found[_SLOPE], found[_RADIUS] = (
-                height,
-                u,
-                u_rail,
-                df,
-                radius,
-            )
+            found[_HEIGHT], found[_U_WHEEL], found[_U_RAIL] = height, u, u_rail
+            found[_SLOPE], found[_RADIUS] = df, radius
 
 
 @jit
@@ -135,8 +130,8 @@ def _touch_both(left, right, y, solve_roll, buffers, found):
 @jit
 def _tabulate(left, right, shifts, solve_roll, rolls, found):
     """Touching points for all lateral positions: ``found`` has shape (n, 2, 5)."""
-    nodes_left = int((left.wheel.shape[0] - 1) * left.wheel_step / SCAN_STEP + 1e-9) + 1
-    nodes_right = int((right.wheel.shape[0] - 1) * right.wheel_step / SCAN_STEP + 1e-9) + 1
+    nodes_left = int((left.wheel.shape[0] - 1) * left.wheel_step / NODE_STEP + 1e-9) + 1
+    nodes_right = int((right.wheel.shape[0] - 1) * right.wheel_step / NODE_STEP + 1e-9) + 1
     buffers = (np.empty(nodes_left), np.empty(nodes_right))
     for i in range(shifts.shape[0]):
         rolls[i] = _touch_both(left, right, shifts[i], solve_roll, buffers, found[i])

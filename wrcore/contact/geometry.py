@@ -27,23 +27,23 @@ _MOST_BLOCKS = 56
 _MARGIN = 4
 _SAFETY = 1.5
 """Covers what roll and yaw add to a profile's second derivative."""
-RESERVE_TO_SECOND = 8.0 / (_SAFETY * SCAN_STEP**2)
-"""Bound of a second derivative (1/m) from a reserve (m)."""
+SECOND_BOUND = 8.0 / (_SAFETY * SCAN_STEP**2)
+"""Bound of a second derivative (1/m) over its reserve (m)."""
 
-STRAY = 0.6 * SCAN_STEP
+LARGEST_OFFSET = 0.6 * SCAN_STEP
 """Distance by which the scan's nodes may leave their rail cell, m; the second reserve covers what that costs."""
-ROLL_STRAY, YAW_STRAY = 0.03, 1.5
+OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE = 0.03, 1.5
 """What roll and yaw^2 move a strip sideways, m: by its radius' difference to the tape circle (0.03 m at the flange tip)
 and by R R' psi^2 (R R' = 1.5 m on a flange of 70 degrees)."""
 
 PARTS = 4
 """Parts of a scan cell that bounds of gaps are told apart for."""
 
-CALM = 0.15
-"""Share of STRAY up to which tighter bounds hold."""
+SMALL_SHARE = 0.15
+"""Share of LARGEST_OFFSET up to which tighter bounds hold."""
 
 YAW_LIMIT = 0.02
-"""Yaw (rad) up to which `_zone_misses` holds."""
+"""Yaw (rad) up to which `_zone_planar_errors` holds."""
 
 
 class ContactGeometry(NamedTuple):
@@ -61,9 +61,9 @@ class ContactGeometry(NamedTuple):
     reserve, and the cosine of its inclination; padding lies 1 m below the track. The reserves of a wheel node and its
     rail cell together bound how much deeper than the nodes the gap between them can go (M h^2/8)."""
     zone_gaps: np.ndarray
-    """(shifts 2 PARTS, blocks): see `_zone_gaps`; of each shift the calm poses first."""
-    zone_misses: np.ndarray
-    """(shifts, blocks): see `_zone_misses`."""
+    """(shifts 2 PARTS, blocks): see `_zone_gaps`; of each shift poses of small angles first."""
+    zone_planar_errors: np.ndarray
+    """(shifts, blocks): see `_zone_planar_errors`."""
     block: int
     """Strips per block: LANES, or a multiple of it where the rail is very wide."""
     fine_wheel: np.ndarray
@@ -89,12 +89,12 @@ def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
     """ContactGeometry of the profiles of a `WheelOnRail` and its lengths."""
     scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
+    limits = SMALL_SHARE * LARGEST_OFFSET, LARGEST_OFFSET
+    gaps = [_zone_gaps(scan_wheel, scan_rail, block, rolling_radius, limit) for limit in limits]
     return ContactGeometry(
         np.column_stack([-wheel.f, -wheel.df, -wheel.d2f]), np.column_stack([rail.f, rail.df, rail.d2f]),
         scan_wheel, scan_rail,
-        np.concatenate([_zone_gaps(scan_wheel, scan_rail, block, rolling_radius, s) for s in (CALM * STRAY, STRAY)], 1)
-        .reshape(-1, _whole(scan_rail.shape[1] // block)),
-        _zone_misses(scan_wheel, scan_rail, block), block,
+        np.concatenate(gaps, 1).reshape(-1, gaps[0].shape[2]), _zone_planar_errors(scan_wheel, scan_rail, block), block,
         _padded(_strip_rows(rolling_radius - wheel.f, -wheel.df)), _padded(_fine_rail(wheel, rail)),
         float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
@@ -144,23 +144,22 @@ def _zone_gaps(wheel, rail, block, rolling_radius, limit):
 
     Entry (shift, part, block): at height 0 and roll 0 no strip of the block, a run of rail cells, comes closer than
     this to being close (see `scan`), if the first wheel node is ``shift`` and the strips stand in the part
-    ``part`` of PARTS of their cells. Roll and yaw that stray by no more than ``limit`` move a strip by up to ``stray``
-    from there, and only upwards but for ``sag``.
-    """
+    ``part`` of PARTS of their cells. Roll and yaw of a `scan.cell_offset` up to ``limit`` move a strip by up to
+    ``offset`` from there, and only upwards but for ``sag``."""
     cells = rail.shape[1]
     radius, along = wheel[RADIUS], np.abs(wheel[ALONG])
-    tilt_square, roll = limit / YAW_STRAY, limit / ROLL_STRAY
+    tilt_square, roll = limit / OFFSET_PER_YAW_SQUARE, limit / OFFSET_PER_ROLL
     # lateral: roll times the radius' difference, yaw by R R' psi^2, and the axle's foreshortening along the profile
-    stray = (np.abs(radius - rolling_radius) + tilt_square * wheel[DOWN_2]) * roll + tilt_square * along
-    stray += 0.51 * SCAN_STEP * np.arange(wheel.shape[1]) * max(tilt_square, roll * roll)
-    stray = sliding_window_view(1.01 * stray, cells)
+    offset = (np.abs(radius - rolling_radius) + tilt_square * wheel[DOWN_2]) * roll + tilt_square * along
+    offset += 0.51 * SCAN_STEP * np.arange(wheel.shape[1]) * max(tilt_square, roll * roll)
+    offset = sliding_window_view(1.01 * offset, cells)
     sag = along * 0.25 * tilt_square * roll  # R R' tilt^2 ez: at most where half the limit is used up by either
-    reserves = 1.0 + (limit / STRAY) ** 2
+    reserves = 1.0 + (limit / LARGEST_OFFSET) ** 2
     height = sliding_window_view(-radius - sag - reserves * wheel[WHEEL_RESERVE], cells) - reserves * rail[RAIL_RESERVE]
     c0, c1, c2, c3 = rail[:4]
     gaps = np.full((len(height), PARTS, _whole(cells // block)), 1.0)
     for part in range(PARTS):
-        low, high = part / PARTS * SCAN_STEP - stray, (part + 1) / PARTS * SCAN_STEP + stray
+        low, high = part / PARTS * SCAN_STEP - offset, (part + 1) / PARTS * SCAN_STEP + offset
         # highest point of a cubic over an interval: its ends, and how far it can rise above their chord
         top = np.maximum(*(c0 + d * (c1 + d * (c2 + d * c3)) for d in (low, high)))
         bend = np.maximum(*(np.abs(2.0 * c2 + 6.0 * c3 * d) for d in (low, high)))
@@ -169,14 +168,14 @@ def _zone_gaps(wheel, rail, block, rolling_radius, limit):
     return gaps
 
 
-def _zone_misses(wheel, rail, block):
+def _zone_planar_errors(wheel, rail, block):
     """Largest penetration, over yaw^2 up to YAW_LIMIT, that planar detection can miss in each block (shift, block)."""
     cells = rail.shape[1]
-    missed = YAW_LIMIT**2 * 0.5 * RESERVE_TO_SECOND * rail[RAIL_RESERVE] * sliding_window_view(wheel[ALONG] ** 2, cells)
+    missed = YAW_LIMIT**2 * 0.5 * SECOND_BOUND * rail[RAIL_RESERVE] * sliding_window_view(wheel[ALONG] ** 2, cells)
     missed += sliding_window_view(wheel[DOWN_2], cells)
-    misses = np.zeros((len(missed), _whole(cells // block)))
-    misses[:, : cells // block] = missed.reshape(len(missed), -1, block).max(axis=2)
-    return misses
+    missed_most = np.zeros((len(missed), _whole(cells // block)))
+    missed_most[:, : cells // block] = missed.reshape(len(missed), -1, block).max(axis=2)
+    return missed_most
 
 
 def _fine_rail(wheel, rail):

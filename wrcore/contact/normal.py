@@ -52,8 +52,7 @@ def _elliptic(flat):
 def hertz_shape(ratio):
     """Factors of the larger (along the smaller curvature) and smaller semi-axis and of the stiffness in the module's
     formulas, exact, from the larger over the smaller relative curvature (array_like, 1 to 1e20): Johnson, Contact
-    Mechanics (1985), Eqs. (4.28)-(4.32), with Abramowitz and Stegun (1964), 17.6.
-    """
+    Mechanics (1985), Eqs. (4.28)-(4.32), with Abramowitz and Stegun (1964), 17.6."""
     ratio = np.asarray(ratio, float)
     low, high = np.zeros_like(ratio), np.full_like(ratio, 30.0)
     for _ in range(60):  # halves the range of ln(a/b)
@@ -115,8 +114,7 @@ def damping_factor(approach_speed, c_e, v0):
 
     C1 and never negative, so the normal force never pulls. At rest it is (1 + c_e)/2: the static penetration is larger
     than Hertz's by the factor (2/(1 + c_e))^(2/3). The restitution of a fast impact is sqrt(c_e). Ambrosio and Pombo,
-    Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020).
-    """
+    Multibody System Dynamics 42 (2018) 317-345, as used by Marques et al. (2020)."""
     if approach_speed >= v0:
         return 1.0
     if approach_speed <= -v0:

@@ -45,6 +45,13 @@ P_MAX = 21  # filled where patches are no ellipses
 PSI = 22  # shape number, filled where the creep table asks for it
 PATCH_COLUMNS = 23
 
+CHANNELS = {
+    "u_wheel_m": U_WHEEL, "s_wheel_rad": S_WHEEL, "u_rail_m": U_RAIL, "x_m": X, "y_m": Y, "z_m": Z,
+    "contact_angle_rad": ANGLE, "penetration_m": PENETRATION, "a_m": SEMI_A, "b_m": SEMI_B, "N_N": NORMAL,
+    "Fx_N": FX, "Fy_N": FY, "Mz_Nm": MZ, "xi": XI, "eta": ETA, "phi_per_m": PHI,
+}  # fmt: skip
+"""Columns of the patch array by the names that runs and tables give them."""
+
 SLOPE_TOLERANCE = 1e-12
 """Slopes agree to this: the contact point is then right to about 1e-13 m, on nearly conformal pairs to 1e-11 m."""
 

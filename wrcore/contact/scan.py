@@ -14,38 +14,26 @@ import numpy as np
 
 from wrcore.contact.geometry import (
     ALONG,
-    CALM,
     DOWN_2,
     DOWN_4,
     DOWN_6,
     LANES,
+    LARGEST_OFFSET,
+    OFFSET_PER_ROLL,
+    OFFSET_PER_YAW_SQUARE,
     PARTS,
     RADIUS,
     RAIL_COSINE,
     RAIL_RESERVE,
-    RESERVE_TO_SECOND,
-    ROLL_STRAY,
     SCAN_STEP,
-    STRAY,
+    SECOND_BOUND,
+    SMALL_SHARE,
     WHEEL_COSINE,
     WHEEL_RESERVE,
-    YAW_STRAY,
 )
 from wrcore.contact.strip import strip_point
+from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.kernels.lanes import (
-    below,
-    count_bits,
-    greatest,
-    highest_bit,
-    lane,
-    lanes8,
-    load8,
-    lowest_bit,
-    ramp8,
-    total,
-    where_below,
-)
 
 MOST_STRIPS = 128
 """Strips that one call of `scan` can tell apart: the bits of two words."""
@@ -56,8 +44,7 @@ class Grid(NamedTuple):
 
     The k-th strip, with its radius' shares ``down`` and ``along``, lies
     d = lateral + k lateral_rate + down y_down + along y_along from the start of its cell, and at the height
-    height + k height_rate + down z_down + along z_along.
-    """
+    height + k height_rate + down z_down + along z_along."""
 
     node: int
     cell: int
@@ -78,13 +65,13 @@ class Window(NamedTuple):
 
     grid: Grid
     zone_row: int
-    """Row of ``zone_gaps`` for calm poses: by node, and part of a cell that the strips stand in."""
+    """Row of ``zone_gaps`` for poses of small angles: by node, and part of a cell that the strips stand in."""
     reserves: float
     """Gaps below so many reserves are close: the first one bounds what lies between two nodes, the rest, up to another
     one, what leaving the rail cell costs (in proportion to the square of the distance)."""
 
 
-class Strips(NamedTuple):
+class StripRange(NamedTuple):
     """Which strips of a zone are below some limit, counted from its first one."""
 
     count: int
@@ -93,16 +80,16 @@ class Strips(NamedTuple):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def stray(pose):
+def cell_offset(pose):
     """How far roll and yaw may move the scan's nodes away from their rail cells, m."""
-    return ROLL_STRAY * abs(pose.ez) + YAW_STRAY * pose.tilt * pose.tilt
+    return OFFSET_PER_ROLL * abs(pose.ez) + OFFSET_PER_YAW_SQUARE * pose.tilt * pose.tilt
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def leaves_cells(pose):
     """Whether the scan's nodes leave their rail cells by too much, so that every strip must be looked up exactly. Small
     angles on real runs stay far below the limit: 12 mrad of roll or 15 mrad of yaw alone."""
-    return stray(pose) > STRAY
+    return cell_offset(pose) > LARGEST_OFFSET
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -132,7 +119,7 @@ def make_window(geometry, pose):
     position *= 1.0 / SCAN_STEP
     node = int(math.floor(position)) + 1
     part = min(int((node - position) * PARTS), PARTS - 1)
-    share = stray(pose) * (1.0 / STRAY)
+    share = cell_offset(pose) * (1.0 / LARGEST_OFFSET)
     grid = _grid(pose, node, 0, start + node * SCAN_STEP, offset, SCAN_STEP)
     return Window(grid, 2 * PARTS * node + part, 1.0 + share * share)
 
@@ -140,12 +127,12 @@ def make_window(geometry, pose):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def near_blocks(geometry, window):
     """Blocks with a strip that can be close, a bit for each."""
-    calm = window.reserves < 1.0 + CALM * CALM
-    return _near_blocks(geometry, window.grid, window.zone_row if calm else window.zone_row + PARTS, 0.0)
+    small = window.reserves < 1.0 + SMALL_SHARE * SMALL_SHARE
+    return _near_blocks(geometry, window.grid, window.zone_row if small else window.zone_row + PARTS, 0.0)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def blocks_near_misses(geometry, window, yaw_square):
+def blocks_with_planar_errors(geometry, window, yaw_square):
     """Blocks with a strip that can take part in `planar_bound`, a bit for each."""
     return _near_blocks(geometry, window.grid, window.zone_row + PARTS, yaw_square)
 
@@ -153,22 +140,22 @@ def blocks_near_misses(geometry, window, yaw_square):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _near_blocks(geometry, grid, row, yaw_square):
     rise = geometry.block * grid.height_rate
-    low = grid.height + 0.5 * (rise - abs(rise)) + ramp8() * rise
+    low = grid.height + 0.5 * (rise - abs(rise)) + lanes.ramp8() * rise
     near = np.uint64(0)
     for first in range(0, geometry.zone_gaps.shape[1], LANES):
-        block, limit = np.uint64(first), lanes8(0.0)
+        block, limit = np.uint64(first), lanes.lanes8(0.0)
         if yaw_square > 0.0:
-            limit = yaw_square * load8(geometry.zone_misses, np.uint64(grid.node), block)
-        gaps = load8(geometry.zone_gaps, np.uint64(row), block)
-        near |= below(gaps + (low + float(first) * rise), limit) << block
+            limit = yaw_square * lanes.load8(geometry.zone_planar_errors, np.uint64(grid.node), block)
+        gaps = lanes.load8(geometry.zone_gaps, np.uint64(row), block)
+        near |= lanes.below(gaps + (low + float(first) * rise), limit) << block
     return near
 
 
 @jit(allocates=False, forceinline=True)
 def first_zone(near, block):
     """First run of near blocks: its first strip, the strip after its last one, and the bits beyond."""
-    first = lowest_bit(near)
-    end = first + lowest_bit(~(near >> np.uint64(first)))
+    first = lanes.lowest_bit(near)
+    end = first + lanes.lowest_bit(~(near >> np.uint64(first)))
     return first * block, end * block, near & (~np.uint64(0) << np.uint64(end))
 
 
@@ -195,9 +182,9 @@ def strip_gap(grid, wheel, rail, k):
 def _gaps(grid, wheel, rail, k):
     """Gaps of eight strips from the k-th on, as `strip_gap`."""
     square, node = grid.tilt_square, np.uint64(grid.node + k)
-    down = square * (load8(wheel, DOWN_4, node) + square * load8(wheel, DOWN_6, node))
-    down = load8(wheel, RADIUS, node) - square * (load8(wheel, DOWN_2, node) + down)
-    along, index = load8(wheel, ALONG, node), float(k) + ramp8()
+    down = square * (lanes.load8(wheel, DOWN_4, node) + square * lanes.load8(wheel, DOWN_6, node))
+    down = lanes.load8(wheel, RADIUS, node) - square * (lanes.load8(wheel, DOWN_2, node) + down)
+    along, index = lanes.load8(wheel, ALONG, node), float(k) + lanes.ramp8()
     d = grid.lateral + index * grid.lateral_rate + down * grid.y_down + along * grid.y_along
     height = grid.height + index * grid.height_rate + down * grid.z_down + along * grid.z_along
     return height - _rail_heights(rail, grid.cell + k, d)
@@ -206,84 +193,85 @@ def _gaps(grid, wheel, rail, k):
 @jit(allocates=False, forceinline=True)
 def _rail_heights(rail, first, d):
     cell = np.uint64(first)
-    slope = load8(rail, 1, cell) + d * (load8(rail, 2, cell) + d * load8(rail, 3, cell))
-    return load8(rail, 0, cell) + d * slope
+    slope = lanes.load8(rail, 1, cell) + d * (lanes.load8(rail, 2, cell) + d * lanes.load8(rail, 3, cell))
+    return lanes.load8(rail, 0, cell) + d * slope
 
 
 @jit(allocates=False, forceinline=True)
 def _strips(low, high):
     """From a bit for each strip, the first 64 of them in ``low``."""
-    first = lowest_bit(low) if low > 0 else 64 + lowest_bit(high)
-    last = 64 + highest_bit(high) if high > 0 else highest_bit(low)
-    return Strips(count_bits(low) + count_bits(high), first, last)
+    first = lanes.lowest_bit(low) if low > 0 else 64 + lanes.lowest_bit(high)
+    last = 64 + lanes.highest_bit(high) if high > 0 else lanes.highest_bit(low)
+    return StripRange(lanes.count_bits(low) + lanes.count_bits(high), first, last)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def scan(window, wheel, rail, begin, end):
     """Sums of g^2, g^2 i, g^2 i^2 over strips with negative gap g, from ``begin``, where i = 0, to before ``end``, at
-    most `MOST_STRIPS`: what a single overlap needs; then the Strips with a negative gap, and those with one below
+    most `MOST_STRIPS`: what a single overlap needs; then the `StripRange` with a negative gap, and those with one below
     ``window.reserves`` times their reserve."""
-    grid, zero = window.grid, lanes8(0.0)
+    grid, zero = window.grid, lanes.lanes8(0.0)
     m0, m1, m2 = zero, zero, zero
     overlap_low = overlap_high = close_low = close_high = np.uint64(0)
     for i in range(0, end - begin, LANES):
-        index, gap = float(i) + ramp8(), _gaps(grid, wheel, rail, begin + i)
-        negative = where_below(gap, zero, gap, zero)
+        index, gap = float(i) + lanes.ramp8(), _gaps(grid, wheel, rail, begin + i)
+        negative = lanes.where_below(gap, zero, gap, zero)
         weight = negative * negative
         first_moment = weight * index
         m0, m1, m2 = m0 + weight, m1 + first_moment, m2 + first_moment * index
         cell = np.uint64(begin + i)
-        reserve = load8(wheel, WHEEL_RESERVE, np.uint64(grid.node) + cell) + load8(rail, RAIL_RESERVE, cell)
-        overlap, close, shift = below(gap, zero), below(gap, window.reserves * reserve), np.uint64(i & 63)
+        reserve = lanes.load8(wheel, WHEEL_RESERVE, np.uint64(grid.node) + cell) + lanes.load8(rail, RAIL_RESERVE, cell)
+        overlap, close, shift = lanes.below(gap, zero), lanes.below(gap, window.reserves * reserve), np.uint64(i & 63)
         if i < 64:
             overlap_low, close_low = overlap_low | overlap << shift, close_low | close << shift
         else:
             overlap_high, close_high = overlap_high | overlap << shift, close_high | close << shift
-    return total(m0), total(m1), total(m2), _strips(overlap_low, overlap_high), _strips(close_low, close_high)
+    overlaps, near = _strips(overlap_low, overlap_high), _strips(close_low, close_high)
+    return lanes.total(m0), lanes.total(m1), lanes.total(m2), overlaps, near
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def deepest_strip(grid, wheel, rail, first, last):
     """The strip that overlaps most along the rail's normal, if the only overlap reaches from ``first`` to ``last``."""
-    best, chosen = lanes8(0.0), lanes8(0.0)
+    best, chosen = lanes.lanes8(0.0), lanes.lanes8(0.0)
     for k in range(first // LANES * LANES, last + 1, LANES):
-        depth = -1.0 * _gaps(grid, wheel, rail, k) * load8(rail, RAIL_COSINE, np.uint64(k))
-        chosen = where_below(best, depth, float(k) + ramp8(), chosen)
-        best = where_below(best, depth, depth, best)
-    shallower = below(best, lanes8(greatest(best)))
-    return int(lane(chosen, lowest_bit(~shallower)))
+        depth = -1.0 * _gaps(grid, wheel, rail, k) * lanes.load8(rail, RAIL_COSINE, np.uint64(k))
+        chosen = lanes.where_below(best, depth, float(k) + lanes.ramp8(), chosen)
+        best = lanes.where_below(best, depth, depth, best)
+    shallower = lanes.below(best, lanes.lanes8(lanes.greatest(best)))
+    return int(lanes.lane(chosen, lanes.lowest_bit(~shallower)))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def cells_ahead(geometry, u, ur):
-    """Number by which fine rail cells are ahead of the fine wheel nodes over them, at wheel u over rail ur."""
+def fine_cell_shift(geometry, u, ur):
+    """Number of the fine rail cell less that of the fine wheel node over it, at wheel u over rail ur."""
     return int(math.floor((ur - geometry.rail_start - u + geometry.wheel_start) / geometry.wheel_step))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def fine_sums(geometry, pose, ahead, first, last):
+def fine_sums(geometry, pose, shift, first, last):
     """Integrals of g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``,
     the position (m) from which e counts, and the number of nodes in overlap, 0 where those of wheel and rail do not go
-    together. ``ahead``: see `cells_ahead`, for the middle of the overlap."""
+    together. ``shift``: see `fine_cell_shift`, for the middle of the overlap."""
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
     density = 1.0 / step
-    begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -ahead)
+    begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -shift)
     end = min(int((last - geometry.wheel_start) * density) + 1, wheel.shape[1] - LANES)
-    end = min(end, rail.shape[1] - LANES - ahead)
-    origin, cell = geometry.wheel_start + begin * step, begin + ahead
+    end = min(end, rail.shape[1] - LANES - shift)
+    origin, cell = geometry.wheel_start + begin * step, begin + shift
     offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
     grid = _grid(pose, begin, cell, geometry.half_distance + origin, offset, step)
-    zero, size = lanes8(0.0), lanes8(float(end - begin))
+    zero, size = lanes.lanes8(0.0), lanes.lanes8(float(end - begin))
     m0, m1, m2 = zero, zero, zero
     nodes = 0
     for k in range(0, end - begin, LANES):
-        index, gap = float(k) + ramp8(), _gaps(grid, wheel, rail, k)
-        negative = where_below(index, size, where_below(gap, zero, gap, zero), zero)
+        index, gap = float(k) + lanes.ramp8(), _gaps(grid, wheel, rail, k)
+        negative = lanes.where_below(index, size, lanes.where_below(gap, zero, gap, zero), zero)
         weight = negative * negative
         first_moment = weight * index
         m0, m1, m2 = m0 + weight, m1 + first_moment, m2 + first_moment * index
-        nodes += count_bits(below(negative, zero))
-    return total(m0) * step, total(m1) * step**2, total(m2) * step**3, origin, nodes
+        nodes += lanes.count_bits(lanes.below(negative, zero))
+    return lanes.total(m0) * step, lanes.total(m1) * step**2, lanes.total(m2) * step**3, origin, nodes
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -293,17 +281,16 @@ def planar_bound(grid, yaw_square, wheel, rail, begin, end):
     At a strip with slope R' the extreme point lies R R' psi^2 further out, over a rail of the same slope and of second
     derivative f'': missed is the height R (psi R')^2/2 + |f''| (R R' psi^2)^2/2. The first term, along the normal, is
     the first-order law r psi^2 tan^2(delta) cos(delta)/2; the second one counts on the flange. It matters where the
-    planar gap is below that height (or its reserve).
-    """
-    largest = lanes8(0.0)
+    planar gap is below that height (or its reserve)."""
+    largest = lanes.lanes8(0.0)
     for k in range(begin, end, LANES):
         node = np.uint64(grid.node + k)
-        index, radius = float(k) + ramp8(), load8(wheel, RADIUS, node)
+        index, radius = float(k) + lanes.ramp8(), lanes.load8(wheel, RADIUS, node)
         d = grid.lateral + index * grid.lateral_rate + radius * grid.y_down
         gap = grid.height + index * grid.height_rate + radius * grid.z_down - _rail_heights(rail, k, d)
-        shift, reserve = yaw_square * load8(wheel, ALONG, node), load8(rail, RAIL_RESERVE, np.uint64(k))
-        missed = yaw_square * load8(wheel, DOWN_2, node) + (0.5 * RESERVE_TO_SECOND) * reserve * shift * shift
-        limit = missed + 2.0 * (load8(wheel, WHEEL_RESERVE, node) + reserve)
-        counted = where_below(gap, limit, missed * load8(wheel, WHEEL_COSINE, node), lanes8(0.0))
-        largest = where_below(largest, counted, counted, largest)
-    return greatest(largest)
+        shift, reserve = yaw_square * lanes.load8(wheel, ALONG, node), lanes.load8(rail, RAIL_RESERVE, np.uint64(k))
+        missed = yaw_square * lanes.load8(wheel, DOWN_2, node) + (0.5 * SECOND_BOUND) * reserve * shift * shift
+        limit = missed + 2.0 * (lanes.load8(wheel, WHEEL_RESERVE, node) + reserve)
+        counted = lanes.where_below(gap, limit, missed * lanes.load8(wheel, WHEEL_COSINE, node), lanes.lanes8(0.0))
+        largest = lanes.where_below(largest, counted, counted, largest)
+    return lanes.greatest(largest)

@@ -24,8 +24,7 @@ class Pose(NamedTuple):
     """A wheel's position and the coefficients of its strips, for kernels.
 
     With ``along = tilt R'`` and ``down = sqrt(1 - along^2)`` a strip at distance c along the axle has
-    y = y0 + c ey + R (down y_down + along y_along), and z likewise.
-    """
+    y = y0 + c ey + R (down y_down + along y_along), and z likewise."""
 
     side: float
     y: float

@@ -44,17 +44,21 @@ class WheelOnRail:
             raise InputError(self.wheel.name, "kind", f"expected a wheel and a rail, got {got}")
         check_number(self.rolling_radius, *RADII, "wheel", "rolling_radius", "m")
         check_number(self.half_distance, *HALF_DISTANCES, "wheelset", "half_distance", "m")
-        if self.rail_distance is None:
-            object.__setattr__(self, "rail_distance", 0.5 * 1.435 + self.rail.gauge_offset())
-        if math.isnan(self.rail_distance):
+        distance = 0.5 * 1.435 + self.rail.gauge_offset() if self.rail_distance is None else self.rail_distance
+        object.__setattr__(self, "rail_distance", distance)
+        if math.isnan(distance):
             raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
-        check_number(self.rail_distance, *HALF_DISTANCES, "track", "rail_distance", "m")
+        check_number(distance, *HALF_DISTANCES, "track", "rail_distance", "m")
 
     @cached_property
     def geometry(self):
         """The `ContactGeometry` of it, for kernels."""
         return contact_geometry(
-            self.wheel, self.rail, self.rolling_radius, self.half_distance, float(self.rail_distance)
+            self.wheel,
+            self.rail,
+            self.rolling_radius,
+            self.half_distance,
+            float(self.rail_distance),  # type: ignore[arg-type]
         )
 
 
@@ -114,15 +118,15 @@ class WheelsetOnTrack:
         return cls(side, side, half_distance, gauge)
 
     @property
-    def base(self):
+    def base(self) -> float:
         """Distance of the tape circles, m: the standard's e = 1500 mm at standard gauge."""
         return 2.0 * self.half_distance
 
     @property
-    def mean_radius(self):
+    def mean_radius(self) -> float:
         """Mean of both rolling radii, m."""
         return 0.5 * (self.left.rolling_radius + self.right.rolling_radius)
 
-    def rail_distance(self, side):
+    def rail_distance(self, side: WheelOnRail) -> float:
         """Origin of a side's rail from the centre line, m, positive."""
         return 0.5 * self.gauge + side.rail.gauge_offset(self.gauge_depth)

@@ -156,15 +156,9 @@ def _solid(c, start, row, layer, wt, wa, wb):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def table_lookup(table, g, psi, xi, eta, phi):
+def table_lookup(table, log_g, g, psi, xi, eta, phi):
     """Creep force fx, fy, mz from the table, over mu N and mu N c, and 1 where a/b or psi lay outside its range: then
     the nearest patch inside is taken. Creepages that are not finite give NaN and the flag."""
-    return table_lookup_at(table, np.log(g), g, psi, xi, eta, phi)
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def table_lookup_at(table, log_g, g, psi, xi, eta, phi):
-    """`table_lookup` where ln(a/b) is known."""
     axes, c = table.axes, table.coefficients
     if not abs(log_g + psi + xi + eta + phi) < np.inf:
         return np.nan, np.nan, np.nan, 1

@@ -1,5 +1,6 @@
 """Fill the nodes of a creep table with exact solutions and turn them into B-spline coefficients."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -177,8 +178,7 @@ def spline_coefficients(values):
 
     At the spin axis, the pole of (alpha, beta), a smooth force has a slope that goes with cos(alpha) and sin(alpha).
     Interpolation alone gives it overtones, too, and with them slopes that turn within any small distance of the axis.
-    They are held flat there, at the price of node values that are off by up to 0.2 % of mu N beside the pole.
-    """
+    They are held flat there, at the price of node values that are off by up to 0.2 % of mu N beside the pole."""
     n_g, n_psi, n_t, n_alpha, n_beta, _ = values.shape
     c = _along(_interpolation(n_g, False), values, 0)
     c = _along(_interpolation(n_t, False), c, 2)
@@ -212,8 +212,7 @@ def build_data(nu, planes, resolution, progress=None):
 def random_creepages(g, count, kalker, rng):
     """Creepages from small to beyond saturation: a third each without spin, pure spin, mixed.
 
-    With X = xi' C11/3, Y = eta' C22/3, spin phi' C23: abs(X, Y) log-uniform 0.03..3, spin log-uniform 0.03..5.
-    """
+    With X = xi' C11/3, Y = eta' C22/3, spin phi' C23: abs(X, Y) log-uniform 0.03..3, spin log-uniform 0.03..5."""
     c11, c22, c23, _ = coefficients_at(np.log(g), kalker)
     kind, turn = rng.integers(0, 3, count), rng.uniform(0, 2 * np.pi, count)
     radius = np.exp(rng.uniform(np.log(0.03), np.log(3), count)) * (kind != 1)
@@ -231,7 +230,7 @@ def random_errors(data, level, patches=48, per_patch=40, seed=0):
         psi = rng.uniform(-axes.psi_max, axes.psi_max)
         creepages = random_creepages(g, per_patch, data.kalker, rng)
         exact, _ = RollingContact(g, psi, data.kalker.nu, level).solve_many(creepages)
-        error = np.array([table_lookup(data, g, psi, *row)[:3] for row in creepages]) - exact
+        error = np.array([table_lookup(data, math.log(g), g, psi, *row)[:3] for row in creepages]) - exact
         force.append(np.hypot(error[:, 0], error[:, 1]))
         moment.append(abs(error[:, 2]))
     return np.concatenate(force), np.concatenate(moment)

@@ -37,8 +37,7 @@ def read_cases(path):
 
 def check_cases(frame, source="cases"):
     """Columns a_m, b_neg_m, b_pos_m, N_N, mu, G_Pa, nu, xi, eta (or ux, uy), phi_per_m of a case list, which has a
-    case_id, too, as arrays of floats by name. InputError names ``source`` and the column and row (from 1) at fault.
-    """
+    case_id, too, as arrays of floats by name. InputError names ``source`` and the column and row (from 1) at fault."""
     frame = frame.rename(columns={other: name for other, name in OTHER_NAMES.items() if name not in frame})
     missing = [name for name in ("case_id", *NUMBERS) if name not in frame.columns]
     if missing:
@@ -66,8 +65,7 @@ def _refuse(bad, values, name, source, expected):
 
 def nondimensional(columns):
     """g, psi (n,), creepages xi', eta', phi' (n, 3) as the laws take them, and c = sqrt(a b) (n,), m, with b the mean
-    of b_neg and b_pos, from columns that `check_cases` returns.
-    """
+    of b_neg and b_pos, from columns that `check_cases` returns."""
     b = (columns["b_neg_m"] + columns["b_pos_m"]) / 2
     psi = (columns["b_pos_m"] - columns["b_neg_m"]) / (2 * b)
     c = np.sqrt(columns["a_m"] * b)
@@ -82,8 +80,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
 
     ``table`` (CreepTable or path): for the model "table"; by default the cached one for each nu, built if need be.
     ``level``: refinement of the model "exact". ``progress`` wraps the iterable of patches, ``source`` is named in
-    messages. ``attrs`` counts cases ``out_of_range`` of the law's data and exact solutions ``not_converged``.
-    """
+    messages. ``attrs`` counts cases ``out_of_range`` of the law's data and exact solutions ``not_converged``."""
     import pandas as pd
 
     source = source or frame.attrs.get("source", "cases")
@@ -112,7 +109,8 @@ def _exact(g, psi, nu, creepages, level, progress):
     patches, member = np.unique(np.round(np.stack([g, psi, nu], axis=1), 12), axis=0, return_inverse=True)
     for index in progress(range(len(patches))) if progress else range(len(patches)):
         rows = np.flatnonzero(member.ravel() == index)
-        forces[rows], iterations = RollingContact(*patches[index], level=level).solve_many(creepages[rows])
+        ratio, shape, poisson = patches[index]
+        forces[rows], iterations = RollingContact(ratio, shape, poisson, level=level).solve_many(creepages[rows])
         failed += int((iterations < 0).sum())
     return forces, {"not_converged": failed, "out_of_range": 0}
 
@@ -188,11 +186,9 @@ def creep_force(
     import pandas as pd
 
     given = {"a": a, "b": b, "normal_force": normal_force, "mu": mu, "shear_modulus": shear_modulus, "nu": nu}
-    a, b, *values, psi = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
-    names = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa", "nu", "xi", "eta", "phi_per_m")
-    values = a, b * (1.0 - psi), b * (1.0 + psi), *values
-    frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(names, values, strict=True)})
+    along, across, *others, shape = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
+    values = along, across * (1.0 - shape), across * (1.0 + shape), *others
+    frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(NUMBERS, values, strict=True)})
     frame.insert(0, "case_id", range(len(frame)))
     forces = solve_cases(frame, model, table, source="creep_force")
-    shape = values[0].shape
-    return tuple(forces[name].to_numpy().reshape(shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))
+    return tuple(forces[name].to_numpy().reshape(along.shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))

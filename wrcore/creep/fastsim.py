@@ -29,8 +29,7 @@ def fastsim(settings, kalker, g, psi, xi, eta, phi):
 
     Slip s = w - L dtau/dx with L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23) for longitudinal,
     lateral and spin creepage; the traction starts at zero at the leading edge, follows s = 0 and is cut back to its
-    bound where it exceeds it. An SDEC patch takes the flexibilities of its mean ellipse.
-    """
+    bound where it exceeds it. An SDEC patch takes the flexibilities of its mean ellipse."""
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
     rate_x, rate_y = xi * 3 * c11 / (8 * a), eta * 3 * c22 / (8 * a)

@@ -205,8 +205,7 @@ def solve_rows(op, creepages, tolerance, max_iterations, batch, results, iterati
     (K,), negative where the tolerance was not met, and, unless empty, panel forces and slip (K, 2 N).
 
     The sum over panels of abs(y - F) has to fall below ``tolerance`` times that of abs(F). Up to ``batch`` cases are
-    iterated together so that the resolvent is a matrix product; one that has converged makes room for the next.
-    """
+    iterated together so that the resolvent is a matrix product; one that has converged makes room for the next."""
     cases, size = creepages.shape[0], op.bound.size
     width = min(batch, cases)
     shape, half_shape = (width, 2 * size), (width, size)
@@ -351,15 +350,15 @@ class RollingContact:
         if np.ndim(creepages) != 2 or np.shape(creepages)[1] != 3:
             raise InputError("RollingContact", "creepages", f"expected rows of three, got {np.shape(creepages)}")
         creepages = _rows(*np.transpose(creepages))
-        results, iterations, empty = np.empty((len(creepages), 3)), np.empty(len(creepages), np.int64), _no_rows()
+        results, iterations = np.empty((len(creepages), 3)), np.empty(len(creepages), np.int64)
+        empty = np.empty((0, 0), np.float32)
         solve_rows(self.operator, creepages, tolerance, MAX_ITERATIONS, BATCH, results, iterations, empty, empty)
         return results, iterations
 
     def linear_response(self):
         """Derivatives of (fx, fy, mz) by (xi', eta', phi') at zero creepage, adhesion everywhere: (3, 3) ndarray.
 
-        Row i belongs to output i. For the ellipse this is Kalker's matrix at this refinement.
-        """
+        Row i belongs to output i. For the ellipse this is Kalker's matrix at this refinement."""
         return resultants(self.operator, self.operator.stuck).T.astype(float)
 
     @checked
@@ -382,10 +381,6 @@ def _rows(xi, eta, phi):
     return np.ascontiguousarray(rows.reshape(-1, 3), dtype=float)
 
 
-def _no_rows():
-    return np.empty((0, 0), np.float32)
-
-
 def _field(contact, force, slip, result):
     """Divide panel forces by panel areas and lay out the outlines."""
     op, n, ny = contact.operator, contact.n, contact.ny
@@ -402,8 +397,3 @@ def _field(contact, force, slip, result):
         force[:size] / area, force[size:] / area, bound / area, slip[:size], slip[size:],
         magnitude < 0.9999 * bound, *result,
     )  # fmt: skip
-
-
-def solve_field(g, psi, nu, xi, eta, phi, level=DEFAULT_LEVEL):
-    """Traction, slip and adhesion of one case from scratch: ``RollingContact(...).field(...)``."""
-    return RollingContact(g, psi, nu, level).field(xi, eta, phi)

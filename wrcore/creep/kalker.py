@@ -4,7 +4,7 @@
 
 in the nondimensional form of the package (`halfspace.RollingContact`), i.e. Fx = -G a b C11 xi and so on. The
 coefficients come from this package's own half-space operator with adhesion everywhere, extrapolated in the panel
-size; ``kalker_coefficients.csv`` beside this file holds them on a grid of a/b and nu, `write_coefficients` made it.
+size, on a grid of a/b and nu: ``kalker_coefficients.csv`` beside this file, made by ``tests/creep/kalker_grid.py``.
 
 References
 ----------
@@ -17,14 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.creep.operator import make_panels, panel_counts, resultants, stuck_forces
 from wrcore.geometry.spline import spline_cubics
 from wrcore.kernels.jit import FUSED, jit
 
 COEFFICIENTS_FILE = "kalker_coefficients.csv"
 GRID_A_OVER_B = 2.0 ** np.arange(-5, 5.25, 0.5)
 GRID_NU = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
-LEVELS = (32, 48)
 
 
 class KalkerData(NamedTuple):
@@ -38,71 +36,8 @@ class KalkerData(NamedTuple):
     """(cells, 4, 4): per cell and power 0..3 of the distance from its lower node: C11, C22, C23, C33."""
 
 
-def adhesion_coefficients(g, nu, level):
-    """C11, C22, C23, C33 of an ellipse at one refinement, by solving A F = -w with no slip anywhere.
-
-    Parameters
-    ----------
-    g, nu : float
-        a/b and Poisson's ratio.
-    level : int
-        About ``level**2`` panels.
-
-    Returns
-    -------
-    ndarray (4,)
-        C23 is the mean of the two numbers (-dfy/dphi', dmz/duy') that agree in the limit.
-    """
-    panels = make_panels(g, 0.0, *panel_counts(g, level))
-    (c11, _, _), (_, c22, c32), (_, c23, c33) = -resultants(panels, stuck_forces(panels, nu, True)[1])
-    return np.array([c11, c22, (c23 - c32) / 2, c33])
-
-
-def extrapolated_coefficients(g, nu, levels=LEVELS):
-    """C11, C22, C23, C33 extrapolated linearly in 1/level from two refinements."""
-    coarse, fine = (adhesion_coefficients(g, nu, level) for level in levels)
-    return fine + (fine - coarse) * levels[0] / (levels[1] - levels[0])
-
-
-def write_coefficients(path, progress=None):
-    """Compute the packaged coefficient grid afresh (about two minutes) and write it as CSV.
-
-    Parameters
-    ----------
-    path : path-like
-        File to write.
-    progress : callable, optional
-        Wraps the iterable of (nu, g), e.g. ``tqdm.tqdm``.
-    """
-    pairs = [(nu, g) for nu in GRID_NU for g in GRID_A_OVER_B]
-    lines = [
-        "# Linear creep coefficients of two equal bodies, ellipse; wrcore.creep.kalker.write_coefficients: half-space, "
-        f"adhesion everywhere, levels {LEVELS[0]} and {LEVELS[1]} extrapolated",
-        "nu,a_over_b,C11,C22,C23,C33",
-    ]
-    for nu, g in progress(pairs) if progress else pairs:
-        lines.append(",".join(f"{value:.8g}" for value in (nu, g, *extrapolated_coefficients(g, nu))))
-    with open(path, "w", encoding="utf-8") as out:
-        out.write("\n".join(lines) + "\n")
-
-
 def kalker_data(nu):
-    """Coefficients for one Poisson's ratio, ready for kernels.
-
-    Parameters
-    ----------
-    nu : float
-        0 to 0.5; interpolated by the polynomial through all stored values.
-
-    Returns
-    -------
-    KalkerData
-
-    Raises
-    ------
-    ValueError
-        If nu lies outside 0 to 0.5.
-    """
+    """`KalkerData` for one Poisson's ratio, 0 to 0.5, by the polynomial in it through all stored values."""
     if not 0 <= nu <= 0.5:
         raise ValueError(f"Poisson's ratio: expected 0 to 0.5, got {nu}")
     text = files("wrcore.creep").joinpath(COEFFICIENTS_FILE).read_text(encoding="utf-8")

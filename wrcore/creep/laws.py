@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup_at
+from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.kernels.jit import FUSED, jit, rarely_called
@@ -43,8 +43,7 @@ class CreepData(NamedTuple):
 def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 1.0)):
     """`CreepData` for `creep_force` at Poisson's ratio ``nu``. ``table``: ``CreepTable.kernel_data()``, for the law
     "table" only; ``grid``: FASTSIM's steps along x and strips across; ``elliptic``: its bound is Hertzian instead of
-    parabolic; ``factors``: k_A and k_S of Polach's law.
-    """
+    parabolic; ``factors``: k_A and k_S of Polach's law."""
     if table is None:
         table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker_data(nu), np.zeros(0, np.float32))
     fastsim_data = FastsimData(int(grid), int(grid), int(elliptic))
@@ -76,8 +75,7 @@ def polach(kalker, factors, g, xi, eta, phi):
     eps = (pi/4) c_jj s_c, F = (2/pi) (k_A eps/(1 + (k_A eps)^2) + atan(k_S eps)), F_x = -F s_x/s_c,
     F_y = -F s_y/s_c + (9/16) a k K phi/s_c, k = 1 + 6.3 (1 - exp(-a/b)), K(eps_s) from eps_s = (8/3) b C23 abs(s_yc)/k
     (lengths over c). The factors k_A and k_S do not touch the part that spin makes. Polach, Vehicle System Dynamics
-    Suppl. 33 (1999) 728-739, and with k_A and k_S Wear 258 (2005) 992-1000.
-    """
+    Suppl. 33 (1999) 728-739, and with k_A and k_S Wear 258 (2005) 992-1000."""
     c11, c22, c23, _ = kalker_coefficients(g, kalker)
     a, b = np.sqrt(g), 1 / np.sqrt(g)
     turned = eta + phi * a
@@ -119,7 +117,7 @@ def _other_law(law, data, log_g, g, psi, xi, eta, phi):
 def creep_force_at(law, data, log_g, g, psi, xi, eta, phi):
     """`creep_force` where ln(a/b) is known."""
     if law == _TABLE:
-        return table_lookup_at(data.table, log_g, g, psi, xi, eta, phi)
+        return table_lookup(data.table, log_g, g, psi, xi, eta, phi)
     return _other_law(law, data, log_g, g, psi, xi, eta, phi)
 
 

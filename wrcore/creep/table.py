@@ -78,7 +78,7 @@ class CreepTable:
     moment_error: tuple
 
     @property
-    def nu(self):
+    def nu(self) -> float:
         """Poisson's ratio."""
         return self.data.kalker.nu
 
@@ -99,7 +99,7 @@ class CreepTable:
             "table", a, b, normal_force, xi, eta, phi, mu, shear_modulus, self.nu, table=self, psi=psi
         )
 
-    def kernel_data(self):
+    def kernel_data(self) -> CreepTableData:
         """The `CreepTableData` to hand to kernels."""
         return self.data
 
@@ -111,8 +111,7 @@ def _quantiles(errors):
 def build_table(nu=0.28, planes="ellipse", tolerance=DEFAULT_TOLERANCE, progress=None):
     """`CreepTable` at Poisson's ratio ``nu`` with four inputs (``planes`` "ellipse", psi = 0) or five ("sdec"), whose
     99 % quantile of abs(dF)/(mu N) over random cases stays below ``tolerance``; the finest of the known resolutions is
-    the last resort. ``progress`` wraps the list of patches to solve, e.g. ``tqdm.tqdm``.
-    """
+    the last resort. ``progress`` wraps the list of patches to solve, e.g. ``tqdm.tqdm``."""
     _check_arguments(nu, planes, tolerance)
     for resolution in _promising(planes, tolerance):
         data = build_data(nu, planes, resolution, progress)
@@ -140,26 +139,19 @@ def _check_arguments(nu, planes, tolerance):
 
 def write_table(path, table):
     """Write a `CreepTable` as HDF5, with a digest of all its bytes."""
-    with new_hdf5(path) as file:
-        _write_datasets(file, table)
-
-
-def _write_datasets(file, table):
     axes = table.data.axes
     inputs = (axes.n_g + 2, axes.n_psi + 2 * (axes.n_psi > 1), axes.n_t + 2, -1, axes.n_beta + 2, 4)
-    coefficients = file.create_dataset("coefficients", data=table.data.coefficients.reshape(inputs))
-    coefficients.attrs["units"] = "1"
-    coefficients.attrs["description"] = (
-        "quadratic B-spline coefficients over ln(a/b), abs(psi), t, alpha, beta; outputs fx, fy, mz and one zero"
-    )
-    for name, errors in (("force_error", table.force_error), ("moment_error", table.moment_error)):
-        dataset = file.create_dataset(name, data=errors)
-        dataset.attrs["units"] = "1"
-        dataset.attrs["description"] = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
-    file.attrs.update(schema=SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
-    file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
-    for name, value in axes._asdict().items():
-        file.attrs[f"axes.{name}"] = value
+    errors = f"{', '.join(QUANTILES)} of the error at random cases, over mu N (c)"
+    splines = "quadratic B-spline coefficients over ln(a/b), abs(psi), t, alpha, beta; outputs fx, fy, mz and one zero"
+    with new_hdf5(path) as file:
+        for name, data, description in (
+            ("coefficients", table.data.coefficients.reshape(inputs), splines),
+            ("force_error", table.force_error, errors), ("moment_error", table.moment_error, errors),
+        ):  # fmt: skip
+            file.create_dataset(name, data=data).attrs.update(units="1", description=description)
+        file.attrs.update(schema=SCHEMA, wrcore_version=__version__, planes=table.planes, nu=table.nu)
+        file.attrs.update(tolerance=table.tolerance, cases=table.cases, resolution=table.resolution)
+        file.attrs.update({f"axes.{name}": value for name, value in axes._asdict().items()})
 
 
 def load_table(path):
@@ -184,9 +176,8 @@ def _read_datasets(path, file):
     errors = tuple(tuple(float(value) for value in file[name][...]) for name in ("force_error", "moment_error"))
     if not all(len(part) == len(QUANTILES) for part in errors):
         raise InputError(path, "force_error", f"expected {', '.join(QUANTILES)}")
-    return CreepTable(
-        data, str(attributes["planes"]), float(attributes["tolerance"]), resolution, int(attributes["cases"]), *errors
-    )
+    planes, tolerance = str(attributes["planes"]), float(attributes["tolerance"])
+    return CreepTable(data, planes, tolerance, resolution, int(attributes["cases"]), *errors)
 
 
 def _check_axes(path, axes, planes, coefficients):
@@ -196,14 +187,12 @@ def _check_axes(path, axes, planes, coefficients):
     shape = (axes.n_g + 2, axes.n_psi + 2 * (not ellipse), axes.n_t + 2, angles, axes.n_beta + 2, 4)
     if planes not in RESOLUTIONS or ellipse != (planes == "ellipse") or min(axes[3:]) < 1 or axes.n_g < 2:
         raise InputError(path, "axes", f"expected the axes of a table, got {planes!r} with {axes}")
-    if not (
-        -20.0 < axes.log_g_min < axes.log_g_max < 20.0 and 0.0 <= axes.psi_max < 1.0 and ellipse == (not axes.psi_max)
-    ):
+    sizes = -20.0 < axes.log_g_min < axes.log_g_max < 20.0
+    if not (sizes and 0.0 <= axes.psi_max < 1.0 and ellipse == (not axes.psi_max)):
         raise InputError(path, "axes", f"expected ranges of ln(a/b) and psi, got {axes}")
     if coefficients.shape != shape or not np.isfinite(coefficients).all():
-        raise InputError(
-            path, "coefficients", f"expected finite numbers in the shape {shape}, got {coefficients.shape}"
-        )
+        expected = f"expected finite numbers in the shape {shape}, got {coefficients.shape}"
+        raise InputError(path, "coefficients", expected)
 
 
 def show_progress(patches):
@@ -214,11 +203,11 @@ def show_progress(patches):
 
 
 def creep_digest():
-    """Digest (16 hex digits) of everything in this room that the numbers in a table depend on, and of their form."""
-    digest = hashlib.sha256(SCHEMA.encode())
-    room = files("wrcore.creep")
+    """Digest (16 hex digits) of everything here that the numbers in a table depend on, and of their form."""
+    digest, core = hashlib.sha256(SCHEMA.encode()), files("wrcore")
     for name in ("axes.py", "build.py", "halfspace.py", "kalker.py", "kalker_coefficients.csv", "operator.py"):
-        digest.update(room.joinpath(name).read_bytes())
+        digest.update(core.joinpath("creep", name).read_bytes())
+    digest.update(core.joinpath("contact/patch/panels.py").read_bytes())
     return digest.hexdigest()[:16]
 
 

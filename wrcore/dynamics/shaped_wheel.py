@@ -21,7 +21,7 @@ from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import motion_of
-from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, find_overlaps, patch_wrench
+from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, detect_patches, patch_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -70,7 +70,7 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
         for wheel in range(2):
             m, wrench, rows = motion_of(motions[i, wheel]), wrenches[i, wheel], patches[i, wheel]
             contact = contact_of(model, i, wheel)
-            count, bound, spatial = find_overlaps(contact, m, rows)
+            count, bound, spatial = detect_patches(contact, m, rows)
             counts[i, wheel], bounds[i, wheel] = count, bound
             pose = make_pose(m.side, m.y, m.z, m.side * m.ex, m.side * m.ey, m.side * m.ez, spatial)
             for k in range(6):

@@ -34,7 +34,7 @@ from wrcore.creep.laws import creep_force_at
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, contact_of, falling, find_overlaps, wheel_wrenches
+from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, contact_of, detect_patches, falling, wheel_wrenches
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -388,7 +388,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
             seen = motion_of(motions[i, wheel])
             m = as_left(seen)
-            count, bound, spatial = find_overlaps(contact, m, rows)
+            count, bound, spatial = detect_patches(contact, m, rows)
             for k in range(6):
                 wrench[k] = 0.0
             first = kept = group = 0

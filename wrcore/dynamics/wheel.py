@@ -12,7 +12,7 @@ from wrcore.contact.patch.model import StripModel
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
 from wrcore.dynamics.motion import MOTION, motion_of
-from wrcore.kernels.handles import call_address, one_of
+from wrcore.kernels.handles import call_address, member_of
 from wrcore.kernels.jit import FUSED, jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED = range(4)
@@ -48,7 +48,7 @@ class ContactModel(NamedTuple):
 @jit(allocates=False, inline="always")
 def contact_of(model, wheelset, wheel):
     """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
-    return one_of(model, "wheels", 2 * wheelset + wheel)
+    return member_of(model, "wheels", 2 * wheelset + wheel)
 
 
 @jit(allocates=False, forceinline=True)
@@ -82,7 +82,7 @@ def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def find_overlaps(model, m, rows):
+def detect_patches(model, m, rows):
     """Patches of a wheel by the model's detection: their number, AUTO's bound of planar detection's error, and whether
     detection was spatial."""
     bound, spatial = 0.0, model.detection == SPATIAL
@@ -158,7 +158,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
         for i in range(motions.shape[0]):
             for wheel in range(2):
                 m, contact = motion_of(motions[i, wheel]), contact_of(model, i, wheel)
-                count, bound, _ = find_overlaps(contact, m, patches[i, wheel])
+                count, bound, _ = detect_patches(contact, m, patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
     for i in range(motions.shape[0]):
         for wheel in range(2):

@@ -47,7 +47,6 @@ ARRAY = {*typing.get_args(ArrayLike)}
 ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
-
 UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
 """What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
 
@@ -80,23 +79,16 @@ def checked(thing: Thing) -> Thing:
         more = [(name, kind) for name, (how, kind) in found.items() if how is Parameter.VAR_POSITIONAL]
         return [pair for pair in by_name.items() if pair not in more], by_name, more
 
-    def refuse(name, kind, value):
-        expected = one_of(kind.words, value) if kind.words else f"expected {kind.text}, got {short(value)}"
-        raise InputError(thing.__qualname__.removesuffix(".__init__"), name, expected)
-
     @wraps(thing)
     def front(*args, **options):
         in_order, by_name, more = kinds()
-        for (name, kind), value in zip(in_order, args, strict=False):
-            if not kind[0](value):
-                refuse(name, kind, value)
-        for name, kind in more:
-            for value in args[len(in_order) :]:
-                if not kind[0](value):
-                    refuse(name, kind, value)
-        for name, value in options.items():
-            if name in by_name and not by_name[name][0](value):
-                refuse(name, by_name[name], value)
+        given = [(*pair, value) for pair, value in zip(in_order, args, strict=False)]
+        given += [(*pair, value) for pair in more for value in args[len(in_order) :]]
+        given += [(name, by_name[name], value) for name, value in options.items() if name in by_name]
+        for name, kind, value in given:
+            if not kind.fits(value):
+                expected = one_of(kind.words, value) if kind.words else f"expected {kind.text}, got {short(value)}"
+                raise InputError(thing.__qualname__.removesuffix(".__init__"), name, expected)
         try:
             return thing(*args, **options)
         except OSError as error:

@@ -22,11 +22,8 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAD = b"HDF5 with SHA-256 of all that follows byte 512: "
 
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-MOST_DEFLATED = 1100
-"""Bytes that one stored byte stands for at most: deflate reaches 1032."""
-
-LARGEST_CHUNK = 2**26
-"""Bytes."""
+MOST_DEFLATED = 1100  # bytes that one stored byte stands for at most: deflate reaches 1032
+LARGEST_CHUNK = 2**26  # bytes
 
 
 @contextmanager

@@ -5,10 +5,12 @@ import math
 import os
 import re
 import sys
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from itertools import islice
+from pathlib import Path
 
 import yaml
 
@@ -125,6 +127,13 @@ def read_yaml(path):
     if not isinstance(data, dict):
         raise InputError(path, "", f"expected a mapping of keys, got {type(data).__name__}")
     return data
+
+
+def read_source(source, kind):
+    """Name for errors, folder that paths count from, and content of a file, or of a mapping in its place."""
+    if isinstance(source, Mapping):
+        return kind, Path(), plain_tree(dict(source), kind)
+    return str(source), Path(source).parent, read_yaml(source)
 
 
 def parse_value(text):

@@ -18,8 +18,7 @@ except ImportError:  # a system without such locks
     fcntl = None  # type: ignore[assignment]
 
 
-HDF5 = (".h5", ".hdf5")
-"""Endings of our binary files."""
+HDF5 = (".h5", ".hdf5")  # endings of our binary files
 
 
 def named(path: str | os.PathLike[str], endings: Iterable[str], source: str) -> None:

@@ -90,19 +90,14 @@ def irregularity_at(data, s, out):
 
 def irregularity_data(start, step, values):
     """IrregularityData of samples (n, 4), m, in the order of `CHANNELS`, from arc length ``start`` on by ``step`` (m),
-    that begin and end at zero: a spline that dies out, C2, in cells of zeros added at both ends.
-    """
+    that begin and end at zero: a spline that dies out, C2, in cells of zeros added at both ends."""
     from scipy.interpolate import CubicSpline  # a third of a second that other scenes need not wait
 
     values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
     spline = CubicSpline(step * np.arange(len(values)), values, bc_type="clamped")
     coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
-    return IrregularityData(
-        coefficients,
-        np.array([start - _PADDING * step], float),
-        np.array([step], float),
-        np.array([0, len(coefficients)]),
-    )
+    first, steps = np.array([start - _PADDING * step], float), np.array([step], float)
+    return IrregularityData(coefficients, first, steps, np.array([0, len(coefficients)]))
 
 
 def sum_of(parts):
@@ -124,27 +119,21 @@ def combine(alignment, level, cross_level, gauge):
     )
 
 
-def fade(s, fade_in, fade_out):
-    """Factor 0 to 1 that fades samples at s (n,) in and out over the given lengths (m), with two derivatives zero."""
-
-    def smooth(distance, length):
-        t = np.clip(distance / length, 0.0, 1.0) if length > 0.0 else np.ones_like(distance)
-        return t**3 * (10.0 + t * (6.0 * t - 15.0))
-
-    return smooth(s - s[0], fade_in) * smooth(s[-1] - s, fade_out)
+def _smooth(distance, length):
+    """Factor from 0 to 1 over a length (m), with two derivatives zero at both ends."""
+    t = np.clip(distance / length, 0.0, 1.0) if length > 0.0 else np.ones_like(distance)
+    return t**3 * (10.0 + t * (6.0 * t - 15.0))
 
 
-def faded_irregularity(s, values, fade_in, fade_out, source, field):
+def faded(s, values, fade_in, fade_out, source, field):
     """IrregularityData from samples at uniform arc lengths s (n,), values (n, 4), both in m; InputError if the fades
-    are longer, or the ends are neither zero nor faded.
-    """
+    are longer, or the ends are neither zero nor faded."""
     if fade_in + fade_out > s[-1] - s[0]:
         raise InputError(source, field, f"expected fades shorter than the {s[-1] - s[0]:g} m of irregularity")
-    values = values * fade(s, fade_in, fade_out)[:, None]
+    values = values * (_smooth(s - s[0], fade_in) * _smooth(s[-1] - s, fade_out))[:, None]
     if max(np.abs(values[0]).max(), np.abs(values[-1]).max()) > 1e-9:
-        raise InputError(
-            source, field, "expected fade_in and fade_out above 0, as the values do not begin and end at 0"
-        )
+        expected = "expected fade_in and fade_out above 0, as the values do not begin and end at 0"
+        raise InputError(source, field, expected)
     return irregularity_data(s[0], (s[-1] - s[0]) / (len(s) - 1), values)
 
 
@@ -154,8 +143,7 @@ def read_irregularity(path):
     The header names ``s_m`` and either any of `CHANNELS` or any of `MEANS`, each with ``_m``; columns that are missing
     are zero. Lines that begin with ``#`` are comments. Samples at varying distances are carried over, by a cubic
     spline, to a grid of the smallest distance, which is said. InputError names the file and the line or column at
-    fault: also where such a spline would make up what lies between samples.
-    """
+    fault: also where such a spline would make up what lies between samples."""
     names, lines, table = _read_table(path)
     s, columns = table[:, 0], dict(zip(names[1:], table[:, 1:].T, strict=True))
     wrong = np.flatnonzero(np.diff(s) <= 0.0)
@@ -243,8 +231,7 @@ def spectrum(quantity, level, omega):
     """German (ERRI B 176 RP 1, 1993; constants as in public codes) power spectral density over wave numbers ``omega``
     (rad/m) of the mean "level" or "alignment" (m^2/(rad/m)), or of the "cross_angle" between the rails' heights
     (rad^2/(rad/m)), at the disturbance level "low" or "high". One-sided and per rad/m: a band's variance is the
-    integral of S over its positive wave numbers, without a further factor 2 or 2 pi.
-    """
+    integral of S over its positive wave numbers, without a further factor 2 or 2 pi."""
     square = np.asarray(omega, float) ** 2
     factor = (LATERAL if quantity == "alignment" else VERTICAL)[level]
     density = factor * CUTOFF_C**2 / ((square + CUTOFF_R**2) * (square + CUTOFF_C**2))
@@ -260,8 +247,7 @@ def generate(level, seed, length, spacing, shortest, longest):
 
     A sum of cosines with random phases: their wave numbers are the multiples of 2 pi / period, the period being at
     least twice the length, and each carries the variance of its own share of the band. Alignment, level and cross level
-    are independent; the gauge stays as it is (the spectra know none).
-    """
+    are independent; the gauge stays as it is (the spectra know none)."""
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
     from scipy.fft import next_fast_len
 
@@ -278,10 +264,9 @@ def _realise(quantity, level, random, period, spacing, shortest, longest):
     """One periodic realisation (period,) of a spectrum."""
     step = 2.0 * np.pi / (period * spacing)
     omega = step * np.arange(period // 2 + 1)
-    low, high = (
-        np.clip(omega + shift, 2.0 * np.pi / longest, 2.0 * np.pi / shortest) for shift in (-step / 2, step / 2)
-    )
-    ends = spectrum(quantity, level, low) + spectrum(quantity, level, high)
-    variance = (high - low) / 6.0 * (ends + 4.0 * spectrum(quantity, level, 0.5 * (low + high)))
+    ends = 2.0 * np.pi / longest, 2.0 * np.pi / shortest
+    low, high = (np.clip(omega + shift, *ends) for shift in (-step / 2, step / 2))
+    sides = spectrum(quantity, level, low) + spectrum(quantity, level, high)
+    variance = (high - low) / 6.0 * (sides + 4.0 * spectrum(quantity, level, 0.5 * (low + high)))
     phase = random.uniform(0.0, 2.0 * np.pi, len(omega))
     return np.fft.irfft(0.5 * period * np.sqrt(2.0 * variance) * np.exp(1j * phase), period)

@@ -24,18 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.geometry.path_pieces import (
-    CENTRE,
-    COLUMNS,
-    CURVATURE,
-    HEADING,
-    RAISE,
-    ROLL,
-    WIDENING,
-    X,
-    Y,
-    cut,
-)
+from wrcore.geometry.path_pieces import CENTRE, COLUMNS, CURVATURE, HEADING, RAISE, ROLL, WIDENING, X, Y, cut
 from wrcore.kernels.jit import jit
 
 
@@ -102,8 +91,7 @@ def path_data(
     The k - 1 ``shapes`` are those of `wrcore.geometry.ramps`, linear if left out; corners of cant and widening are
     rounded over the length ``rounding`` (m). ``cant_about`` is "lower_rail", "inner_rail" (of the curve) or
     "centreline": what keeps its height. ``incline`` (`wrcore.geometry.ramps.Incline`) is the height before cant,
-    ``aside`` that of `PathData`.
-    """
+    ``aside`` that of `PathData`."""
     knots = np.asarray(knots, float)
     pieces, borders = cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
     starts = np.concatenate(([-math.inf], borders))
@@ -168,10 +156,8 @@ def centreline(path, s):
     if i == pieces.shape[0] - 1 and bend != 0.0:
         x, y, tx, ty = _on_last_circle(pieces[i, X], pieces[i, Y], pieces[i, X + 1], pieces[i, Y + 1], bend, d)
     heading = pieces[i, HEADING] + d * (bend + d * (0.5 * bend_1 + d * (bend_2 / 3.0 + d * (0.25 * bend_3))))
-    curvature, curvature_rate = (
-        bend + d * (bend_1 + d * (bend_2 + d * bend_3)),
-        bend_1 + d * (2.0 * bend_2 + 3.0 * bend_3 * d),
-    )
+    curvature = bend + d * (bend_1 + d * (bend_2 + d * bend_3))
+    curvature_rate = bend_1 + d * (2.0 * bend_2 + 3.0 * bend_3 * d)
     sin_roll, sin_rate, sin_second = _cubic(pieces, i, ROLL, d)
     z, slope, slope_rate = _cubic(pieces, i, RAISE, d)
     widening, widening_rate, _ = _cubic(pieces, i, WIDENING, d)
@@ -185,9 +171,11 @@ def centreline(path, s):
     )  # fmt: skip
 
 
-@jit(inline="always")
-def fill_frame(station, matrix):
-    """Write the frame's axes into the columns of matrix (3, 3): t forward, n left in the canted plane, b up."""
+@jit(forceinline=True)
+def track_frame(path, s, matrix):
+    """The Station at arc length s (m); fills ``matrix`` (3, 3) with the track's frame A = [t n b], Eq. (3), rolled by
+    the cant about t: columns t forward, n left in the canted plane, b up."""
+    station = centreline(path, s)
     tx, ty, tz, level = station.tx, station.ty, station.slope, station.level
     inverse = 1.0 / level
     nx, ny = -ty * inverse, tx * inverse
@@ -196,14 +184,6 @@ def fill_frame(station, matrix):
     matrix[0, 0], matrix[1, 0], matrix[2, 0] = tx, ty, tz
     matrix[0, 1], matrix[1, 1], matrix[2, 1] = c * nx + s * bx, c * ny + s * by, s * level
     matrix[0, 2], matrix[1, 2], matrix[2, 2] = c * bx - s * nx, c * by - s * ny, c * level
-
-
-@jit(forceinline=True)
-def track_frame(path, s, matrix):
-    """The Station at arc length s (m); fills ``matrix`` (3, 3) with the track's frame A = [t n b], Eq. (3), rolled by
-    the cant about t."""
-    station = centreline(path, s)
-    fill_frame(station, matrix)
     return station
 
 

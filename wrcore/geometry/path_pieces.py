@@ -31,7 +31,7 @@ CANT_ABOUT = {
 _DEGREE = 7
 
 
-def cut(knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None):
+def cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline):
     """Pieces (n + 1, COLUMNS) of a path, the first straight and without beginning, and the arc lengths (n,) between
     them (m); the arguments are those of :func:`wrcore.geometry.path.path_data`."""
     curvature, cant, half = np.asarray(curvature, float), np.asarray(cant, float), 0.5 * rounding

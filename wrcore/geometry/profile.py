@@ -52,8 +52,7 @@ class ProfileCurve:
     def from_sections(cls, name, kind, sections, source="", window=WINDOW, spacing=SPACING):
         """Curve through exact sections (Arc, Line or Polynomial) in order of increasing u (m), those of rails in track
         pose (`profile_sections.incline`); ``window``: averaging length of the curvature, m; ``spacing``: distance of
-        the nodes, m; u = 0 is a node.
-        """
+        the nodes, m; u = 0 is a node."""
         low, high, used = profile_sections.usable_span(sections, STEEPEST)
         u = _nodes(low, high, spacing)
         f, df = profile_sections.evaluate(used, u)
@@ -69,8 +68,7 @@ class ProfileCurve:
         Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
         stays) after a turn by ``inclination`` (0: they lie in track pose). ``trim`` keeps the single-valued portion
         around the origin instead of refusing a profile that turns back. ``name`` and the points' ``lines`` in a file
-        are for messages.
-        """
+        are for messages."""
         outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing)
         low, high = outline.working_span(STEEPEST, trim)
         nodes = _nodes(low, high, spacing)
@@ -81,8 +79,7 @@ class ProfileCurve:
     def __call__(self, u, nu=0):
         """Ordinate (``nu=0``, m), slope (1) or second derivative (2, 1/m) at ``u`` (m, any shape); NaN beyond the ends.
 
-        Ordinate and slope are those of the cubic Hermite polynomial, the second derivative is interpolated linearly.
-        """
+        Ordinate and slope are those of the cubic Hermite polynomial, the second derivative is interpolated linearly."""
         u = np.asarray(u, dtype=float)
         h = self.spacing
         u = np.where((u >= self.u[0]) & (u <= self.u[-1]), u, np.nan)
@@ -108,8 +105,7 @@ class ProfileCurve:
 
     def gauge_offset(self, depth=GAUGE_DEPTH):
         """Distance (m, positive) from a rail's origin to its innermost point within ``depth`` (m) of the top; NaN if
-        the profile ends above that depth on the gauge side. InputError for a wheel.
-        """
+        the profile ends above that depth on the gauge side. InputError for a wheel."""
         if self.kind != "rail":
             raise InputError(self.name, "gauge", "expected a rail profile, got a wheel")
         if isinstance(self.outline, profile_points.Outline):
@@ -132,8 +128,7 @@ def averaged_second_derivative(u, f, df, window=WINDOW):
     arc length ``window`` (m) centred there: the turn of the tangent over it, divided by it; cut off at the ends.
 
     It is f'' = kappa (1 + f'^2)^(3/2), so that Hertz' local curvature f'' / (1 + f'^2)^(3/2) is the mean. On a circular
-    arc this is exact also where the arc is steep, where the mean of f'' over u is not.
-    """
+    arc this is exact also where the arc is steep, where the mean of f'' over u is not."""
     if not window > 0.0:
         raise ValueError(f"window must be positive, got {window!r}")
     angle = np.arctan(df)

@@ -33,8 +33,7 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
 
     Keys: ``unit`` (m or mm); ``inclined`` (default True): a rail's points lie in the track pose already, else
     ``inclination`` turns them; ``smoothing`` (m). For files of columns: ``mirrored``: the first column counts towards
-    the track's centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that.
-    """
+    the track's centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that."""
     spec = _checked(spec if isinstance(spec, dict) else {"points": spec}, kind)
     path, unit = Path(spec["points"]), spec.get("unit")
     text = _text(path)
@@ -73,9 +72,8 @@ def _checked(spec, kind):
     if not isinstance(shift, (list, tuple)) or len(shift) != 2 or not all(map(_is_distance, shift)):
         raise InputError(kind, "shift", f"expected two distances in m, within 1, got {shift!r}")
     if Path(spec["points"]).suffix.lower() in (".prw", ".prr") and {"mirrored", "downwards", "shift"} & set(spec):
-        raise InputError(
-            kind, "mirrored, downwards, shift", "expected none of these: a SIMPACK file states them itself"
-        )
+        expected = "expected none of these: a SIMPACK file states them itself"
+        raise InputError(kind, "mirrored, downwards, shift", expected)
     smoothing = spec.get("smoothing", 0.0)
     if isinstance(smoothing, bool) or not isinstance(smoothing, (int, float)):
         raise InputError(kind, "smoothing", f"expected a distance in m, got {smoothing!r}")
@@ -93,9 +91,8 @@ def _text(path):
         wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
         return data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:
-        raise InputError(
-            path, "", f"expected a readable profile file: {getattr(error, 'strerror', None) or error}"
-        ) from None
+        fault = getattr(error, "strerror", None) or error
+        raise InputError(path, "", f"expected a readable profile file: {fault}") from None
 
 
 def _numbers(path, line, text):
@@ -187,8 +184,7 @@ def read_simpack(path, text, smoothed=False):
 
     Applied, in the order of the file's own numbering: shift, bounds, mirroring, inversion, unit. Rotation, minimum
     distance and, unless the caller smooths, SIMPACK's approximation are refused where they are not zero, as their
-    definition is not public.
-    """
+    definition is not public."""
     keys, begin = _header(path, text)
     for name in _UNSUPPORTED[: 2 if smoothed else 3]:
         if _value(path, keys, name, 0.0):

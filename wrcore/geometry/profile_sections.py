@@ -1,7 +1,7 @@
 """Profile sections: arcs, straight lines and polynomials, evaluated in closed form.
 
-A profile is a tuple of sections in order of increasing u (see ``wrcore`` for the axes). Arcs and lines stay arcs and
-lines when the rail is inclined, so an inclined rail is as exact as the upright one.
+A profile is a tuple of sections in order of increasing u (see ``wrcore`` for the axes); `Arc` says what their methods
+give. Arcs and lines stay arcs and lines when the rail is inclined, so an inclined rail is as exact as the upright one.
 """
 
 from dataclasses import dataclass, replace
@@ -91,33 +91,26 @@ class Line:
 
     @property
     def ends(self):
-        """First and last point, ((u, f), (u, f)) in m."""
         return (self.u0, self.f0), (self.u1, self.f1)
 
     def evaluate(self, u):
-        """Ordinate (m) and slope at the abscissae ``u`` (m)."""
         slope = (self.f1 - self.f0) / (self.u1 - self.u0)
         return self.f0 + slope * (u - self.u0), np.full_like(u, slope)
 
     def rotated(self, angle):
-        """The line turned counter-clockwise about (0, 0) by ``angle`` (rad)."""
         return Line(*_rotate(self.u0, self.f0, angle), *_rotate(self.u1, self.f1, angle))
 
     def shifted(self, du, df):
-        """The line moved by (``du``, ``df``), m."""
         return Line(self.u0 + du, self.f0 + df, self.u1 + du, self.f1 + df)
 
     def highest(self):
-        """Highest point (u, f), m."""
         return max(self.ends, key=lambda p: p[1])
 
     def span(self, steepest):
-        """Range of u (m), or None where the line is steeper than ``steepest``."""
         run, rise = self.u1 - self.u0, abs(self.f1 - self.f0)
         return (self.u0, self.u1) if run > 0.0 and rise <= steepest * run else None
 
     def leftmost(self, level):
-        """Points that may be the leftmost one not below the ordinate ``level`` (m)."""
         points = list(self.ends)
         if min(self.f0, self.f1) < level < max(self.f0, self.f1):
             points.append((self.u0 + (level - self.f0) / (self.f1 - self.f0) * (self.u1 - self.u0), level))
@@ -145,7 +138,6 @@ class Polynomial:
 
     @property
     def ends(self):
-        """First and last point, ((u, f), (u, f)) in m."""
         u = np.array([self.u0, self.u1])
         f = self.evaluate(u)[0]
         return (self.u0, float(f[0])), (self.u1, float(f[1]))

@@ -73,8 +73,7 @@ def s1002_sections():
     in m.
 
     The published coefficients leave value jumps of 0.118 um at -35 mm and 0.037 um at -26 mm. A Hermite cell would turn
-    them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5).
-    """
+    them into a false slope, so section C takes them up by a linear function of u (slope change below 2e-5)."""
     h, g, f, d = (
         Arc.between(a * _MM, b * _MM, yc * _MM, -zc * _MM, r * _MM, -side) for a, b, yc, zc, r, side in _S1002_ARCS
     )
@@ -98,7 +97,8 @@ def _closed(polynomial, f0, f1):
 
 def rail_sections(head):
     """Sections of an upright RailHead from the gauge side to the field side, crown at (0, 0), in m."""
-    right, start, uc, fc, before = [], 0.0, 0.0, 0.0, 0.0
+    right: list = []
+    start = uc = fc = before = 0.0
     ends = [w * _MM for w in head.half_widths] + [None]
     for radius, end in zip((r * _MM for r in head.radii), ends, strict=True):
         # the centre moves along the common normal, so that the arcs are tangent
@@ -106,14 +106,10 @@ def rail_sections(head):
         stop = np.pi / 2 - np.arctan(head.side) if end is None else float(np.arcsin((end - uc) / radius))
         right.append(Arc(uc, fc, radius, start, stop))
         start, before = stop, radius
-    right.append(_side_face(right[-1].ends[1], head.side))
+    u, f = right[-1].ends[1]
+    right.append(Line(u, f, u + head.side * (f + _SIDE_DEPTH), -_SIDE_DEPTH))
     crown = Arc(0.0, right[0].fc, right[0].radius, -right[0].last, right[0].last)
     return (*(_mirrored(s) for s in reversed(right[1:])), crown, *right[1:])
-
-
-def _side_face(top, side):
-    u, f = top
-    return Line(u, f, u + side * (f + _SIDE_DEPTH), -_SIDE_DEPTH)
 
 
 def _mirrored(section):
@@ -179,7 +175,7 @@ def named_profile(
     spec = str(spec) if isinstance(spec, Path) else spec
     upright = isinstance(spec, dict) and spec.get("inclined") is False
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
-        name = spec["points"] if upright and "points" in spec else spec
+        name = spec["points"] if isinstance(spec, dict) and "points" in spec else spec
         raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
     inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}

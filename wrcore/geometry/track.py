@@ -9,14 +9,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import validate
-from wrcore.geometry.irregularity import (
-    IrregularityData,
-    faded_irregularity,
-    generate,
-    no_irregularity,
-    read_irregularity,
-    sum_of,
-)
+from wrcore.geometry.irregularity import IrregularityData, faded, generate, no_irregularity, read_irregularity, sum_of
 from wrcore.geometry.path import PathData, path_data, tangent_path
 from wrcore.geometry.profile import GAUGE_DEPTH
 from wrcore.geometry.ramps import STEEPEST, incline
@@ -71,15 +64,13 @@ class Track:
         """Distance (m) from the track's centre line to the origin (highest point) of a rail's ProfileCurve in track
         pose.
 
-        Its part of the widening, half unless the path says otherwise, and the irregularity come on top.
-        """
+        Its part of the widening, half unless the path says otherwise, and the irregularity come on top."""
         return 0.5 * self.gauge + rail.gauge_offset(self.gauge_depth)
 
 
 def build_track(data, source, folder="."):
     """Track of a scene's key ``track`` (a dict, left as it is); ``source`` is named in errors, a points file is looked
-    for in ``folder``, then above it. InputError names a segment by its position in the list (from 0) and its key.
-    """
+    for in ``folder``, then above it. InputError names a segment by its position in the list (from 0) and its key."""
     try:
         data = validate(data, "track", source)
     except InputError as error:
@@ -192,7 +183,7 @@ def _irregularity(data, source, folder):
         sampled.append(read_irregularity(found[0]))
     if "spectrum" in data:
         sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))
-    return sum_of([faded_irregularity(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled])
+    return sum_of([faded(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled])
 
 
 def _generated(data, source, key):
@@ -214,7 +205,6 @@ def rotation(roll, yaw):
     """Rotation matrix of a wheelset's frame: first roll about x, then yaw about z, shape (3, 3).
 
     The second column is the axle's direction, (-sin yaw cos roll, cos yaw cos roll, sin roll). The wheelset's
-    pitch is left out: it does not move the wheel's surface.
-    """
+    pitch is left out: it does not move the wheel's surface."""
     cr, sr, cy, sy = np.cos(roll), np.sin(roll), np.cos(yaw), np.sin(yaw)
     return np.array([[cy, -sy * cr, sy * sr], [sy, cy * cr, -cy * sr], [0.0, sr, cr]])

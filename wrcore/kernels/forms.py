@@ -42,7 +42,6 @@ class _Register(AnalysisPass):
         super().__init__()
 
     def run_pass(self, state):
-        """Register what was lowered."""
         lowered = state["cr"]._replace(cfunc=object())
         state.targetctx.insert_user_function(lowered.cfunc, lowered.fndesc, [state.library])
         state.reload_init.extend(state.library._reload_init)
@@ -54,7 +53,6 @@ class _LinkedCompiler(CompilerBase):
     """Numba's passes but for the last one, which makes machine code."""
 
     def define_pipelines(self):
-        """Numba's passes without machine code."""
         state = self.state
         state.flags.no_compile = True
         state.library = _Intermediate(state.targetctx.codegen(), state.func_id.func_qualname)
@@ -68,14 +66,12 @@ class _LinkedFile(CompileResultCacheImpl):
     """What of a linked kernel is kept on disk."""
 
     def reduce(self, result):
-        """What is written."""
         result.library._ensure_finalized()
         result.fndesc.typemap = result.fndesc.calltypes = None
         kept = result.fndesc, result.environment, result.signature, result.reload_init
         return result.library.name, result.library._final_module.as_bitcode(), kept
 
     def rebuild(self, target_context, payload):
-        """What was written, as a result of compiling again."""
         name, code, (description, environment, signature, reload_init) = payload
         for prepare in reload_init:
             prepare()
@@ -117,7 +113,6 @@ class KernelCache(FunctionCache):
         return None
 
     def save_overload(self, *args):
-        """Keep the kernel for some types."""
         self._tried(super().save_overload, *args)
 
     def _tried(self, act, *args):
@@ -134,10 +129,9 @@ def _set_environments(result):
 
 
 class _Form(CPUDispatcher):
-    """A kernel in a form that Python cannot call."""
+    """A kernel in a form that Python cannot call: its table of calls gets nothing."""
 
     def add_overload(self, result):
-        """Keep a result; Python's table of calls gets nothing."""
         self.overloads[tuple(result.signature.args)] = result
         if not isinstance(result.library, _Intermediate):
             _set_environments(result)
@@ -147,11 +141,9 @@ class KernelDispatcher(CPUDispatcher):
     """A kernel as Python calls it; other kernels get it linked."""
 
     def get_call_template(self, args, kws):
-        """How another kernel calls this one."""
         return self.in_form("linked").get_call_template(args, kws)
 
     def get_overload(self, sig):
-        """What another kernel calls for these types."""
         return self.in_form("linked").get_overload(sig)
 
     @property
@@ -170,6 +162,5 @@ class KernelDispatcher(CPUDispatcher):
         return forms[form]
 
     def add_overload(self, result):
-        """Keep a result for calls from Python."""
         super().add_overload(result)
         _set_environments(result)

@@ -112,7 +112,7 @@ def _pack(kind, value, begin, memory):
 
 
 @intrinsic(prefer_literal=True)
-def one_of(_, whole, name, k):
+def member_of(_, whole, name, k):
     """Reference to the k-th of the equal named tuples in the field ``name``; where that is empty, ``whole`` itself."""
     target = whole.target if isinstance(whole, Reference) else whole
     field = target.fields.index(name.literal_value)

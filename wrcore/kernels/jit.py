@@ -34,8 +34,7 @@ def jit(function=None, *, allocates=True, **options):
     What is not asked for is switched off: numba would hand fast math and inlining on from the first caller that has a
     kernel compiled, so that its code depended on who came first. With ``allocates=False``, for kernels that create no
     arrays but views, numba counts no references, which costs more than the arithmetic where a kernel is handed a tuple
-    of many arrays.
-    """
+    of many arrays."""
     if function is None:
         return lambda f: jit(f, allocates=allocates, **options)
     settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}

@@ -12,8 +12,7 @@ from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint
 
-NO_PATCHES = np.zeros((0, 0, 0, MEMORY))
-"""Of models without strips; files of before strips say nothing about them."""
+NO_PATCHES = np.zeros((0, 0, 0, MEMORY))  # of models without strips; files of before strips say nothing about them
 
 
 class _Saved(NamedTuple):

@@ -4,7 +4,12 @@ Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: it
 of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Sum of
 Y: lateral force of a wheelset on the track, to the left. Wear number T gamma: |Fx xi + Fy eta| summed over the patches
 (N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed
-over the patches (W); see :mod:`wrcore.run.wear`. Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b).
+over the patches (W). Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b).
+
+The work of a patch per metre run, -(Fx xi + Fy eta + Mz phi), is what friction turns into heat and wear, never negative
+(Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 1.3). T gamma is its amount without the
+spin's part, as wear models take it (Pearce and Sherratt, Wear 144 (1991) 343-351), or with it. The products carry
+signs: where spin drives the lateral force along its creepage (on a flange, mostly), one of them gives work back.
 """
 
 from __future__ import annotations
@@ -15,10 +20,8 @@ from functools import partial
 import numpy as np
 
 from wrcore.geometry.track import SIDES
-from wrcore.run.wear import creep_work
 
-UNLOADED = 1e3
-"""Below this Q counts as no contact and Y/Q is left out, N."""
+UNLOADED = 1e3  # below this Q counts as no contact and Y/Q is left out, N
 
 OF_WHEELS = {
     "Q": "Q_N", "Y": "Y_N", "Y_over_Q": "Y_over_Q", "T_gamma": "T_gamma_N", "T_gamma_spin": "T_gamma_spin_N",
@@ -43,6 +46,16 @@ def forces_on_rail(contact: Mapping[str, np.ndarray], side: str) -> tuple[np.nda
         vertical[rows] += normal * cosine + aside * sine
         lateral[rows] += aside * cosine - normal * sine
     return vertical, -SIDES[side] * lateral
+
+
+def creep_work(fx, fy, mz, xi, eta, phi):
+    """Creep work of wheels, shape (...), from forces (N), spin moment (N m), creepages and spin (1/m) of patches (...,
+    patches), NaN where there is none: sums of abs(Fx xi + Fy eta), N, of abs(Fx xi + Fy eta + Mz phi), N, and of -(Fx
+    xi + Fy eta + Mz phi), J/m, which times the rolling speed is the dissipated power.
+    """
+    sliding = fx * xi + fy * eta
+    whole = sliding + mz * phi
+    return tuple(np.nansum(part, axis=-1) for part in (np.abs(sliding), np.abs(whole), -whole))
 
 
 def quotient(vertical: np.ndarray, lateral: np.ndarray) -> np.ndarray:
@@ -126,7 +139,5 @@ def asked_for(wanted: Iterable[str], groups: Groups, speed: float) -> dict[str, 
         if kinds.keys().isdisjoint(wanted):
             continue
         derived = derived_channels(groups, group, speed)
-        own = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
-        if own:
-            found[group] = own
+        found[group] = {kinds[name]: _known(stored, derived, kinds[name]) for name in wanted if name in kinds}
     return found

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 from wrcore.kernels.cache import kernel_folder
 from wrcore.scene.description import announce
 
-DELAY = 1.0
-"""Work that is done within this time shows no bar, s."""
+DELAY = 1.0  # work that is done within this time shows no bar, s
 
 
 def somebody_watches() -> bool:

@@ -21,16 +21,13 @@ from wrcore.run.run import Run
 from wrcore.run.state import State
 
 FORMAT = "wrcore run"
-FORMAT_VERSION = 3
-"""Up to version 2 velocities and accelerations stood in the ground's axes."""
+FORMAT_VERSION = 3  # up to version 2 velocities and accelerations stood in the ground's axes
 
 KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
-END = "end"
-"""Group that is no body: the last valid state."""
-
-ROWS = 8192
-"""Output times of a joined run that are in memory at once."""
+RECORDS = ("scene", "settings", "counters")
+END = "end"  # group that is no body: the last valid state
+ROWS = 8192  # output times of a joined run that are in memory at once
 
 COMPRESSION = {"compression": "gzip", "shuffle": True}
 
@@ -65,7 +62,9 @@ def write_run(
     completed
     """
     with new_hdf5(path) as file:
-        _write_attributes(file, run)
+        file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, wrcore_version=__version__)
+        file.attrs.update(status=run.status, reason=run.reason)
+        file.attrs.update({name: _record(getattr(run, name)) for name in RECORDS})
         time = _create_dataset(file, "t", data=run.t, **options)
         time.make_scale("t")
         for group in sorted(run.groups):
@@ -76,16 +75,6 @@ def write_run(
             _write_end(file.create_group(END), run)
         if also is not None:
             also(file, run)
-
-
-def _write_attributes(file, run):
-    file.attrs["format"] = FORMAT
-    file.attrs["format_version"] = FORMAT_VERSION
-    file.attrs["wrcore_version"] = __version__
-    file.attrs["status"] = run.status
-    file.attrs["reason"] = run.reason
-    for name in ("scene", "settings", "counters"):
-        file.attrs[name] = _record(getattr(run, name))
 
 
 def _record(values):
@@ -100,25 +89,20 @@ def _plain(value):
 
 
 def _create_dataset(group, name, **options):
-    dataset = group.create_dataset(name, **(COMPRESSION | options))
-    dataset.attrs["units"] = unit_of(name)
-    dataset.attrs["description"] = DESCRIPTIONS.get(name, name.replace("_", " "))
+    return _described(group, name, unit_of(name), DESCRIPTIONS.get(name, name.replace("_", " ")), COMPRESSION | options)
+
+
+def _described(group, name, unit, text, options):
+    dataset = group.create_dataset(name, **options)
+    dataset.attrs["units"], dataset.attrs["description"] = unit, text
     return dataset
 
 
 def _write_end(group, run):
     """The last valid state, and all that a run needs to go on from there."""
-    for name, value, unit, text in (
-        ("t", run.end_t, "s", "time of the last valid state"),
-        (
-            "state",
-            run.end_state,
-            "SI",
-            "13 numbers per body, then own states of force elements and of wheels",
-        ),
-    ):
-        dataset = group.create_dataset(name, data=value)
-        dataset.attrs["units"], dataset.attrs["description"] = unit, text
+    _described(group, "t", "s", "time of the last valid state", {"data": run.end_t})
+    text = "13 numbers per body, then own states of force elements and of wheels"
+    _described(group, "state", "SI", text, {"data": run.end_state})
     if isinstance(run.end_state, State):
         group.attrs["frame_m"], group.attrs["vehicle"] = run.end_state.frame, _record(run.end_state.vehicle)
 
@@ -160,8 +144,7 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
                         file[name][begin + at : begin + end] = content[name][at:end]
             begin += length
         with checked_hdf5(parts[-1], KIND) as last:
-            for name, value in last.attrs.items():
-                file.attrs[name] = value
+            file.attrs.update(last.attrs)
             last.copy(END, file)
         file.attrs["counters"] = _record(counters)
 
@@ -264,7 +247,7 @@ def _check_run(path, run):
     """What every other part of the package relies on."""
     if run.status not in STATUSES or not isinstance(run.reason, str):
         raise InputError(path, "attribute status", one_of(STATUSES, run.status))
-    for name in ("scene", "settings", "counters"):
+    for name in RECORDS:
         if not isinstance(getattr(run, name), dict):
             raise InputError(path, f"attribute {name}", "expected a JSON object")
     if not all(isinstance(value, int | float) for value in run.counters.values()):
@@ -282,16 +265,16 @@ def _check_run(path, run):
 
 def _read_frame(file):
     """A run without its channels."""
-    records = {name: json.loads(file.attrs[name]) for name in ("scene", "settings", "counters")}
+    records = {name: json.loads(file.attrs[name]) for name in RECORDS}
     run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
     if END in file:
-        end, t = file[END], float(file[END]["t"][()])
-        run.end_t, run.end_state = t, end["state"][()]
+        end = file[END]
+        run.end_t, run.end_state = float(end["t"][()]), end["state"][()]
         if "frame_m" in end.attrs:
             names = tuple(json.loads(end.attrs["vehicle"]))
-            run.end_state = State(run.end_state, t, float(end.attrs["frame_m"]), names)
-        if "checkpoint" in file[END]:
-            run.end = read_checkpoint(file[END]["checkpoint"])
+            run.end_state = State(run.end_state, run.end_t, float(end.attrs["frame_m"]), names)
+        if "checkpoint" in end:
+            run.end = read_checkpoint(end["checkpoint"])
     return run
 
 

@@ -18,11 +18,9 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.integrate.trajectory import Checkpoint
-from wrcore.run.course import DERAILED_Y as DERAILED_Y
-from wrcore.run.course import Course
-from wrcore.run.course import evaluated as evaluated
 from wrcore.run.progress import counted, simulated_time
 from wrcore.run.run import Run
+from wrcore.run.simulation import Simulation
 from wrcore.run.state import State
 from wrcore.scene.description import Scene, Source, load_scene
 
@@ -85,8 +83,8 @@ def simulate(
     begin = start.t if isinstance(start, Checkpoint | State) else 0.0
     check_memory(scene)
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
-        course = Course(scene, begin_at, show_progress if progress is None else None)
-        return course.advance(output_times(begin, settings["duration"], rate), advance)
+        simulation = Simulation(scene, begin_at, show_progress if progress is None else None)
+        return simulation.advance(output_times(begin, settings["duration"], rate), advance)
 
 
 @checked
@@ -124,17 +122,20 @@ def simulate_many(
         return [run for _, run in zip(bar(scenes), runs, strict=True)]
 
 
-LARGEST_RUN = 4e9
-"""Channels of a run that is kept in memory take no more than this, bytes."""
+LARGEST_RUN = 4e9  # channels of a run that is kept in memory take no more than this, bytes
+
+
+def bytes_per_time(vehicle):
+    """Memory that the channels of one output time take."""
+    patches = len(vehicle.bodies.wheelsets) * 2 * reduction.MAX_PATCHES * reduction.PATCH_COLUMNS
+    return 8 * (STATE_SIZE * len(vehicle.body_names) + patches)
 
 
 def check_memory(scene):
     """Refuse a run whose channels memory could not hold."""
     count = scene.data["integration"]["duration"] * scene.data["output"]["rate"]
-    numbers = STATE_SIZE * len(scene.vehicle.body_names)
-    numbers += len(scene.vehicle.bodies.wheelsets) * 2 * reduction.MAX_PATCHES * reduction.PATCH_COLUMNS
-    if 8.0 * count * numbers > LARGEST_RUN:
-        most = LARGEST_RUN / (8.0 * numbers)
+    most = LARGEST_RUN / bytes_per_time(scene.vehicle)
+    if count > most:
         expected = f"expected at most {most:.2g} output times in memory, got {count:.2g}"
         raise InputError(scene.source, "output.rate", f"{expected}; 'wrcore simulate' writes runs of any length")
 

@@ -20,36 +20,31 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
-from wrcore.contact import reduction
-from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.new_files import hold, remove_folder, remove_remains
 from wrcore.integrate.integrator import REFERENCES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
-from wrcore.run.course import Course, Places
 from wrcore.run.results import join_runs, read_part, write_going_on, write_run
 from wrcore.run.run import Run
-from wrcore.run.simulate import check_memory, output_blocks
+from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
+from wrcore.run.simulation import ArcLengths, Simulation
 from wrcore.scene.description import Scene
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
 """Size of a block's channels in memory, bytes, and its number of output times at most."""
 
-PLAIN = {"compression": None, "shuffle": False}
-"""Blocks are compressed when they are joined."""
-
-WHOLE = 2**62
-"""Output times in a block that holds all of them."""
+PLAIN = {"compression": None, "shuffle": False}  # blocks are compressed when they are joined
+WHOLE = 2**62  # output times in a block that holds all of them
 
 STOP, INTERRUPTED = "stop", "interrupted"
 """Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""
 
-CHECKPOINT_S = 60.0
-"""Wall time between two checkpoints at most, s."""
+CHECKPOINT_S = 60.0  # wall time between two checkpoints at most, s
 
 
 class Interrupts:
@@ -90,62 +85,51 @@ def simulate_to(
     between checkpoints, ``block`` the output times in a block, ``record`` further settings to keep. InputError if
     another process writes the same file; OSError names the file where the disk is full, with the blocks kept.
     """
-    course, settings = Course(scene), scene.data["integration"]
+    simulation, settings = Simulation(scene), scene.data["integration"]
     if settings["method"] not in REFERENCES:
-        size = block or _block_size(course)
+        size = block or _block_size(simulation)
     else:  # methods of other libraries have no checkpoints
         check_memory(scene)
         size = WHOLE
-    total, parts = Total(), None
+    summary, blocks = Summary(), None
     with ExitStack() as stack:
         if path is not None:
-            parts = stack.enter_context(Parts(path, fingerprint(course), say))
-            if parts.take_up(course, total, resume):
-                say(f"goes on at t = {total.t:.6g} s, where it was interrupted")
+            blocks = stack.enter_context(Blocks(path, fingerprint(simulation), say))
+            if blocks.take_up(simulation, summary, resume):
+                say(f"goes on at t = {summary.t:.6g} s, where it was interrupted")
         interrupts = stack.enter_context(Interrupts())
-        for times, final in _with_last(output_blocks(0.0, settings["duration"], scene.data["output"]["rate"], size)):
-            while len(rest := times[times > total.t]) and not total.over:
+        pieces = output_blocks(0.0, settings["duration"], scene.data["output"]["rate"], size)
+        for times, following in pairwise(chain(pieces, [None])):
+            while len(rest := times[times > summary.t]) and not summary.over:
                 deadline = time.monotonic() + checkpoint_s if size < WHOLE else math.inf
-                run = course.advance(rest, progress, partial(_stop, interrupts, deadline))
+                run = simulation.advance(rest, progress, partial(_stop, interrupts, deadline))
                 run.settings |= record or {}
-                end = final and len(run.t) and run.t[-1] == times[-1]
-                total.add(run, 0 if end else interrupts.caught)
-                if parts is not None:
-                    parts.add(run, course, end or total.over)
-        if parts is not None:
-            parts.join(total)
-    return total.summary(), interrupts.caught
+                end = following is None and len(run.t) and run.t[-1] == times[-1]
+                summary.add(run, 0 if end else interrupts.caught)
+                if blocks is not None:
+                    blocks.add(run, simulation, end or summary.over)
+        if blocks is not None:
+            blocks.join(summary)
+    return summary.run(), interrupts.caught
 
 
 def _stop(interrupts, deadline):
     return STOP if interrupts.caught or time.monotonic() > deadline else ""
 
 
-def _with_last(items):
-    """Items, each with whether it is the last one."""
-    items = iter(items)
-    item = next(items)
-    for following in items:
-        yield item, False
-        item = following
-    yield item, True
-
-
-def _block_size(course):
+def _block_size(simulation):
     """Output times whose channels take `BLOCK_BYTES` at most, and at least one."""
-    numbers = len(course.model.bodies.mass) * STATE_SIZE
-    numbers += len(course.model.bodies.wheelsets) * 2 * reduction.MAX_PATCHES * reduction.PATCH_COLUMNS
-    return max(1, min(LONGEST_BLOCK, int(BLOCK_BYTES / (8 * numbers))))
+    return max(1, min(LONGEST_BLOCK, int(BLOCK_BYTES / bytes_per_time(simulation.scene.vehicle))))
 
 
-def fingerprint(course):
+def fingerprint(simulation):
     """Digest of everything that decides on the bits of a run's channels: model, start, settings, sources of kernels."""
-    data = course.scene.data
+    data = simulation.scene.data
     settings = json.dumps([data["integration"], data["output"]], sort_keys=True)
-    return digest_of((course.start,), source_digest(), course.mark, settings).hexdigest()
+    return digest_of((simulation.start,), source_digest(), simulation.mark, settings).hexdigest()
 
 
-class Total:
+class Summary:
     """The blocks of a run: reach (``t``, s), cost, the ``last`` one, and whether it is ``over`` before its duration."""
 
     def __init__(self):
@@ -171,13 +155,13 @@ class Total:
             else:
                 self.counters.setdefault(name, value)
 
-    def summary(self):
+    def run(self):
         """The last block with the counters of all."""
         self.last.counters = {"compile_s": 0.0, **self.counters, "simulated_s": self.t - self.first}
         return self.last
 
 
-class Parts:
+class Blocks:
     """The ``count`` blocks of the run with a fingerprint (``mark``), numbered from 0 without a gap in a folder beside
     its file; ``say`` is told of damaged ones.
     """
@@ -203,21 +187,21 @@ class Parts:
     def _part(self, number):
         return self.folder / f"{number:06d}.h5"
 
-    def take_up(self, course, total, resume):
-        """Put a course where an interrupted run of the same scene has got to; False if there is none to go on with.
+    def take_up(self, simulation, summary, resume):
+        """Put a simulation where an interrupted run of the same scene has got to; False if there is none to go on with.
         Everything is read before anything is moved or removed.
         """
-        files, gap = sorted(self.folder.glob("[0-9]*.h5")), 1.5 / course.scene.data["output"]["rate"]
+        files, gap = sorted(self.folder.glob("[0-9]*.h5")), 1.5 / simulation.scene.data["output"]["rate"]
         kept = self._readable(files, gap) if resume else []
         alone = self._readable([self.path], gap) if resume and not kept else []
         if alone and alone[0][0].reason.startswith(INTERRUPTED):
             kept = alone
         for run, _ in kept:
-            total.add(run)
-            total.over &= not run.reason.startswith(INTERRUPTED)
+            summary.add(run)
+            summary.over &= not run.reason.startswith(INTERRUPTED)
         if kept:
-            course.begin_at(kept[-1][0].end, Places(*kept[-1][1]))
-            del total.counters["compile_s"]
+            simulation.begin_at(kept[-1][0].end, ArcLengths(*kept[-1][1]))
+            del summary.counters["compile_s"]
         for file in reversed(files if kept is alone else files[len(kept) :]):
             file.unlink()
         if kept and kept is alone:
@@ -243,9 +227,9 @@ class Parts:
             reached = run.t[-1] if len(run.t) else reached
         return kept
 
-    def add(self, run, course, last):
+    def add(self, run, simulation, last):
         """Write a block: as a part, or as the run file if it is the only one."""
-        also = partial(write_going_on, mark=self.mark, places=course.places)
+        also = partial(write_going_on, mark=self.mark, places=simulation.arc_lengths)
         with self._told():
             if last and not self.count:
                 write_run(self.path, run, also)
@@ -254,11 +238,11 @@ class Parts:
             write_run(self._part(self.count), run, also, **PLAIN)
             self.count += 1
 
-    def join(self, total):
+    def join(self, summary):
         """Make the run file of the blocks and remove them."""
         if self.count:
             with self._told():
-                join_runs(self.path, [self._part(number) for number in range(self.count)], total.summary().counters)
+                join_runs(self.path, [self._part(number) for number in range(self.count)], summary.run().counters)
         if self.lock is not None:
             remove_folder(self.folder)
 

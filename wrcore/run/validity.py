@@ -28,16 +28,11 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.detection import PLANAR
-from wrcore.contact.geometry import CURVATURE, ROLL_STRAY, SLOPE, STRAY, VALUE, YAW_STRAY
+from wrcore.contact.geometry import CURVATURE, LARGEST_OFFSET, OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE, SLOPE, VALUE
 
-WIDEST = 1.0 / 3.0
-"""Largest semi-axis across rolling over the smaller radius of curvature."""
-
-WIDEST_TURN = 0.35
-"""Largest turn of the normal over a patch in a hollow, rad."""
-
-FLANGE = 0.5
-"""Contact angle from which a wheel touches with its flange, rad."""
+WIDEST = 1.0 / 3.0  # largest semi-axis across rolling over the smaller radius of curvature
+WIDEST_TURN = 0.35  # largest turn of the normal over a patch in a hollow, rad
+FLANGE = 0.5  # contact angle from which a wheel touches with its flange, rad
 
 LIMITS = {
     "half_space": "patches too wide for a half-space",
@@ -53,8 +48,7 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
-_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")
-"""Those that look at the profiles."""
+_OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # those that look at the profiles
 
 
 def exceeded(contact, patches, roll, yaw):
@@ -73,17 +67,17 @@ def exceeded(contact, patches, roll, yaw):
     rail, rail_ends, *_ = _profile(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
     reach = width * np.cos(rows[:, reduction.ANGLE])
     tilt = np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
-    ahead = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # sin^2(chi)
+    sine_square = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # of chi
     hollow = (geometry.rolling_radius + larger) * wheel * np.sqrt(1.0 + slope**2)
     flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
-    stray = ROLL_STRAY * np.abs(np.sin(roll)) + YAW_STRAY * tilt**2  # as the search sees it
+    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * tilt**2  # as the search sees it
     return {
         "patches": len(rows),
         "half_space": int(np.sum(width * np.maximum(abs(wheel), abs(rail)) > WIDEST)),
         "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
         "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
-        "search_fallback": 2 * int(np.sum(stray > STRAY)),
-        "hollow_ahead": int(np.sum(1.0 - ahead + hollow * ahead < 0.0)),
+        "search_fallback": 2 * int(np.sum(offset > LARGEST_OFFSET)),
+        "hollow_ahead": int(np.sum(1.0 - sine_square + hollow * sine_square < 0.0)),
         "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }
 

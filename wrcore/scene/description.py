@@ -31,12 +31,12 @@ from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.errors.checked_yaml import parse_value, plain_tree, read_yaml, validate
+from wrcore.errors.checked_yaml import parse_value, read_source, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
-from wrcore.scene.pairs import digests_of_files, find_file, own_pairs, wheel_and_rail
+from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
 from wrcore.vehicle.train import train_of
@@ -147,10 +147,8 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     """
     if isinstance(scene, Scene):
         source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
-    elif isinstance(scene, Mapping):
-        source, folder, data = "scene", Path("."), plain_tree(dict(scene), "scene")
     else:
-        source, folder, data = str(scene), Path(scene).parent, read_yaml(scene)
+        source, folder, data = read_source(scene, "scene")
     texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
     asked = [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
     for option, key, value in asked:
@@ -158,7 +156,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     try:
         return _checked(data, source, folder)
     except InputError as error:
-        raise _blamed(error, source, asked) from None
+        raise _of_a_change(error, source, asked) from None
 
 
 def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
@@ -172,7 +170,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     _check_creep(data["contact"], source, folder)
     track = build_track(_with_points(data["track"], folder, source), source, folder)
     data["track"] = validate(data["track"], "track", source)
-    pairs = own_pairs(data, vehicle, wheel, rail, track, folder, source)
+    pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
@@ -182,8 +180,8 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     return Scene(data, source, vehicle, wheel, rail, track, pairs, digests)
 
 
-def _blamed(error, source, asked):
-    """A fault of a scene's file, or of what has been asked for instead of what is written there."""
+def _of_a_change(error, source, asked):
+    """The error of a scene's file, or of a change where that is what is wrong."""
     for option, key, _ in reversed(asked):
         near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")
         if error.source == source and near:
@@ -280,40 +278,28 @@ def _creep(scene, progress):
             announce(f"building a creep table ({creep['planes']}, {creep['tolerance']:g}): some ten seconds, once")
         table = ensure_table(nu, creep["planes"], creep["tolerance"], progress)
     if abs(table.nu - nu) > 1e-9:
-        raise InputError(
-            scene.source,
-            "contact.creep.table",
-            f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}",
-        )
+        expected = f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}"
+        raise InputError(scene.source, "contact.creep.table", expected)
     return creep_data(nu, table.kernel_data(), factors=factors)
 
 
 def compile_scene(
     scene: Scene, progress: Callable | None = None, shared: dict[Any, Any] | None = None
 ) -> tuple[Model, np.ndarray]:
-    """Turn a scene into what kernels need.
+    """A scene's model, as kernels take it, and its initial state (13 n,): wheelsets at rest on the rails vertically and
+    in roll, rolling forward without slip.
 
-    Parameters
-    ----------
-    scene : Scene
-    progress : callable, optional
-        Wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``.
-    shared : dict, optional
-        Keeps what does not change from one scene to the next (contact geometry, creep table, static equilibrium); hand
-        the same one over for each scene of a series. It knows vehicles, profiles and tracks by their identity.
-
-    Returns
-    -------
-    model : Model
-    state : numpy.ndarray, shape (13 n,)
-        Initial state: wheelsets at rest on the rails vertically and in roll, rolling forward without slip.
+    ``progress`` wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``. ``shared`` keeps what
+    does not change from one scene of a series to the next (contact geometry, creep table, static equilibrium); it knows
+    vehicles, profiles and tracks by their identity.
     """
     shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
-    material, damping, parts = contact["material"], contact["normal"]["damping"], _parts(scene)
+    material, damping = contact["material"], contact["normal"]["damping"]
+    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs  # known by their identity
     friction = read_friction(contact["friction"], scene.source)
-    geometry = _once(shared, "geometry", parts, lambda: scene.alike.geometry)
+    geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     support, elements = track_support(
         data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
     )
@@ -321,7 +307,7 @@ def compile_scene(
         vehicle.bodies,
         ContactModel(
             geometry, hertz_table(), LAWS[contact["creep"]["model"]],
-            _once(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
+            _kept(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
                   lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
@@ -342,30 +328,12 @@ def compile_scene(
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
         *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
-    at_rest = _once(shared, "rest", decisive, lambda: rest(scene, model))
+    at_rest = _kept(shared, "rest", decisive, lambda: rest(scene, model))
     return model, initial_state(scene, model, at_rest, shared)
 
 
-def _once(shared, name, key, make):
+def _kept(shared, name, key, make):
     """The part of a name that was made for a key before, or is made now."""
     if (name, key) not in shared:
         shared[name, key] = make()
     return shared[name, key]
-
-
-def _parts(scene):
-    """What a scene is made of, by identity."""
-    return tuple(_Same(part) for part in (scene.vehicle, scene.wheel, scene.rail, scene.track, scene.pairs))
-
-
-class _Same:
-    """A key that is equal for the same object only, and keeps it alive."""
-
-    def __init__(self, part):
-        self.part = part
-
-    def __eq__(self, other):
-        return self.part is other.part
-
-    def __hash__(self):
-        return id(self.part)

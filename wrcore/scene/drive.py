@@ -9,8 +9,7 @@ from wrcore.errors import InputError, one_of
 from wrcore.scene.schedule import read_schedule
 from wrcore.vehicle.layout import FRAME_NAME
 
-OVER = ("time", "arc_length")
-"""What tables are over, in the order of the constants in `wrcore.dynamics.drive`."""
+OVER = ("time", "arc_length")  # what tables are over, in the order of the constants in `wrcore.dynamics.drive`
 
 
 def read_drive(spec, vehicle, source):

@@ -13,8 +13,8 @@ PARTS = ("scenes", "vehicles", "sweeps", "wear")
 
 def examples_folder() -> Path:
     """The folder that holds `PARTS`: in an installed package its own, in a checkout ``config/``."""
-    own = PACKAGE / "examples"
-    return own if own.is_dir() else PACKAGE.parent / "config"
+    inside = PACKAGE / "examples"
+    return inside if inside.is_dir() else PACKAGE.parent / "config"
 
 
 @checked

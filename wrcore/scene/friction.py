@@ -6,6 +6,7 @@ import numpy as np
 
 from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.errors import InputError
+from wrcore.geometry.track import SIDES
 from wrcore.scene.schedule import read_schedule
 
 
@@ -41,7 +42,7 @@ def read_friction(spec, source):
             return Friction(float(table), pack_schedules([]), float(falling["ratio"]), float(falling["decay"]))
         tables = [_table(table, source, field)] * 2
     else:
-        tables = [_table(spec[side], source, f"{field}.{side}") for side in ("left", "right")]
+        tables = [_table(spec[side], source, f"{field}.{side}") for side in SIDES]
     largest = float(max(np.max(table[:, 1]) for table in tables))
     return Friction(largest, pack_schedules(tables), float(falling["ratio"]), float(falling["decay"]))
 

@@ -15,12 +15,8 @@ from wrcore.geometry.track import SIDES
 POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
 """Endings by which a profile given as plain text is taken for a point file."""
 
-LARGEST_WEAR = 0.05
-"""Radii that differ by more than this from the vehicle's are taken for a mistake, m."""
-
-
-NAMED_BY = ("parameters", "profile", "points", "table")
-"""Keys of a scene whose values name files."""
+LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
+NAMED_BY = ("parameters", "profile", "points", "table")  # keys of a scene whose values name files
 
 
 def find_file(path, folder, source, field):
@@ -49,11 +45,10 @@ def digests_of_files(value, folder, key=""):
 
 def wheel_and_rail(data, folder, source):
     """The scene's wheel and rail profile, of all wheels that are not said to differ; files count from ``folder``."""
-    wheel, rail = (_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))
-    return wheel, rail
+    return tuple(_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))
 
 
-def own_pairs(data, vehicle, wheel, rail, track, folder, source):
+def differing_pairs(data, vehicle, wheel, rail, track, folder, source):
     """Left and right `WheelOnRail` of each wheelset, from the front; empty where all are ``wheel`` on ``rail``."""
     single = data["wheel"].get("wheelsets", {})
     unknown = sorted(set(single) - set(vehicle.wheelset_names))
@@ -63,8 +58,8 @@ def own_pairs(data, vehicle, wheel, rail, track, folder, source):
         return ()
     sides = []
     for side in SIDES:
-        own = _rail_of(data["rail"], side, rail, folder, source)
-        pair = WheelOnRail(wheel, own, vehicle.rolling_radius, vehicle.half_distance, track.rail_distance(own))
+        under = _rail_of(data["rail"], side, rail, folder, source)
+        pair = WheelOnRail(wheel, under, vehicle.rolling_radius, vehicle.half_distance, track.rail_distance(under))
         sides.append(_wheel_of(data["wheel"].get(side, {}), f"wheel.{side}", pair, folder, source))
     return tuple(
         _wheel_of(single.get(name, {}).get(side, {}), f"wheel.wheelsets.{name}.{side}", pair, folder, source)

@@ -5,8 +5,7 @@ import numpy as np
 from wrcore.dynamics.flexible_track import RAILS, FlexibleTrack, rigid_track, track_size
 from wrcore.errors import InputError
 
-SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2
-"""Freedoms of the sleeper."""
+SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # freedoms of the sleeper
 
 
 def check_support(spec, source):

@@ -33,24 +33,16 @@ from wrcore.errors.new_files import appearing, held, remove_folder, remove_remai
 from wrcore.integrate.integrator import integrate
 from wrcore.run.channels import unit_of
 from wrcore.run.progress import counted
-from wrcore.run.simulate import DERAILED_Y, output_times
+from wrcore.run.simulate import output_times
+from wrcore.run.simulation import DERAILED_Y, counters_of
 from wrcore.scene.description import Scene, compile_scene, load_scene
-from wrcore.sweep.measures import (
-    COUNTERS,
-    FORCES,
-    MOTION,
-    Motions,
-    lateral_and_yaw,
-    wheel_forces,
-    wheelset_motion,
-)
+from wrcore.sweep.measures import COUNTERS, FORCES, MOTION, Motions, wheel_forces, wheelset_motion
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 
 _SEALED = "# seal of this part: "
 _KIND = "a sweep's table (CSV or HDF5)"
 
-CHUNK = 200
-"""Runs whose motions are held at a time."""
+CHUNK = 200  # runs whose motions are held at a time
 
 
 def column_unit(name: str) -> str:
@@ -67,7 +59,6 @@ class _Task(NamedTuple):
 
 class _Outcome(NamedTuple):
     run: int
-    tangent: bool
     times: np.ndarray
     record: dict[str, Any]
     motion: np.ndarray
@@ -177,8 +168,9 @@ def _run(task: _Task, measures: list[str]) -> _Outcome:
     motion = wheelset_motion(model, starts, trajectory.states)
     forces = wheel_forces(model, trajectory) if set(measures) & set(FORCES) else None
     record = {"status": trajectory.status, "method": trajectory.method}
-    record |= {name: COUNTERS[name](trajectory) for name in measures if name in COUNTERS}
-    return _Outcome(task.run, bool(model.track.tangent), times, record, motion, forces)
+    counters = counters_of(trajectory)
+    record |= {name: counters[name] for name in measures if name in COUNTERS}
+    return _Outcome(task.run, times, record, motion, forces)
 
 
 @lru_cache
@@ -188,8 +180,8 @@ def _times(duration: float, rate: float) -> np.ndarray:
 
 def _alike(one: _Outcome, other: _Outcome) -> bool:
     """Whether the motions of two runs fit into one array."""
-    same_kind = one.tangent == other.tangent and one.motion.shape[1] == other.motion.shape[1]
-    return same_kind and (one.times is other.times or np.array_equal(one.times, other.times))
+    alike = one.times is other.times or np.array_equal(one.times, other.times)
+    return alike and one.motion.shape[1] == other.motion.shape[1]
 
 
 def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
@@ -198,12 +190,10 @@ def _measured(sweep: Sweep, outcomes: list[_Outcome]) -> pd.DataFrame:
     records = [outcome.record for outcome in outcomes]
     table: dict[str, Any] = {name: [record[name] for record in records] for name in ("status", "method")}
     late = times >= sweep.data["begin"]
-    motion = _stacked([outcome.motion for outcome in outcomes], len(times))[:, late]
-    y, yaw = lateral_and_yaw(motion, outcomes[0].tangent)
-    forces = None
+    motion, forces = _stacked([outcome.motion for outcome in outcomes], len(times))[:, late], None
     if outcomes[0].forces is not None:
         forces = _stacked([outcome.forces for outcome in outcomes], len(times))[:, late]
-    motions = Motions(times[late], y, yaw, forces, sweep.data["window"])
+    motions = Motions(times[late], motion[..., 0], motion[..., 1], forces, sweep.data["window"])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # all NaN: a run that ended before ``begin`` has no measure
         for name in sweep.data["measures"]:
@@ -262,7 +252,7 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
     tables: list[pd.DataFrame] = []
     owners: dict[int, str | PathLike[str]] = {}
     for part in parts:
-        tables.append(load_part(sweep, part))
+        tables.append(load_table(part, sweep))
         for run in tables[-1]["run"]:
             if run in owners:
                 raise InputError(part, f"run {run}", f"expected each run once, but {owners[run]} has it, too")
@@ -274,14 +264,9 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
     write_table(path, pd.concat(tables).sort_values("run", ignore_index=True))
 
 
-def load_part(sweep: Sweep, path: str | PathLike[str]) -> pd.DataFrame:
-    """Read a part of a sweep's table whose seal says that it is whole and of this sweep; else InputError."""
-    return _read(Path(path), sweep)
-
-
 def _whole(sweep: Sweep, part: Path) -> bool:
     try:
-        return len(load_part(sweep, part)) > 0
+        return len(load_table(part, sweep)) > 0
     except InputError:
         return False
 
@@ -327,13 +312,11 @@ def _write_hdf5(path: Path, table: pd.DataFrame, seal: str) -> None:
             dataset.attrs["units"] = column_unit(name)
 
 
-def load_table(path: str | PathLike[str]) -> pd.DataFrame:
-    """Read a sweep's table, CSV or HDF5; InputError if there is none or it is of another kind."""
-    return _read(Path(path))
-
-
-def _read(path: Path, part_of: Sweep | None = None) -> pd.DataFrame:
-    """A table, which is a part of a sweep if one is given."""
+def load_table(path: str | PathLike[str], part_of: Sweep | None = None) -> pd.DataFrame:
+    """Read a sweep's table, CSV or HDF5; InputError if there is none, it is of another kind, or its seal does not say
+    that it is a whole part of the sweep ``part_of``.
+    """
+    path = Path(path)
     try:
         if path.suffix == ".h5":
             table, seal = _read_hdf5(path)

@@ -35,12 +35,9 @@ from wrcore.dynamics.body import STATE_SIZE, angles
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import track_poses
 from wrcore.integrate.trajectory import Trajectory
+from wrcore.run.derived import UNLOADED, creep_work
 from wrcore.run.motion import hunting_frequency
-from wrcore.run.simulate import evaluated
-from wrcore.run.wear import creep_work
-
-LEAST_Q = 1e3
-"""Wheels that carry less have no quotient Y/Q, N."""
+from wrcore.run.simulation import evaluated
 
 
 @dataclass(frozen=True)
@@ -82,8 +79,7 @@ def _frequency(m: Motions) -> np.ndarray:
 def _quotient(m: Motions) -> np.ndarray:
     assert m.forces is not None
     vertical, lateral = m.forces[..., 0], m.forces[..., 1]
-    ratios = np.abs(np.divide(lateral, vertical, out=np.zeros_like(vertical), where=vertical > LEAST_Q))
-    return _worst(ratios)
+    return _worst(np.abs(np.divide(lateral, vertical, out=np.zeros_like(vertical), where=vertical > UNLOADED)))
 
 
 def _over_way(m: Motions, column: int) -> np.ndarray:
@@ -111,45 +107,26 @@ FORCES: dict[str, Callable[[Any], np.ndarray]] = {
 }
 """Measures of the wheels' forces, shape (runs,)."""
 
-COUNTERS: dict[str, Callable[[Trajectory], Any]] = {
-    "simulated_s": lambda run: float(run.t[-1]) if len(run.t) else 0.0,
-    "steps": lambda run: run.steps,
-    "rejected": lambda run: run.rejected,
-    "rhs_evaluations": lambda run: run.rhs_evaluations,
-    "jacobians": lambda run: run.jacobians,
-    "factorisations": lambda run: run.factorisations,
-    "table_out_of_range": lambda run: run.out_of_range,
-    "smallest_step_s": lambda run: run.smallest_step,
-    "wall_s": lambda run: run.wall_s,
-}
-"""Measures of the cost."""
+COUNTERS = (
+    "simulated_s", "steps", "rejected", "rhs_evaluations", "jacobians", "factorisations", "table_out_of_range",
+    "smallest_step_s", "wall_s",
+)  # fmt: skip
+"""Measures of the cost, of `wrcore.run.simulation.counters_of`."""
 
 MEASURES = (*MOTION, *FORCES, *COUNTERS)
-"""Names of all measures."""
 
 
 def wheelset_motion(model: Model, starts: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Motion of the wheelsets (n, wheelsets, 5) from ``states`` (n, size): on tangent track y (m) and four Euler
-    parameters, else arc length (m), y, z (m), roll and yaw (rad); ``starts`` (wheelsets,): arc lengths at the start, m.
+    """Lateral position (m) and yaw (rad) of the wheelsets in ``states`` (n, size), (n, wheelsets, 2), with their arc
+    lengths at the start (wheelsets,), m.
     """
-    wheelsets = model.bodies.wheelsets
-    out = np.empty((len(states), len(wheelsets), 5))
-    for k, body in enumerate(wheelsets):
-        at = STATE_SIZE * body
-        if model.track.tangent:
-            out[:, k, 0] = states[:, at + 1]
-            out[:, k, 1:] = states[:, at + 3 : at + 7]
-        else:
-            out[:, k] = track_poses(model.track, states, at, starts[k])[0][:, :5]
+    places = STATE_SIZE * model.bodies.wheelsets
+    if model.track.tangent:
+        return np.stack([states[:, places + 1], angles(states[:, places[:, None] + [3, 4, 5, 6]])[2]], axis=-1)
+    out = np.empty((len(states), len(places), 2))
+    for k, (at, start) in enumerate(zip(places, starts, strict=True)):
+        out[:, k] = track_poses(model.track, states, at, start)[0][:, [1, 4]]
     return out
-
-
-def lateral_and_yaw(motion: np.ndarray, tangent: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Lateral position (m) and yaw (rad) from what :func:`wheelset_motion` gave, over any leading axes."""
-    if not tangent:
-        return motion[..., 1], motion[..., 4]
-    yaw = angles(motion[..., 1:].reshape(-1, 4))[2]
-    return motion[..., 0], np.reshape(yaw, motion.shape[:-1])
 
 
 def wheel_forces(model: Model, trajectory: Trajectory) -> np.ndarray:

@@ -6,10 +6,9 @@ import hashlib
 import itertools
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +18,15 @@ import pandas as pd
 from wrcore import __version__
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import checked
-from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
 from wrcore.scene.description import Scene, load_scene
+from wrcore.scene.pairs import find_file
 from wrcore.sweep.measures import MEASURES
 
-MOST_RUNS = 10_000_000
-"""Runs of a sweep."""
-
-MOST_BATCHES = 500
-"""A sweep with more batches than this would be many short processes."""
+MOST_RUNS = 10_000_000  # runs of a sweep
+MOST_BATCHES = 500  # a sweep with more batches than this would be many short processes
 
 OF_PARTS = ("name", "description", "vehicle", "wheel", "rail", "track", "contact.creep.table")
 """Keys that decide what a scene is made of: a run that changes one of them needs the scene read anew."""
@@ -107,21 +104,21 @@ def load_sweep(
     ... })
     Sweep 'hunting': 15 runs over speed, initial.y; 1 batches
     """
-    if isinstance(source, Mapping):
-        name, folder, data = "sweep", Path(), json.loads(json.dumps(source, default=fspath))
-    else:
-        name, folder, data = str(source), Path(source).parent, read_yaml(source)
+    name, folder, data = read_source(source, "sweep")
     data = validate(data, "sweep", name)
     for measure in data["measures"]:
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
-    scene = load_scene(load_scene(_scene_file(data["scene"], folder, name), data["set"]), overrides)
+    scene = load_scene(load_scene(find_file(data["scene"], folder, name, "scene"), data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     read = scene.files | _check_values(scene, data["keys"], name)
     grid = data["sampling"]["kind"] == "grid"
     if grid and (count := math.prod(map(len, values.values()))) > MOST_RUNS:
         raise InputError(name, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
-    runs = _grid(values) if grid else _hypercube(values, data["sampling"], name)
+    if grid:
+        runs = pd.DataFrame(list(itertools.product(*values.values())), columns=list(values))
+    else:
+        runs = _hypercube(values, data["sampling"], name)
     runs.index.name = "run"
     shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
     if data["begin"] >= shortest:
@@ -131,13 +128,6 @@ def load_sweep(
         least = math.ceil(len(runs) / MOST_BATCHES)
         raise InputError(name, "batch", f"expected at least {least} runs per batch: a batch is a process of its own")
     return sweep
-
-
-def _scene_file(path, folder, source):
-    for base in (folder, folder.parent, Path()):
-        if os.path.isfile(base / path):
-            return base / path
-    raise InputError(source, "scene", f"expected an existing file, got {path!r}")
 
 
 def _values(entry, sampling, field, source):
@@ -163,12 +153,8 @@ def _check_values(scene, entries, source):
     """Try each key by itself: at its bounds, or at each of its values. Returns the digests of the files read."""
     files: dict[str, str] = {}
     for key, entry in entries.items():
-        tried = entry.get("values") or [
-            entry["from"],
-            entry["to"],
-            entry["from"] + 0.4142 * (entry["to"] - entry["from"]),
-        ]
-        for value in tried:
+        low, high = entry.get("from", 0.0), entry.get("to", 0.0)
+        for value in entry.get("values") or (low, high, low + 0.4142 * (high - low)):
             try:
                 changed = load_scene(scene, {key: value})
             except InputError as error:
@@ -177,11 +163,6 @@ def _check_values(scene, entries, source):
                 raise InputError(source, f"keys.{key}", one_of(("auto", *METHODS), value))
             files |= changed.files
     return files
-
-
-def _grid(values):
-    rows = itertools.product(*values.values())
-    return pd.DataFrame(list(rows), columns=list(values))
 
 
 def _hypercube(values, sampling, source):

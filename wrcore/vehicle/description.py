@@ -29,7 +29,7 @@ LARGEST_LIFT = 0.02
 """Wheelsets whose centre lies further than this from its rolling radius above the rails are taken for a mistake, m."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Vehicle:
     """A vehicle in its nominal position."""
 

@@ -13,7 +13,7 @@ import os
 
 import pandas as pd
 
-from tests.analysis.test_poses import outcome, row_of, with_creepages
+from tests.analysis.contact.test_poses import outcome, row_of, with_creepages
 from tests.contact.patch import contact_reference as contact
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns

@@ -8,8 +8,8 @@ import sys
 
 import numpy as np
 
+from tests.contact.patch.strip_contact import NormalContact
 from tests.contact.patch.test_normal_strips import MODULUS, height
-from wrcore.contact.patch.normal import NormalContact
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.standards import named_profile
 

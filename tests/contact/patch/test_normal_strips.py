@@ -6,17 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from study.patch.rolling import solve_patch
 from tests.conftest import DATA
+from tests.contact.patch.strip_contact import RESOLUTIONS, NormalContact
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
-from wrcore.contact.patch.library import solve_patch
-from wrcore.contact.patch.normal import RESOLUTIONS, NormalContact, even_length
-from wrcore.contact.patch.solve import wheel_overlaps
+from wrcore.contact.patch.solve import even_length
 from wrcore.contact.patch.strips import MEMORY
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 
@@ -296,9 +295,9 @@ def lobes_alone(contact, y, heights):
     """The overlaps of a left wheel, each solved by itself at a height of its own."""
     found = []
     for k, z in enumerate(heights):
-        count, pose = wheel_overlaps(contact.geometry, 1.0, y, z, 0.0, 1.0, 0.0, True, contact._patches)
+        count, pose = contact.overlaps(y, z, (0.0, 1.0, 0.0))
         assert count == len(heights)
-        found.append(contact._solve("left", pose, k, k + 1, None, np.zeros(MEMORY)))
+        found.append(contact.solve("left", pose, k, k + 1, None, np.zeros(MEMORY)))
     return found
 
 
@@ -346,18 +345,3 @@ def test_virtual_penetration_is_near_on_the_tread(benchmark_pair):
         (reference,), (cheap,) = (model.at_height("left", y, z) for model in (exact, strips))
         assert cheap.normal_force == pytest.approx(reference.normal_force, rel=0.006)  # at 4 mm 0.50 %
         assert cheap.p_max == pytest.approx(reference.p_max, rel=0.05)
-
-
-def test_bad_input(benchmark_pair):
-    for arguments in ((0.0,), (MODULUS, "finest"), (MODULUS, "fine", "hertz"), (MODULUS, "fine", "exact", "auto")):
-        with pytest.raises(InputError):
-            NormalContact(benchmark_pair, *arguments)
-    contact = NormalContact(benchmark_pair, MODULUS)
-    for call in (
-        lambda: contact.at_height("both", 0.0, 0.46),
-        lambda: contact.at_height("left", math.nan, 0.46),
-        lambda: contact.at_height("left", 0.0, 0.46, velocity=[1.0] * 6),
-        lambda: contact.at_load("left", 0.0, -1.0),
-    ):
-        with pytest.raises(InputError):
-            call()

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch
+from study.patch.rolling import solve_patch
+from wrcore.contact.patch.library import ellipse_strips, make_library
 from wrcore.contact.patch.rolling import (
     AUTO,
     BAND,
@@ -16,8 +17,8 @@ from wrcore.contact.patch.rolling import (
     LIBRARY,
     LIMIT,
     Level,
-    make_workspace,
     rolling_force,
+    rolling_work,
 )
 from wrcore.contact.patch.rolling_influence import _add_strip, _add_strip_exactly
 from wrcore.creep.cases import check_cases
@@ -163,15 +164,24 @@ def test_agrees_with_contact(name, bound_95, bound_max):
     assert np.max(errors) < bound_max
 
 
-@pytest.mark.parametrize("level, bound_95", [("coarse", 0.011), ("middle", 0.008), ("fine", 0.0065)])
-def test_agrees_with_the_solver_for_ellipses(level, bound_95):
-    rng, errors = np.random.default_rng(1), []
+@pytest.fixture(scope="module")
+def on_ellipses():
+    """Semi-axes, shape number, creepages and forces by the solver for ellipses of some patches."""
+    rng, cases = np.random.default_rng(1), []
     for ratio, psi in ((0.3, 0.0), (0.7, 0.4), (1.3, 0.0), (2.5, -0.5)):
         a, b = 4e-3 * np.sqrt(ratio), 4e-3 / np.sqrt(ratio)
-        strips = sdec(LEVELS[level].strips, a, b, psi)
-        scale = G * a * b / (MU * load_of(strips))
-        creepages = random_creepages(rng, sdec(8, a, b, psi), 6)
+        strips = sdec(8, a, b, psi)
+        scale, creepages = G * a * b / (MU * load_of(strips)), random_creepages(rng, strips, 6)
         reference = RollingContact(ratio, psi, NU, 20).solve_many(creepages * scale * [1, 1, 4e-3])[0]
+        cases.append((a, b, psi, creepages, reference))
+    return cases
+
+
+@pytest.mark.parametrize("level, bound_95", [("coarse", 0.011), ("middle", 0.008), ("fine", 0.0065)])
+def test_agrees_with_the_solver_for_ellipses(on_ellipses, level, bound_95):
+    errors = []
+    for a, b, psi, creepages, reference in on_ellipses:
+        strips = sdec(LEVELS[level].strips, a, b, psi)
         found = [solve(strips, row, level) for row in creepages]
         forces = np.array([(f.Fx, f.Fs, f.Mn / 4e-3) for f in found]) / (MU * load_of(strips))
         errors += list(np.hypot(*(forces - reference)[:, :2].T))
@@ -194,15 +204,20 @@ def test_small_creepage_is_linear_theory(ratio):
     assert np.all(abs(matrix - expected) <= tolerance * abs(expected) + 1e-5)
 
 
-@pytest.mark.parametrize("level, bound", [("coarse", 0.008), ("middle", 0.005), ("fine", 0.0035)])
-def test_refined_strips_change_little(level, bound):
-    """95 % of random cases on odd single patches, against 32 strips x 20 panels: the levels' promise."""
-    rng, errors = np.random.default_rng(5), []
+@pytest.fixture(scope="module")
+def refined():
+    """Odd single patches, creepages, and forces on 32 strips x 20 panels."""
+    rng, cases = np.random.default_rng(5), []
     for shape in tread_shapes(rng, 9):
         fine = shape(REFINED.strips)
-        for row in random_creepages(rng, fine, 3):
-            coarse = force(shape(LEVELS[level].strips), row, level)
-            errors.append(np.hypot(*(coarse - force(fine, row, REFINED, method=BAND))))
+        cases += [(shape, row, force(fine, row, REFINED, method=BAND)) for row in random_creepages(rng, fine, 3)]
+    return cases
+
+
+@pytest.mark.parametrize("level, bound", [("coarse", 0.008), ("middle", 0.005), ("fine", 0.0035)])
+def test_refined_strips_change_little(refined, level, bound):
+    """95 % of random cases: the levels' promise."""
+    errors = [np.hypot(*(force(shape(LEVELS[level].strips), row, level) - fine)) for shape, row, fine in refined]
     assert np.percentile(errors, 95) < bound
 
 
@@ -396,7 +411,7 @@ def solve_twice(one, slip_one, two, slip_two, library, work):
 
 
 def test_no_history():
-    library, work = make_library("coarse"), make_workspace(16, 8)
+    library, work = make_library("coarse"), rolling_work(16, 8)
     one, two = sdec(8, 5e-3, 3e-3, 0.2), lobes(8, 2.5e-3, 0.6)
     first, again = solve_twice(one, slip_of(one, 3e-4, 0, 0.1), two, slip_of(two, 0, 3e-4, 0.3), library, work)
     assert first == again

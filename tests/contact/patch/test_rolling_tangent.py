@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import wrcore as wr
+from tests.contact.patch.strip_contact import NormalContact
 from tests.contact.patch.test_grid_rolling import MU, NU, G, ellipse_patch
 from wrcore.contact.patch.grid_traction import slip_influence, solve_traction
 from wrcore.contact.patch.library import make_library
-from wrcore.contact.patch.normal import NormalContact
-from wrcore.contact.patch.rolling import AUTO, BAND, DIRECT, LEVELS, LIMIT, make_workspace, rolling_force
+from wrcore.contact.patch.rolling import AUTO, BAND, BOUND, DIRECT, LENGTH, LEVELS, LIMIT, rolling_force, rolling_work
 
 LATERAL = (-6e-3, -3e-3, -1e-3, 0.0, 0.5e-3, 1e-3, 2e-3, 4.5e-3, 5e-3, 6.3e-3)
 """Tread, two lobes as one window and as two, flange root, and a slender patch."""
@@ -41,7 +41,7 @@ def matrices(patch, method, far):
     windows = len(set(patch.window))
     level = LEVELS["slender" if a > 3 * b else "coarse"]
     library = make_library(level._replace(strips=max(level.strips, count // windows)), NU)
-    n, work, c = library.panels.n, make_workspace(count, library.panels.n), np.sqrt(a * b)
+    n, work, c = library.panels.n, rolling_work(count, library.panels.n), np.sqrt(a * b)
     size, centre, middle = 2 * n * count, patch.centre - patch.mean_s, patch.middle - patch.mean_x
     found, stuck, unit = np.zeros((3, 3)), np.zeros((3, 3)), far * MU * patch.normal_force / (G * c * c)
     for k, creepage in enumerate(unit * np.diag([1, 1, 1 / c])):
@@ -51,9 +51,9 @@ def matrices(patch, method, far):
         found[:, k] = np.array(force) / (G * unit) / [c * c, c * c, c**3]
         matrix, step = work.matrix[: size * size].reshape(size, size).astype(float), work.step[:size].astype(float)
         panel = np.linalg.solve(matrix, -work.rigid[:size] / step).reshape(count, 2, n)
-        x = work.strip[1, :count, None] + work.strip[0, :count, None] * library.panels.load
-        moment = (x * panel[:, 1] - work.strip[2, :count, None] * panel[:, 0]).sum() * work.scale[0] / c
-        stuck[:, k] = np.array([panel[:, 0].sum(), panel[:, 1].sum(), moment]) * work.scale[2] / (G * unit * c * c)
+        x = work.strip.middle[:count, None] + work.strip.half[:count, None] * library.panels.load
+        moment = (x * panel[:, 1] - work.strip.line[:count, None] * panel[:, 0]).sum() * work.scale[LENGTH] / c
+        stuck[:, k] = np.array([panel[:, 0].sum(), panel[:, 1].sum(), moment]) * work.scale[BOUND] / (G * unit * c * c)
     return found, stuck, residual
 
 

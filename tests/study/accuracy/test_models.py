@@ -7,9 +7,11 @@ import pytest
 from study.accuracy import errors, models
 from study.accuracy.figures import speed_against_error
 from tests.study.accuracy.test_errors import worn_run
-from wrcore.run.accuracy import Choice
 
-CHOICES = [Choice("spatial", "moment", "table 0.01", "rk23", 1e-3), Choice("planar", "moment", "she", "rk23", 1e-3)]
+CHOICES = [
+    errors.Choice("spatial", "moment", "table 0.01", "rk23", 1e-3),
+    errors.Choice("planar", "moment", "she", "rk23", 1e-3),
+]
 
 
 def shifted(by, **kwargs):

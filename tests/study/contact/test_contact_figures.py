@@ -6,8 +6,9 @@ import pytest
 from study.contact import figures as figures_contact
 from study.contact import tables as analysis_contact
 from study.report.legible import save_figure
+from study.style import LINES
 from wrcore.analysis.pictures.plot_contact import fig_contact_location
-from wrcore.analysis.pictures.style import ACCENT, LINES
+from wrcore.analysis.pictures.style import ACCENT
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.first_touch import first_touch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack

@@ -10,7 +10,7 @@ from study.creep.figures import LAW_STYLES, binned_errors, stick_border
 from study.creep.laws import contact_points
 from study.report.legible import save_figure
 from tests.conftest import ROOT
-from wrcore.creep.halfspace import solve_field
+from wrcore.creep.halfspace import RollingContact
 
 DATA = ROOT / "tests" / "data" / "creep"
 FAMILIES = ("exact", "table sdec", "fastsim", "polach", "she", "linear")
@@ -30,8 +30,8 @@ def curves():
 @pytest.fixture(scope="module")
 def fields():
     return {
-        "round": solve_field(1.0, 0.0, 0.28, 0.25, 0.15, 0.0, 16),
-        "skewed": solve_field(0.6, 0.6, 0.28, 0.15, 0.1, 0.6, 16),
+        "round": RollingContact(1.0, 0.0, 0.28, 16).field(0.25, 0.15, 0.0),
+        "skewed": RollingContact(0.6, 0.6, 0.28, 16).field(0.15, 0.1, 0.6),
     }
 
 
@@ -90,7 +90,7 @@ def test_border_encloses_the_sticking_panels(fields):
             assert (x[1::2] - x[::2]).sum() == pytest.approx(-np.diff(field.x_edges[j])[stick[j]].sum(), abs=1e-9)
         flat = segments[segments[:, 0, 0] != segments[:, 1, 0]]
         assert len(flat) > 0 and np.isin(flat[:, 0, 1], field.y_edges).all()
-    everywhere = solve_field(1.0, 0.0, 0.28, 5.0, 0.0, 0.0, 8)
+    everywhere = RollingContact(1.0, 0.0, 0.28, 8).field(5.0, 0.0, 0.0)
     assert len(stick_border(everywhere)) == 0
 
 

@@ -27,25 +27,20 @@ from study.creep.smoothness import error_map, sized_creepages, smoothness, smoot
 from tests.conftest import ROOT
 from wrcore.creep import table as table_module
 from wrcore.creep.axes import scales
-from wrcore.creep.build import RESOLUTIONS, Resolution, build_data, count_cases
+from wrcore.creep.build import Resolution
 from wrcore.creep.halfspace import RollingContact
 from wrcore.creep.kalker import coefficients_at, kalker_data
-from wrcore.creep.table import CreepTable, build_table, ensure_table, table_path
+from wrcore.creep.table import build_table, ensure_table, table_path
 from wrcore.errors import InputError
 
 DATA = ROOT / "tests" / "data" / "creep"
 NU = 0.28
 
 
-def coarse_table(planes):
-    resolution = RESOLUTIONS[planes][0][1]
-    data = build_data(NU, planes, resolution)
-    return CreepTable(data, planes, 0.015, resolution, count_cases(data.axes), (0.0,) * 4, (0.0,) * 4)
-
-
 @pytest.fixture(scope="module")
 def tables():
-    return {planes: coarse_table(planes) for planes in ("ellipse", "sdec")}
+    """The coarse ones of the tests' runs: they are in the cache."""
+    return {planes: ensure_table(NU, planes, 0.05) for planes in ("ellipse", "sdec")}
 
 
 @pytest.fixture(scope="module")
@@ -88,10 +83,11 @@ def test_missing_reference_names_the_file(tmp_path):
 
 def test_errors_are_those_of_the_forces(reference, models, errors):
     cases = reference["sdec"]
+    references = {"CONTACT": cases.forces, "exact": exact_forces(cases, NU, 16)}
     for model in models:
         forces, outside = law_forces(model, cases.g, cases.psi, cases.creepages)
         rows = errors[(errors.cases == "sdec") & (errors.model == model.name)]
-        for against, right in (("CONTACT", cases.forces), ("exact", exact_forces(cases, NU, 16))):
+        for against, right in references.items():
             part = rows[rows.against == against]
             assert part.case_id.tolist() == cases.case_id.tolist()
             assert part.force_error.to_numpy() == pytest.approx(np.linalg.norm((forces - right)[:, :2], axis=1))
@@ -240,7 +236,17 @@ def test_step_ratio_tells_a_jump_from_a_bend(force, ratio):
     assert smoothness_table(frame).step_ratio.tolist() == pytest.approx([ratio] * 3, abs=0.01)
 
 
-def test_timed_table_is_the_built_one():
+TINY = ((0.5, Resolution(4, 1, 5, 8, 5, 6)),)
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    """Tables of ellipses are tiny, and checked by a coarse solver."""
+    monkeypatch.setattr(table_module, "RESOLUTIONS", {"ellipse": TINY})
+    monkeypatch.setattr(table_module, "CHECK_LEVEL", 6)
+
+
+def test_timed_table_is_the_built_one(tiny):
     table, row = timed_table("one", 0.3, "ellipse", 0.5)
     built = build_table(0.3, "ellipse", 0.5)
     assert np.array_equal(table.data.coefficients, built.data.coefficients)
@@ -252,7 +258,7 @@ KILLED = """
 import os, signal, sys
 from wrcore.creep import table
 os.environ["WRCORE_CACHE"] = sys.argv[1]
-table.RESOLUTIONS = {{"ellipse": ((0.5, table.Resolution(4, 1, 5, 8, 5, 6)),)}}
+table.RESOLUTIONS, table.CHECK_LEVEL = {{"ellipse": ((0.5, table.Resolution(4, 1, 5, 8, 5, 6)),)}}, 6
 def kill(*_):
     os.kill(os.getpid(), signal.SIGKILL)
 def half(patches):
@@ -270,13 +276,12 @@ table.ensure_table(0.33, "ellipse", 0.9, half)
 @pytest.mark.parametrize(
     ("solving", "writing"), [("kill() if i == 2 else None", ""), ("", "table._write_datasets = half_written")]
 )
-def test_killed_build_starts_over_and_the_table_is_found_again(tmp_path, monkeypatch, solving, writing):
+def test_killed_build_starts_over_and_the_table_is_found_again(tmp_path, monkeypatch, tiny, solving, writing):
     """A table of another nu, killed while solving or while writing, then built, cached and found again."""
     script = KILLED.format(solving=solving or "pass", writing=writing)
     died = subprocess.run([sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True)
     assert died.returncode == -9, died.stderr
     monkeypatch.setenv("WRCORE_CACHE", str(tmp_path))
-    monkeypatch.setattr(table_module, "RESOLUTIONS", {"ellipse": ((0.5, Resolution(4, 1, 5, 8, 5, 6)),)})
     assert not table_path(0.33, "ellipse", 0.9).exists()
     built = ensure_table(0.33, "ellipse", 0.9)
     assert built.nu == 0.33 and table_path(0.33, "ellipse", 0.9).is_file()

@@ -5,10 +5,11 @@ import pandas as pd
 import pytest
 
 from study.critical_speed.figures import fig_limit_cycles, fig_modes, fig_root_locus
+from study.critical_speed.tables import loci
 from study.report.legible import save_figure
 from tests.conftest import SCENES
 from wrcore.analysis.pictures.style import ACCENT
-from wrcore.analysis.stability.stability import critical_speeds, loci, modes
+from wrcore.analysis.stability.stability import critical_speeds, modes
 from wrcore.scene.description import load_scene
 
 

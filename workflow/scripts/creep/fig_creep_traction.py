@@ -4,12 +4,12 @@ import sys
 
 from study.creep.figures import fig_creep_traction
 from study.report.legible import save_figure
-from wrcore.creep.halfspace import solve_field
+from wrcore.creep.halfspace import RollingContact
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 params = snakemake.params
 fields = {}
 for case in params.cases:
     patch = (case["a_over_b"], case["psi"], params.nu)
-    fields[case["title"]] = solve_field(*patch, *case["creepages"], level=params.level)
+    fields[case["title"]] = RollingContact(*patch, params.level).field(*case["creepages"])
 save_figure(fig_creep_traction(fields), *snakemake.output)

@@ -5,7 +5,8 @@ import sys
 
 import numpy as np
 
-from wrcore.analysis.stability.stability import critical_speeds, loci, modes
+from study.critical_speed.tables import loci
+from wrcore.analysis.stability.stability import critical_speeds, modes
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)

@@ -6,17 +6,49 @@ two independent integrators; their difference says how far the reference itself 
 
 import dataclasses
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces, wheelsets_of
-from wrcore.run.accuracy import Choice, kind_of
 from wrcore.run.motion import amplitude, hunting_frequency
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
 SIDES = ("left", "right")
+
+
+class Choice(NamedTuple):
+    """One way to run a scene."""
+
+    detection: str
+    patch: str
+    creep: str
+    """Creep law; a table with the 99 % error it is built for, as in ``table 0.01``."""
+    method: str
+    rtol: float
+
+    def overrides(self):
+        """Changes to a scene, as :func:`wrcore.load_scene` takes them."""
+        law, _, tolerance = self.creep.partition(" ")
+        changes = [
+            f"contact.detection={self.detection}",
+            f"contact.patch={self.patch}",
+            f"contact.creep.model={law}",
+            f"integration.method={self.method}",
+            f"integration.rtol={self.rtol:g}",
+            "integration.atol=0",
+        ]
+        return [*changes, f"contact.creep.tolerance={tolerance}"] if tolerance else changes
+
+
+def kind_of(scene):
+    """``vehicle``, ``suspended_wheelset`` or ``free_wheelset``."""
+    vehicle = scene.vehicle
+    if len(vehicle.body_names) > len(vehicle.wheelset_names):
+        return "vehicle"
+    return "suspended_wheelset" if len(vehicle.elements.pairs) else "free_wheelset"
 
 
 def combinations(grids):

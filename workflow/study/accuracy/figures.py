@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from study.accuracy.errors import pareto_front
-from wrcore.analysis.pictures.style import ACCENT, shared_legend, styled
+from study.style import shared_legend
+from wrcore.analysis.pictures.style import ACCENT, styled
 
 MODELS = (
     ("spatial, fine table", "#222222", "o"),

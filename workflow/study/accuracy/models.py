@@ -6,8 +6,7 @@ from a tight run of the same model, its twin; the second is the twin's differenc
 
 import pandas as pd
 
-from study.accuracy.errors import SHOWN, part_of, run_errors
-from wrcore.run.accuracy import Choice
+from study.accuracy.errors import SHOWN, Choice, part_of, run_errors
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 

@@ -261,7 +261,7 @@ def interpreted(tally):
                 new = registers[name]
             elif (module.__name__, name) == ("wrcore.dynamics.system", "call_address"):
                 new = _call
-            elif name == "one_of":
+            elif name == "member_of":
                 new = lambda whole, field, k: (getattr(whole, field) or {k: whole})[k]  # noqa: E731
             elif name == "rarely_called":
                 new = lambda: None  # noqa: E731

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.pictures.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from study.style import LINES, derailed_at, shared_legend
+from wrcore.analysis.pictures.style import ACCENT, MM, styled
 from wrcore.analysis.stability.modes import OVERDAMPED
 
 GREY = "0.72"

@@ -3,6 +3,16 @@
 import pandas as pd
 
 from wrcore.analysis.stability.limit_cycles import nonlinear_critical_speed
+from wrcore.analysis.stability.stability import rising, root_locus, straight_ahead
+
+
+def loci(scenes, speeds):
+    """Tables of `root_locus` of one vehicle at rising ``speeds`` (m/s) in several scenes by detection, after a column
+    of that name.
+    """
+    speeds = rising(speeds)
+    tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}
+    return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
 
 
 def critical_table(linear, cycles):

@@ -19,7 +19,8 @@ from wrcore.dynamics.outputs import evaluations_at
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
-from wrcore.run.simulate import DERAILED_Y, output_times
+from wrcore.run.simulate import output_times
+from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import compile_scene, load_scene
 
 COLUMNS = (

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from wrcore.analysis.pictures.style import ACCENT, LINES, MM, styled
+from study.style import LINES
+from wrcore.analysis.pictures.style import ACCENT, MM, styled
 
 KILO = 1e-3
 

@@ -8,7 +8,7 @@ import numpy as np
 from study.hard_cases.cases import Check, contacts, prepare, rows, run_in_parts, sound, wheel_forces, with_forces
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.run.simulate import DERAILED_Y
+from wrcore.run.simulation import DERAILED_Y
 
 RATE = 500.0
 """Outputs per second: 20 mm of track at 10 m/s."""

@@ -8,7 +8,8 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
-from wrcore.analysis.pictures.style import ACCENT, LINES, MARKERS, MM, RAIL, WHEEL, shared_legend, styled
+from study.style import LINES, MARKERS, shared_legend
+from wrcore.analysis.pictures.style import ACCENT, MM, RAIL, WHEEL, styled
 from wrcore.contact.detection import detect
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import MAXIMUM

@@ -3,17 +3,10 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.assessment.motion import (
-    SIDES,
-    _patches,
-    difference,
-    first_flange_contact,
-    mirror_defect,
-    prediction_horizon,
-)
+from study.paper.motion import _patches, difference, first_flange_contact, mirror_defect, prediction_horizon
 from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.strip import cubic_at
-from wrcore.geometry.track import SIDES as SIGNS
+from wrcore.geometry.track import SIDES
 from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
 from wrcore.run.simulate import simulate
 
@@ -100,7 +93,7 @@ def rigid_contact(geometry, shifts, detection="planar"):
     touching = loaded_poses(poses, geometry, RIGID_LOAD, "maximum", detection=detection)
     patches = touching.sort_values("N_N").groupby(["pose_id", "side"]).last()
     table = pd.DataFrame({"y_m": shifts})
-    for side in SIGNS:
+    for side in SIDES:
         rows = patches.xs(side, level="side").reindex(range(len(shifts)))
         for name in ("u_wheel_m", "u_rail_m", "contact_angle_rad"):
             table[f"{side}_{name}"] = rows[name].to_numpy()
@@ -113,7 +106,7 @@ def rigid_contact(geometry, shifts, detection="planar"):
                 for u in table[f"{side}_u_wheel_m"]
             ]
         )
-        for side in SIGNS
+        for side in SIDES
     )
     table.insert(3, "radius_difference_m", left - right)
     return table

@@ -8,11 +8,13 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
+from study.patch.rolling import solve_patch
 from study.patch.tables import REFERENCE, radius_differences
+from study.style import shared_legend
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.analysis.pictures.style import MM, shared_legend, styled
+from wrcore.analysis.pictures.style import MM, styled
 from wrcore.contact import reduction as columns
-from wrcore.contact.patch.library import ellipse_strips, make_library, solve_patch
+from wrcore.contact.patch.library import ellipse_strips, make_library
 from wrcore.contact.patch.result import Patch
 
 LINES = (

@@ -36,7 +36,13 @@ def compared(name, settings):
             begin = time.process_time()
             runs[patch] = wr.simulate(wr.example(name), **choice)
             times.append(time.process_time() - begin)
-        rows.append({"patch": patch, "times real time": settings["integration.duration"] / times[-1], "filled, s": times[0] - times[-1]})
+        rows.append(
+            {
+                "patch": patch,
+                "times real time": settings["integration.duration"] / times[-1],
+                "filled, s": times[0] - times[-1],
+            }
+        )
     wheels = [key for key in runs["exact"] if key.endswith(("/left", "/right"))]
     first = wheels[0].rpartition("/")[0]
     normal = {patch: np.array([np.nansum(run[wheel].N_N, axis=1) for wheel in wheels]) for patch, run in runs.items()}
@@ -51,7 +57,9 @@ def main():
     """Print a table of the scenes that are asked for, or all."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("scenes", nargs="*", default=list(SCENES))
-    table = pd.concat({name: pd.DataFrame(compared(*SCENES[name])) for name in parser.parse_args().scenes}, names=["scene"])
+    table = pd.concat(
+        {name: pd.DataFrame(compared(*SCENES[name])) for name in parser.parse_args().scenes}, names=["scene"]
+    )
     print(table.reset_index("scene").to_markdown(index=False, floatfmt=".3g"))
 
 

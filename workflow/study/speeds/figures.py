@@ -6,9 +6,11 @@ Units, colours and the difference between planar and spatial are those of :mod:`
 import numpy as np
 from matplotlib.figure import Figure
 
-from wrcore.analysis.assessment.motion import SIDES
-from wrcore.analysis.assessment.wheels import hunting, wheel_forces, wheelsets_of
-from wrcore.analysis.pictures.style import ACCENT, LINES, MM, derailed_at, shared_legend, styled
+from study.speeds.tables import hunting
+from study.style import LINES, derailed_at, shared_legend
+from wrcore.analysis.assessment.wheels import wheel_forces, wheelsets_of
+from wrcore.analysis.pictures.style import ACCENT, MM, styled
+from wrcore.geometry.track import SIDES
 from wrcore.run.derived import quotient
 
 KN = 1e-3

@@ -3,11 +3,24 @@
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.assessment.wheels import hunting, wheel_table, wheelsets_of
-from wrcore.run.motion import amplitude
+from wrcore.analysis.assessment.wheels import wheel_table, wheelsets_of
+from wrcore.run.motion import amplitude, growth_rate, hunting_frequency
+
+SMALLEST = 1e-6
+"""Motions below this are not asked for a frequency or a damping, m."""
 
 OF_WHOLE_RUNS = {"speed_m_per_s", "status", "simulated_s", "frequency_Hz", "growth_per_s", "damping_ratio"}
 """Columns that a run has, too, which ended early."""
+
+
+def hunting(t, y):
+    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion y (m) over t (s)
+    from release on; NaN once the motion has died before it has swung.
+    """
+    swinging = np.flatnonzero(np.abs(y) > SMALLEST)
+    end = swinging[-1] + 1 if swinging.size else 0
+    frequency, growth = hunting_frequency(t[:end], y[:end]), growth_rate(t[:end], y[:end])
+    return frequency, growth, -growth / np.hypot(growth, 2.0 * np.pi * frequency)
 
 
 def speed_row(run, begin=0.5, body="car_body"):

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pandas as pd
 
-from wrcore.analysis.wear.evolve import evolve, last_depth, load_wear_plan
+from wrcore.analysis.wear.evolve import evolve, load_wear_plan, profiles_over_distance
 from wrcore.analysis.wear.worn_profiles import POINTS
 
 SEEDS = 100
@@ -38,7 +38,8 @@ def variant_depth(source, changes, folder, copies=1):
     started = time.process_time()
     table = evolve(source, folder, changes=changes)
     seconds = time.process_time() - started
-    return *last_depth(folder), table, seconds
+    profiles = profiles_over_distance(folder)
+    return profiles[-1][1], profiles[-1][2] - profiles[0][2], table, seconds
 
 
 def influence_table(found):

@@ -28,11 +28,8 @@ from wrcore.run.derived import quotient
 from wrcore.run.run import Run
 
 PERCENTILES = (0.15, 50.0, 99.85)
-WINDOW = 2.0
-"""Of the sliding means, m."""
-
-CUT = 20.0
-"""Of the low-pass, Hz."""
+WINDOW = 2.0  # of the sliding means, m
+CUT = 20.0  # of the low-pass, Hz
 
 LEAST_RATE = 1000.0
 """What lies above half of the output rate comes back as lower frequencies: see reports/assessment.md, 1/s."""

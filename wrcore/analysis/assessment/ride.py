@@ -23,11 +23,8 @@ from wrcore.geometry.path import track_frame
 from wrcore.geometry.track import build_track
 from wrcore.vehicle.description import GRAVITY
 
-BLOCK = 5.0
-"""Length of the stretches that comfort is evaluated over, s."""
-
-LEAST_RATE = 200.0
-"""Weightings end at 100 Hz, 1/s."""
+BLOCK = 5.0  # length of the stretches that comfort is evaluated over, s
+LEAST_RATE = 200.0  # weightings end at 100 Hz, 1/s
 
 
 class Weighting(NamedTuple):
@@ -45,17 +42,7 @@ class Weighting(NamedTuple):
     gain: float = 1.0
 
     def response(self, frequency):
-        """Complex response at frequencies.
-
-        Parameters
-        ----------
-        frequency : array_like
-            Hz.
-
-        Returns
-        -------
-        numpy.ndarray
-        """
+        """Complex response at frequencies (array_like, Hz)."""
         s = 1j * np.asarray(frequency, float)
 
         def pair(corner, quality):
@@ -92,38 +79,19 @@ WEIGHTINGS = {
 DIRECTIONS = {"ax_m_per_s2": "Wd", "ay_m_per_s2": "Wd", "az_m_per_s2": "Wb"}
 """Weighting of each acceleration in EN 12299."""
 
-DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}
-"""The same in ISO 2631-1."""
+DIRECTIONS_ISO = DIRECTIONS | {"az_m_per_s2": "Wk"}  # the same in ISO 2631-1
 
 NEEDED = (*DIRECTIONS, "roll_rad", "pitch_rad", "yaw_rad")
 """Channels of a body whose ride is evaluated; one that spins has no pitch."""
 
-RUNNING = 1.0
-"""Time of the running rms of ISO 2631-1, s."""
+RUNNING = 1.0  # time of the running rms of ISO 2631-1, s
 
 SETTLED = 1.0
 """From this time after its start on a signal under Sperling's weighting has settled (slowest decay: 4 1/s), s."""
 
 
 def weighted(values, rate, weighting):
-    """A signal after a weighting, by its response in frequency, as if it had always been at its first value.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-    rate : float
-        1/s.
-    weighting : {"Wk", "Wd", "Wb", "B vertical", "B lateral"}
-
-    Returns
-    -------
-    numpy.ndarray, shape (n,)
-
-    Raises
-    ------
-    InputError
-        For an unknown weighting.
-    """
+    """A signal (n,) of a rate (1/s) after one of the `WEIGHTINGS`, as if it had always been at its first value."""
     if weighting not in WEIGHTINGS:
         raise InputError("weighted", "weighting", one_of(WEIGHTINGS, weighting))
     values = np.asarray(values, float)
@@ -133,44 +101,17 @@ def weighted(values, rate, weighting):
 
 
 def block_rms(values, rate, block=BLOCK):
-    """Root mean squares over whole blocks.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-    rate : float
-        1/s.
-    block : float
-        s.
-
-    Returns
-    -------
-    numpy.ndarray
-        One per whole block.
-    """
+    """Root mean squares of values (n,) of a rate (1/s) over each whole block (s)."""
     length = round(block * rate)
     count = len(values) // length
     return np.sqrt(np.mean(np.square(np.asarray(values, float)[: count * length]).reshape(count, length), axis=1))
 
 
 def sperling(values, rate, vertical, late=True):
-    """Sperling's ride index Wz of an acceleration: (sum of a^2 B^2)^(3/20), a the amplitudes of its parts in cm/s^2.
+    """Sperling's ride index Wz of an acceleration (n,), m/s^2, where ``late``: (sum of a^2 B^2)^(3/20), with the
+    amplitudes a of its parts in cm/s^2.
 
     The sum is twice the mean square of the weighted signal, once that has settled. 3/20 is mostly rounded to 1/6.67.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        m/s^2.
-    rate : float
-        1/s.
-    vertical : bool
-    late : array_like of bool, shape (n,)
-        What of the weighted signal counts.
-
-    Returns
-    -------
-    float
     """
     felt = 100.0 * weighted(values, rate, "B vertical" if vertical else "B lateral")
     settled = np.arange(len(felt)) >= min(SETTLED * rate, len(felt) // 2)
@@ -178,18 +119,8 @@ def sperling(values, rate, vertical, late=True):
 
 
 def floor_accelerations(run, body):
-    """What accelerometers on a body's floor show, at its centre of mass; nothing where it stands on level track.
-
-    Parameters
-    ----------
-    run : Run
-    body : str
-        With the channels `NEEDED`, in the track's axes.
-
-    Returns
-    -------
-    dict of str to numpy.ndarray
-        By the keys of `DIRECTIONS`, in the body's own axes, m/s^2.
+    """What accelerometers on a body's floor show at its centre of mass, in its axes (m/s^2, by the keys of
+    `DIRECTIONS`): nothing where it stands on level track. The body needs the channels `NEEDED`.
     """
     from scipy.spatial.transform import Rotation
 
@@ -212,85 +143,47 @@ def _upright(run, channels):
 
 
 def ride_table(run, begin=0.0):
-    """Comfort of a run's bodies at their centres of mass, in their own axes.
-
-    Parameters
-    ----------
-    run : Run
-        With the channels of poses and accelerations.
-    begin : float
-        Start of the evaluation, s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per body: number of blocks, 95th percentiles of the weighted accelerations over them (m/s^2), N_MV of
-        EN 12299, Sperling's Wz lateral and vertical.
-
-    Raises
-    ------
-    InputError
-        Without such a body, with less than one block, or with too low a rate.
+    """Comfort of a run's bodies from ``begin`` (s) on, a row each: number of blocks, 95th percentiles of the weighted
+    accelerations over them (m/s^2), N_MV of EN 12299, Sperling's Wz lateral and vertical.
     """
     rate, late, bodies = _bodies(run, begin, BLOCK)
     rows = []
     for body in bodies:
         felt = floor_accelerations(run, body)
-        blocks = {
-            name: block_rms(weighted(felt[name], rate, weighting)[late], rate) for name, weighting in DIRECTIONS.items()
-        }
+        blocks = {name: block_rms(weighted(felt[name], rate, DIRECTIONS[name])[late], rate) for name in DIRECTIONS}
         high = {f"{name[:2]}_weighted_95_m_per_s2": float(np.percentile(b, 95.0)) for name, b in blocks.items()}
-        rows.append(
-            {"body": body, "blocks": len(blocks["ax_m_per_s2"])}
-            | high
-            | {
-                "N_MV": 6.0 * float(np.sqrt(sum(value**2 for value in high.values()))),
-                "Wz_lateral": sperling(felt["ay_m_per_s2"], rate, False, late),
-                "Wz_vertical": sperling(felt["az_m_per_s2"], rate, True, late),
-            }
-        )
+        rows.append({
+            "body": body, "blocks": len(blocks["ax_m_per_s2"]), **high,
+            "N_MV": 6.0 * float(np.sqrt(sum(value**2 for value in high.values()))),
+            "Wz_lateral": sperling(felt["ay_m_per_s2"], rate, False, late),
+            "Wz_vertical": sperling(felt["az_m_per_s2"], rate, True, late),
+        })  # fmt: skip
     return pd.DataFrame(rows)
 
 
 def whole_body_table(run, begin=0.0):
-    """Whole-body vibration at the centres of mass of a run's bodies, in their own axes, by ISO 2631-1.
-
-    Parameters
-    ----------
-    run : Run
-        With the channels of poses and accelerations.
-    begin : float
-        Start of the evaluation, s.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per body and direction x, y, z: weighting, weighted rms (m/s^2), crest factor (largest weighted value over
-        the rms), MTVV (largest running rms over 1 s, m/s^2), VDV (fourth root of the integral of the fourth power,
-        m/s^1.75), and the vibration total value of the body, root of the sum of the squares of the rms (m/s^2).
-
-    Raises
-    ------
-    InputError
-        As for `ride_table`.
+    """Whole-body vibration by ISO 2631-1 from ``begin`` (s) on, a row per body and direction x, y, z: weighting,
+    weighted rms (m/s^2), crest factor (largest weighted value over the rms), MTVV (largest running rms over 1 s,
+    m/s^2), VDV (fourth root of the integral of the fourth power, m/s^1.75), and the vibration total value of the body,
+    root of the sum of the squares of the rms (m/s^2).
     """
     rate, late, bodies = _bodies(run, begin, RUNNING)
     rows = []
     for body in bodies:
-        own, felt = [], floor_accelerations(run, body)
+        directions, felt = [], floor_accelerations(run, body)
         for name, weighting in DIRECTIONS_ISO.items():
             values = weighted(felt[name], rate, weighting)[late]
             rms = float(np.sqrt(np.mean(values**2)))
             window = round(RUNNING * rate)
             sums = np.cumsum(np.concatenate([[0.0], values**2]))
-            own.append({
+            directions.append({
                 "body": body, "direction": name[1], "weighting": weighting, "rms_m_per_s2": rms,
                 "crest_factor": float(np.abs(values).max()) / rms if rms > 0.0 else np.nan,
                 "MTVV_m_per_s2": float(np.sqrt(max((sums[window:] - sums[:-window]).max(), 0.0) / window)),
                 "VDV_m_per_s1_75": float((np.sum(values**4) / rate) ** 0.25),
             })  # fmt: skip
-        total = float(np.sqrt(sum(row["rms_m_per_s2"] ** 2 for row in own)))
-        rows += [row | {"total_value_m_per_s2": total} for row in own]
+        total = float(np.sqrt(sum(row["rms_m_per_s2"] ** 2 for row in directions)))
+        rows += [row | {"total_value_m_per_s2": total} for row in directions]
     return pd.DataFrame(rows)
 
 
@@ -306,13 +199,7 @@ def _bodies(run, begin, least):
 
 
 def rate_of(run, least, what):
-    """Output rate of a run, 1/s.
-
-    Raises
-    ------
-    InputError
-        If it is below ``least``, or its times are not equally spaced.
-    """
+    """Output rate of a run, 1/s; one below ``least`` and times that are not equally spaced are refused."""
     steps = np.diff(run.t)
     if len(steps) == 0 or np.ptp(steps) > 1e-6 * steps[0]:
         raise InputError(what, "run", "expected at least two output times, equally spaced")

@@ -1,4 +1,4 @@
-"""What a vehicle's runs say: wheel loads, guiding forces, wear, ride and hunting, per wheel and over speed.
+"""What a run says of its wheels: loads, guiding forces, wear, pressure.
 
 Definitions of Q, Y, T gamma and the others: :mod:`wrcore.run.derived`.
 """
@@ -14,13 +14,9 @@ from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import forces_on_rail, quotient, rolling_speed
-from wrcore.run.motion import growth_rate, hunting_frequency
 from wrcore.run.run import Run
 
 Side = Annotated[str, OneOf(SIDES)]
-
-SMALLEST = 1e-6
-"""Motions below this are not asked for a frequency or a damping, m."""
 
 
 def wheelsets_of(run):
@@ -152,7 +148,7 @@ def wheelset_channels(run: Run, wheelset: str) -> pd.DataFrame:
     >>> list(wr.wheelset_channels(run, "wheelset"))[:3]
     ['Q_left_N', 'Y_left_N', 'Y_over_Q_left']
     """
-    columns = {}
+    columns: dict[str, np.ndarray] = {}
     for side in SIDES:
         vertical, lateral = wheel_forces(run, wheelset, side)
         columns |= {
@@ -198,28 +194,12 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
         for side in SIDES:
             vertical, lateral = (force[late] for force in wheel_forces(run, wheelset, side))
             ratio = np.abs(quotient(vertical, lateral))
-            rows.append(
-                {
-                    "wheelset": wheelset,
-                    "side": side,
-                    "Q_mean_N": np.mean(vertical),
-                    "Q_min_N": np.min(vertical),
-                    "Q_max_N": np.max(vertical),
-                    "Y_max_N": np.max(np.abs(lateral)),
-                    "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
-                    "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
-                    "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
-                    "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
-                }
-            )
+            rows.append({
+                "wheelset": wheelset, "side": side, "Q_mean_N": np.mean(vertical), "Q_min_N": np.min(vertical),
+                "Q_max_N": np.max(vertical), "Y_max_N": np.max(np.abs(lateral)),
+                "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
+                "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
+                "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
+                "creep_power_mean_W": np.mean(creep_power(run, wheelset, side)[late]),
+            })  # fmt: skip
     return pd.DataFrame(rows)
-
-
-def hunting(t, y):
-    """Frequency (Hz), growth (1/s) and damping ratio of a decaying, steady or growing lateral motion y (m) over t (s)
-    from release on; NaN once the motion has died before it has swung.
-    """
-    swinging = np.flatnonzero(np.abs(y) > SMALLEST)
-    end = swinging[-1] + 1 if swinging.size else 0
-    frequency, growth = hunting_frequency(t[:end], y[:end]), growth_rate(t[:end], y[:end])
-    return frequency, growth, -growth / np.hypot(growth, 2.0 * np.pi * frequency)

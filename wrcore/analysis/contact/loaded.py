@@ -16,26 +16,12 @@ from wrcore.contact import reduction as columns
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import DETECTIONS, axle_direction, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_table
+from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import frame_of_overlaps, group_end
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
-from wrcore.contact.patch.normal import even_length, height_of_zero
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.rolling import read_field
-from wrcore.contact.patch.solve import (
-    CENTRE,
-    HALF_LENGTH,
-    LOAD,
-    MEAN_S,
-    MEAN_X,
-    MIDDLE,
-    OWN_WIDTH,
-    S_MAX,
-    S_MIN,
-    WINDOW,
-    X_MAX,
-    X_MIN,
-)
 from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, settle
@@ -57,23 +43,12 @@ MODELS = (*PATCHES, "grid")
 GRIDS = {"coarse": ((32, 24),), "middle": ((32, 24), (40, 32)), "fine": FINE}
 """Grids of each resolution (elements along x, across)."""
 
-DEEPEST = 1e-3
-"""Overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread."""
-
-LOWEST = 0.1
-"""A wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot."""
-
-SMOOTH = 1e-9
-"""Coefficient of friction where the normal forces alone are looked at."""
-
-SLOWEST = 1e-9
-"""Creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at."""
-
-_CARRIED = 1e-9
-"""Relative error of F^(2/3) that ends the search for a height."""
-
-_LEVEL = 1e-10
-"""Step in roll that ends the search for it, rad."""
+DEEPEST = 1e-3  # overlap that a given height may make, m; the greatest load, 1 MN, makes 0.35 mm on a tread
+LOWEST = 0.1  # a wheelset lies at most so much below its rolling radius, m: beyond, flanges stand on the rail's foot
+SMOOTH = 1e-9  # coefficient of friction where the normal forces alone are looked at
+SLOWEST = 1e-9  # creepages are not divided by a smaller speed, m/s: below all that a wheelset can be asked to roll at
+_CARRIED = 1e-9  # relative error of F^(2/3) that ends the search for a height
+_LEVEL = 1e-10  # step in roll that ends the search for it, rad
 
 _MOST_ROLLS = 25
 
@@ -217,8 +192,9 @@ class LoadedWheels:
             find = tabulated_wrench if contact.value.strips.looked_up else group_wrench
             found = find(contact, left, self.spatial, overlaps, first, last, out[0], wrench, self._counters,
                          work.spare, self._work_handle)  # fmt: skip
-            x, sums = out[0, columns.X] - work.sums[MEAN_X], work.sums
-            extent = x + sums[X_MIN], x + sums[X_MAX], sums[S_MAX] - sums[S_MIN]
+            sums = work.sums
+            x = out[0, columns.X] - sums[solve.MEAN_X]
+            extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
             if fields is not None and (self.always or self._counters[ON_GRID] > before):
@@ -236,19 +212,20 @@ class LoadedWheels:
         field = np.empty((9, count * library.panels.n))
         read_field(library.panels, count, rolling, field)
         tx, ts, pressure, sx, ss, slides = field[2:8].reshape(6, count, -1)
-        centre, width, half, middle = (work.strips[k, :count] for k in (CENTRE, OWN_WIDTH, HALF_LENGTH, MIDDLE))
-        even = even_length(half, width, work.strips[WINDOW, :count])  # strips as rectangles with the areas they have
-        longer = load / work.sums[LOAD] * (half / even)[:, None]
+        rows = (solve.CENTRE, solve.OWN_WIDTH, solve.HALF_LENGTH, solve.MIDDLE, solve.WINDOW)
+        centre, width, half, middle, window = work.strips[list(rows), :count]
+        even = solve.even_length(half, width, window)  # strips as rectangles with the areas they have
+        longer = load / work.sums[solve.LOAD] * (half / even)[:, None]
         edges = middle[:, None] + even[:, None] * library.panels.edges
-        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[MEAN_X], work.sums[MEAN_S]
+        like, mean_x, mean_s = np.ones(pressure.shape), work.sums[solve.MEAN_X], work.sums[solve.MEAN_S]
         slips = slides > 0.0
         cells = (
             0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, sign * like * (centre - mean_s)[:, None],
             edges[:, :-1] - edges[:, 1:], like * width[:, None], pressure * longer, tx * longer, sign * ts * longer,
             np.where(slips, sx, 0.0), np.where(slips, sign * ss, 0.0), ~slips,
         )  # fmt: skip
-        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (S_MIN, S_MAX))
-        ends = (*(work.sums[k] - mean_x for k in (X_MIN, X_MAX)), *s_ends)
+        s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (solve.S_MIN, solve.S_MAX))
+        ends = (*(work.sums[k] - mean_x for k in (solve.X_MIN, solve.X_MAX)), *s_ends)
         return Patch(
             *(cell.ravel() for cell in cells), *map(float, row[[columns.NORMAL, columns.FX, columns.FY, columns.MZ]]),
             *map(float, row[columns.XI : columns.PHI + 1]), float(row[columns.ANGLE]),
@@ -288,18 +265,32 @@ class LoadedWheels:
         extent = origin[0] + x_min, origin[0] + x_max, s_max - s_min
         return Found(row, extent, patch.normal, math.nan, patch, True)
 
-    def check_depth(self, side, y, z, roll, yaw, source, field):
-        """Refuse a height at which a wheel lies deeper in its rail than `DEEPEST`."""
-        axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
-        lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
-        if find_patches(self.geometry, *lifted, MOMENT, self._rows) or z < self.geometry.rolling_radius - LOWEST:
-            raise InputError(source, field, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
+    def placed(self, sides, y, yaw, known, load, how, told):
+        """Roll, and height of the wheelset by side, in a pose: what is NaN of ``known``, its roll and z, is sought for
+        the load as `loaded_poses` says, with arguments ``how`` of `height`. A height at which a wheel lies deeper in
+        its rail than `DEEPEST` is refused; ``told``: source and field.
+        """
+        roll, z = known
+        if math.isnan(z) and math.isnan(roll):
+            roll, z = self.settled(y, load, yaw, **how)
+        elif math.isnan(z):
+            return roll, {side: self.height(side, y, load, roll, yaw, **how) for side in sides}
+        else:
+            roll = 0.0 if math.isnan(roll) else roll
+            for side in sides:
+                axle = (SIDES[side] * c for c in axle_direction(roll, yaw))
+                lifted = (SIDES[side], y, z + DEEPEST, *axle, self.spatial)
+                low = z < self.geometry.rolling_radius - LOWEST
+                if low or find_patches(self.geometry, *lifted, MOMENT, self._rows):
+                    raise InputError(*told, f"expected at most {1e3 * DEEPEST:g} mm of overlap, got z = {z:g} m")
+        return roll, dict.fromkeys(sides, z)
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """Height z (m) of the wheelset at which one wheel carries a load (N; of all forces vertically, or of the normal
         forces), sought near ``guess`` (m); NaN where there is none.
         """
-        goal, ellipse = load ** (2.0 / 3.0), not self._still.strips.strips
+        goal = load ** (2.0 / 3.0)
+        solved = not self._still.strips.strips and rolling is None and vertical  # by Hertz's law at rest
 
         def excess(z):
             found = self.at_height(side, y, z, roll, yaw, rolling, friction)
@@ -307,14 +298,12 @@ class LoadedWheels:
             rest = max(force, 0.0) ** (2.0 / 3.0) - goal
             return 0.0 if abs(rest) < _CARRIED * goal else rest
 
-        if math.isnan(guess) or (ellipse and rolling is None and vertical):
+        if math.isnan(guess) or solved:
             guess = height_at_load(
                 self.geometry, self._still.hertz, self.modulus, SIDES[side], y, roll, yaw, self.spatial,
                 self._still.reduction, load, self.geometry.rolling_radius, self._rows,
             )  # fmt: skip
-        if math.isnan(guess) or (ellipse and rolling is None and vertical):
-            return guess
-        return height_of_zero(excess, guess)
+        return guess if math.isnan(guess) or solved else height_of_zero(excess, guess)
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
         """Roll (rad) and height (m) at which each wheel carries a load; NaN where there are none. As for `height`."""
@@ -338,6 +327,33 @@ class LoadedWheels:
             roll -= step
             left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
         return math.nan, math.nan
+
+
+def height_of_zero(excess, z):
+    """Zero of a function that falls with z, nearly linear near it: a bracket, then Illinois steps; NaN if lost."""
+    low = high = math.nan
+    e_low = e_high = 0.0
+    step, last = 2e-5, 0
+    for _ in range(60):
+        e = excess(z)
+        if math.isnan(e):
+            return math.nan
+        pressed = e > 0.0
+        if pressed:
+            low, e_low = z, e
+            e_high *= 0.5 if last > 0 else 1.0
+        else:
+            high, e_high = z, e
+            e_low *= 0.5 if last < 0 else 1.0
+        if math.isnan(low) or math.isnan(high):
+            z, step = z + (step if pressed else -step), 2.0 * step
+            continue
+        last = 1 if pressed else -1
+        new = low + (high - low) * e_low / (e_low - e_high)
+        if abs(new - z) < 1e-13 or high - low < 1e-13:
+            return new
+        z = new
+    return math.nan
 
 
 @lru_cache(maxsize=4)

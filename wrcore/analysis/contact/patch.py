@@ -91,19 +91,15 @@ def patch(
     load, speed, mu = (usual[k] if v is None else v for k, v in (("load", load), ("speed", speed), ("mu", mu)))
     wheels = LoadedWheels(geometry, method, resolution, slip, **options)
     rolling = Rolling(float(speed), math.nan if omega is None else float(omega), float(vy), float(yaw_rate))
-    how, vertical = {"rolling": rolling, "friction": float(mu)}, load_by == "vertical"
-    if z is not None:
-        wheels.check_depth(side, y, z, roll or 0.0, yaw, "patch", "z")
-    else:
+    how = {"rolling": rolling, "friction": float(mu)}
+    if z is None:
         check_number(load, 1e-9, 1e6, "patch", "load", "N")
-        if roll is None:
-            roll, z = wheels.settled(y, load, yaw, vertical=vertical, **how)
-        else:
-            z = wheels.height(side, y, load, roll, yaw, vertical=vertical, **how)
-        if math.isnan(z):
-            raise InputError("patch", "load", f"expected a load that the wheel finds at y = {y:g} m, got {load:g} N")
-    found = wheels.at_height(side, y, z, roll or 0.0, yaw, fields=True, **how)
-    return [one.patch for one in found]
+    known = [math.nan if value is None else value for value in (roll, z)]
+    to_load = how | {"vertical": load_by == "vertical"}
+    turned, heights = wheels.placed((side,), y, yaw, known, load, to_load, ("patch", "z"))
+    if math.isnan(heights[side]):
+        raise InputError("patch", "load", f"expected a load that the wheel finds at y = {y:g} m, got {load:g} N")
+    return [one.patch for one in wheels.at_height(side, y, heights[side], turned, yaw, fields=True, **how)]
 
 
 def pair_of(source, side="left"):

@@ -6,56 +6,30 @@ import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction as columns
-from wrcore.contact.poses import PATCH_FIELDS
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
 
-ROLLING_FIELDS = {
-    "xi": columns.XI, "eta": columns.ETA, "phi_per_m": columns.PHI, "Fx_N": columns.FX, "Fy_N": columns.FY,
-    "Mz_Nm": columns.MZ,
-}  # fmt: skip
+ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
 """Columns of rolling, empty where the wheelset does not move."""
 
-AT_REST = ("pose_id", "side", "patch", *PATCH_FIELDS, "p_max_Pa", "roll_rad", "z_wheelset_m")
-FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING_FIELDS)
+STILL = tuple(name for name in columns.CHANNELS if name not in ROLLING)
+AT_REST = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m")
+FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING)
 
 
 def loaded_poses(
     poses, geometry, wheel_load, patch="moment", resolution="fine", slip="surfaces", load_by="vertical", friction=0.3,
     detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28,
 ):  # fmt: skip
-    """Patches of both wheels for every pose.
+    """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.pose_file.read_poses`: columns
+    FIELDS, a row per patch, none without contact or equilibrium; ``attrs["on_grid"]``: patches that a grid has solved
+    instead of strips.
 
-    Parameters
-    ----------
-    poses : pandas.DataFrame
-        As from :func:`wrcore.contact.poses.read_poses`. z given: forces at that height (roll left out: 0). Roll given,
-        z not: each side is solved for the load by itself. Neither: both are solved so that each wheel carries it. With
-        V_m_per_s above 0 the wheelset rolls, freely where omega_rad_per_s is not given; else it stands.
-    geometry : ContactGeometry
-    wheel_load : float
-        N per wheel, above 0 and up to 1e6.
-    patch : {"maximum", "moment", "strips", "exact", "tabulated", "grid"}
-    resolution, slip : str
-        See `LoadedWheels`.
-    load_by : {"vertical", "normal"}
-        The load is the vertical sum of all forces on the wheel, creep forces included, or that of its normal forces.
-    friction : float
-        Where a pose has no ``mu``.
-    detection : {"planar", "spatial"}
-    shear_modulus, poisson_ratio : float
-        Material of both bodies, Pa and -.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns FIELDS, one row per patch; a wheel without contact has none. A pose without equilibrium gives no rows.
-        ``attrs["on_grid"]``: patches that a grid has solved instead of strips.
-
-    Raises
-    ------
-    InputError
-        For an unknown choice, or a number in another unit.
+    z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
+    Neither: both are solved so that each wheel carries it. With V_m_per_s above 0 the wheelset rolls, freely where
+    omega_rad_per_s is not given; else it stands. ``load_by``: the load (N per wheel) is the ``vertical`` sum of all
+    forces on a wheel, or that of its ``normal`` forces; ``friction`` holds where a pose has no ``mu``; all else as for
+    `LoadedWheels`.
     """
     check_number(wheel_load, 1e-9, 1e6, "contact", "wheel_load", "N")
     check_number(friction, 0.0, 2.0, "contact", "friction")
@@ -70,15 +44,16 @@ def loaded_poses(
             rolling = Rolling(speed, _given(pose, "omega_rad_per_s", math.nan), _given(pose, "vy_m_per_s", 0.0),
                               _given(pose, "yaw_rate_rad_per_s", 0.0))  # fmt: skip
         how = {"rolling": rolling, "friction": mu}
-        roll, heights = _placed(wheels, y, yaw, pose.roll_rad, pose.z_m, wheel_load, load_by == "vertical", how)
+        to_load = how | {"vertical": load_by == "vertical"}
+        roll, heights = wheels.placed(SIDES, y, yaw, (pose.roll_rad, pose.z_m), wheel_load, to_load, ("contact", "z_m"))
         for side, z in heights.items():
             found = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
             for number, one in enumerate(found, start=1):
                 on_grid += one.on_grid
                 rows.append([
-                    pose.pose_id, side, number, *(one.row[column] for column in PATCH_FIELDS.values()),
+                    pose.pose_id, side, number, *(one.row[columns.CHANNELS[name]] for name in STILL),
                     one.row[columns.P_MAX], roll, z, *one.extent,
-                    *(math.nan if rolling is None else one.row[column] for column in ROLLING_FIELDS.values()),
+                    *(math.nan if rolling is None else one.row[columns.CHANNELS[name]] for name in ROLLING),
                 ])  # fmt: skip
     table = pd.DataFrame(rows, columns=list(FIELDS))
     table.attrs["on_grid"] = on_grid
@@ -89,16 +64,3 @@ def _given(pose, name, otherwise):
     """A number of a pose, or what holds where its column is missing or empty."""
     value = getattr(pose, name, math.nan)
     return otherwise if math.isnan(value) else value
-
-
-def _placed(wheels, y, yaw, roll, z, load, vertical, how):
-    """Roll, and height by side, of a wheelset in a pose."""
-    if not math.isnan(z):
-        roll = 0.0 if math.isnan(roll) else roll
-        for side in SIDES:
-            wheels.check_depth(side, y, z, roll, yaw, "contact", "z_m")
-        return roll, dict.fromkeys(SIDES, z)
-    if math.isnan(roll):
-        roll, z = wheels.settled(y, load, yaw, vertical=vertical, **how)
-        return roll, dict.fromkeys(SIDES, z)
-    return roll, {side: wheels.height(side, y, load, roll, yaw, vertical=vertical, **how) for side in SIDES}

@@ -20,14 +20,9 @@ from wrcore.errors.new_files import appearing
 from wrcore.geometry.track import SIDES
 
 MOST_FRAMES = 600
-FRAME_RATE = 50.0
-"""Frames per second of simulated time, as near as the run's output times allow."""
-
-SHOWN = 0.5
-"""Largest displacement from above, as the factor is chosen, m."""
-
-POINTS = 160
-"""Of a profile."""
+FRAME_RATE = 50.0  # frames per second of simulated time, as near as the run's output times allow
+SHOWN = 0.5  # largest displacement from above, as the factor is chosen, m
+POINTS = 160  # of a profile
 
 PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
 

@@ -10,10 +10,7 @@ from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import checked
 from wrcore.geometry.track import SIDES
 
-LIFT = 0.020
-"""Height by which the wheel is drawn above the rail, m."""
-
-
+LIFT = 0.020  # height by which the wheel is drawn above the rail, m
 _LABEL_WIDTH = 3.5  # mm
 
 
@@ -52,7 +49,7 @@ def _location(axes, pair, table, side):
 
 def _label_shifts(axes, shifts, across, height):
     """Write whole millimetres of shift above the wheel, small shifts first; leave out what would overlap."""
-    written = []
+    written: list[float] = []
     for k in np.argsort(np.abs(shifts)):
         whole = abs(shifts[k] - round(shifts[k])) < 1e-6 and np.isfinite(across[k])
         if whole and all(abs(across[k] - other) > _LABEL_WIDTH for other in written):

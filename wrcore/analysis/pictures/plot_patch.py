@@ -14,14 +14,9 @@ from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.geometry.track import SIDES
 from wrcore.scene.description import Source
 
-TALLEST = 12.0
-"""Height that the greatest pressure is drawn with, mm."""
-
-ARROW = 22.0
-"""Length of the arrow of the most loaded patch's force, mm."""
-
-SEEN = (-34.0, 30.0)
-"""Heights between which wheel and rail are shown, mm."""
+TALLEST = 12.0  # height that the greatest pressure is drawn with, mm
+ARROW = 22.0  # length of the arrow of the most loaded patch's force, mm
+SEEN = (-34.0, 30.0)  # heights between which wheel and rail are shown, mm
 
 
 @checked

@@ -23,8 +23,7 @@ PRINTED = {
 }  # fmt: skip
 """Factor to the printed unit, and that unit; other units are printed as they are."""
 
-LARGE = ("x_m", "s_m", "z_m")
-"""Channels in m that are printed in m."""
+LARGE = ("x_m", "s_m", "z_m")  # channels in m that are printed in m
 
 WIDTH, HEIGHT = 7.2, 1.7
 COLORS = ("0.1", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7", "0.6")
@@ -33,8 +32,7 @@ COLORS = ("0.1", "#0072B2", "#E69F00", "#56B4E9", "#CC79A7", "0.6")
 DASHES: tuple[Any, ...] = ("-", (0, (4, 2)), (0, (1, 1)), (0, (6, 1, 1, 1)))
 """A wheelset's left wheel has full lines, its right one dashes."""
 
-MOST_ENTRIES = 8
-"""In one column of a legend."""
+MOST_ENTRIES = 8  # in one column of a legend
 
 
 @checked
@@ -88,16 +86,11 @@ def _values(run: Run, channel: str) -> np.ndarray:
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
     """Panels (quantity, lines by label) that say most about a run with the channels that it has."""
-    panels = []
     names = wheelsets_of(run) or [name for name, group in run.groups.items() if "y_m" in group]
-    for quantity in ("y_m", "yaw_rad"):
-        lines = {name: run.groups[name][quantity] for name in names if quantity in run.groups[name]}
-        if lines:
-            panels.append((quantity, lines))
-    wheels = {(name, side): wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
-    for at, quantity in enumerate(("Q_N", "Y_N")):
-        if wheels:
-            panels.append((quantity, {f"{name} {side}": forces[at] for (name, side), forces in wheels.items()}))
+    motion = {q: {name: run.groups[name][q] for name in names if q in run.groups[name]} for q in ("y_m", "yaw_rad")}
+    wheels = {f"{name} {side}": wheel_forces(run, name, side) for name in wheelsets_of(run) for side in SIDES}
+    forces = {q: {label: pair[at] for label, pair in wheels.items()} for at, q in enumerate(("Q_N", "Y_N"))}
+    panels = [(quantity, lines) for quantity, lines in (motion | forces).items() if lines]
     if not panels:
         first = next(((group, name) for group, names in run.groups.items() for name in names), None)
         if first is None:

@@ -5,6 +5,7 @@ SVG every part is a group named ``body:NAME``, ``element:NAME`` or ``joint:NAME`
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
@@ -22,28 +23,29 @@ MARKS = {name: kind.mark for name, kind in KINDS.items()} | {
 }
 """Look of each kind of force element, and of joints."""
 
-VIEWS = (("side", 2), ("plan", 1))
-"""Name, and which coordinate stands upright."""
-
-WIDTH = 10.0
-"""Of the figure, inches."""
-
-WHEEL_WIDTH = 0.135
-"""Of a wheel in plan view, m."""
-
-ROW = 0.125
-"""Height of a line of the list of names, inches."""
+VIEWS = (("side", 2), ("plan", 1))  # name, and which coordinate stands upright
+WIDTH = 10.0  # of the figure, inches
+WHEEL_WIDTH = 0.135  # of a wheel in plan view, m
+ROW = 0.125  # height of a line of the list of names, inches
 
 COLUMNS = 4
 
-SMALLEST_SCALE = 0.33
-"""Inches per m: longer vehicles make wider figures."""
+SMALLEST_SCALE = 0.33  # inches per m: longer vehicles make wider figures
+LETTER = (4.1, 8.5)  # width and height that a letter of a label takes up, points
+MARK = 4.0  # size of a mark, points; of several at one place those below are larger
 
-LETTER = (4.1, 8.5)
-"""Width and height that a letter of a label takes up, points."""
 
-MARK = 4.0
-"""Size of a mark, points; of several at one place those below are larger."""
+class Part(NamedTuple):
+    """A force element or joint as it is drawn."""
+
+    number: int
+    name: str
+    kind: str
+    bodies: list
+    ends: np.ndarray
+    """(2, 3): m."""
+    along: np.ndarray = np.zeros(3)
+    """Direction in which it acts, if not along its line."""
 
 
 def box_of(body):
@@ -88,7 +90,7 @@ def plot_vehicle(scene):
 
 
 def _elements(vehicle):
-    """Number, name, kind, bodies, ends (2, 3) and direction (3,) of each force element."""
+    """Force elements as `Part`."""
     bodies = vehicle.data["bodies"]
     parts = []
     for item in vehicle.data["elements"]:
@@ -99,12 +101,12 @@ def _elements(vehicle):
         along = np.zeros(3)
         if item.get("direction", "line") != "line":
             along["xyz".index(item["direction"])] = 1.0
-        parts.append((len(parts) + 1, item["name"], item["kind"], item["bodies"], ends, along))
+        parts.append(Part(len(parts) + 1, item["name"], item["kind"], item["bodies"], ends, along))
     return parts
 
 
 def _joints(vehicle):
-    """The same of each joint, those of axle boxes included; a coordinate that follows the frame is at its body."""
+    """Joints, those of axle boxes included; a coordinate that follows the frame is at its body."""
     data = vehicle.data
     first = len(data["elements"]) + 1
     items = [(item["name"], item["bodies"], item.get("at")) for item in data["joints"]]
@@ -116,13 +118,13 @@ def _joints(vehicle):
     parts = []
     for name, pair, at in items:
         ends = np.array(data["bodies"][pair[0]]["position"] if at is None else at, float).reshape(-1, 3)[[0, -1]]
-        parts.append((first + len(parts), name, "joint", pair, ends, np.zeros(3)))
+        parts.append(Part(first + len(parts), name, "joint", pair, ends))
     return parts
 
 
 def _limits(bodies, parts):
     """Smallest and largest x, y, z of what is drawn, m."""
-    corners = [ends for *_, ends, _ in parts]
+    corners = [part.ends for part in parts]
     for body in bodies.values():
         half = _half(body)
         corners.append(np.array(body["position"]) + [-half, half])
@@ -162,10 +164,7 @@ def _draw_parts(axes, parts, view, upright):
     """A mark for each part, the line between its ends, and a stroke along the direction in which it acts; the marks'
     places (m) with the size of the largest one (points).
     """
-    places = {}
-    for part in parts:
-        middle = part[4].mean(axis=0)
-        places.setdefault((round(middle[0], 2), round(middle[upright], 2)), []).append(part)
+    places = _by_place(parts, upright)
     for (x, across), here in places.items():
         for k, (_, name, kind, _, ends, along) in enumerate(here):
             color = MARKS[kind]["color"]
@@ -178,6 +177,15 @@ def _draw_parts(axes, parts, view, upright):
             gid = f"{'joint' if kind == 'joint' else 'element'}:{name}:{view}"
             axes.plot(x, across, linestyle="", markersize=size, markeredgewidth=0.9, zorder=5, gid=gid, **MARKS[kind])
     return {place: _size(len(here) - 1) for place, here in places.items()}
+
+
+def _by_place(parts, upright):
+    """Parts by the place (m) of their middle in a view."""
+    places = {}
+    for part in parts:
+        middle = part.ends.mean(axis=0)
+        places.setdefault((round(middle[0], 2), round(middle[upright], 2)), []).append(part)
+    return places
 
 
 def _size(below):
@@ -197,11 +205,7 @@ def _names(bodies):
 
 def _numbers(parts):
     """Numbers and their places in the plan view; those of parts at one place stand together."""
-    places = {}
-    for number, *_, ends, _ in parts:
-        x, y, _ = ends.mean(axis=0)
-        places.setdefault((round(x, 2), round(y, 2)), []).append(str(number))
-    return [(",".join(numbers), place) for place, numbers in places.items()]
+    return [(",".join(str(part.number) for part in here), place) for place, here in _by_place(parts, 1).items()]
 
 
 def _label(axes, texts, spots, scale):
@@ -243,16 +247,16 @@ def _list(words, parts):
     """Names behind the numbers, column by column."""
     words.set_axis_off()
     rows = -(-len(parts) // COLUMNS)
-    for k, (number, name, _, pair, *_) in enumerate(parts):
+    for k, part in enumerate(parts):
         column, row = divmod(k, rows)
-        to_frame = ", to the moving frame" if FRAME_NAME in pair else ""
+        to_frame = ", to the moving frame" if FRAME_NAME in part.bodies else ""
         at = (column / COLUMNS, 1.0 - (row + 0.5) / rows)
-        words.text(*at, f"{number} {name}{to_frame}", transform=words.transAxes, fontsize=6.5, va="center")
+        words.text(*at, f"{part.number} {part.name}{to_frame}", transform=words.transAxes, fontsize=6.5, va="center")
 
 
 def _legend(figure, parts, bodies):
     """What the marks stand for, with how many there are; and the boxes."""
-    kinds = [part[2] for part in parts]
+    kinds = [part.kind for part in parts]
     handles = [
         Line2D([], [], linestyle="", markersize=4.5, label=f"{kind.replace('_', ' ')} ({kinds.count(kind)})", **look)
         for kind, look in MARKS.items()

@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 from wrcore.analysis.pictures.style import MM, styled
 
 KM = 1e-3
-SHOWN = 6
-"""Profiles drawn, evenly over the distance."""
+SHOWN = 6  # profiles drawn, evenly over the distance
 
 FLANGE = (
     ("Sh_m", "k-", "flange height Sh"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -20,11 +20,11 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.run.motion import hunting_frequency
-from wrcore.run.simulate import DERAILED_Y
+from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import Source, as_scene
 
-CYCLES = ("limit cycle", "irregular")
-"""Status of motions that do not die away."""
+CYCLES = ("limit cycle", "irregular")  # status of motions that do not die away
+DISTURBANCES = (0.006, 0.0065, 0.007, 0.008, 0.009)  # sideways shifts that may end on a cycle, m
 
 
 @checked
@@ -132,16 +132,18 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     tried as well and the largest of these motions counts: an irregular motion can leave one limit cycle for another.
     Where every disturbance derails, the next lower speed is tried.
     """
-    rows, lost, carried, below, queue = [], [], None, None, list(speeds)
+    rows: list[dict[str, Any]] = []
+    lost, below, queue = [], None, list(speeds)
+    carried: list[Any] = []
     while queue:
         there, straight = at_speed(model, state, queue.pop())
-        tried = [] if carried is None else [settle_motion(there, at_speed(*carried, there.speed)[1], settling)]
+        tried = [settle_motion(there, at_speed(before, end, there.speed)[1], settling) for before, end in carried]
         if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
             tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
         row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
         if row["status"] in CYCLES:
             rows.append(row)
-            carried = there, end
+            carried = [(there, end)]
         elif row["status"] == "derailed":
             lost.append(row)
         else:
@@ -171,13 +173,7 @@ def limit_cycles(
     scene: Source,
     speeds: Iterable[float],
     settling: Settling | None = None,
-    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = (
-        0.006,
-        0.0065,
-        0.007,
-        0.008,
-        0.009,
-    ),
+    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = DISTURBANCES,
     resolution: Annotated[float, Within(1e-3, 150.0, "m/s")] = 0.25,
 ) -> pd.DataFrame:
     """Both branches of a scene's vehicle.

@@ -3,7 +3,7 @@
 Bodies form families: those named alike up to a number and a side (``bogie_1`` and ``bogie_2``, or
 ``axle_box_1_left`` and others). Energies are kinetic, as parts of the mode's whole. In this order:
 
-* *rails* or *sleeper* lateral, vertical, roll: the mass of a track that gives has more energy than all bodies together,
+* *rails* or *sleeper* lateral, vertical, roll: the mass of a flexible track has more energy than all bodies together,
   or, of rails without mass, hardly oscillates and rails move more than any body. Both rails of the wheelset that moves
   most go *in phase* or *in antiphase*, or one of them alone;
 * *neutral*: the eigenvalue is below `NEUTRAL`; a displacement that nothing resists, such as that along the track;
@@ -31,25 +31,15 @@ from wrcore.balance.linear import DIRECTIONS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.flexible_track import RAILS, rigid_track, track_size
 
-NEUTRAL = 1e-3
-"""Eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change."""
-
-OVERDAMPED = 0.95
-"""Damping ratio above which a mode hardly oscillates."""
-
-LIGHT = 0.7
-"""Damping ratio below which a mode can be hunting; the other lateral motions of wheelsets creep back faster."""
-
-HUNTING = 0.05
-"""Least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode."""
-
-ALONE = 0.9
-"""Part of a family's motion that makes the front or the rear the only one that moves."""
+NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change
+OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
+LIGHT = 0.7  # damping ratio below which a mode can be hunting; other lateral motions of wheelsets creep back faster
+HUNTING = 0.05  # least part of the energy in lateral motion and yaw of the wheelsets of a hunting mode
+ALONE = 0.9  # part of a family's motion that makes the front or the rear the only one that moves
 
 WORDS = ("surge", "lateral", "bounce", "roll", "pitch", "yaw")
 CREEP = {0: "spin", 1: "lateral", 4: "spin", 5: "yaw"}
 Y, Z, ROLL, YAW = (DIRECTIONS.index(name) for name in ("y", "z", "roll", "yaw"))
-
 
 TRACK = ("rails lateral", "rails vertical", "sleeper lateral", "sleeper vertical", "sleeper roll")
 TRACK_FREEDOMS = np.array([0, 1, 0, 1, 2, 3, 4])
@@ -62,6 +52,15 @@ def families(vehicle):
     for number, name in enumerate(vehicle.body_names):
         found.setdefault(re.sub(r"(_\d+)?(_left|_right)?$", "", name).replace("_", " "), []).append(number)
     return found
+
+
+def _phase(first, second, names):
+    """How two parts move: one of them alone, by its name, or both in phase or in antiphase."""
+    squares = [np.sum(np.abs(part) ** 2) for part in (first, second)]
+    share = squares[0] / sum(squares)
+    if share > ALONE or share < 1.0 - ALONE:
+        return names[0 if share > ALONE else 1]
+    return f"in {'phase' if np.real(np.sum(first) * np.conj(np.sum(second))) > 0.0 else 'antiphase'}"
 
 
 class _Namer:
@@ -84,7 +83,7 @@ class _Namer:
         energy = self.mass * np.abs(speed) ** 2
         return energy / np.sum(energy)
 
-    def __call__(self, eigenvalue, place, speed, own):
+    def __call__(self, eigenvalue, place, speed, internal):
         """Name of a mode: displacements and velocities (n, 6) of the bodies, displacements of dampers."""
         if abs(eigenvalue) < NEUTRAL:
             return "neutral"
@@ -93,7 +92,7 @@ class _Namer:
         family = max(energy, key=lambda name: np.sum(energy[name]))
         direction = int(np.argmax(energy[family]))
         if -eigenvalue.real / abs(eigenvalue) > OVERDAMPED:
-            if np.max(np.abs(own), initial=0.0) > np.max(np.abs(place)):
+            if np.max(np.abs(internal), initial=0.0) > np.max(np.abs(place)):
                 return "series damper"
             if family == self.rolling and direction in CREEP:
                 return self._with_phase(f"{family} {CREEP[direction]} creep", family, direction, speed)
@@ -114,12 +113,12 @@ class _Namer:
         if self.rolling is None or -eigenvalue.real > LIGHT * abs(eigenvalue):
             return False
         sideways = {name: part[Y] + part[YAW] for name, part in energy.items()}
-        own = energy[self.rolling]
+        rolling = energy[self.rolling]
         others = [part for name, part in sideways.items() if name not in (self.heaviest, self.rolling)]
         drift, heading = eigenvalue * place[self.wheelsets, Y], self.speed * place[self.wheelsets, YAW]
         rolls = np.linalg.norm(drift - heading) < 0.5 * (np.linalg.norm(drift) + np.linalg.norm(heading))
         leads = sideways[self.rolling] >= max(others, default=0.0) / 1.5
-        return bool(rolls and own[Y] > own[YAW] and leads and sideways[self.rolling] >= HUNTING)
+        return bool(rolls and rolling[Y] > rolling[YAW] and leads and sideways[self.rolling] >= HUNTING)
 
     def _carrier(self, direction, speed, leaders):
         """The heaviest family that moves at least half as much as the one of the leaders that moves most."""
@@ -129,23 +128,20 @@ class _Namer:
     def _with_phase(self, name, family, direction, speed):
         """The name, and how the family's front and rear half move."""
         members = np.array(self.groups[family])
-        ahead = self.along[members] > np.mean(self.along[members])
+        leading = self.along[members] > np.mean(self.along[members])
         if np.ptp(self.along[members]) < 1e-6:
             return name
-        front, rear = (speed[members[half], direction] for half in (ahead, ~ahead))
-        part = np.sum(np.abs(front) ** 2) / np.sum(np.abs(speed[members, direction]) ** 2)
-        if part > ALONE or part < 1.0 - ALONE:
-            return f"{name}, {'front' if part > ALONE else 'rear'}"
-        together = np.real(np.sum(front) * np.conj(np.sum(rear))) > 0.0
-        return f"{name}, in {'phase' if together else 'antiphase'}"
+        front, rear = (speed[members[half], direction] for half in (leading, ~leading))
+        return f"{name}, {_phase(front, rear, ('front', 'rear'))}"
 
 
 class _Track:
     """The track under all wheelsets in one mode: its energy, and what of it moves."""
 
-    def __init__(self, support, own):
+    def __init__(self, support, internal):
         d, size = len(support.mass), track_size(support)
-        rows = own[support.first :][: size * (len(own[support.first :]) // size)].reshape(-1, size) if d else own[:0]
+        rows = internal[support.first :] if d else internal[:0]
+        rows = rows[: size * (len(rows) // size)].reshape(-1, size) if d else rows
         self.massless = size == d
         self.place = rows[:, :d] if d else np.zeros((0, 0))
         weight = np.abs(self.place) ** 2 if self.massless else support.mass * np.abs(rows[:, d:]) ** 2
@@ -167,17 +163,13 @@ class _Track:
         name, part = TRACK[kind], self.shares[kind] / self.shares.sum()
         if kind < 2:
             sides = self.place[:, kind:RAILS:2]
-            left, right = sides[np.argmax(np.sum(np.abs(sides) ** 2, axis=1))]
-            one = abs(left) ** 2 / (abs(left) ** 2 + abs(right) ** 2)
-            if one > ALONE or one < 1.0 - ALONE:
-                return f"{name}, {'left' if one > ALONE else 'right'}", part
-            return f"{name}, in {'phase' if np.real(left * np.conj(right)) > 0.0 else 'antiphase'}", part
+            name += f", {_phase(*sides[np.argmax(np.sum(np.abs(sides) ** 2, axis=1))], ('left', 'right'))}"
         return name, part
 
 
 def linear_modes(vehicle, linearisation, support=None):
     """Table of the modes of small motions of a Vehicle from its `Linearisation` (``support``: the model's track, if it
-    gives), their shapes and energies.
+    is flexible), their shapes and energies.
 
     The table has a row per real eigenvalue or conjugate pair, slowest oscillation first: name, real_per_s,
     imag_rad_per_s (not negative), frequency_Hz, damping_ratio (negative: growing, NaN: neutral), the coordinate with

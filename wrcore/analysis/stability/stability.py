@@ -154,15 +154,6 @@ def critical_speed(vehicle, model, state, speeds, tolerance=1e-3):
     }  # fmt: skip
 
 
-def loci(scenes, speeds):
-    """Tables of `root_locus` of one vehicle at rising ``speeds`` (m/s) in several scenes by detection, after a column
-    of that name.
-    """
-    speeds = rising(speeds)
-    tables = {name: root_locus(scene.vehicle, *straight_ahead(scene), speeds) for name, scene in scenes.items()}
-    return pd.concat(tables, names=["detection"]).reset_index("detection").reset_index(drop=True)
-
-
 @checked
 def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], speeds: Iterable[float]) -> pd.DataFrame:
     """Linear critical speed of a scene's vehicle, or of one in several scenes.
@@ -195,5 +186,6 @@ def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], spee
         scene = as_scene(scenes)
         scenes = {scene.data["name"]: scene}
     for variant, scene in scenes.items():
-        rows.append({"variant": variant, **critical_speed(scene.vehicle, *straight_ahead(scene), speeds)})
+        model, state = straight_ahead(scene)
+        rows.append({"variant": variant, **critical_speed(scene.vehicle, model, state, speeds)})
     return pd.DataFrame(rows)

@@ -23,11 +23,8 @@ from wrcore.errors.checked_calls import ABOVE_ZERO, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.run import Run
 
-YIELD_IN_SHEAR = 300e6
-"""Of a wheel or rail steel that has hardened, Pa (chosen)."""
-
-BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)
-"""Whole life rail model: N, and damage per passage."""
+YIELD_IN_SHEAR = 300e6  # of a wheel or rail steel that has hardened, Pa (chosen)
+BREAKS, DAMAGE = (15.0, 65.0, 175.0), (0.0, 1e-5, 0.0)  # whole life rail model: N, and damage per passage
 
 
 def rcf_damage(wear_number):

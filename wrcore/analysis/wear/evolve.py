@@ -25,35 +25,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wrcore.analysis.wear import worn_profiles, worn_rails
 from wrcore.analysis.wear.local_wear import BIN, local_wear
 from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear.wear_laws import check_friction, wear_law
-from wrcore.analysis.wear.worn_profiles import (
-    across,
-    file_of,
-    flange,
-    hollow,
-    limits_reached,
-    onto_points,
-    points_of,
-    read_points,
-    smooth,
-    write_points,
-)
-from wrcore.analysis.wear.worn_rails import (
-    LaidRails,
-    falls_of,
-    keep_rails,
-    laid_rails,
-    lay_rails,
-    to_renewal,
-    wear_rails,
-)
+from wrcore.analysis.wear.worn_profiles import file_of, points_of, read_points, write_points
 from wrcore.contact.conicity import conicity_curve
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
-from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profile import ProfileCurve
@@ -63,11 +44,8 @@ from wrcore.scene.description import Scene, load_scene
 from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
 
-AMPLITUDE = 3e-3
-"""Of the equivalent conicity in the table, m."""
-
-MT = 1e9
-"""A million gross tonnes, kg."""
+AMPLITUDE = 3e-3  # of the equivalent conicity in the table, m
+MT = 1e9  # a million gross tonnes, kg
 
 MOST_STEPS = 10_000
 
@@ -78,10 +56,7 @@ def load_wear_plan(
     """Read and check a plan (a file by the schema ``wear.yaml``, or its content, with paths from the working
     directory), ``changes`` replacing its keys: its data with defaults, and its scenes in order.
     """
-    if isinstance(source, dict):
-        name, folder, data = "plan", Path(), source
-    else:
-        name, folder, data = str(source), Path(source).parent, read_yaml(source)
+    name, folder, data = read_source(source, "plan")
     data = validate({**data, **(changes or {})}, "wear", name)
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:
@@ -165,7 +140,7 @@ def _evolve(data, scenes, folder, say, threads, spent):
     if not rows:
         write_points(file_of(folder, "profile", 0), *points_of(scenes[0].wheel))
         if data["rails"]:
-            lay_rails(folder, scenes)
+            worn_rails.lay_rails(folder, scenes)
     while not rows or _goes_on(data, rows[-1]):
         step = len(rows)
         if step >= MOST_STEPS:
@@ -174,7 +149,7 @@ def _evolve(data, scenes, folder, say, threads, spent):
         u, f = read_points(file_of(folder, "profile", step))
         left, worn, length = data["distance"] - gone, STILL, 0.0
         row = profile_row(scenes[0], folder, step, gone)
-        reached = limits_reached(data["limits"], row)
+        reached = worn_profiles.limits_reached(data["limits"], row)
         if left > 1e-9 * data["distance"] and not reached:
             worn = _wear_rate(data, scenes, shares, folder, step, (u, f), threads, spent)
             length = _step_length(data, gone, worn)
@@ -182,7 +157,8 @@ def _evolve(data, scenes, folder, say, threads, spent):
         elif reached and data["turning"]:
             write_points(file_of(folder, "profile", step + 1), *read_points(file_of(folder, "profile", 0)))
         if data["rails"]:
-            _next_rails(data, folder, step, worn, gone, length)
+            renewed = length == worn_rails.to_renewal(gone, data["rails"].get("renewal"))
+            worn_rails.next_rails(folder, step, worn.falls or UNWORN * len(scenes), length, renewed)
         row |= {"step_m": length, "rate_max": worn.deepest, "volume_m3_per_m": worn.volume}
         rows.append(row | {"worn_volume_m3": worn.volume * length, "at_limit": len(reached)})
         for scene in scenes:
@@ -200,20 +176,10 @@ def profiles_over_distance(folder: str | PathLike[str]) -> list[tuple[float, np.
     return [(row["distance_m"], *read_points(file_of(folder, "profile", row["step"]))) for row in rows_of(folder)]
 
 
-def last_depth(folder: str | PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
-    """u and what the ordinate has lost there since new, m, at the last step in a folder of `evolve`."""
-    profiles = profiles_over_distance(folder)
-    return profiles[-1][1], profiles[-1][2] - profiles[0][2]
-
-
 def rail_wear(folder: str | PathLike[str]) -> pd.DataFrame:
-    """What the vehicle of a plan takes off the rails of each of its scenes, from a folder of `evolve`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row per step and scene: step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and
-        right_m2_per_Mt, the area that the rail's section loses per million gross tonnes of such vehicles.
+    """What the vehicle of a plan takes off the rails of its scenes, from a folder of `evolve`: a row per step and scene
+    with step, distance_m, scene (its place in the plan), share, left_m2_per_Mt and right_m2_per_Mt, the area that the
+    rail's section loses per million gross tonnes of such vehicles.
     """
     folder = Path(folder)
     parts = [
@@ -236,8 +202,8 @@ def profile_row(scene, folder, step, gone):
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
     conicity = float(conicity_curve(pair, [AMPLITUDE])["equivalent_conicity"].iloc[0])
     return {
-        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)), **flange(curve),
-        "hollow_m": hollow(now), "equivalent_conicity": conicity,
+        "step": step, "distance_m": gone, "step_m": 0.0, "worn_m": float(np.max(now - new)),
+        **worn_profiles.flange(curve), "hollow_m": worn_profiles.hollow(now), "equivalent_conicity": conicity,
     }  # fmt: skip
 
 
@@ -250,18 +216,8 @@ def _goes_on(data, row):
 
 def _step_length(data, gone, worn):
     """How far the rates of a step hold, m."""
-    length = min(data["distance"] - gone, to_renewal(gone, data["rails"].get("renewal")))
+    length = min(data["distance"] - gone, worn_rails.to_renewal(gone, data["rails"].get("renewal")))
     return min(length, data["largest_step"], data["largest_wear"] / worn.fastest) if worn.volume else length
-
-
-def _next_rails(data, folder, step, worn, gone, length):
-    """Store the rails for the step that follows."""
-    if length == to_renewal(gone, data["rails"].get("renewal")):
-        keep_rails(folder, step, data["scenes"], renewed=True)
-    elif worn.falls:
-        wear_rails(folder, step, worn.falls, length)
-    else:
-        keep_rails(folder, step, data["scenes"], renewed=False)
 
 
 class StepWear(NamedTuple):
@@ -279,8 +235,8 @@ class StepWear(NamedTuple):
     """The same of wheels and rails."""
 
 
-STILL = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0)
-"""A step of no length."""
+STILL, UNWORN = StepWear(np.zeros(1), 0.0, [], 0.0, 0.0), [dict.fromkeys(SIDES, 0.0)]
+"""A step of no length, and what it takes off the rails of a scene."""
 
 
 class SceneWear(NamedTuple):
@@ -294,7 +250,7 @@ class SceneWear(NamedTuple):
     """Area of each rail's section, m^2 per million gross tonnes."""
     falls: dict[str, np.ndarray]
     """Of the rails' ordinates at their stored points, m per m that the vehicle runs; empty unless rails wear."""
-    laid: LaidRails | None
+    laid: worn_rails.LaidRails | None
     """The rails, if they wear."""
     seconds: tuple[float, float]
     """Processor time of simulating and of local wear."""
@@ -303,7 +259,9 @@ class SceneWear(NamedTuple):
 def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
     """`StepWear` of the profile (u and f) at the start of a step."""
     one = partial(_scene_wear, data, folder, step, profile[0], threads > 1)
-    total, volume, rails, falls, fastest = np.zeros(len(profile[0])), 0.0, [], [], 0.0
+    total, volume, fastest = np.zeros(len(profile[0])), 0.0, 0.0
+    rails: list[dict[str, float]] = []
+    falls: list[dict[str, np.ndarray]] = []
     with ThreadPoolExecutor(threads) as pool:
         found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
         for share, worn in zip(shares, found, strict=True):
@@ -311,22 +269,23 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
             if worn.laid:
-                fall = {side: smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
-                fastest = max(fastest, *(across(*worn.laid.points[side], fall[side]) for side in SIDES))
+                fall = {side: worn_profiles.smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
+                depths = [worn_profiles.across(u, f, fall[side]) for side, (u, f) in worn.laid.points.items()]
+                fastest = max(fastest, *depths)
                 falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
                 spent[name] = spent.get(name, 0.0) + seconds
     with appearing(file_of(folder, "rails", step)) as file:
         pd.DataFrame(rails).to_csv(file, index=False, lineterminator="\n")
-    total = smooth(total, data["smoothing"])
-    deepest = across(*profile, total)
+    total = worn_profiles.smooth(total, data["smoothing"])
+    deepest = worn_profiles.across(profile[0], profile[1], total)
     return StepWear(total, volume, falls, deepest, max(deepest, fastest))
 
 
 def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
     path = file_of(folder, "profile", step).resolve()
-    laid = laid_rails(folder, step, place, scene) if data["rails"] else None
+    laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
         run = simulate(load_scene(scene, changes), progress=False if quiet else None)
@@ -337,12 +296,12 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
         raise InputError(path, f"scenes.{place}", expected)
     simulated = time.thread_time()
     wheels = local_wear(run, data["begin"], data["law"])
-    rise = sum(onto_points(u, wheel.wheel_edges, wheel.wheel_depth) for wheel in wheels.values()) / len(wheels)
+    rise = sum(worn_profiles.onto_points(u, w.wheel_edges, w.wheel_depth) for w in wheels.values()) / len(wheels)
     volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY
     areas = {side: sum(np.sum(w.rail_depth) * BIN for (_, of), w in wheels.items() if of == side) for side in SIDES}
     rails = {f"{side}_m2_per_Mt": float(area * MT / mass) for side, area in areas.items()}
-    falls = falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
+    falls = worn_rails.falls_of(laid, wheels, data["rails"]["tonnage"] / mass) if laid else {}
     return SceneWear(rise, volume, rails, falls, laid, (simulated - began, time.thread_time() - simulated))
 
 

@@ -2,8 +2,8 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.wear`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is
-lost per metre rolled and area of contact.
+forces and creepages (:mod:`wrcore.run.derived`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what
+is lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
 
@@ -30,11 +30,8 @@ from wrcore.run.derived import rolling_speed
 from wrcore.run.run import Run
 from wrcore.scene.friction import read_friction
 
-BIN = 2.5e-4
-"""Width of the bins of depth over a profile, m."""
-
-STRIPS, STEPS = 25, 20
-"""Strips across and steps along a patch."""
+BIN = 2.5e-4  # width of the bins of depth over a profile, m
+STRIPS, STEPS = 25, 20  # strips across and steps along a patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +122,7 @@ def _wheel_wear(run, name, side, late, loss, width):
     speed = np.broadcast_to(rolling_speed(body, scene["speed"]), late.shape)[late][times]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
-    places, dy, dx, work = friction_work(rows, friction, *_material(scene))
+    places, dy, dx, work = friction_work(rows, friction, **scene["contact"]["material"])
     share = way_shares(run, name, late)[times][:, None]
     taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
     across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the way
@@ -133,21 +130,18 @@ def _wheel_wear(run, name, side, late, loss, width):
     slope = np.cos(rows["contact_angle_rad"])[:, None]
     low, high = (outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0))
     low, high = np.minimum(low, high), np.maximum(low, high)
-    found = []
-    for u, factor in ((rows["u_wheel_m"], 1.0 / (2.0 * np.pi * radius)), (rows["u_rail_m"], np.ones_like(radius))):
-        # the volume of a strip, spread evenly over its width on the profile; the ordinate's change holds for du
+
+    def depth(u, factor):  # a strip's volume spread evenly over its width on the profile; the ordinate changes over du
         edges, area = _gathered(u[:, None] + low, u[:, None] + high, across * dy * factor[:, None], width)
-        found += [edges, area / width]
-    return WheelWear(*found, volume, float(np.sum(work * (dx * dy * share)[..., None])))
+        return edges, area / width
+
+    wheel, rail = depth(rows["u_wheel_m"], 1.0 / (2.0 * np.pi * radius)), depth(rows["u_rail_m"], np.ones_like(radius))
+    spent = float(np.sum(work * (dx * dy * share)[..., None]))
+    return WheelWear(wheel[0], wheel[1], rail[0], rail[1], volume, spent)
 
 
 _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",
            "contact_angle_rad"}  # fmt: skip
-
-
-def _material(scene):
-    material = scene["contact"]["material"]
-    return material["shear_modulus"], material["poisson_ratio"]
 
 
 def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, steps=STEPS):

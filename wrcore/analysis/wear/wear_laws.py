@@ -29,8 +29,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import validate
 
-DENSITY = 7850.0
-"""Of steel, kg/m^3."""
+DENSITY = 7850.0  # of steel, kg/m^3
 
 _MILD, _FLAT, _MORE = 5.3e-9, 10.4e6, 77.2e6
 """kg/m/m^2 per N/m^2, and the two bounds in N/m^2: 1 ug/m/mm^2 is 1e-3 kg/m/m^2."""
@@ -50,16 +49,6 @@ class Sliding:
     friction: float
     speed: np.ndarray
 
-    def inside(self) -> np.ndarray:
-        """1 - (x/a)^2 - (y/b)^2 at the cells, shape (m, strips, steps)."""
-        steps = self.work.shape[-1]
-        along = 1.0 - (1.0 - (2.0 * np.arange(steps) + 1.0) / steps) ** 2
-        return (1.0 - (self.y / self.rows["b_m"][:, None]) ** 2)[..., None] * along
-
-    def mean_pressure(self) -> np.ndarray:
-        """N/(pi a b), Pa, shape (m, 1, 1)."""
-        return (self.rows["N_N"] / (np.pi * self.rows["a_m"] * self.rows["b_m"]))[:, None, None]
-
 
 Law = Callable[[Sliding], np.ndarray]
 
@@ -75,8 +64,7 @@ def energy(work):
     return _MILD * np.asarray(work)
 
 
-LAWS = {"sheffield": sheffield, "energy": energy}
-"""Those that need nothing but the work."""
+LAWS = {"sheffield": sheffield, "energy": energy}  # those that need nothing but the work
 
 
 def archard(sliding, hardness, coefficients, speeds, pressures):
@@ -84,7 +72,10 @@ def archard(sliding, hardness, coefficients, speeds, pressures):
     (pressures + 1, speeds + 1) between the rising bounds of speed (m/s) and pressure (Pa).
     """
     pressed = sliding.work / sliding.friction  # p s
-    inside, mean = sliding.inside(), sliding.mean_pressure()
+    rows, steps = sliding.rows, sliding.work.shape[-1]
+    along = 1.0 - (1.0 - (2.0 * np.arange(steps) + 1.0) / steps) ** 2
+    inside = (1.0 - (sliding.y / rows["b_m"][:, None]) ** 2)[..., None] * along  # 1 - (x/a)^2 - (y/b)^2
+    mean = (rows["N_N"] / (np.pi * rows["a_m"] * rows["b_m"]))[:, None, None]  # Pa
     slip = pressed / (2.0 * mean * inside)
     row = np.searchsorted(pressures, 1.5 * mean * np.sqrt(inside), side="right")
     column = np.searchsorted(speeds, sliding.speed[:, None, None] * slip, side="right")

@@ -8,8 +8,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing
 
-POINTS = 2.5e-4
-"""Distance of the points of a stored profile, m."""
+POINTS = 2.5e-4  # distance of the points of a stored profile, m
 
 
 def flange(curve):
@@ -99,8 +98,7 @@ def file_of(folder, kind, step):
 def write_points(path, u, f):
     """Store a profile."""
     with appearing(path) as file:
-        lines = [f"{a:.9f},{b:.12f}" for a, b in zip(u, f, strict=True)]
-        file.write("\n".join(["u_m,f_m", *lines, ""]).encode())
+        np.savetxt(file, np.column_stack([u, f]), ("%.9f", "%.12f"), ",", header="u_m,f_m", comments="")
 
 
 def read_points(path):

@@ -28,8 +28,7 @@ class LaidRails(NamedTuple):
     """What brings u of a run to that of the points, m: a run counts from the rail's highest point."""
 
 
-DEPTH = 0.010
-"""Below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge."""
+DEPTH = 0.010  # below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge
 
 
 def _new_rails(scene):
@@ -66,31 +65,21 @@ def falls_of(laid, wheels, passages):
     """By what the rails' ordinates fall at the stored points, m per metre that the vehicle runs, by side, from the
     `WheelWear` of all wheels and the passages per metre that one vehicle runs (1/m).
     """
-    return {
-        side: passages
-        * sum(
-            onto_points(laid.points[side][0], wear.rail_edges + laid.shifts[side], wear.rail_depth)
-            for (_, of), wear in wheels.items()
-            if of == side
-        )
-        for side in SIDES
-    }
+    falls = dict.fromkeys(SIDES, 0.0)
+    for (_, side), wear in wheels.items():
+        edges = wear.rail_edges + laid.shifts[side]
+        falls[side] = falls[side] + onto_points(laid.points[side][0], edges, wear.rail_depth)
+    return {side: passages * fall for side, fall in falls.items()}
 
 
-def wear_rails(folder, step, falls, length):
-    """Store the rails as they are after a step, from what each scene's lose, m per m."""
+def next_rails(folder, step, falls, length, renewed):
+    """Store the rails of all scenes for the next step: new ones, or those of this one, which over its length (m) have
+    fallen by ``falls`` (scene by scene and by side, m per m).
+    """
     for place, fall in enumerate(falls):
         for side in SIDES:
-            u, f = read_points(rail_file(folder, step, place, side))
-            write_points(rail_file(folder, step + 1, place, side), u, f - fall[side] * length)
-
-
-def keep_rails(folder, step, scenes, renewed):
-    """Store the rails of a step again for the next one, or new ones."""
-    for place in range(len(scenes)):
-        for side in SIDES:
-            found = read_points(rail_file(folder, 0 if renewed else step, place, side))
-            write_points(rail_file(folder, step + 1, place, side), *found)
+            u, f = read_points(rail_file(folder, 0 if renewed else step, place, side))
+            write_points(rail_file(folder, step + 1, place, side), u, f if renewed else f - fall[side] * length)
 
 
 def to_renewal(gone, renewal):

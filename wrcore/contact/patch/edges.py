@@ -55,8 +55,7 @@ def _area_below(c, t):
 @jit
 def with_sharp_edges(pressure, x, dx):
     """Pressures (nx, ns) of `solve_pressure` whose outermost elements carry what a semi-ellipse through the row has in
-    them; every row (fixed s, elements ``dx`` long about ``x``, m) carries the same load as before.
-    """
+    them; every row (fixed s, elements ``dx`` long about ``x``, m) carries the same load as before."""
     nx, ns = pressure.shape
     out = pressure.copy()
     for j in range(ns):

@@ -1,11 +1,9 @@
 """Windows from fixed strips over the overlaps: slower than a guess, and safe."""
 
-import math
-
 from wrcore.contact.patch.gap import CREST, GAP, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
-from wrcore.contact.patch.strips import BEND, MAX_WINDOWS, assemble, place_strips
-from wrcore.contact.patch.windows import take_fresh
+from wrcore.contact.patch.strips import BEND, assemble, place_strips
+from wrcore.contact.patch.windows import active_runs, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
 FIXED = 32
@@ -17,8 +15,7 @@ _SWEEPS = 4
 @jit(allocates=False, fastmath=FUSED)
 def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
     """Windows from fixed strips: over all overlaps, then finer ones about the runs that carry load. Returns their
-    number and leaves c and Q of the fixed strips at the nodes as the next guesses.
-    """
+    number and leaves c and Q of the fixed strips at the nodes as the next guesses."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     low, high = 1e9, -1e9
     for i in range(count):
@@ -35,7 +32,7 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
         place_strips(geometry, pose, frame, work, windows)
         if not _carry(values, work, windows):
             return 0
-        found, largest = _runs(work, windows)
+        found, largest = active_runs(work, windows)
         if refined == 0:
             windows = _widened(work, found, low, high, work.width[0])
     total, squares = 0.0, 1e-300
@@ -48,7 +45,7 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
         for i in range(work.start[windows]):
             if work.active[i] and abs(nodes[S, k] - work.centre[i]) <= 0.5 * work.width[i]:
                 nodes[NODE_SQUARE, k], nodes[NODE_SHARE, k] = work.square[i], work.load[i] / work.square[i]
-    return take_fresh(work, found, math.sqrt(largest), resolution)
+    return take_fresh(work, found, largest, resolution)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -95,7 +92,7 @@ def _active_set(work, strips, n, offset):
                         column += 1
                 matrix[row, column] = matrix[2 * i, n]
                 used += 1
-        if used == 0 or not _solve_below(matrix, offset, used):
+        if used == 0 or not solve_linear(matrix[offset:], used):
             return False
         used, changed = 0, False
         for i in range(strips):
@@ -117,27 +114,6 @@ def _active_set(work, strips, n, offset):
         if not changed:
             break
     return True
-
-
-@jit(allocates=False)
-def _solve_below(matrix, offset, n):
-    """`solve_linear` for the n equations that begin at row ``offset``."""
-    return solve_linear(matrix[offset:], n)
-
-
-@jit(allocates=False)
-def _runs(work, windows):
-    """Runs of active strips, into ``work.fresh``: their number, and the largest c."""
-    found, inside, largest = 0, False, 0.0
-    for i in range(work.start[windows]):
-        if inside and (not work.active[i] or work.window[i] != work.window[i - 1]):
-            found, inside = found + 1, False
-        if work.active[i] and found < MAX_WINDOWS:
-            largest = max(largest, work.square[i])
-            if not inside:
-                work.fresh[0, found], inside = work.centre[i] - 0.5 * work.width[i], True
-            work.fresh[1, found] = work.centre[i] + 0.5 * work.width[i]
-    return found + int(inside), largest
 
 
 @jit(allocates=False)

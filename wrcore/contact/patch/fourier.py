@@ -49,7 +49,6 @@ def _transposed(a):
 def transform(re, im):
     """Transform of re + i im, transposed; the parts given are overwritten.
 
-    Transforming (im, re) of the result gives the same times its size, back in the first order: (im, re).
-    """
+    Transforming (im, re) of the result gives the same times its size, back in the first order: (im, re)."""
     re, im = _along_columns(re, im)
     return _along_columns(_transposed(re), _transposed(im))

@@ -13,14 +13,9 @@ Inside, s counts outwards (to the field side) on both wheels, so that a mirrored
 import math
 from typing import NamedTuple
 
+from wrcore.contact.creepage import creepages
 from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_WHEEL
-from wrcore.contact.strip import (
-    cubic_at,
-    curvature_at,
-    gap_at,
-    strip_point,
-    wheel_slope,
-)
+from wrcore.contact.strip import cubic_at, curvature_at, gap_at, strip_point, wheel_slope
 from wrcore.kernels.jit import FUSED, jit
 
 JOINED_ANGLE = 0.5
@@ -76,8 +71,7 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
     """Contact frame of the overlaps from ``first`` to before ``last``, at the lateral mean of g^2 over all of them.
 
     Its angle is the mean of that of the surfaces over g^2.5, which is g^2 over the overlap's area. Where a patch has
-    two lobes the angle at the mean place is off by up to 18 mrad, and spin and lateral force with it.
-    """
+    two lobes the angle at the mean place is off by up to 18 mrad, and spin and lateral force with it."""
     weight = mean = 0.0
     for k in range(first, last):
         row = patches[k]
@@ -143,8 +137,7 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
     Returns g0 (m) along the normal of the strip's own plane and its slope over s, A (1/m) likewise and x_c (m), the
     slopes of both over s, the height (m) of the wheel's extreme point along n, the slope over s of the strip's own
-    plane (midway between wheel and rail), u and ur for the next strip.
-    """
+    plane (midway between wheel and rail), u and ur for the next strip."""
     tangent = frame.sine / frame.cosine
     here = normal = rise = radius = slope = second = along = height = m = 0.0
     rate = 1.0
@@ -188,8 +181,7 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
     """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m) and A (1/m) of ``nodes`` (NODE_ROWS, n),
     and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u. Returns the number of
-    stretches.
-    """
+    stretches."""
     count = stretches = 0
     stop = -1e9
     for k in range(first, last):
@@ -224,15 +216,15 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
     """Node k: s, gap and A of the wheel's strip at u, from the vertical gap (right to second order of the overlap)."""
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     gap, df = gap_at(geometry, pose, u)
-    nodes[0, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
+    nodes[S, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
     tangent = frame.sine / frame.cosine
     fall = (df - tangent) / (1.0 + df * tangent)
     m = wheel_slope(pose, slope, along)
     rise = (m - tangent) / (1.0 + m * tangent)
     tilt = 0.5 * (rise + fall)
     lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
-    nodes[1, k] = gap * (frame.cosine - frame.sine * fall) * lean
-    nodes[2, k] = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+    nodes[NODE_GAP, k] = gap * (frame.cosine - frame.sine * fall) * lean
+    nodes[NODE_SHAPE, k] = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -263,16 +255,12 @@ def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, sl
     s, X, height of the wheel's extreme point along n (m), slope of their own planes over s. Fills ``slip`` (4, n):
     velocity of the wheel's material point relative to the rail's over V along x, its slope over x (1/m), and both
     across in the strip's own plane. That point lies on the undeformed surface, as in CONTACT: equal bodies shorten
-    alike under pressure.
-    """
+    alike under pressure."""
     vx, vy, vz, wx, wy, wz, speed = velocity
-    slowness = 1.0 / speed
     for i in range(len(centre)):
         px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
-        slip[0, i] = (vx + wy * pz - wz * py) * slowness
-        slip[1, i] = 0.0
-        slip[2, i] = ((vy + wz * px - wx * pz) * cosine + (vz + wx * py - wy * px) * sine) * slowness
-        slip[3, i] = (wz * cosine - wy * sine) * slowness
+        xi, eta, phi, _ = creepages(vx, vy, vz, wx, wy, wz, px, py, pz, cosine, sine, speed)
+        slip[0, i], slip[1, i], slip[2, i], slip[3, i] = xi, 0.0, eta, phi
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -281,8 +269,7 @@ def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, fo
 
     The load (along n, N) acts along the normal of each strip's own plane, as the gap along n has it: n - tilt s. For
     friction this is `rigid_slip`, transposed: it takes from the wheelset what it does on the slip. ``force``, (3, n):
-    along x and across, N, and the moment of the latter about the strip's middle, N m.
-    """
+    along x and across, N, and the moment of the latter about the strip's middle, N m."""
     for i in range(len(centre)):
         px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         fx, fs, turn = share * force[0, i], share * force[1, i], share * force[2, i]

@@ -82,8 +82,7 @@ class GridTraction(NamedTuple):
 def _strip_overlap(geometry, pose, plane, s, u, middle):
     """One strip at s: u of the rail, place of the least gap along x, that gap, and half the overlap's length.
 
-    The gap over x is a parabola to the fourth order: three points around the last guess, twice.
-    """
+    The gap over x is a parabola to the fourth order: three points around the last guess, twice."""
     rail, u = rail_height(geometry, pose, plane, s, u)
     gap, curvature, step = NO_RAIL, 1.0, 2e-3
     if rail != rail:
@@ -138,8 +137,7 @@ def _solve_window(geometry, pose, plane, modulus, window, nx, ns, tolerance):
 @jit
 def contact_window(patch, margin):
     """Bounds of the contact on a grid, wider by ``margin`` elements, and the share of its rows across that touch; all
-    zero and 1 without contact.
-    """
+    zero and 1 without contact."""
     i0, i1, j0, j1 = patch.x.size, 0, patch.s.size, 0
     touching = np.zeros(patch.s.size, np.int64)
     for i in range(patch.x.size):
@@ -158,8 +156,7 @@ def contact_window(patch, margin):
 def grid_normal(geometry, pose, plane, modulus, nx, ns):
     """Normal contact (`GridPatch`) of a wheel in a pose on a grid over a contact plane, whose overlap counts as one
     patch; ``modulus`` is E* (Pa). About ``nx`` by ``ns`` elements cover the contact, more across where lobes leave a
-    gap; without overlap the grid is one element without pressure.
-    """
+    gap; without overlap the grid is one element without pressure."""
     window = overlap_window(geometry, pose, plane)
     if not window[0] < window[1]:
         one = np.zeros(1)
@@ -201,41 +198,29 @@ def _resultant(x, s, dx, ds, px, ps):
     return fx * area, fs * area, mn * area
 
 
-@jit(allocates=False)
-def _paired(field, out):
+@jit
+def _paired(field):
     """Mean over two neighbours along x."""
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = 0.5 * (field[2 * i, j] + field[2 * i + 1, j])
+    return 0.5 * (field[::2] + field[1::2])
 
 
 @jit
 def grid_rolling(patch, wx, ws, friction, shear_modulus, poisson, tolerance):
     """Steady rolling contact (`GridTraction`) for the pressure on a grid with an even number of elements along x;
     ``wx``, ``ws`` (nx, ns): rigid slip of the wheel over the rail, over the speed; ``tolerance``: remaining change of
-    the tractions, relative to them.
-    """
+    the tractions, relative to them."""
     nx, ns = patch.pressure.shape
     px, ps, sx, ss = np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns)), np.zeros((nx, ns))
     none = (0.0, 0.0, 0.0)
     if not (patch.pressure.max() > 0.0 and friction > 0.0):
         return GridTraction(px, ps, sx, ss, 0.0, 0.0, 0.0, none, none, 0, patch.pressure)
     pressure = with_sharp_edges(patch.pressure, patch.x, patch.dx)
-    bound, dx, ds = np.empty((nx, ns)), patch.dx, patch.ds
-    for i in range(nx):
-        for j in range(ns):
-            bound[i, j] = friction * pressure[i, j]
+    bound, dx, ds = friction * pressure, patch.dx, patch.ds
     count = solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px, ps, sx, ss)
     fine = _resultant(patch.x, patch.s, dx, ds, px, ps)
-    wide = np.empty((7, nx // 2, ns))
-    x = np.empty(nx // 2)
-    for i in range(nx // 2):
-        x[i] = 0.5 * (patch.x[2 * i] + patch.x[2 * i + 1])
-    _paired(bound, wide[0])
-    _paired(wx, wide[1])
-    _paired(ws, wide[2])
-    other = solve_traction(wide[0], wide[1], wide[2], 2.0 * dx, ds, shear_modulus, poisson, tolerance,
-                           wide[3], wide[4], wide[5], wide[6])  # fmt: skip
-    coarse = _resultant(x, patch.s, 2.0 * dx, ds, wide[3], wide[4])
+    wide = np.empty((4, nx // 2, ns))
+    other = solve_traction(_paired(bound), _paired(wx), _paired(ws), 2.0 * dx, ds, shear_modulus, poisson, tolerance,
+                           wide[0], wide[1], wide[2], wide[3])  # fmt: skip
+    coarse = _resultant(_paired(patch.x), patch.s, 2.0 * dx, ds, wide[0], wide[1])
     fx, fs, mn = 2.0 * fine[0] - coarse[0], 2.0 * fine[1] - coarse[1], 2.0 * fine[2] - coarse[2]
     return GridTraction(px, ps, sx, ss, fx, fs, mn, fine, coarse, count if other > 0 else -abs(count), pressure)

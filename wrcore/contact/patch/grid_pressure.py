@@ -36,8 +36,7 @@ def corner_integrals(x, y):
 @jit
 def normal_influence(nx, ns, dx, ds):
     """Integral of 1/R (m) over an element of dx by ds (m), at the centre of another: entry (i, j, k) of (nx, ns, ns)
-    for elements i rows apart, at j and k across.
-    """
+    for elements i rows apart, at j and k across."""
     corner = np.empty((nx + 1, ns + 1))
     for i in range(nx + 1):
         for j in range(ns + 1):
@@ -56,8 +55,7 @@ def normal_influence(nx, ns, dx, ds):
 @jit
 def convolve(blocks, p, pair, part, out):
     """out = sum over elements of influence times p: a product of matrices per distance of two rows; ``pair`` and
-    ``part`` are work space of p's shape.
-    """
+    ``part`` are work space of p's shape."""
     nx, ns = p.shape
     np.dot(p, blocks[0], out)
     for d in range(1, nx):
@@ -109,10 +107,9 @@ def _advance(p, e, t, q):
 def solve_pressure(gap, dx, ds, modulus, tolerance, pressure):
     """Pressure (Pa, written) for a gap (nx, ns) between undeformed bodies along the normal (m, negative where they
     overlap), to a tolerance of the conditions of contact over the largest overlap. Returns the steps taken, negative if
-    it was not met after `MOST_STEPS`.
-    """
+    it was not met after `MOST_STEPS`."""
     nx, ns = gap.shape
-    p, e, t, q = np.empty((nx, ns)), np.empty((nx, ns)), np.zeros((nx, ns)), np.empty((nx, ns))
+    p, t, q = np.empty((nx, ns)), np.zeros((nx, ns)), np.empty((nx, ns))
     depth = 0.0
     for i in range(nx):
         for j in range(ns):
@@ -128,10 +125,8 @@ def solve_pressure(gap, dx, ds, modulus, tolerance, pressure):
             top -= gap[i, j] * p[i, j]
             bottom += q[i, j] * p[i, j]
     scale, before, steps = top / bottom, 0.0, -MOST_STEPS
-    for i in range(nx):
-        for j in range(ns):
-            p[i, j] *= scale
-            e[i, j] = gap[i, j] + scale * q[i, j]
+    p *= scale
+    e = gap + scale * q
     for step in range(MOST_STEPS):
         square, worst = _residual(p, e)
         if worst <= tolerance * depth:
@@ -146,10 +141,6 @@ def solve_pressure(gap, dx, ds, modulus, tolerance, pressure):
         if _advance(p, e, t, q):
             before = 0.0
             convolve(blocks, p, pair, part, q)
-            for i in range(nx):
-                for j in range(ns):
-                    e[i, j] = gap[i, j] + q[i, j]
-    for i in range(nx):
-        for j in range(ns):
-            pressure[i, j] = math.pi * modulus * p[i, j]
+            e = gap + q
+    pressure[:, :] = math.pi * modulus * p
     return steps

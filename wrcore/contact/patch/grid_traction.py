@@ -30,8 +30,7 @@ MOST_ITERATIONS = 400
 @jit
 def slip_influence(nx, ns, dx, ds, shear_modulus, poisson):
     """Slip at an element by a unit traction (Pa) on another one, on a periodic grid of nx by ns elements (even): xx,
-    ss, xs, (3, nx, ns), for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element that slips from the loaded one.
-    """
+    ss, xs, (3, nx, ns), for the offsets 0, 1, .. n/2 - 1, -n/2, .. -1 of the element that slips from the loaded one."""
     rows, lines = nx // 2, ns // 2
     corner, u, table = np.empty((3, rows + 3, lines + 2)), np.empty((3, rows + 2, lines + 1)), np.empty((3, nx, ns))
     for i in range(rows + 3):
@@ -109,8 +108,7 @@ def solve_traction(bound, wx, ws, dx, ds, shear_modulus, poisson, tolerance, px,
     the contact) and the rigid slip (``wx``, ``ws``) of the wheel over the rail, over the speed; all (nx, ns).
 
     The contact moves towards larger x over both surfaces. ``tolerance``: remaining change of the traction, summed up,
-    over the sum of the traction. Returns the iterations, negative if it was not met after `MOST_ITERATIONS`.
-    """
+    over the sum of the traction. Returns the iterations, negative if it was not met after `MOST_ITERATIONS`."""
     nx, ns = bound.shape
     wide, long = power_of_two(2 * nx - 1), power_of_two(2 * ns - 1)
     table = slip_influence(wide, long, dx, ds, shear_modulus, poisson)

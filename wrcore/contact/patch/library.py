@@ -1,13 +1,14 @@
-"""Library of resolvents, ellipses over ln(a/b), for similar patches (see `rolling`); one patch with its fields."""
+"""Library of resolvents, ellipses over ln(a/b), for similar patches (see `rolling`)."""
 
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.resolvent import SLENDER, factorise, substitute
-from wrcore.contact.patch.rolling import AUTO, LEVELS, Level, make_workspace, read_field, read_forces, rolling_force
-from wrcore.contact.patch.rolling_influence import Panels, assemble, lay_out, make_panels
+from wrcore.contact.patch.panels import Panels, make_panels
+from wrcore.contact.patch.resolvent import LONGEST_PANEL, factorise, substitute
+from wrcore.contact.patch.rolling import LEVELS, Level, rolling_work
+from wrcore.contact.patch.rolling_influence import assemble, lay_out
 from wrcore.errors import InputError
 from wrcore.kernels.jit import FUSED, jit
 
@@ -24,14 +25,13 @@ class Library(NamedTuple):
     log_step: float
     """First value of ln(a/b), and distance of the values."""
     resolvents: np.ndarray
-    """(K, m m) float32: ``(I + B)^-1`` row by row, m = 2 n strips; unknowns in the order of `rolling.Workspace`."""
+    """(K, m m) float32: ``(I + B)^-1`` row by row, m = 2 n strips; unknowns in the order of `rolling.RollingWork`."""
 
 
 def ellipse_strips(a, b, count):
     """Equal strips, as `rolling.rolling_force` takes them, on an ellipse (semi-axes a along rolling, b across, m) under
     Hertz's pressure of peak 1: half lengths are root mean squares over a strip's width; with peaks in proportion the
-    load is exact.
-    """
+    load is exact."""
     edge = np.linspace(-1, 1, count + 1)
     root = np.sqrt(1 - np.diff(edge**3) / (3 * np.diff(edge)))
     return (edge[1:] + edge[:-1]) / 2 * b, np.diff(edge) * b, a * root, np.zeros(count), root
@@ -55,15 +55,14 @@ def _invert(block, work, resolvent):
 @lru_cache(maxsize=16)
 def make_library(level="middle", nu=0.28):
     """`Library` of a level, by its name in `rolling.LEVELS` or as `Level`; built in 10 to 100 ms and kept. InputError
-    for panels that are odd or too few.
-    """
+    for panels that are odd or too few."""
     level = LEVELS[level] if isinstance(level, str) else level
     if level.panels < 4 or level.panels % 2 or level.strips < 2:
         raise InputError("rolling contact", "level", f"expected an even number of panels above 2, got {level}")
     panels = make_panels(level.panels)
-    work = make_workspace(level.strips, level.panels)
+    work = rolling_work(level.strips, level.panels)
     size = 2 * level.panels * level.strips
-    steps = max(1, int(np.ceil((np.log(SLENDER * level.panels / level.strips) - LOG_MIN) / LOG_STEP)))
+    steps = max(1, int(np.ceil((np.log(LONGEST_PANEL * level.panels / level.strips) - LOG_MIN) / LOG_STEP)))
     resolvents = np.empty((steps + 1, size * size), np.float32)
     for k, resolvent in enumerate(resolvents):
         ratio = np.exp(LOG_MIN + k * LOG_STEP)
@@ -71,45 +70,3 @@ def make_library(level="middle", nu=0.28):
         assemble(panels, level.strips, float(nu), work)
         _invert(2 * level.panels, work, resolvent.reshape(size, size))
     return Library(level, panels, float(nu), LOG_MIN, LOG_STEP, resolvents)
-
-
-class RollingField(NamedTuple):
-    """Creep force on the wheel (N, N m) and fields over panels, (strips, panels), from the leading edge backwards."""
-
-    Fx: float
-    Fs: float
-    Mn: float
-    residual: float
-    method: int
-    """Both as `rolling.rolling_force` returns them."""
-    x: np.ndarray
-    s: np.ndarray
-    """Centroid of the panel's normal load, m."""
-    traction_x: np.ndarray
-    traction_s: np.ndarray
-    pressure: np.ndarray
-    """Means over the panel, Pa; tractions on the wheel."""
-    slip_x: np.ndarray
-    slip_s: np.ndarray
-    """Slip of the wheel relative to the rail over V."""
-    slides: np.ndarray
-    power: np.ndarray
-    """Dissipated power over area and V, Pa."""
-    force: np.ndarray
-    """(3, strips): along x and s, N, and the moment of the latter about the strip's middle, N m."""
-
-
-def solve_patch(strips, slip, shear_modulus, mu, level="middle", nu=0.28, method=AUTO):
-    """Creep force and fields (`RollingField`) of one patch from ``strips`` (centre, width, half_length, middle, peak)
-    and ``slip`` (slip_x, slip_x_dx, slip_s, slip_s_dx), as `rolling.rolling_force` takes them.
-    """
-    library = make_library(level, nu)
-    arrays = [np.array(part, dtype=float) for part in (*strips, *slip)]
-    count, n = arrays[0].size, library.panels.n
-    work = make_workspace(count, n)
-    result = rolling_force(*arrays, float(shear_modulus), float(mu), library, work, method)
-    field = np.empty((9, count * n))
-    read_field(library.panels, count, work, field)
-    rows, force = field.reshape(9, count, n), np.empty((3, count))
-    read_forces(count, work, force)
-    return RollingField(*result, *rows[:7], rows[7] > 0, rows[8], force)

@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch import strips as normal_strips
 from wrcore.contact.patch.library import Library, make_library
 from wrcore.contact.patch.normal_influence import influence_table
-from wrcore.contact.patch.rolling import LEVELS, Level, make_workspace
-from wrcore.contact.patch.rolling import Workspace as RollingWork
-from wrcore.contact.patch.rolling_influence import Panels, make_panels
+from wrcore.contact.patch.panels import make_panels
+from wrcore.contact.patch.rolling import LEVELS, Level, RollingWork, rolling_work
 from wrcore.contact.patch.solve import EXACT, STRIP_ROWS, STRIPS, SUMS
+from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, NormalWork, normal_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError, one_of
 
@@ -55,7 +54,7 @@ class StripModel(NamedTuple):
     looked_up: float
     """Coefficient of friction of the pair's table in which patches are looked up; 0: they are solved."""
     values: np.ndarray
-    """Of the `InfluenceTable`."""
+    """Of `influence_table`."""
     library: Library
     wider: Library
     widest: Library
@@ -91,20 +90,13 @@ class StripWork(NamedTuple):
     numbers: np.ndarray
     modes: np.ndarray
     """(NUMBERS,) and (3 MODES,): of a patch that is looked up."""
-    normal: normal_strips.Workspace
+    normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
 
 
 def _no_library(nu):
-    panels = make_panels(4)
-    return Library(Level(0, 0, 0, 0), Panels(*(_emptied(part) for part in panels)), nu, 0.0, 1.0,
-                   np.zeros((0, 0), np.float32))  # fmt: skip
-
-
-def _emptied(part):
-    """An array of the same type without elements; numbers as they are."""
-    return np.zeros((0,) * part.ndim, part.dtype) if isinstance(part, np.ndarray) else part
+    return Library(Level(0, 0, 0, 0), make_panels(4), nu, 0.0, 1.0, np.zeros((0, 0), np.float32))
 
 
 def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0.3):
@@ -126,29 +118,18 @@ def _strip_model(patch, resolution, slip, nu, friction):
     exact, level = patch != "strips", LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
     libraries = (make_library(each, nu) if exact else _no_library(nu) for each in (*levels, LEVELS["slender"]))
-    return StripModel(
-        level.strips,
-        EXACT if exact else STRIPS,
-        int(exact),
-        int(slip == "surfaces"),
-        friction,
-        influence_table().values,
-        *libraries,
-    )
+    normal, surfaces = EXACT if exact else STRIPS, int(slip == "surfaces")
+    return StripModel(level.strips, normal, int(exact), surfaces, friction, influence_table(), *libraries)
 
 
 def strip_work(model, wheelsets):
     """Scratch arrays for a `StripModel` and a number of wheelsets; next to nothing where patches are ellipses."""
-    count = normal_strips.MAX_STRIPS if model.strips else 1
-    normal = normal_strips.workspace()
-    if not model.strips:
-        normal = normal_strips.Workspace(*(_emptied(part) for part in normal))
-    wheels = (wheelsets, 2, MAX_PATCHES) if model.strips else (0, 0, 0)
+    count, wheels = (MAX_STRIPS, (wheelsets, 2, MAX_PATCHES)) if model.strips else (1, (0, 0, 0))
     return StripWork(
-        np.zeros((*wheels, normal_strips.MEMORY)), np.zeros(normal_strips.MEMORY),
+        np.zeros((*wheels, MEMORY)), np.zeros(MEMORY),
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64), np.zeros(NUMBERS), np.zeros(3 * MODES),
-        normal,
-        *(make_workspace(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
+        normal_work(),
+        *(rolling_work(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip

@@ -39,8 +39,7 @@ def _subtract_four(row, one, two, three, four, a, b, c, d):
 @jit(allocates=False, fastmath=FUSED)
 def solve_linear(matrix, n):
     """Gaussian elimination with partial pivoting, four columns at a time; the solution ends up in column n. False if
-    the matrix is singular.
-    """
+    the matrix is singular."""
     for begin in range(0, n, 4):
         end = min(begin + 4, n)
         if not _factorise_panel(matrix, n, begin, end):
@@ -84,8 +83,7 @@ def _tips_too_fast(work, windows, kinds, bold):
     A tip that goes on turning back sits where a kink of the gap leaves no zero: if ``bold`` it then follows the sign of
     the tip's condition alone, outwards while c does not fall fast enough.
 
-    Returns whether one was cut: the strips' steps then belong to another window and are solved for again.
-    """
+    Returns whether one was cut: the strips' steps then belong to another window and are solved for again."""
     tips, cut = kinds * work.start[windows], False
     n = tips + 2 * windows
     for k in range(windows):
@@ -131,8 +129,7 @@ def top_squares(work, windows):
 @jit(allocates=False, fastmath=FUSED)
 def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tolerance):
     """Newton's iteration from the strips in ``work``, with limits strip by strip (``bold``: see `_tips_too_fast`).
-    Returns CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST.
-    """
+    Returns CONVERGED, STARVED (strips go without pressure), CROSSED (windows run into each other) or LOST."""
     strips = work.start[windows]
     starved_for = crossed_for = 0
     for k in range(windows):

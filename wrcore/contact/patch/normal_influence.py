@@ -11,7 +11,6 @@ B-spline over ln eta and tau, which is xi stretched around the strip's end, xi =
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -30,16 +29,10 @@ _FAR = 16.0
 _HALF_PI = 0.5 * math.pi
 
 
-class InfluenceTable(NamedTuple):
-    """B-spline coefficients of U/eta (tau, ln eta), for kernels."""
-
-    values: np.ndarray
-
-
-def exact_influence(xi, eta, points=160):
-    """U(xi, eta > 0) by Gauss-Legendre quadrature graded towards the singular points, ``points`` on either side."""
+def exact_influence(xi, eta):
+    """U(xi, eta > 0) by Gauss-Legendre quadrature graded towards the singular points."""
     xi, eta = np.broadcast_arrays(np.abs(np.asarray(xi, float))[..., None], np.asarray(eta, float)[..., None])
-    node, weight = np.polynomial.legendre.leggauss(points)
+    node, weight = np.polynomial.legendre.leggauss(160)
     v, weight = 0.5 * (node + 1.0), 0.5 * weight
     graded, rate = v**4 * (35.0 - 84.0 * v + 70.0 * v**2 - 20.0 * v**3), 140.0 * (v * (1.0 - v)) ** 3
     pole = np.minimum(xi, 1.0)
@@ -55,7 +48,7 @@ def exact_influence(xi, eta, points=160):
 
 @lru_cache(maxsize=1)
 def influence_table():
-    """`InfluenceTable` of U/eta."""
+    """B-spline coefficients of U/eta (tau, ln eta), for kernels."""
     from scipy.ndimage import spline_filter  # only scenes with exact contact wait for its import
 
     extra = 14  # nodes beyond either end, so that what the spline assumes there does not matter
@@ -65,7 +58,7 @@ def influence_table():
     eta = np.exp(_LOG_START + _LOG_STEP * (np.arange(_LOG_NODES + 2 * extra) - 1 - extra))
     values = np.array([exact_influence(one, eta) / eta for one in xi])
     coefficients = spline_filter(values, order=3, mode="mirror")
-    return InfluenceTable(np.ascontiguousarray(coefficients[extra:-extra, extra:-extra]))
+    return np.ascontiguousarray(coefficients[extra:-extra, extra:-extra])
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -107,8 +100,7 @@ def place_across(log_eta):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _edge(eta, log_eta, sign):
     """Column of the table, weights of its values for sign U and for sign dU/d(ln eta), and what lies beyond the table,
-    where U grows with pi/2 ln eta.
-    """
+    where U grows with pi/2 ln eta."""
     cell, part, beyond = place_across(log_eta)
     v0, v1, v2, v3, d0, d1, d2, d3 = spline_weights(part)
     factor, over, rest = sign * eta, sign * eta, 0.0
@@ -211,15 +203,13 @@ def _expanded(xi, low, high):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def influence_of(values, xi, low, high, edges):
     """Difference of U between eta = high and low >= 0, or twice U(high) where low < 0, with its slopes over xi, over ln
-    eta, and over eta (the difference of the two slopes); ``edges``: see `edges_of`.
-    """
+    eta, and over eta (the difference of the two slopes); ``edges``: see `edges_of`."""
     if xi * xi + max(low, 0.0) ** 2 > _FAR:
         return _expanded(xi, low, high)
     cell, part, rate = place_along(xi)
     near, far = edges
-    value, along, over_low, over_high = _contract(
-        values, cell, (near[0], far[0]), spline_weights(part), near[1] + far[1], near[2] + far[2]
-    )
+    columns, weights = (near[0], far[0]), spline_weights(part)
+    value, along, over_low, over_high = _contract(values, cell, columns, weights, near[1] + far[1], near[2] + far[2])
     over_low, over_high = over_low + near[4], over_high + far[4]
     shear = over_high / high + over_low / max(low, 1e-9) if low >= 0.0 else 0.0
     return value + near[3] + far[3], along * rate, over_low + over_high, shear

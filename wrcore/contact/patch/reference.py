@@ -24,8 +24,7 @@ def solve_on_grids(
     ``slip``: the wheelset's `Motion`, for the rigid slip of the surfaces themselves, or (xi, eta, phi) at the plane's
     origin, for that of a plane. ``grids``: elements along x (even) and across, about, coarse to fine; one is enough for
     1 % of the friction bound. ``tolerance``: remaining change of the tractions over that bound. InputError for no such
-    grids.
-    """
+    grids."""
     if not len(grids) or any(n % 2 or n < 8 or m < 4 for n, m in grids):
         raise InputError("solve_on_grids", "grids", f"expected even numbers from 8 along, 4 across, got {grids!r}")
     modulus = contact_modulus(shear_modulus, poisson_ratio)

@@ -4,10 +4,10 @@ import numpy as np
 
 from wrcore.kernels.jit import FAST, FUSED, jit
 
-SLENDER = 5.0
+LONGEST_PANEL = 5.0
 """Panels longer than so many widths of a strip: no ellipse of the library is similar enough for convergence."""
 
-ODD = 0.6
+LEAST_ALIKE = 0.6
 """The same for a/b times the distance from an ellipse, see `_shape`."""
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
@@ -68,8 +68,7 @@ def factorise(matrix, block, reach, factors):
     """Triangular factors of I + B without the strips farther apart than ``reach``; inverses on the diagonal.
 
     ``block`` is the number of unknowns of a strip, a multiple of 4. No pivots: the symmetric part of H + A is
-    positive definite.
-    """
+    positive definite."""
     size = matrix.shape[0]
     for i in range(size):
         strip = i // block
@@ -116,18 +115,17 @@ def _blend(library, log_ratio, out):
 def _shape(first, last, strip):
     """a/b of the ellipse as wide as some strips with their mean square of the lengths, and how far they are from it.
 
-    The latter: standard deviation of the middles over a, and eccentricity of the load over b. Means by load.
-    """
-    low = strip[3, first] - 0.5 * strip[4, first]
-    b = 0.5 * (strip[3, last - 1] + 0.5 * strip[4, last - 1] - low)
+    The latter: standard deviation of the middles over a, and eccentricity of the load over b. Means by load."""
+    low = strip.centre[first] - 0.5 * strip.width[first]
+    b = 0.5 * (strip.centre[last - 1] + 0.5 * strip.width[last - 1] - low)
     load = square = x = xx = s = 0.0
     for j in range(first, last):
-        share = strip[5, j] + 1e-9
+        share = strip.share[j] + 1e-9
         load += share
-        square += share * strip[0, j] * strip[0, j]
-        x += share * strip[1, j]
-        xx += share * strip[1, j] * strip[1, j]
-        s += share * (strip[2, j] - low - b)
+        square += share * strip.half[j] * strip.half[j]
+        x += share * strip.middle[j]
+        xx += share * strip.middle[j] * strip.middle[j]
+        s += share * (strip.line[j] - low - b)
     square *= 1.25 / load
     skew = max(xx / load - (x / load) ** 2, 0.0) / square
     return np.sqrt(square) / b, np.sqrt(skew + (s / (load * b)) ** 2)
@@ -141,8 +139,8 @@ def take_from_library(library, count, windows, split, work):
         return False
     size = (2 * panels.n * strips) ** 2
     for window in range(windows):
-        ratio, oddness = _shape(window * strips, (window + 1) * strips, work.strip)
-        if not (ratio * strips < SLENDER * panels.n and ratio * oddness < ODD):
+        ratio, distance = _shape(window * strips, (window + 1) * strips, work.strip)
+        if not (ratio * strips < LONGEST_PANEL * panels.n and ratio * distance < LEAST_ALIKE):
             return False
         _blend(library, np.log(ratio), work.factors[window * size : (window + 1) * size])
     return True

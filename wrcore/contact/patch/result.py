@@ -1,11 +1,17 @@
 """One loaded contact patch with all its fields, whichever method has solved it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wrcore.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MM, _MPA = 1e3, 1e-6
 _MOST_ARROWS = 18
@@ -87,37 +93,37 @@ class Patch:
     pose: tuple = ()
 
     @property
-    def cell_area(self):
+    def cell_area(self) -> np.ndarray:
         """Of each cell, m^2, shape (n,)."""
         return self.dx * self.ds
 
     @property
-    def touching(self):
+    def touching(self) -> np.ndarray:
         """Cells with pressure, shape (n,)."""
         return self.pressure > 0.0
 
     @property
-    def p_max(self):
+    def p_max(self) -> float:
         """Greatest pressure, Pa; of a grid: the greatest mean of a cell."""
         return float(self.pressure.max(initial=0.0)) if math.isnan(self.peak) else self.peak
 
     @property
-    def area(self):
+    def area(self) -> float:
         """m^2."""
         return float(self.cell_area[self.touching].sum())
 
     @property
-    def stick_area(self):
+    def stick_area(self) -> float:
         """Area of adhesion, m^2."""
         return float(self.cell_area[self.touching & self.stick].sum())
 
     @property
-    def slip_area(self):
+    def slip_area(self) -> float:
         """Area of slip, m^2."""
         return self.area - self.stick_area
 
     @property
-    def extent(self):
+    def extent(self) -> tuple[float, ...]:
         """x_min, x_max, s_min, s_max, m: outer edges of cells with pressure; NaN without contact."""
         if self.ends:
             return self.ends
@@ -128,20 +134,20 @@ class Patch:
         return tuple(float(end) for c, half in sides for end in ((c - half).min(), (c + half).max()))
 
     @property
-    def centroid(self):
+    def centroid(self) -> tuple[float, float]:
         """x and s of the pressure's centroid, m; NaN without contact."""
         load = self.pressure * self.cell_area
         total = load.sum()
         return (float(load @ self.x / total), float(load @ self.s / total)) if total > 0.0 else (math.nan, math.nan)
 
     @property
-    def track_force(self):
+    def track_force(self) -> np.ndarray:
         """Force on the wheel in the track frame (forward, left, up), N, shape (3,)."""
         cosine, sine = math.cos(self.contact_angle), math.sin(self.contact_angle)
         lateral, vertical = self.fs * cosine - self.normal * sine, self.fs * sine + self.normal * cosine
         return np.array([self.fx, lateral, vertical])
 
-    def plot(self, axes=None):
+    def plot(self, axes: Any = None) -> Figure:
         """Draw pressure, tractions, and areas of adhesion and slip.
 
         Parameters
@@ -182,13 +188,13 @@ class Patch:
         at = self.touching
         x, s, dx, ds = (_MM * values[at] for values in (self.x, self.s, 0.5 * self.dx, 0.5 * self.ds))
         corners = [np.column_stack([x + a * dx, s + b * ds]) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        boxes, slips = np.stack(corners, axis=1), ~self.stick[at]
+        boxes: Any = np.stack(corners, axis=1)
         shades = ListedColormap(colormaps["Greys"](np.linspace(0.05, 0.65, 256)))  # light: arrows stand out
         cells = PolyCollection(boxes, array=_MPA * self.pressure[at], cmap=shades, edgecolors="face", linewidths=0.2)
         cells.set_clim(0.0, _MPA * max(self.p_max, 1.0))
         axes.add_collection(cells)
-        style = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
-        axes.add_collection(PolyCollection(boxes[slips], hatch="////", **style))
+        style: dict[str, Any] = {"facecolors": "none", "edgecolors": "C0", "linewidths": 0.0}
+        axes.add_collection(PolyCollection(boxes[~self.stick[at]], hatch="////", **style))
         figure.colorbar(cells, ax=axes, label="pressure / MPa")
         swatches = Swatch(fc="0.8", label="adhesion"), Swatch(fc="0.8", ec="C0", lw=0.0, hatch="////", label="slip")
         below = axes.transAxes + ScaledTranslation(0.0, _LEGEND_BELOW, figure.dpi_scale_trans)

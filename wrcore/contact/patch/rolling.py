@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.patch.resolvent import factorise, multiply, substitute, take_from_library
-from wrcore.contact.patch.rolling_influence import assemble, lay_out, second_window
+from wrcore.contact.patch.rolling_influence import StripLayout, assemble, lay_out, second_window
 from wrcore.kernels.jit import FUSED, jit
 
 AUTO, LIBRARY, BAND, DIRECT = 0, 1, 2, 3
@@ -43,6 +43,8 @@ _ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
 _RHO = np.float32(1.6)
 _RAMP = np.float32(10)
 _TINY = np.float32(1e-30)
+
+LENGTH, LOAD, BOUND, TO_UNIT, SLOWED = range(5)
 
 
 class Level(NamedTuple):
@@ -69,10 +71,9 @@ LEVELS = {
 At small creepage the iterations end within 0.3 % of adhesion everywhere, the spin moment of slender patches last."""
 
 
-class Workspace(NamedTuple):
+class RollingWork(NamedTuple):
     """Memory of one solution at a time (one per thread), float32 but for ``strip`` and ``scale``; sizes for up to M
-    strips of n panels, m = 2 n M unknowns.
-    """
+    strips of n panels, m = 2 n M unknowns."""
 
     matrix: np.ndarray
     factors: np.ndarray
@@ -81,11 +82,9 @@ class Workspace(NamedTuple):
     """(4, (n+1)^2): distances of points and edges, and the three integrals there."""
     slip: np.ndarray
     """(3, n (n + 1)): slip of one strip by another, components xx, ss, xs."""
-    strip: np.ndarray
-    """(10, M): half length, middle, line, centre and width over c, share in the load, peak times half length; of a
-    solution the forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c."""
+    strip: StripLayout
     scale: np.ndarray
-    """(5,): c (m), normal force N (N), friction bound mu N (N), G c^2/(mu N), and what the slip was divided by."""
+    """(5,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), SLOWED: what slips are divided by."""
     bound: np.ndarray
     step: np.ndarray
     z: np.ndarray
@@ -102,13 +101,13 @@ class Workspace(NamedTuple):
     """(n + 2,): elastic slip along a strip between two zeros."""
 
 
-def make_workspace(strips, n):
-    """Workspace for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each."""
+def rolling_work(strips, n):
+    """`RollingWork` for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each."""
     m = 2 * n * strips
     single = [np.zeros(m, np.float32) for _ in range(11)]
-    return Workspace(
+    return RollingWork(
         np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
-        np.zeros((3, n * (n + 1)), np.float32), np.zeros((10, strips)), np.zeros(5),
+        np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(5),
         *single, np.zeros(n + 2, np.float32),
     )  # fmt: skip
 
@@ -129,8 +128,7 @@ def _project(size, n, z, bound, force, ramp):
 @jit(allocates=False, fastmath=FUSED)
 def _shift_slip(panels, start, relaxation, work):
     """Relax delta towards the change of slip between where it holds and the load, in one strip's sliding panels; the
-    elastic part of the slip is h (F - z) - delta - w.
-    """
+    elastic part of the slip is h (F - z) - delta - w."""
     n, elastic, force, z = panels.n, work.elastic, work.force, work.z
     for i in range(n):
         j = start + i
@@ -186,20 +184,20 @@ def _iterate(panels, size, method, reach, windows, iterations, work):
 @jit(allocates=False, fastmath=FUSED)
 def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work):
     """Bounds and rigid slip of the panels, over mu N and over mu N/(G c^2); returns what the slip was divided by."""
-    n, strip, scale = panels.n, work.strip, work.scale[3]
-    scale_dx = scale * work.scale[0]
+    n, strip, scale = panels.n, work.strip, work.scale[TO_UNIT]
+    scale_dx = scale * work.scale[LENGTH]
     largest = 0.0
     for j in range(slip_x.size):
         largest = max(largest, scale * max(abs(slip_x[j]), abs(slip_s[j])))
-        largest = max(largest, scale_dx * strip[0, j] * max(abs(slip_x_dx[j]), abs(slip_s_dx[j])))
+        largest = max(largest, scale_dx * strip.half[j] * max(abs(slip_x_dx[j]), abs(slip_s_dx[j])))
     slow = max(1.0, largest / FASTEST)
     for j in range(slip_x.size):
         here_x, here_s = slip_x[j] * scale / slow, slip_s[j] * scale / slow
         change_x, change_s = slip_x_dx[j] * scale_dx / slow, slip_s_dx[j] * scale_dx / slow
         for k in range(n):
             i = 2 * n * j + k
-            work.bound[i] = np.float32(strip[5, j] * panels.share[k]) + _TINY
-            x, shift = strip[0, j] * panels.slip[k], strip[0, j] * (panels.load[k] - panels.slip[k])
+            work.bound[i] = np.float32(strip.share[j] * panels.share[k]) + _TINY
+            x, shift = strip.half[j] * panels.slip[k], strip.half[j] * (panels.load[k] - panels.slip[k])
             work.rigid[i], work.rigid[i + n] = here_x + change_x * x, here_s + change_s * x
             work.shift[i], work.shift[i + n] = change_x * shift, change_s * shift
     return slow
@@ -210,12 +208,11 @@ def _resultant(panels, count, work):
     """(fx, fs, mn) of the panel forces over mu N and mu N c; those of the strips into ``work.strip``.
 
     At a slip that had to be divided by ``slow`` the force differs from that of the rigid slip alone by 1/slow of what
-    it does at the reduced slip.
-    """
-    n, strip, slow = panels.n, work.strip, work.scale[4]
+    it does at the reduced slip."""
+    n, strip, slow = panels.n, work.strip, work.scale[SLOWED]
     fx = fs = mn = 0.0
     for j in range(count):
-        strip[7, j] = strip[8, j] = strip[9, j] = 0.0
+        strip.force_x[j] = strip.force_s[j] = strip.turn[j] = 0.0
         for k in range(n):
             i = 2 * n * j + k
             if slow > 1:
@@ -223,11 +220,11 @@ def _resultant(panels, count, work):
                 traction = work.bound[i] / np.sqrt(sx * sx + ss * ss + _TINY)
                 work.force[i] = -traction * sx + (work.force[i] + traction * sx) / slow
                 work.force[i + n] = -traction * ss + (work.force[i + n] + traction * ss) / slow
-            strip[7, j] += work.force[i]
-            strip[8, j] += work.force[i + n]
-            strip[9, j] += strip[0, j] * panels.load[k] * work.force[i + n]
-        fx, fs = fx + strip[7, j], fs + strip[8, j]
-        mn += strip[9, j] + strip[1, j] * strip[8, j] - strip[2, j] * strip[7, j]
+            strip.force_x[j] += work.force[i]
+            strip.force_s[j] += work.force[i + n]
+            strip.turn[j] += strip.half[j] * panels.load[k] * work.force[i + n]
+        fx, fs = fx + strip.force_x[j], fs + strip.force_s[j]
+        mn += strip.turn[j] + strip.middle[j] * strip.force_s[j] - strip.line[j] * strip.force_x[j]
     return fx, fs, mn
 
 
@@ -247,8 +244,7 @@ def rolling_force(
 
     ``method``: AUTO is LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else
     BAND, and DIRECT with more iterations if the residual then exceeds LIMIT; or LIBRARY (falls back on BAND), BAND,
-    DIRECT. ``work`` afterwards holds what `read_field` needs.
-    """
+    DIRECT. ``work`` afterwards holds what `read_field` needs."""
     panels, level = library.panels, library.level
     count = centre.size
     size = 2 * panels.n * count
@@ -256,13 +252,13 @@ def rolling_force(
     windows = 1 if split == count else 2
     c, load = lay_out(centre, width, half_length, middle, peak, split, work.strip)
     bound = mu * load
-    work.scale[2] = bound
+    work.scale[BOUND] = bound
     if not bound > 0:
         return 0.0 * bound, 0.0 * bound, 0.0 * bound, 0.0 * bound, DIRECT
     assemble(panels, count, library.nu, work)
     scale = work.scale
-    scale[0], scale[1], scale[2], scale[3] = c, load, bound, shear_modulus * c * c / bound
-    scale[4] = _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work)
+    scale[LENGTH], scale[LOAD], scale[BOUND], scale[TO_UNIT] = c, load, bound, shear_modulus * c * c / bound
+    scale[SLOWED] = _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work)
     if (method == AUTO or method == LIBRARY) and take_from_library(library, count, windows, split, work):
         used = LIBRARY
         residual = _iterate(panels, size, LIBRARY, 0, windows, level.iterations, work)
@@ -289,10 +285,12 @@ def _solve_factorised(panels, size, reach, iterations, work):
 @jit(allocates=False, fastmath=FUSED)
 def read_forces(count, work, force):
     """Forces of the strips of the last solution into (3, M): along x and s, N, moment about the middle, N m."""
+    strip, bound = work.strip, work.scale[BOUND]
     for j in range(count):
-        for k in range(3):
-            force[k, j] = work.scale[2] * work.strip[7 + k, j] if work.scale[2] > 0.0 else 0.0
-        force[2, j] *= work.scale[0]
+        force[0, j] = force[1, j] = force[2, j] = 0.0
+        if bound > 0.0:
+            force[0, j], force[1, j] = bound * strip.force_x[j], bound * strip.force_s[j]
+            force[2, j] = bound * strip.turn[j] * work.scale[LENGTH]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -302,24 +300,23 @@ def read_field(panels, count, work, field):
     and s (Pa), pressure (Pa), slip over V along x and s, 1 where the panel slides, dissipated power over V (Pa).
 
     The power is that of traction and slip times one factor, with which it adds up to what the force does on the rigid
-    slip: the upwind slip alone misses 10 to 40 % of it at the coarser levels.
-    """
+    slip: the upwind slip alone misses 10 to 40 % of it at the coarser levels."""
     n, strip, scale = panels.n, work.strip, work.scale
-    c = scale[0]
-    to_slip = scale[4] / scale[3]
+    c = scale[LENGTH]
+    to_slip = scale[SLOWED] / scale[TO_UNIT]
     work_done = power = 0.0
     for j in range(count):
         for k in range(n):
             i, out = 2 * n * j + k, n * j + k
-            area = c * c * strip[4, j] * strip[0, j] * (panels.edges[k] - panels.edges[k + 1])
-            tx, ts = scale[2] * work.force[i] / area, scale[2] * work.force[i + n] / area
+            area = c * c * strip.width[j] * strip.half[j] * (panels.edges[k] - panels.edges[k + 1])
+            tx, ts = scale[BOUND] * work.force[i] / area, scale[BOUND] * work.force[i + n] / area
             sx = to_slip * work.step[i] * (work.force[i] - work.z[i])
             ss = to_slip * work.step[i] * (work.force[i + n] - work.z[i + n])
             slides = np.sqrt(work.z[i] ** 2 + work.z[i + n] ** 2) > work.bound[i]
-            field[0, out] = c * (strip[1, j] + strip[0, j] * panels.load[k])
-            field[1, out] = c * strip[2, j]
+            field[0, out] = c * (strip.middle[j] + strip.half[j] * panels.load[k])
+            field[1, out] = c * strip.line[j]
             field[2, out], field[3, out] = tx, ts
-            field[4, out] = scale[1] * strip[5, j] * panels.share[k] / area
+            field[4, out] = scale[LOAD] * strip.share[j] * panels.share[k] / area
             field[5, out], field[6, out] = sx, ss
             field[7, out] = 1.0 if slides else 0.0
             field[8, out] = -(tx * sx + ts * ss)

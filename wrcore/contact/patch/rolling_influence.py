@@ -30,7 +30,6 @@ from numba.extending import intrinsic
 
 from wrcore.kernels.jit import FUSED, jit
 
-UPWIND = 0.6
 _STEP_SCALE, _UNIT, _ZERO = np.float32(2), np.float32(1), np.float32(0)
 _ROOT_HALF = 0x3F3504F3
 """Bits of sqrt(1/2)."""
@@ -41,41 +40,22 @@ _SERIES = tuple(np.float32(2 / k) for k in (1, 3, 5, 7))
 _LN2, _LEAST = np.float32(np.log(2.0)), np.float32(1e-30)
 
 
-class Panels(NamedTuple):
-    """Panels along a strip, from the leading edge backwards, over its half length and load: what depends on their
-    number alone; a kernel argument.
-    """
+class StripLayout(NamedTuple):
+    """Strips of a patch and what they transmit, (M,) each; lengths over c."""
 
-    n: int
-    edges: np.ndarray
-    points: np.ndarray
-    """(n + 1,): edges of the panels; points between which slip is a difference (the first lies ahead of the strip)."""
+    half: np.ndarray
+    middle: np.ndarray
+    line: np.ndarray
+    centre: np.ndarray
+    width: np.ndarray
+    """Half length and middle along x; line of the load, centre and width across."""
     share: np.ndarray
-    load: np.ndarray
-    slip: np.ndarray
-    """(n,): share of the panel in the strip's normal load, centroid of that load, and where the slip row holds."""
-    scale: np.ndarray
-    """(n (n + 1) - 1,) float32: reciprocals of distances between points times widths of panels, in rows of points with
-    one void between."""
-    ahead: np.ndarray
-    behind: np.ndarray
-    """(n,): weights that carry elastic slip from ``slip`` to ``load``."""
-
-
-def make_panels(n):
-    """Lay out ``n`` >= 3 panels with cosine spacing on a strip with semi-elliptic pressure."""
-    theta = np.pi * np.arange(n + 1) / n
-    share = np.diff(theta / 2 - np.sin(2 * theta) / 4) / (np.pi / 2)
-    load = np.diff(np.sin(theta) ** 3 / 3) / (np.pi / 2) / share
-    points = np.concatenate([[2 - np.cos(np.pi / (2 * n))], np.cos((np.arange(n) + 0.5) * np.pi / n)])
-    slip = (points[1:] + points[:-1]) / 2
-    shift = load - slip
-    ahead, behind = np.zeros(n), np.zeros(n)
-    ahead[1:] = shift[1:] / np.diff(slip) * np.where(np.arange(1, n) < n - 1, UPWIND, 1.0)
-    behind[:-1] = shift[:-1] / np.diff(slip) * np.where(np.arange(n - 1) > 0, 1 - UPWIND, 1.0)
-    edges, scale = np.cos(theta), np.zeros((n, n + 1))
-    scale[:, :n] = 1 / np.outer(np.diff(points), np.diff(edges))
-    return Panels(n, edges, points, share, load, slip, scale.ravel()[:-1].astype(np.float32), ahead, behind)
+    density: np.ndarray
+    """Share in the patch's load; peak times half length."""
+    force_x: np.ndarray
+    force_s: np.ndarray
+    turn: np.ndarray
+    """Forces along x and s over mu N, and the moment of the latter about the strip's middle over mu N c."""
 
 
 @intrinsic
@@ -141,8 +121,7 @@ def _add_strip(dx, d, width, weight, nu, gxx, gyy, gxy):
 def _add_strip_exactly(dx, far, near, nu, gxx, gyy, gxy):
     """The same in closed form for a strip from ``near`` to ``far`` (the larger one) that may hold the line.
 
-    Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R.
-    """
+    Ixx = (1-nu) x asinh(y/|x|) + y asinh(x/|y|), Iyy = x asinh(y/|x|) + (1-nu) y asinh(x/|y|), Ixy = -nu R."""
     y_far, y_near, share = np.float32(far), np.float32(near), np.float32(1.0 / (far - near))
     scale_far, scale_near = np.float32(1.0 / abs(far)), np.float32(1.0 / abs(near))
     sign_far, sign_near = np.float32(1.0 if far > 0 else -1.0), np.float32(1.0 if near > 0 else -1.0)
@@ -191,8 +170,7 @@ def second_window(centre, width):
 @jit(allocates=False, fastmath=FUSED)
 def _centroid_shift(before, here, after, first, last):
     """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola); at a tip it
-    falls to zero at the strip's outer edge: exact for an ellipse.
-    """
+    falls to zero at the strip's outer edge: exact for an ellipse."""
     if first and last:
         return 0.0
     if first:
@@ -219,15 +197,15 @@ def lay_out(centre, width, half_length, middle, peak, split, strip):
         longest = max(longest, half_length[j])
     c = np.sqrt(area)
     for j in range(count):
-        strip[0, j] = max(half_length[j], 1e-3 * longest) / c
-        strip[1, j], strip[3, j], strip[4, j] = middle[j] / c, centre[j] / c, width[j] / c
-        strip[5, j] = 0.5 * np.pi * peak[j] * half_length[j] * width[j] / load
-        strip[6, j] = peak[j] * half_length[j]
+        strip.half[j] = max(half_length[j], 1e-3 * longest) / c
+        strip.middle[j], strip.centre[j], strip.width[j] = middle[j] / c, centre[j] / c, width[j] / c
+        strip.share[j] = 0.5 * np.pi * peak[j] * half_length[j] * width[j] / load
+        strip.density[j] = peak[j] * half_length[j]
     for j in range(count):
         first, last = j == 0 or j == split, j == count - 1 or j == split - 1
-        before, after = strip[6, max(j - 1, 0)], strip[6, min(j + 1, count - 1)]
-        shift = _centroid_shift(before, max(strip[6, j], 1e-30), after, first, last)
-        strip[2, j] = strip[3, j] + shift * strip[4, j]
+        before, after = strip.density[max(j - 1, 0)], strip.density[min(j + 1, count - 1)]
+        shift = _centroid_shift(before, max(strip.density[j], 1e-30), after, first, last)
+        strip.line[j] = strip.centre[j] + shift * strip.width[j]
     return c, load
 
 
@@ -236,9 +214,9 @@ def _distances(panels, point_strip, load_strip, strip, dx):
     """x of all edges of one strip relative to all points of another."""
     n = panels.n
     for m in range(n + 1):
-        x = strip[1, point_strip] + strip[0, point_strip] * panels.points[m]
+        x = strip.middle[point_strip] + strip.half[point_strip] * panels.points[m]
         for k in range(n + 1):
-            dx[m * (n + 1) + k] = strip[1, load_strip] + strip[0, load_strip] * panels.edges[k] - x
+            dx[m * (n + 1) + k] = strip.middle[load_strip] + strip.half[load_strip] * panels.edges[k] - x
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -251,7 +229,7 @@ def _corners(panels, i, j, nu, work):
         gxx[part] = 0.0
         gyy[part] = 0.0
         gxy[part] = 0.0
-    d, width = strip[3, j] - strip[2, i], strip[4, j]
+    d, width = strip.centre[j] - strip.line[i], strip.width[j]
     if abs(d) < 0.8 * width:
         _add_strip_exactly(dx, d + 0.5 * width, d - 0.5 * width, nu, gxx, gyy, gxy)
     elif abs(d) < 1.6 * width:
@@ -266,7 +244,7 @@ def _block(panels, i, j, work, matrix):
     """Write the slip of strip i by strip j, over the step."""
     n = panels.n
     row, column = 2 * n * i, 2 * n * j
-    factor = 1.0 / (np.pi * work.strip[0, i] * work.strip[0, j])
+    factor = 1.0 / (np.pi * work.strip.half[i] * work.strip.half[j])
     for part in range(3):
         _difference(work.corner[part + 1], panels.scale, factor, work.slip[part])
     for m in range(n):

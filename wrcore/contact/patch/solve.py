@@ -1,22 +1,28 @@
-"""Solution of one patch, from its overlaps to strips with pressure: the kernels behind :mod:`normal`."""
+"""Exact non-Hertzian normal contact of a wheel on a rail: Galerkin strips in windows that end at the tips of contact.
+
+Across the patch, strips of width w carry a pressure that is semi-elliptic along x,
+
+    p = p0 sqrt(1 - ((x - X)/a)^2),   p0 = pi E* Q a,
+
+with unknown Q, half length a and (with yaw) middle X. Galerkin's conditions make the loaded gap vanish in the mean and
+in its second and first moment along the strip; the tips of a window lie where a^2, linear there, vanishes. All strips
+of a patch, whichever window they belong to, act on each other through the half-space
+(:mod:`wrcore.contact.patch.normal_influence`).
+
+References
+----------
+Johnson, Contact Mechanics (1985), chapters 3 and 4. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990).
+"""
 
 import math
 
-from wrcore.contact.detection import find_patches
+import numpy as np
+
 from wrcore.contact.patch.fixed import windows_from_fixed
 from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps, unroll
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
 from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
-from wrcore.contact.patch.windows import (
-    drop_starved,
-    guess_squares,
-    merge_close,
-    newborn,
-    start_strips,
-    windows_from_guess,
-)
-from wrcore.contact.reduction import MOMENT
-from wrcore.contact.strip import make_pose
+from wrcore.contact.patch.windows import drop_starved, guess_squares, guess_windows, merge_close, newborn, start_strips
 from wrcore.kernels.jit import FUSED, jit
 
 EXACT, STRIPS = 0, 1
@@ -38,6 +44,9 @@ _STEPS = 24
 _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
 
+TIP_SHARE, TIP_GROWTH = 0.13, 0.04
+"""By which a window's last strips are too long for their area: the share, and its growth with ln(a/width) there."""
+
 # Rows of the strip array, and of the sums over a patch.
 CENTRE, WIDTH, HALF_LENGTH, MIDDLE, PEAK, WINDOW, WHEEL_HEIGHT, STRIP_TILT, STRIP_LOAD, OWN_PLACE, OWN_WIDTH = range(11)
 STRIP_ROWS = 11
@@ -51,14 +60,13 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     moments), which count as one patch. Fills ``work``; returns the number of windows (0 where no solution was found)
     and their `Frame`.
 
-    ``resolution``: strips of a window. ``model``: EXACT or STRIPS. ``values``: of an `InfluenceTable`. ``memory``
+    ``resolution``: strips of a window. ``model``: EXACT or STRIPS. ``values``: of `influence_table`. ``memory``
     (MEMORY,): a solution to start from if it fits (its first number 0: none), which leaves the result the same to the
-    square of the iteration's tolerance; filled with this one.
-    """
+    square of the iteration's tolerance; filled with this one."""
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
     guess_squares(hertz, patches, first, work, stretches, model == EXACT)
-    windows = windows_from_guess(work, stretches, resolution)
+    windows = guess_windows(work, stretches, resolution)
     kinds = 2 if pose.ex == 0.0 else 3
     if model == EXACT and _resume(frame, memory, work, windows):
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
@@ -67,7 +75,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
             if newborn(values, work, windows, stretches, resolution) == windows:
                 _remember(frame, work, windows, memory)
                 return windows, frame
-        windows = windows_from_guess(work, stretches, resolution)
+        windows = guess_windows(work, stretches, resolution)
     memory[0] = 0.0
     if windows > 0:
         start_strips(geometry, pose, frame, work, windows, stretches)
@@ -87,8 +95,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
 @jit(allocates=False)
 def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds):
     """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be.
-    Returns the number of windows, 0 where no solution was found, and of attempts.
-    """
+    Returns the number of windows, 0 where no solution was found, and of attempts."""
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if attempt == 1 or again:
@@ -212,8 +219,12 @@ def publish(modulus, work, windows, strips, sums):
     return count
 
 
-@jit(allocates=False)
-def wheel_overlaps(geometry, side, y, z, ex, ey, ez, spatial, patches):
-    """Overlaps of one wheel, reduced by moments (see `find_patches`), and its pose."""
-    count = find_patches(geometry, side, y, z, ex, ey, ez, spatial, MOMENT, patches)
-    return count, make_pose(side, y, z, ex, ey, ez, spatial)
+def even_length(half_length, width, window):
+    """Half lengths of rectangles as wide as the strips with the areas under them, m, shape (strips,).
+
+    Galerkin's strips at the tips of a window are too long, by a share that grows with length over width: fitted to
+    the area of Hertz's ellipses with a/b from 0.25 to 9 and 8 to 32 strips (within 0.3 %)."""
+    even, edge = half_length.copy(), np.diff(window, prepend=-1, append=-1) != 0
+    at = edge[1:] | edge[:-1]
+    even[at] *= 1.0 - TIP_SHARE - TIP_GROWTH * np.log(even[at] / width[at])
+    return even

@@ -53,7 +53,7 @@ WIDENED, WEIGHT, GUESS = range(3)
 """Places of a workspace's ``more``."""
 
 
-class Workspace(NamedTuple):
+class NormalWork(NamedTuple):
     """Arrays that a solution works in; lateral coordinates count outwards, strips by increasing s."""
 
     nodes: np.ndarray
@@ -104,10 +104,10 @@ class Workspace(NamedTuple):
     solution with MORE has in the mean of both (found with 1); and this weight of the first guess."""
 
 
-def workspace():
-    """`Workspace` for the solution of one patch at a time."""
+def normal_work():
+    """`NormalWork` for the solution of one patch at a time."""
     n, m = MAX_STRIPS, MAX_WINDOWS
-    return Workspace(
+    return NormalWork(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
         *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), *np.zeros((2, m)), np.zeros((2, m)),
         np.zeros(n, np.int64),

@@ -33,8 +33,7 @@ class ContactPlane(NamedTuple):
 class Motion(NamedTuple):
     """Velocity of the wheelset's centre (m/s), its angular velocity (rad/s), both in the track frame, and speed (m/s).
 
-    The angular velocity contains the rolling rate: about the axle, positive forward.
-    """
+    The angular velocity contains the rolling rate: about the axle, positive forward."""
 
     vx: float
     vy: float
@@ -53,8 +52,7 @@ def contact_plane(x, y, z, angle):
 @jit(allocates=False)
 def rail_height(geometry, pose, plane, s, u):
     """Height n (m) of the rail over a contact plane at s, and its profile coordinate there, from the guess ``u``; NaN
-    where the line along n does not meet the rail's profile.
-    """
+    where the line along n does not meet the rail's profile."""
     side, sine = pose.side, pose.side * plane.sine
     origin = side * plane.y - geometry.rail_distance
     low, high = geometry.rail_start, geometry.rail_start + (geometry.rail.shape[0] - 1) * geometry.rail_step
@@ -110,8 +108,7 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
     relative to its origin (m, increasing).
 
     Writes, (nx, ns), the distance from rail to wheel along n (m; negative in overlap, `NO_RAIL` where a profile has
-    ended) and the wheel's height n over the plane (m; 0 where a profile has ended). A pose may be spatial or planar.
-    """
+    ended) and the wheel's height n over the plane (m; 0 where a profile has ended). A pose may be spatial or planar."""
     u = pose.side * plane.y - geometry.rail_distance + pose.side * plane.cosine * s[0]
     for j in range(s.size):
         rail, u = rail_height(geometry, pose, plane, s[j], u)
@@ -127,8 +124,7 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
 @jit
 def strip_planes(s, gap, height):
     """Of each strip along x the wheel's least height (m), and the slope over s midway between wheel and rail there,
-    (ns,), from ``gap`` and ``height`` of `surface_gap`; 0 where a profile has ended.
-    """
+    (ns,), from ``gap`` and ``height`` of `surface_gap`; 0 where a profile has ended."""
     low, tilt = np.zeros(s.size), np.zeros(s.size)
     for j in range(s.size):
         here, middle = _lowest(gap, height, j)
@@ -160,8 +156,7 @@ def surface_slip(pose, plane, motion, x, s, low, tilt, wx, ws):
     each strip along x, over the speed: fills ``wx``, ``ws`` (nx, ns); ``low``, ``tilt``: of `strip_planes`.
 
     A strip of the wheel counts with its radius at its point nearest to the rail: away from it the undeformed wheel
-    moves more slowly along x, but the flattened one does not, as its surface passes over the same length.
-    """
+    moves more slowly along x, but the flattened one does not, as its surface passes over the same length."""
     slowness = 1.0 / motion.speed
     for j in range(s.size):
         secant = 1.0 / math.sqrt(1.0 + tilt[j] * tilt[j])

@@ -13,15 +13,13 @@ from wrcore.contact.patch.strips import GUESS, MAX_STRIPS, MAX_WINDOWS, WEIGHT, 
 from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y, PENETRATION
 from wrcore.kernels.jit import FUSED, jit
 
-LEAST = 8
-"""Strips of a slender window (length over width above `SLENDER`), whatever the resolution."""
-
-SLENDER = 4.0
+FEWEST_STRIPS, SLENDER_WINDOW = 8, 4.0
+"""Strips of a slender window, whatever the resolution, and the length over width from which it is one."""
 
 MORE = 1.05
 """Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
 
-_STEPS = (1.0 / SLENDER, 1.2, 1.8)
+_STEPS = (1.0 / SLENDER_WINDOW, 1.2, 1.8)
 """Widths over lengths at which the number of strips steps."""
 
 _SADDLE = 0.02
@@ -37,8 +35,7 @@ def guess_squares(hertz, patches, first, work, stretches, by_lobes):
 
     For a lobe of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's ellipse of
     the overlap, and Q of that ellipse: exact for an ellipse. Else (not ``by_lobes``) d - min g is that ellipse's, too,
-    and Q gives its force.
-    """
+    and Q gives its force."""
     nodes = work.nodes
     begin = 0
     for k in range(stretches):
@@ -98,22 +95,21 @@ def guess_at(work, count, s):
 def count_strips(width, length, resolution, more):
     """Strips of a window: few where it is slender, more where it is wide (it then has lobes).
 
-    Just below a width at which the number steps ``more`` (see `Workspace`) gets the weight of the larger number: it
-    rises from 0 to 1, so that forces do not step. It is the largest over the windows.
-    """
+    Just below a width at which the number steps ``more`` (see `NormalWork`) gets the weight of the larger number: it
+    rises from 0 to 1, so that forces do not step. It is the largest over the windows."""
     ratio = more[WIDENED] * width / length
     for step in _STEPS:
         t = (MORE * ratio / step - 1.0) / (MORE - 1.0)
-        if 0.0 < t <= 1.0 and more[WIDENED] == 1.0 and (step >= 1.0 or resolution != LEAST):
+        if 0.0 < t <= 1.0 and more[WIDENED] == 1.0 and (step >= 1.0 or resolution != FEWEST_STRIPS):
             more[WEIGHT] = max(more[WEIGHT], t * t * (3.0 - 2.0 * t))
     if ratio < _STEPS[0]:
-        return LEAST
+        return FEWEST_STRIPS
     halves = 2 if ratio <= _STEPS[1] else 3 if ratio <= _STEPS[2] else 4
     return min(resolution * halves // 2, MAX_STRIPS)
 
 
 @jit(allocates=False, fastmath=FUSED)
-def windows_from_guess(work, stretches, resolution):
+def guess_windows(work, stretches, resolution):
     """Windows where the guess of c is positive. Returns their number."""
     nodes, count, windows = work.nodes, work.ends[stretches - 1], 0
     inside, largest, work.more[WEIGHT] = False, 0.0, 0.0
@@ -179,34 +175,34 @@ def start_strips(geometry, pose, frame, work, windows, stretches):
             work.middle[i] = work.gap[i, CREST]
 
 
+@jit(allocates=False)
+def active_runs(work, windows):
+    """Runs of active strips, into ``work.fresh``: their number, and the largest c."""
+    found, inside, largest = 0, False, 0.0
+    for i in range(work.start[windows]):
+        if inside and (not work.active[i] or work.window[i] != work.window[i - 1]):
+            found, inside = found + 1, False
+        if work.active[i] and found < MAX_WINDOWS:
+            largest = max(largest, work.square[i])
+            if not inside:
+                work.fresh[0, found], inside = work.centre[i] - 0.5 * work.width[i], True
+            work.fresh[1, found] = work.centre[i] + 0.5 * work.width[i]
+    return found + int(inside), largest
+
+
 @jit(allocates=False, fastmath=FUSED)
 def drop_starved(work, windows, resolution):
     """Windows of the runs of strips that kept their pressure after a starved iteration. Returns their number."""
     largest = top_squares(work, windows)
-    strips = work.start[windows]
-    found, inside = 0, False
-    lows, highs = work.fresh[0], work.fresh[1]
-    for i in range(strips):
+    for i in range(work.start[windows]):
         top = work.tops[work.window[i]]
-        alive = work.square[i] > FAINT * top and top > NEGLIGIBLE * largest
-        edge = i > 0 and work.window[i] != work.window[i - 1]
-        if inside and (edge or not alive):
-            highs[found] = work.centre[i - 1] + 0.5 * work.width[i - 1]
-            found, inside = found + 1, False
-        if alive and not inside and found < MAX_WINDOWS:
-            lows[found], inside = work.centre[i] - 0.5 * work.width[i], True
-    if inside:
-        highs[found] = work.centre[strips - 1] + 0.5 * work.width[strips - 1]
-        found += 1
-    return take_fresh(work, found, math.sqrt(largest), resolution)
+        work.active[i] = work.square[i] > FAINT * top and top > NEGLIGIBLE * largest
+    return take_fresh(work, active_runs(work, windows)[0], largest, resolution)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def merge_close(work, windows, resolution):
     """Windows closer than a share of a strip become one. Returns their number."""
-    largest = 0.0
-    for i in range(work.start[windows]):
-        largest = max(largest, work.square[i])
     lows, highs = work.fresh[0], work.fresh[1]
     found = 0
     for k in range(windows):
@@ -218,21 +214,18 @@ def merge_close(work, windows, resolution):
         else:
             lows[found], highs[found] = work.low[k], work.high[k]
             found += 1
-    if found == windows:
-        return windows
-    return take_fresh(work, found, math.sqrt(largest), resolution)
+    return windows if found == windows else take_fresh(work, found, top_squares(work, windows), resolution)
 
 
 @jit(allocates=False, fastmath=FUSED)
-def take_fresh(work, found, a, resolution):
+def take_fresh(work, found, largest, resolution):
     """Windows from their tips in ``work.fresh``: as many strips as guessed if they are as many as were guessed."""
-    known = found == work.guessed[0]
+    known, length = found == work.guessed[0], 2.0 * math.sqrt(largest)
     work.more[WEIGHT] = work.more[GUESS] if known else 0.0
     for k in range(found):
         work.low[k], work.high[k] = work.fresh[0, k], work.fresh[1, k]
-        work.start[k + 1] = (
-            work.guessed[k + 1] if known else count_strips(work.high[k] - work.low[k], 2.0 * a, resolution, work.more)
-        )
+        width = work.high[k] - work.low[k]
+        work.start[k + 1] = work.guessed[k + 1] if known else count_strips(width, length, resolution, work.more)
     _number(work, found)
     return found
 
@@ -276,7 +269,4 @@ def newborn(values, work, windows, stretches, resolution):
             lows[j + 1], highs[j + 1] = lows[j], highs[j]
             j -= 1
         lows[j + 1], highs[j + 1] = low, high
-    largest = 0.0
-    for i in range(work.start[windows]):
-        largest = max(largest, work.square[i])
-    return take_fresh(work, found, math.sqrt(largest), resolution)
+    return take_fresh(work, found, top_squares(work, windows), resolution)

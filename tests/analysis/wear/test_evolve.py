@@ -152,7 +152,11 @@ def test_a_damaged_folder_is_refused(request, tmp_path, name, damage, of):
     folder = request.getfixturevalue(of)
     folder = shutil.copytree(folder[0] if of == "worn" else folder, tmp_path / "damaged")
     damage(folder / name)
-    for read in (lambda: ev.evolve(PLAN, folder), lambda: ev.last_depth(folder), lambda: ev.rail_wear(folder)):
+    for read in (
+        lambda: ev.evolve(PLAN, folder),
+        lambda: ev.profiles_over_distance(folder),
+        lambda: ev.rail_wear(folder),
+    ):
         with pytest.raises(InputError, match=f"{name}: expected"):
             read()
 

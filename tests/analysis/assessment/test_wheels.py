@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from study.speeds.tables import cost_table, speed_row
+from study.speeds.tables import cost_table, hunting, speed_row
 from tests.conftest import SCENES
 from tests.synthetic import hunting_run
 from wrcore.analysis.assessment import wheels as av
@@ -99,7 +99,7 @@ def test_wheel_table_has_a_row_per_wheel(run):
 
 
 def test_hunting_of_a_decaying_oscillation(run):
-    frequency, growth, damping = av.hunting(run.t, run["wheelset"].y_m)
+    frequency, growth, damping = hunting(run.t, run["wheelset"].y_m)
     assert frequency == pytest.approx(2.6, rel=1e-3)
     assert growth == pytest.approx(-0.5, rel=1e-2)
     assert damping == pytest.approx(0.5 / math.hypot(0.5, 2 * math.pi * 2.6), rel=1e-2)
@@ -109,7 +109,7 @@ def test_hunting_of_a_motion_that_has_died_is_not_that_of_its_rounding():
     t = np.arange(2001) / 200
     y = 2e-3 * np.exp(-2.0 * t) * np.cos(2 * np.pi * 2.0 * t)
     noisy = np.where(t > 5.0, 1e-9 * np.sin(2 * np.pi * 70 * t), y)
-    frequency, growth, _ = av.hunting(t, noisy)
+    frequency, growth, _ = hunting(t, noisy)
     assert frequency == pytest.approx(2.0, rel=1e-2)
     assert growth == pytest.approx(-2.0, rel=2e-2)
 

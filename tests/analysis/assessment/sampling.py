@@ -1,4 +1,7 @@
-"""Worst values by EN 14363 over the output rate, for reports/assessment.md: ``python -m tests.analysis.sampling``."""
+"""Worst values by EN 14363 over the output rate, for reports/assessment.md.
+
+``python -m tests.analysis.assessment.sampling``
+"""
 
 from unittest import mock
 

@@ -1,18 +1,9 @@
-"""Poses of a wheelset from a file, and the columns of patches: for ``wrcore contact``."""
+"""Poses of a wheelset from a file: for ``wrcore contact``."""
 
 import numpy as np
 
-from wrcore.contact import reduction as columns
 from wrcore.errors import InputError
 from wrcore.errors.checked_csv import read_csv_table
-
-PATCH_FIELDS = {
-    "u_wheel_m": columns.U_WHEEL, "s_wheel_rad": columns.S_WHEEL, "u_rail_m": columns.U_RAIL, "x_m": columns.X,
-    "y_m": columns.Y, "z_m": columns.Z, "contact_angle_rad": columns.ANGLE, "penetration_m": columns.PENETRATION,
-    "a_m": columns.SEMI_A, "b_m": columns.SEMI_B, "N_N": columns.NORMAL,
-}  # fmt: skip
-"""Columns of the result and of the patch array."""
-
 
 POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0}
 MOTION_LIMITS = {"V_m_per_s": 200.0, "omega_rad_per_s": 4e3, "vy_m_per_s": 200.0, "yaw_rate_rad_per_s": 1e3, "mu": 2.0}
@@ -25,8 +16,7 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 def read_poses(path):
     """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m,
     V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the file, the
-    column, the row and what was expected.
-    """
+    column, the row and what was expected."""
     import pandas as pd
 
     frame = read_csv_table(path, "pose_id")

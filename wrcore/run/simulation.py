@@ -33,15 +33,13 @@ from wrcore.scene.description import Scene, compile_scene
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
 
-CONTACT_CHANNELS = {
-    "u_wheel_m": reduction.U_WHEEL, "s_wheel_rad": reduction.S_WHEEL, "u_rail_m": reduction.U_RAIL,
-    "x_m": reduction.X, "y_m": reduction.Y, "z_m": reduction.Z, "contact_angle_rad": reduction.ANGLE,
-    "penetration_m": reduction.PENETRATION, "a_m": reduction.SEMI_A, "b_m": reduction.SEMI_B,
-    "N_N": reduction.NORMAL, "Fx_N": reduction.FX, "Fy_N": reduction.FY, "Mz_Nm": reduction.MZ,
-    "xi": reduction.XI, "eta": reduction.ETA, "phi_per_m": reduction.PHI,
+COUNTERS = {
+    "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
+    "factorisations": "factorisations", "smallest_step_s": "smallest_step", "step_collapses": "collapses",
+    "table_out_of_range": "out_of_range", "patches_on_grid": "on_grid", "rails_unbalanced": "unbalanced",
+    "wall_s": "wall_s",
 }  # fmt: skip
-"""Contact channels and their columns in the patch array."""
-
+"""Counters of a run, and what a `Trajectory` calls them."""
 
 TRACK_CHANNELS = (
     "rail_y_left_m", "rail_z_left_m", "rail_y_right_m", "rail_z_right_m",
@@ -50,7 +48,13 @@ TRACK_CHANNELS = (
 """Of a flexible track, in the order of its freedoms (:mod:`wrcore.dynamics.flexible_track`)."""
 
 
-class Places(NamedTuple):
+def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
+    """Counters of a trajectory from a time (s) on by the names that they have in runs and sweeps."""
+    simulated = float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0
+    return {name: getattr(trajectory, attribute) for name, attribute in COUNTERS.items()} | {"simulated_s": simulated}
+
+
+class ArcLengths(NamedTuple):
     """Arc lengths from which those of the next output are sought on a curved track, m."""
 
     wheelsets: np.ndarray
@@ -59,9 +63,9 @@ class Places(NamedTuple):
     """(n,)."""
 
 
-class Course:
+class Simulation:
     """A compiled scene and where it has got to: ``model``, its fingerprint ``mark``, the ``start`` (Checkpoint or state
-    (size,)) of the next stretch and the ``places`` for its channels.
+    (size,)) of the next stretch and the ``arc_lengths`` for its channels.
 
     InputError if it cannot begin there. ``progress`` wraps the patches of a creep table that has to be built,
     ``shared`` is that of :func:`wrcore.scene.description.compile_scene`.
@@ -80,11 +84,11 @@ class Course:
         self.mark = model_fingerprint(self.model)
         self.start, self._moved = state, 0.0
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)
-        self.places = Places(unknown, scene.vehicle.positions[:, 0].astype(float))
+        self.arc_lengths = ArcLengths(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
             self.begin_at(start)
 
-    def begin_at(self, start: Checkpoint | np.ndarray, places: Places | None = None) -> None:
+    def begin_at(self, start: Checkpoint | np.ndarray, arc_lengths: ArcLengths | None = None) -> None:
         """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
         if isinstance(start, Checkpoint):
             method = self.scene.data["integration"]["method"]
@@ -98,10 +102,10 @@ class Course:
         elif (begun := from_state(self.model, self.scene.vehicle, start, self.scene.source)) is not self.model:
             self.model, self.mark = begun, model_fingerprint(begun)
             self._moved = start.frame - begun.speed * start.t
-        if places is not None:
-            if [place.shape for place in places] != [place.shape for place in self.places]:
+        if arc_lengths is not None:
+            if [known.shape for known in arc_lengths] != [known.shape for known in self.arc_lengths]:
                 raise InputError(self.scene.source, "start", "expected as many places as wheelsets and bodies")
-            self.places = places
+            self.arc_lengths = arc_lengths
         self.start = start
 
     def advance(
@@ -120,14 +124,7 @@ class Course:
             settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
         )  # fmt: skip
         compiled = time.perf_counter() - self._began - trajectory.wall_s
-        counters = {
-            "steps": trajectory.steps, "rejected": trajectory.rejected, "rhs_evaluations": trajectory.rhs_evaluations,
-            "jacobians": trajectory.jacobians, "factorisations": trajectory.factorisations,
-            "smallest_step_s": trajectory.smallest_step, "step_collapses": trajectory.collapses,
-            "table_out_of_range": trajectory.out_of_range, "patches_on_grid": trajectory.on_grid,
-            "rails_unbalanced": trajectory.unbalanced, "wall_s": trajectory.wall_s, "compile_s": compiled,
-            "simulated_s": float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0,
-        }  # fmt: skip
+        counters = counters_of(trajectory, begin) | {"compile_s": compiled}
         groups, limits = self._channels(trajectory)
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
         record["method_used"] = trajectory.method
@@ -141,13 +138,11 @@ class Course:
 
     def _end_state(self, trajectory: Trajectory) -> State | None:
         """Where the stretch ended, with what belongs to it."""
-        scene, t = self.scene, trajectory.end_t
-        names = scene.vehicle.name, *scene.vehicle.body_names
-        return (
-            None
-            if trajectory.end_state is None
-            else State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
-        )
+        if trajectory.end_state is None:
+            return None
+        t, vehicle = trajectory.end_t, self.scene.vehicle
+        names = vehicle.name, *vehicle.body_names
+        return State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
 
     def _channels(self, trajectory: Trajectory):
         """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs."""
@@ -158,30 +153,30 @@ class Course:
         poses, axes = self._poses(states)
         energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
         if len(states):
-            self.places = Places(work.arc_lengths.copy(), poses[-1, :, 0].copy())
-        groups = {}
+            self.arc_lengths = ArcLengths(work.arc_lengths.copy(), poses[-1, :, 0].copy())
+        groups, numbers = {}, {int(body): k for k, body in enumerate(wheelsets)}
         for body, name in enumerate(scene.vehicle.body_names):
-            own, pitches = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), not model.bodies.spins[body]
-            place, turned = poses[:, body], axes[:, body]
-            groups[name] = _body_channels(states[:, own], rates[:, own], place, turned, wanted, pitches)
+            part, k = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), numbers.get(body)
+            motion = states[:, part], rates[:, part], poses[:, body], axes[:, body]
+            groups[name] = _body_channels(*motion, wanted, pitches=not model.bodies.spins[body])
             if "pose" in wanted and not model.track.tangent:
-                groups[name]["s_m"] = place[:, 0]
-            if "pose" in wanted and body in wheelsets and len(model.flexible_track.mass):
-                groups[name] |= self._track_places(states, body)
+                groups[name]["s_m"] = poses[:, body, 0]
+            if "pose" in wanted and k is not None and len(model.flexible_track.mass):
+                groups[name] |= self._track_places(states, k)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
-            if body in wheelsets and not {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
-                k = int(np.flatnonzero(wheelsets == body)[0])
-                contacts = self._contact_channels(name, patches[:, k])
-                if "contact" in wanted:
-                    groups |= contacts
-                moving = {name: _body_channels(states[:, own], rates[:, own], place, turned, ("velocity",))}
-                for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
-                    groups[group] = groups.get(group, {}) | channels
-                if "contact" in wanted and scene.detection == "auto":
-                    groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
-                    spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
-                    groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
+            if k is None or {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
+                continue
+            contacts = self._contact_channels(name, patches[:, k])
+            if "contact" in wanted:
+                groups |= contacts
+            moving = {name: _body_channels(*motion, ("velocity",))}
+            for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
+                groups[group] = groups.get(group, {}) | channels
+            if "contact" in wanted and scene.detection == "auto":
+                groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
+                spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
+                groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
         if energies is not None:
             groups["energy"] = energies
         groups |= self._drive_channels(trajectory)
@@ -194,7 +189,7 @@ class Course:
         """Channels of the contacts of a wheelset's wheels by group."""
         groups = {}
         for side, rows in zip(SIDES, np.moveaxis(patches, 1, 0), strict=True):
-            channels = {key: rows[..., column] for key, column in CONTACT_CHANNELS.items()}
+            channels = {key: rows[..., column] for key, column in reduction.CHANNELS.items()}
             if self.model.contact.strips.strips:
                 channels["p_max_Pa"] = rows[..., reduction.P_MAX]
             if shaped(self.model.contact):
@@ -206,14 +201,13 @@ class Course:
         """Channels of the rolling rates of wheels that turn independently, rad/s."""
         bodies = self.model.bodies
         j = int(np.flatnonzero(bodies.wheelsets[bodies.independent[:, 0]] == body)[0])
-        own = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
-        mean = np.array([matrix_of(part[3:7])[:, 1] @ part[10:13] for part in own])
+        part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+        mean = np.array([matrix_of(one[3:7])[:, 1] @ one[10:13] for one in part])
         half = states[:, independent_at(bodies, j)]
         return {f"rolling_rate_{side}_rad_per_s": mean + sign * half for side, sign in zip(SIDES, (1, -1), strict=True)}
 
-    def _track_places(self, states, body):
-        """Channels of the displacements of rails and sleeper under a wheelset, m and rad."""
-        k = int(np.flatnonzero(self.model.bodies.wheelsets == body)[0])
+    def _track_places(self, states, k):
+        """Channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
         places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
@@ -233,7 +227,7 @@ class Course:
 
     def _workspace(self):
         work = workspace(self.model)
-        work.arc_lengths[:] = self.places.wheelsets
+        work.arc_lengths[:] = self.arc_lengths.wheelsets
         return work
 
     def _poses(self, states):
@@ -248,7 +242,7 @@ class Course:
                 roll, pitch, yaw = angles(states[:, at + 3 : at + 7])
                 poses[:, body] = np.column_stack([states[:, at : at + 3], roll, yaw, pitch])
             else:
-                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.places.bodies[body])
+                poses[:, body], axes[:, body] = track_poses(self.model.track, states, at, self.arc_lengths.bodies[body])
         return poses, axes
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.analysis.test_assess import synthetic
+from tests.analysis.assessment.test_assess import synthetic
 from wrcore.analysis.assessment.wheels import wheel_table
 from wrcore.analysis.wear.damage import damage_table, fatigue_index, plot_shakedown, rcf_damage, utilised_friction
 from wrcore.errors import InputError

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.analysis.test_assess import synthetic
+from tests.analysis.assessment.test_assess import synthetic
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
 from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
-from wrcore.run.wear import creep_work
+from wrcore.run.derived import creep_work
 
 G, NU, MU = 8.2e10, 0.28, 0.3
 RADIUS = 0.46

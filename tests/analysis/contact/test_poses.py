@@ -11,11 +11,11 @@ from tests.conftest import SCENES
 from tests.contact.patch import contact_reference as contact
 from tests.contact.patch.test_grid import some_cases
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.analysis.contact.poses import ROLLING_FIELDS, loaded_poses
+from wrcore.analysis.contact.poses import STILL, loaded_poses
 from wrcore.cli import main
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table
-from wrcore.contact.poses import PATCH_FIELDS, read_poses
+from wrcore.contact.pose_file import read_poses
 from wrcore.contact.statics import wheel_at_rest
 from wrcore.geometry.track import SIDES
 
@@ -100,7 +100,7 @@ def with_creepages(wheels):
 
 def row_of(found):
     """A patch as a row of the command's table."""
-    names = {**PATCH_FIELDS, **ROLLING_FIELDS, "p_max_Pa": columns.P_MAX}
+    names = columns.CHANNELS | {"p_max_Pa": columns.P_MAX}
     ends = dict(zip(("x_min_m", "x_max_m", "width_m"), found.extent, strict=True))
     return pd.Series({name: found.row[column] for name, column in names.items()} | ends)
 
@@ -125,8 +125,8 @@ def test_still_ellipses_are_what_they_were(tmp_path, benchmark_pair):
                 benchmark_pair, hertz_table(), contact_modulus(8.2e10, 0.28), SIDES[side], y, z, roll, yaw, True,
                 columns.REDUCTIONS[reduction], rows,
             )  # fmt: skip
-            expected = rows[:count, list(PATCH_FIELDS.values())]
-            np.testing.assert_allclose(own[list(PATCH_FIELDS)].to_numpy(float), expected, rtol=1e-12, atol=1e-15)
+            expected = rows[:count, [columns.CHANNELS[name] for name in STILL]]
+            np.testing.assert_allclose(own[list(STILL)].to_numpy(float), expected, rtol=1e-12, atol=1e-15)
             assert pose == "d" or force == pytest.approx(54.5e3, rel=1e-9)
         assert found.Fx_N.isna().all() and np.allclose(found.x_max_m - found.x_min_m, 2.0 * found.a_m)
 

@@ -1,30 +1,17 @@
-"""What runs say of the motion: flange contact, differences between runs, how far a run can be trusted."""
+"""What pairs of runs say of the motion: flange contact, differences, how far ahead a run can be trusted."""
 
 import numpy as np
+
+from wrcore.geometry.track import SIDES
 
 FLANGE_ANGLE = 0.7
 """Contact angle from which a contact counts as flange contact, rad. S1002 on UIC60 at 1:40 jumps across this value:
 from the flange root to the flange, whose face stands at 1.22 rad (70 degrees)."""
 
 
-SIDES = ("left", "right")
-
-
 def first_flange_contact(run, body="wheelset", angle=FLANGE_ANGLE):
-    """Time of the first contact on a flange.
-
-    Parameters
-    ----------
-    run : Run
-    body : str
-        Wheelset whose contacts are searched.
-    angle : float
-        Contact angle from which a patch counts as flange contact, rad.
-
-    Returns
-    -------
-    float
-        First output time with such a patch on either side, s; NaN if there is none.
+    """First output time (s) at which a wheelset has a patch of at least a contact angle (rad) on either side; NaN if
+    there is none.
     """
     steep = [np.nanmax(np.abs(_patches(run[f"{body}/{side}"].contact_angle_rad)), axis=1) >= angle for side in SIDES]
     when = np.flatnonzero(np.logical_or(*steep))
@@ -37,26 +24,8 @@ def _patches(values):
 
 
 def difference(run, other, channel="y_m", group="wheelset", until=np.inf):
-    """Root mean square and maximum of the difference between two runs over their common output times.
-
-    Parameters
-    ----------
-    run, other : Run
-        Runs with the same output rate.
-    channel, group : str
-        What to compare; a channel of shape (n,).
-    until : float
-        End of the comparison, s.
-
-    Returns
-    -------
-    rms, maximum : float
-        In the channel's unit.
-
-    Raises
-    ------
-    ValueError
-        If the output times differ.
+    """Root mean square and maximum of the difference of two runs in a channel (n,), in its unit, over their common
+    output times up to ``until`` (s); ValueError if the output times differ.
     """
     t, gap = _gap(run, other, channel, group)
     gap = gap[t <= until]
@@ -71,22 +40,8 @@ def _gap(run, other, channel, group, sign=1.0):
 
 
 def prediction_horizon(run, twin, bound, channel="y_m", group="wheelset"):
-    """Time up to which a run agrees with its twin, run to a tighter tolerance, within a bound.
-
-    Parameters
-    ----------
-    run, twin : Run
-        Two runs of one scene with the same output rate.
-    bound : float
-        Largest difference that still counts as agreement, in the channel's unit.
-    channel, group : str
-        What to compare; a channel of shape (n,).
-
-    Returns
-    -------
-    float
-        Last output time before the bound is first exceeded, s; the end of the shorter run if it never is; NaN if
-        they differ from the start.
+    """Last output time (s) up to which a run agrees in a channel (n,) with its twin, run to a tighter tolerance, within
+    a bound in the channel's unit; the end of the shorter run if it always does, NaN if they differ from the start.
     """
     t, gap = _gap(run, twin, channel, group)
     apart = np.flatnonzero(~(gap <= bound))
