@@ -48,10 +48,10 @@ def whole_model(wheels, lag=False):
     return solve
 
 
-def errors(name, resolution):
+def errors(name, resolution, patch="exact"):
     """Columns of QUANTITIES per case of a set."""
     geometry, cases = contact.geometry(name), comparable(name)
-    surfaces, creepages = (LoadedWheels(geometry, "exact", resolution, slip) for slip in ("surfaces", "creepages"))
+    surfaces, creepages = (LoadedWheels(geometry, patch, resolution, slip) for slip in ("surfaces", "creepages"))
     table = contact.compare(whole_model(surfaces), cases, geometry)
     table["force"] = math.nan
     if not math.isnan(sum(case.xi * case.fx for case in cases)):  # none in the file that is distributed
@@ -77,6 +77,7 @@ def main():
     """Print the distributions of all sets that are present."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folder", nargs="?", help="folder with the reference files")
+    parser.add_argument("--patch", default="exact", choices=("exact", "tabulated"))
     parser.add_argument("--resolution", nargs="*", default=RESOLUTIONS, choices=RESOLUTIONS)
     chosen = parser.parse_args()
     if chosen.folder:
@@ -84,7 +85,7 @@ def main():
     parts = {}
     for name in contact.SETS:
         if comparable(name) and contact.geometry(name) is not None:
-            parts |= {(name, level): distributions(errors(name, level)) for level in chosen.resolution}
+            parts |= {(name, level): distributions(errors(name, level, chosen.patch)) for level in chosen.resolution}
     table = pd.concat(parts, names=["set", "resolution"]).reset_index(["set", "resolution"])
     print(table.to_markdown(index=False, floatfmt=".3g"))
 
