@@ -366,7 +366,7 @@ def test_bad_input_is_named(s1002, uic60, manchester):
         WheelOnRail(s1002, uic60, 0.46, 0.75, 760.5)
     with pytest.raises(InputError, match="gauge: .* a part"):
         u = np.linspace(-0.02, 0.02, 81)
-        WheelOnRail(s1002, ProfileCurve.from_points(u, np.sqrt(0.09 - u**2) - 0.3, "rail", "top"))
+        WheelOnRail(s1002, ProfileCurve.from_points(u, np.sqrt(0.09 - u**2) - 0.3, "rail", "top")).geometry  # noqa: B018
     with pytest.raises(InputError, match="gauge"):
         WheelsetOnTrack.alike(s1002, uic60, gauge=-1.0)
     with pytest.raises(InputError, match="gauge"):

@@ -138,4 +138,4 @@ def test_a_run_beside_the_exact_one():
     run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.3, "contact.patch": "exact"})
     y = run["wheelset"].y_m
     assert abs(table[:, 0] - y).max() < 2e-3 * abs(y).max()
-    assert np.sqrt(np.mean((table[:, 1] / load(run) - 1.0) ** 2)) < 1e-3
+    assert np.sqrt(np.mean((table[:, 1] / load(run) - 1.0) ** 2)) < 5e-3

@@ -46,13 +46,14 @@ class WheelOnRail:
         check_number(self.half_distance, *HALF_DISTANCES, "wheelset", "half_distance", "m")
         distance = 0.5 * 1.435 + self.rail.gauge_offset() if self.rail_distance is None else self.rail_distance
         object.__setattr__(self, "rail_distance", distance)
-        if math.isnan(distance):
-            raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
-        check_number(distance, *HALF_DISTANCES, "track", "rail_distance", "m")
+        if not math.isnan(distance):
+            check_number(distance, *HALF_DISTANCES, "track", "rail_distance", "m")
 
     @cached_property
     def geometry(self):
-        """The `ContactGeometry` of it, for kernels."""
+        """The `ContactGeometry` of it, for kernels; InputError where a part of a rail's profile has no gauge."""
+        if math.isnan(self.rail_distance):
+            raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
         return contact_geometry(
             self.wheel,
             self.rail,

@@ -54,7 +54,7 @@ def from_state(model: Model, vehicle: Vehicle, state: np.ndarray, source: str) -
         return model
     markers = joints.markers.copy()
     markers[joints.bodies[:, 1] == FRAME, 1, 0] += moved
-    elements = elements._replace(ahead=elements.ahead + moved)
+    elements = elements._replace(offset=elements.offset + moved)
     return model._replace(elements=elements, joints=joints._replace(markers=markers))
 
 
