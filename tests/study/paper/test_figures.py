@@ -14,6 +14,7 @@ from study.paper.figures import (
     fig4_lateral_position,
     fig5_contact_points,
 )
+from study.style import LINES
 from tests.conftest import SCENES
 from wrcore.analysis.pictures import style as figures
 from wrcore.scene.description import load_scene
@@ -84,7 +85,7 @@ def test_fig5_puts_every_patch_on_its_profile(scene):
 
 
 def test_planar_and_spatial_differ_in_grey_too():
-    planar, spatial = (luminance(figures.LINES[name]["color"]) for name in ("planar", "spatial"))
+    planar, spatial = (luminance(LINES[name]["color"]) for name in ("planar", "spatial"))
     # contrast as defined by WCAG 2; 2 and more are told apart side by side
     assert (spatial + 0.05) / (planar + 0.05) > 2.0
 

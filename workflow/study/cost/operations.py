@@ -259,7 +259,7 @@ def interpreted(tally):
                 new = mathematics
             elif name in registers and getattr(value, "__module__", "") == "wrcore.kernels.lanes":
                 new = registers[name]
-            elif (module.__name__, name) == ("wrcore.dynamics.system", "call_address"):
+            elif name == "call_address" and module.__name__ in ("wrcore.dynamics.system", "wrcore.dynamics.wheel"):
                 new = _call
             elif name == "member_of":
                 new = lambda whole, field, k: (getattr(whole, field) or {k: whole})[k]  # noqa: E731
