@@ -52,15 +52,10 @@ class WheelOnRail:
     @cached_property
     def geometry(self):
         """The `ContactGeometry` of it, for kernels; InputError where a part of a rail's profile has no gauge."""
-        if math.isnan(self.rail_distance):
+        distance = self.rail_distance
+        if distance is None or math.isnan(distance):
             raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
-        return contact_geometry(
-            self.wheel,
-            self.rail,
-            self.rolling_radius,
-            self.half_distance,
-            float(self.rail_distance),  # type: ignore[arg-type]
-        )
+        return contact_geometry(self.wheel, self.rail, self.rolling_radius, self.half_distance, float(distance))
 
 
 @checked
