@@ -1,14 +1,20 @@
 """Exact contact, looked up: against the exact solver, its symmetries, and the same bits however full the table is."""
 
+import math
+
 import numpy as np
 import pytest
 
 import wrcore as wr
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
+from wrcore.contact.detection import find_patches
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics import pair_store, pair_table
+from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, look_up
+from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 
 SPEED, Z = 20.0, 0.45973
 """Rolling speed, m/s, and height of the wheelset, m."""
@@ -72,6 +78,37 @@ def test_against_the_exact_solver(rolling_wheels):
     np.testing.assert_allclose(table[:, reduction.ANGLE], exact[:, reduction.ANGLE], atol=2e-4)
 
 
+def test_moment_and_creepages_of_the_exact_solver(rolling_wheels):
+    """The moment over mu N c, and creepages over V: of the same motion at nearly the same point."""
+    exact, table = rolling_wheels[1]["exact"], rolling_wheels[1]["tabulated"]
+    bound = 0.3 * exact[:, reduction.NORMAL] * np.sqrt(exact[:, reduction.SEMI_A] * exact[:, reduction.SEMI_B])
+    assert (abs(exact[:, reduction.MZ]) / bound).max() > 0.05
+    assert (abs(table[:, reduction.MZ] - exact[:, reduction.MZ]) / bound).max() < 0.005
+    for column, unit in ((reduction.XI, 1e-4), (reduction.ETA, 1e-4), (reduction.PHI, 1e-3)):
+        assert abs(exact[:, column]).max() > 10.0 * unit
+        np.testing.assert_allclose(table[:, column], exact[:, column], atol=unit)
+
+
+@pytest.mark.parametrize("vx", [SPEED, -SPEED])
+def test_power_of_the_wrench_is_that_of_the_patch(rolling_wheels, vx):
+    """Of all six velocities: V (Fx xi + Fy eta + Mz phi), less N times the rate at which wheel and rail approach."""
+    wheels, contact, axle = rolling_wheels[0]["tabulated"], rolling_wheels[0]["tabulated"]._rolling[0.3], (2e-3, 1e-3)
+    ex, ez = axle
+    z = Z - wheels.geometry.half_distance * ez
+    velocity = np.array([vx, 0.07, 0.003, 0.02, vx / 0.459, 0.015])
+    m = WheelMotion(1.0, -1.5e-3, z, ex, math.sqrt(1.0 - ex * ex - ez * ez), ez, *velocity, 0.0, 0.0, 0.3)
+    rows, row, wrench = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(6)
+    count = find_patches(wheels.geometry, *m[:6], True, reduction.MOMENT, rows)
+    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, row, wheels._work_handle)
+    place = row[[reduction.X, reduction.Y, reduction.Z]] - [0.0, m.y, m.z]
+    drift = velocity[:3] + np.cross(velocity[3:], place)
+    approach = drift[1] * row[reduction.SINE] - drift[2] * row[reduction.COSINE]
+    creep = row[[reduction.FX, reduction.FY, reduction.MZ]] @ row[[reduction.XI, reduction.ETA, reduction.PHI]]
+    assert wheels._counters[3] == 0 and abs(creep * SPEED) > 100.0
+    expected = SPEED * creep - row[reduction.NORMAL] * approach
+    assert wrench @ velocity == pytest.approx(expected, abs=1e-3 * abs(creep * SPEED))
+
+
 def test_a_right_wheel_is_the_mirror_image_of_a_left_one(rolling_wheels):
     wheels = rolling_wheels[0]["tabulated"]
     (left,), (right,) = (
@@ -131,6 +168,32 @@ def test_the_same_bits_on_an_empty_a_full_and_a_damaged_table(own_cache, capsys)
     path.write_bytes(path.read_bytes()[:-100])
     np.testing.assert_array_equal(simulated(), empty)
     assert "solved anew" in capsys.readouterr().err
+
+
+def test_what_went_wrong_while_solving_is_not_kept(own_cache, monkeypatch, capsys):
+    """A cell whose solution failed is solved anew the next time: the same bits as if nothing had happened."""
+
+    def fail(*_):
+        raise MemoryError("no more")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(pair_store.Pair, "solve", fail)
+        simulated()
+    assert capsys.readouterr().err.count("no more") == 1
+    for pair in list(pair_store._PAIRS.values()):
+        assert not pair._cells.any()
+    assert not list(own_cache.iterdir())
+
+
+def test_another_profile_or_friction_is_another_table(own_cache, benchmark_pair):
+    wheels = LoadedWheels(benchmark_pair, "tabulated")
+    contact = wheels._at_work(0.3).value
+    filed = benchmark_pair.rail.copy()
+    filed[len(filed) // 2, 0] += 1e-9
+    changed = contact._replace(geometry=benchmark_pair._replace(rail=filed))
+    slippery = contact._replace(strips=contact.strips._replace(looked_up=0.2))
+    coarse = contact._replace(strips=contact.strips._replace(strips=8))
+    assert len({pair_store.pair_of(one).path for one in (contact, changed, slippery, coarse)}) == 4
 
 
 def test_a_run_beside_the_exact_one():

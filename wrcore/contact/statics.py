@@ -149,3 +149,30 @@ def settle(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nomina
         if high - low < 1e-13:
             break
     return 0.5 * (low + high), 0.5 * (z + other)
+
+
+def height_of_zero(excess, z):
+    """Zero of a function that falls with z, nearly linear near it: a bracket, then Illinois steps; NaN if lost."""
+    low = high = math.nan
+    e_low = e_high = 0.0
+    step, last = 2e-5, 0
+    for _ in range(60):
+        e = excess(z)
+        if math.isnan(e):
+            return math.nan
+        pressed = e > 0.0
+        if pressed:
+            low, e_low = z, e
+            e_high *= 0.5 if last > 0 else 1.0
+        else:
+            high, e_high = z, e
+            e_low *= 0.5 if last < 0 else 1.0
+        if math.isnan(low) or math.isnan(high):
+            z, step = z + (step if pressed else -step), 2.0 * step
+            continue
+        last = 1 if pressed else -1
+        new = low + (high - low) * e_low / (e_low - e_high)
+        if abs(new - z) < 1e-13 or high - low < 1e-13:
+            return new
+        z = new
+    return math.nan

@@ -10,7 +10,8 @@ from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import group_end, material_point
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
-from wrcore.contact.reduction import MOMENT
+from wrcore.contact.reduction import MOMENT, PENETRATION
+from wrcore.contact.statics import height_of_zero
 from wrcore.contact.strip import make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_forces
@@ -21,6 +22,8 @@ from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
 SUMS = 13
+"""Of `solve_motions`."""
+
 PROBE = 0.06
 """Creepages, over those of saturation, between which the slopes at rest are taken."""
 
@@ -43,33 +46,6 @@ def overlaps_at(geometry, y, z, ex, ey, ez, flange, rows):
 
 
 @jit(allocates=False)
-def height_of(geometry, y, ex, ey, ez, depth, flange, rows):
-    """Height of the wheelset's centre at which the overlaps have a depth D (Illinois steps); NaN if there is none."""
-    z, low, high, e_low, e_high = geometry.rolling_radius - geometry.half_distance * ez, np.nan, np.nan, 0.0, 0.0
-    last, step = 0, 2e-5
-    for _ in range(80):
-        e = overlaps_at(geometry, y, z, ex, ey, ez, flange, rows)[2] - depth
-        if abs(e) < 1e-9 * depth:
-            return z
-        if e > 0.0:
-            low, e_low = z, e
-            if last > 0:
-                e_high *= 0.5
-        else:
-            high, e_high = z, e
-            if last < 0:
-                e_low *= 0.5
-        if math.isnan(low) or math.isnan(high):
-            z, step = z + (step if e > 0.0 else -step), 2.0 * step
-            continue
-        last = 1 if e > 0.0 else -1
-        z = low + (high - low) * e_low / (e_low - e_high)
-        if high - low < 1e-14:
-            return z
-    return np.nan
-
-
-@jit(allocates=False)
 def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters, work):
     """Exact solution of a left wheel's pose for several velocities (n, 6) of its wheelset, linear and angular: the mean
     of those with less and with more strips.
@@ -82,7 +58,7 @@ def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters,
     first, last, _ = overlaps_at(geometry, y, z, ex, ey, ez, flange, work.rows)
     if first == last:
         return False
-    pose = make_pose(1.0, y, z, ex, ey, ez, True)
+    pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), work.rows[first:last, PENETRATION].max()
     sums[:] = 0.0
     forces[:] = 0.0
     for turn in range(2):
@@ -99,7 +75,7 @@ def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters,
             m = WheelMotion(1.0, y, z, ex, ey, ez, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
             for q in range(6):
                 work.wrench[0, q] = work.wrench[1, q] = 0.0
-            found = roll_patch(model, m, pose, frame, windows, 0.0, 1.0, model.friction, 1.0, counters, work)
+            found = roll_patch(model, m, pose, frame, windows, deepest, 1.0, model.friction, 1.0, counters, work)
             for q in range(6):
                 forces[k, q] += weight * work.wrench[1, q]
         for i in range(work.normal.start[windows]):
@@ -113,11 +89,8 @@ def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters,
             )  # fmt: skip
         for q in range(6):
             sums[q] += weight * work.wrench[0, q]
-        sums[9], sums[10], sums[11] = (
-            sums[9] + weight * found.a,
-            sums[10] + weight * found.b,
-            sums[11] + weight * found.p_max,
-        )
+        for q, value in ((9, found.a), (10, found.b), (11, found.p_max)):
+            sums[q] += weight * value
         if not share > 0.0:
             break
     return True
@@ -134,7 +107,8 @@ def solve_place(contact, handle, work, place, points):
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
     axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
     y = t + geometry.rail_distance - half * axle[1]
-    z = height_of(geometry, y, *axle, depth, flange, work.value.rows)
+    level = radius - half * axle[2]
+    z = height_of_zero(lambda z: overlaps_at(geometry, y, z, *axle, flange, work.value.rows)[2] - depth, level)
     if math.isnan(z):
         return None
     sums, counters = np.zeros(SUMS), np.zeros(4, np.int64)
@@ -173,15 +147,10 @@ def solve_place(contact, handle, work, place, points):
         return solved, np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
 
     solved, exact, table = exact_and_table(AT_REST, np.ones(2))
-    slopes = (
-        [(force[0] - force[1])[0] for force in (exact, table)],
-        [(force[2] - force[3])[1] for force in (exact, table)],
-    )
-    factors = np.clip([of_exact / of_table for of_exact, of_table in slopes], 0.5, 2.0)
-    numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1], numbers[columns.FORCE : columns.MODE] = (
-        factors,
-        exact[4] - table[4],
-    )
+    of_exact, of_table = (np.diag(force[[0, 2]] - force[[1, 3]]) for force in (exact, table))
+    factors = np.clip(of_exact / of_table, 0.5, 2.0)
+    numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
+    numbers[columns.FORCE : columns.MODE] = exact[4] - table[4]
     solved_too, exact, table = exact_and_table(points, factors)
     return (numbers, exact - table) if solved and solved_too and np.isfinite(exact).all() else None
 

@@ -28,7 +28,7 @@ from wrcore.kernels.cache import source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
 
 SHIPPED = Path(__file__).parent / "tables"
-"""Folder of what comes with the package: the modes, made by ``python -m study.contact.creep_modes``."""
+"""Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
 WRONG_NORMAL, WRONG_FORCE = 3e-3, 0.01
 """Errors in the middle of a cell, of N and over mu N, from which on its patches are solved instead of looked up."""
@@ -92,8 +92,7 @@ class Pair:
                     self.misses[cell] = miss = self._miss(*cell)
                     found = READY if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE else HARD
                 self._cells[cell] = found
-            except BaseException as error:  # a kernel cannot hand it on
-                self._cells[cell] = HARD
+            except BaseException as error:  # a kernel cannot hand it on; the cell stays EMPTY, as if never met
                 _hand_on(error)
             self._spent += time.monotonic() - begin
             if self._spent > _PATIENCE and not self._told:
@@ -196,7 +195,12 @@ def _hand_on(error):
 
         _thread.interrupt_main()
     else:
-        warn(f"exact contact: {error!r}; the patch is solved without a table")
+        _warn_once(f"exact contact: {error!r}; patches are solved without a table")
+
+
+@cache
+def _warn_once(text):
+    warn(text)
 
 
 def with_pair(contact):

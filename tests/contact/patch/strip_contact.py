@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wrcore.analysis.contact.loaded import height_of_zero
 from wrcore.contact.detection import axle_direction, find_patches
 from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch import solve
@@ -14,6 +13,7 @@ from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, WEIGHT, WIDENED, normal_work
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
+from wrcore.contact.statics import height_of_zero
 from wrcore.contact.strip import make_pose
 from wrcore.geometry.track import SIDES
 
