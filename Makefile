@@ -44,7 +44,8 @@ report: $(STAMP)
 	$(SNAKEMAKE) --forcerun report_pages report_archive
 
 figures:
-	for name in $(notdir $(wildcard reports/figures/*.png)); do cp results/*/$$name reports/figures/ || exit 1; done
+	for path in $(wildcard results/*/*.png); do \
+	    if [ -e reports/figures/$${path##*/} ]; then cp $$path reports/figures/ || exit 1; fi; done
 
 docs: $(DOCS_STAMP)
 	$(BIN)/python docs/build.py results/docs

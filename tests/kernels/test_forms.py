@@ -2,12 +2,15 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
 from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import jit
@@ -109,3 +112,30 @@ def test_the_cache_gives_what_was_compiled_for_this_processor(tmp_path):
     (first, compiled), (second, again), (other, anew) = run(), run(), run(NUMBA_CPU_NAME="generic")
     assert first[:3] == second[:3] == other[:3] == [[[2.0, 3.0], [6.0, 11.0]], 120, "two rows, please"]
     assert compiled > 0 and again == 0 and anew == compiled
+
+
+def test_kernels_of_edited_sources_are_not_kept(tmp_path):
+    """A process whose sources are edited while it runs may compile what its digest does not name: the folder stays as
+    it is, and the source state that comes back later finds no kernel of another."""
+    package = tmp_path / "wrcore"
+    shutil.copytree(Path(forms.__file__).parents[1], package, ignore=shutil.ignore_patterns("__pycache__"))
+    script = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from pathlib import Path\n"
+        "from wrcore.contact import normal\n"
+        f"assert normal.__file__.startswith({str(tmp_path)!r})\n"
+        "source = Path(normal.__file__).with_name('statics.py')\n"
+        "if sys.argv[1:]:\n"
+        "    source.write_text(source.read_text() + '\\n')\n"
+        "normal.damping_factor(0.0, 1.0, 1.0)\n"
+    )
+
+    def kept(cache, *edited):
+        environment = os.environ | {"WRCORE_CACHE": str(cache)}
+        told = subprocess.run([sys.executable, "-c", script, *edited], env=environment, capture_output=True, text=True)
+        assert told.returncode == 0, told.stderr
+        return told.stderr, len(list(cache.rglob("*.nbc")))
+
+    assert kept(tmp_path / "as_read")[1] > 0
+    message, count = kept(tmp_path / "edited", "edited")
+    assert "edited" in message and count == 0

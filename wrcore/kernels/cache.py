@@ -19,17 +19,34 @@ from pathlib import Path
 
 KERNEL_ROOMS = ("kernels", "geometry", "contact", "creep", "elements", "dynamics", "integrate")
 _KEEP_SECONDS = 14 * 86400
+_ROOT = Path(__file__).parents[1]
+
+
+def source_digest():
+    """Digest (16 hex digits) of the sources that kernels are made of, as this process first read them."""
+    return _first_read()[0]
+
+
+def sources_changed():
+    """Whether a source was edited since: what is imported later is no longer what the digest says."""
+    return _stamps() != _first_read()[1]
 
 
 @cache
-def source_digest():
-    """Digest (16 hex digits) of the sources that kernels are made of."""
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for path in sorted(p for room in KERNEL_ROOMS for p in (root / room).rglob("*.py")):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def _first_read():
+    """Digest of the sources, and their stamps before they were read."""
+    stamps, digest = _stamps(), hashlib.sha256()
+    for name, _, _ in stamps:
+        digest.update(name.encode())
+        digest.update((_ROOT / name).read_bytes())
+    return digest.hexdigest()[:16], stamps
+
+
+def _stamps():
+    """Name, time and size of each source."""
+    paths = sorted(path for room in KERNEL_ROOMS for path in (_ROOT / room).rglob("*.py"))
+    states = ((path, path.stat()) for path in paths)
+    return [(path.relative_to(_ROOT).as_posix(), state.st_mtime_ns, state.st_size) for path, state in states]
 
 
 def kernel_folder():

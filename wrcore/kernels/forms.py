@@ -18,7 +18,7 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
-from wrcore.kernels.cache import kernel_folder, warn
+from wrcore.kernels.cache import kernel_folder, sources_changed, warn
 
 _FOLDER = str(kernel_folder())
 
@@ -113,7 +113,11 @@ class KernelCache(FunctionCache):
         return None
 
     def save_overload(self, *args):
-        self._tried(super().save_overload, *args)
+        """Keep a kernel; not if its sources were edited since this process began, whose digest names the folder."""
+        if sources_changed():
+            warn("sources of kernels were edited while this process ran: its kernels are not kept")
+        else:
+            self._tried(super().save_overload, *args)
 
     def _tried(self, act, *args):
         try:
