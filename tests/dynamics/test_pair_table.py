@@ -10,11 +10,14 @@ from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.detection import find_patches
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics import pair_store, pair_table
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, look_up
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.standards import named_profile
 
 SPEED, Z = 20.0, 0.45973
 """Rolling speed, m/s, and height of the wheelset, m."""
@@ -30,13 +33,17 @@ def own_cache(tmp_path, monkeypatch):
 
 def test_what_is_linear_is_looked_up_exactly():
     """And what depends on yaw as a parabola."""
-    i, j, k, yaw = np.meshgrid(*map(np.arange, (6, 6, 6)), (0.0, YAW, -YAW), indexing="ij")
-    lattice = np.zeros((*i.shape, pair_table.NUMBERS), np.float32)
-    lattice[..., 0] = 2.0 * i - 3.0 * j + 0.5 * k
-    lattice[..., 1] = i + 4.0 * yaw / YAW + 2.0 * (yaw / YAW) ** 2
+    key = pair_table.key_of(1, 7, 300, 200, 9)
+    assert pair_table.corner_of(key) == (1, 7, 300, 200, 9)
+    nodes = np.zeros((pair_table.CORNERS + 1, pair_table.NUMBERS), np.float32)
+    for n, (_, _, i, j, k, w) in enumerate(pair_store._nodes_of(key), 1):
+        nodes[n, :2] = (
+            2.0 * (i - 300) - 3.0 * (j - 200) + 0.5 * (k - 9),
+            (i - 300) + 4.0 * (0, 1, -1)[w] + 2.0 * (w > 0),
+        )
     numbers = np.empty(pair_table.NUMBERS)
-    look_up(lattice, 2, 3, 1, 0.3, 0.6, 0.9, 0.4 * YAW, numbers)
-    np.testing.assert_allclose(numbers[:2], [2 * 2.3 - 3 * 3.6 + 0.5 * 1.9, 2.3 + 1.6 + 0.32], rtol=1e-6)
+    look_up(nodes, np.arange(1, pair_table.CORNERS + 1, dtype=np.int32), 0.3, 0.6, 0.9, 0.4 * YAW, numbers)
+    np.testing.assert_allclose(numbers[:2], [2 * 0.3 - 3 * 0.6 + 0.5 * 0.9, 0.3 + 1.6 + 0.32], rtol=1e-6)
 
 
 def test_modes_leave_the_slopes_at_rest():
@@ -107,6 +114,32 @@ def test_power_of_the_wrench_is_that_of_the_patch(rolling_wheels, vx):
     assert wheels._counters[3] == 0 and abs(creep * SPEED) > 100.0
     expected = SPEED * creep - row[reduction.NORMAL] * approach
     assert wrench @ velocity == pytest.approx(expected, abs=1e-3 * abs(creep * SPEED))
+
+
+def test_lobes_that_are_apart():
+    """A wheel that stands on both edges of its hollow, 30 mm apart: each lobe is looked up, with what the other's
+    pressure and friction do to it."""
+    new, rail = named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40)
+    u = np.linspace(-0.06, 0.055, 1151)
+    hollow = ProfileCurve.from_points(u, new(u) + 1e-3 * (np.exp(-((u / 0.015) ** 2)) - 1.0), "wheel")
+    models = {name: LoadedWheels(WheelOnRail(hollow, rail).geometry, name) for name in ("exact", "tabulated")}
+    for y, yaw, drift in ((0.3e-3, 2e-3, 2e-3), (0.5e-3, -1e-3, -1e-3), (0.7e-3, 0.0, 3e-3)):
+        roll, _ = models["exact"].settled(y, 6e4)
+        z = models["exact"].height("left", y, 6e4, roll, yaw)
+        rolling = Rolling(SPEED, SPEED / 0.459, SPEED * (yaw + drift))
+        (exact,), (table,) = (models[name].at_height("left", y, z, roll, yaw, rolling) for name in models)
+        exact, table = exact.row, table.row
+        normal = exact[reduction.NORMAL]
+        assert exact[reduction.SEMI_B] > 0.02  # of both lobes together
+        assert table[reduction.NORMAL] == pytest.approx(normal, rel=2e-3)
+        limit, c = 0.3 * normal, math.sqrt(exact[reduction.SEMI_A] * exact[reduction.SEMI_B])
+        assert math.hypot(*(table - exact)[[reduction.FX, reduction.FY]]) < 5e-3 * limit
+        assert table[reduction.MZ] == pytest.approx(exact[reduction.MZ], abs=0.01 * limit * c)
+        assert table[reduction.P_MAX] == pytest.approx(exact[reduction.P_MAX], rel=2e-3)
+        np.testing.assert_allclose(table[[reduction.X, reduction.Y]], exact[[reduction.X, reduction.Y]], atol=2e-4)
+        for column, unit in ((reduction.XI, 2e-5), (reduction.ETA, 2e-5), (reduction.PHI, 3e-3)):
+            assert table[column] == pytest.approx(exact[column], abs=unit)
+    assert models["tabulated"]._counters[3] == 0
 
 
 def test_a_right_wheel_is_the_mirror_image_of_a_left_one(rolling_wheels):
@@ -181,7 +214,7 @@ def test_what_went_wrong_while_solving_is_not_kept(own_cache, monkeypatch, capsy
         simulated()
     assert capsys.readouterr().err.count("no more") == 1
     for pair in list(pair_store._PAIRS.values()):
-        assert not pair._cells.any()
+        assert not pair.cells
     assert not list(own_cache.iterdir())
 
 

@@ -11,6 +11,7 @@ from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.gap import Frame
+from wrcore.contact.patch.model import strip_model, strip_work
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.motion import WheelMotion
@@ -188,3 +189,12 @@ def test_steady_running_needs_no_step_at_the_start():
     load = run["wheelset/left"].N_N[:, 0]
     assert np.ptp(load) < 2e-5 * load[0]
     assert len(run.end_state) == STATE_SIZE
+
+
+def test_a_scene_of_ellipses_carries_no_strips():
+    """Its scratch arrays for patches take next to nothing, those of strips some 700 kB."""
+
+    def size(part):
+        return sum(map(size, part)) if isinstance(part, tuple) else part.nbytes
+
+    assert size(strip_work(strip_model("moment"), 4)) < 10_000 < size(strip_work(strip_model("exact"), 1))

@@ -12,50 +12,81 @@ from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MOMENT, PENETRATION
 from wrcore.contact.statics import height_of_zero
-from wrcore.contact.strip import make_pose
+from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import NUMBERS, depth_of
+from wrcore.dynamics.pair_table import NUMBERS, PART, depth_of, lobe_end
 from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
-SUMS = 13
+SUMS = 12
 """Of `solve_motions`."""
 
 PROBE = 0.06
-"""Creepages, over those of saturation, between which the slopes at rest are taken."""
+"""Creepages, over those of saturation, between which the slopes at rest are taken; where spin leaves less than a fifth
+of the table's slope, its factor is 1."""
 
 AT_REST = PROBE * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0, 0]])
 """Creepages with which slopes and force at rest are found."""
 
 
+REACH = 2.0 * PART
+"""A lobe this far from a place on the wheel's profile may still be meant, m."""
+
+
 @jit(allocates=False)
-def overlaps_at(geometry, y, z, ex, ey, ez, flange, rows):
-    """First and end of the tread's or the flange's overlaps, and their depth D; 0, 0, 0 where there are none."""
+def lobe_at(geometry, y, z, ex, ey, ez, place, rows):
+    """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, and their depth D; 0, 0, 0
+    where there is none."""
+    low, high, found, nearest, first = 0, 0, 0.0, REACH, 0
     count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
-    first = 0
     while first < count:
-        last = group_end(rows, count, first)
-        depth, steep = depth_of(rows, first, last)
-        if steep == flange:
-            return first, last, depth
-        first = last
-    return 0, 0, 0.0
+        group = group_end(rows, count, first)
+        while first < group:
+            last = lobe_end(rows, first, group)
+            depth, u = depth_of(rows, first, last, 0.0)
+            if abs(u - place) < nearest:
+                low, high, found, nearest = first, last, depth, abs(u - place)
+            first = last
+    return low, high, found
 
 
 @jit(allocates=False)
-def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters, work):
-    """Exact solution of a left wheel's pose for several velocities (n, 6) of its wheelset, linear and angular: the mean
-    of those with less and with more strips.
+def least_gap(geometry, y, z, ex, ey, ez, place):
+    """Smallest vertical gap about a place on the wheel's profile, m."""
+    pose, least = make_pose(1.0, y, z, ex, ey, ez, True), 1.0
+    for k in range(-8, 9):
+        least = min(least, gap_at(geometry, pose, place + 0.125 * PART * k)[0])
+    return least
+
+
+def _height(geometry, y, axle, depth, u, rows):
+    """Height at which the lobe nearest to ``u`` has a depth D; NaN where there is none."""
+    level = geometry.rolling_radius - geometry.half_distance * axle[2]
+    level -= least_gap(geometry, y, level, *axle, u) + 0.5 * depth
+
+    def excess(z):
+        found = lobe_at(geometry, y, z, *axle, u, rows)[2]
+        if found == 0.0 and least_gap(geometry, y, z, *axle, u) < 0.0:  # one with its neighbours
+            return depth
+        return found - depth
+
+    z = height_of_zero(excess, level)
+    return z if abs(lobe_at(geometry, y, z, *axle, u, rows)[2] - depth) < 1e-6 * depth else math.nan
+
+
+@jit(allocates=False)
+def solve_motions(model, y, z, axle, place, velocities, forces, sums, counters, work):
+    """Exact solution of a left wheel's lobe near a ``place`` on its profile (m) for several velocities (n, 6) of its
+    wheelset, linear and angular: the mean of those with less and with more strips.
 
     Fills ``forces`` (n, 6), wrenches of friction about the wheelset's centre at V = 1 m/s, and ``sums`` (SUMS,):
-    wrench of pressure, place of the slip from the centre, semi-axes, p_max, and height over the rail's surface. Returns
-    whether strips found a solution.
+    wrench of pressure, place of the slip from the centre, semi-axes and p_max. Returns whether strips found a solution.
     """
     finer, share, geometry, (ex, ey, ez) = work.normal.more, 0.0, model.geometry, axle
-    first, last, _ = overlaps_at(geometry, y, z, ex, ey, ez, flange, work.rows)
+    first, last, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
     if first == last:
         return False
     pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), work.rows[first:last, PENETRATION].max()
@@ -84,9 +115,7 @@ def solve_motions(model, y, z, axle, flange, velocities, forces, sums, counters,
                 geometry, pose, frame, work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i], height,
                 work.strips[solve.STRIP_TILT, i],
             )  # fmt: skip
-            sums[6], sums[7], sums[8], sums[12] = (
-                sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz, sums[12] + part * height
-            )  # fmt: skip
+            sums[6], sums[7], sums[8] = sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz
         for q in range(6):
             sums[q] += weight * work.wrench[0, q]
         for q, value in ((9, found.a), (10, found.b), (11, found.p_max)):
@@ -101,21 +130,20 @@ def solve_place(contact, handle, work, place, points):
     creepages (n, 2) over those of saturation; None where strips find no solution.
 
     ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``work``: handle of a `StripWork`;
-    ``place``: t, slope of the axle, depth D, yaw, and whether it is the flange's.
+    ``place``: t, slope of the axle, depth D, yaw, and place on the wheel's profile, m.
     """
-    (t, slope, depth, yaw, flange), geometry = place, contact.geometry
+    (t, slope, depth, yaw, u), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
     axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
     y = t + geometry.rail_distance - half * axle[1]
-    level = radius - half * axle[2]
-    z = height_of_zero(lambda z: overlaps_at(geometry, y, z, *axle, flange, work.value.rows)[2] - depth, level)
+    z = _height(geometry, y, axle, depth, u, work.value.rows)
     if math.isnan(z):
         return None
     sums, counters = np.zeros(SUMS), np.zeros(4, np.int64)
 
     def forces_at(velocities):
         forces = np.zeros((len(velocities), 6))
-        return solve_motions(handle, y, z, tuple(axle), flange, velocities, forces, sums, counters, work), forces
+        return solve_motions(handle, y, z, tuple(axle), u, velocities, forces, sums, counters, work), forces
 
     if not forces_at(np.array([[1.0, 0.0, 0.0, *(axle / radius)]]))[0]:
         return None
@@ -123,7 +151,7 @@ def solve_place(contact, handle, work, place, points):
     cosine, sine = sums[2] / normal, -sums[1] / normal
     numbers = np.zeros(NUMBERS)
     numbers[columns.LOG_NORMAL] = math.log(normal / (modulus * depth**1.5))
-    numbers[columns.ANGLE], numbers[columns.HEIGHT] = math.atan2(sine, cosine), sums[12]
+    numbers[columns.ANGLE] = math.atan2(sine, cosine)
     numbers[columns.PLACE_X : columns.PLACE_Z + 1] = slip - half * axle + [0.0, 0.0, radius]
     numbers[[columns.LOG_A, columns.LOG_B, columns.LOG_PEAK]] = np.log([a, b, sums[11] / modulus])
     # what is added to rolling without slip in the mean, over the creepages of saturation
@@ -148,7 +176,8 @@ def solve_place(contact, handle, work, place, points):
 
     solved, exact, table = exact_and_table(AT_REST, np.ones(2))
     of_exact, of_table = (np.diag(force[[0, 2]] - force[[1, 3]]) for force in (exact, table))
-    factors = np.clip(of_exact / of_table, 0.5, 2.0)
+    linear = np.clip(2.5 * np.abs(of_table) / (6.0 * PROBE) - 0.5, 0.0, 1.0)
+    factors = 1.0 + linear**2 * (3.0 - 2.0 * linear) * (np.clip(of_exact / of_table, 0.5, 2.0) - 1.0)
     numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
     numbers[columns.FORCE : columns.MODE] = exact[4] - table[4]
     solved_too, exact, table = exact_and_table(points, factors)

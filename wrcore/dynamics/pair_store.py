@@ -9,7 +9,9 @@ one.
 import atexit
 import ctypes
 import hashlib
+import itertools
 import math
+import os
 import time
 from functools import cache
 from pathlib import Path
@@ -21,17 +23,23 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES, NUMBERS, PairTable, strip_work
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import COUNTS, EMPTY, FIRST, HARD, READY, STEPS, YAW
+from wrcore.dynamics.pair_table import CORNERS, FIELD, FINER, FIRST, HARD, LEVELS, PART, STEPS, YAW, corner_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.kernels.cache import source_digest, table_folder, warn
+from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
 
 SHIPPED = Path(__file__).parent / "tables"
 """Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
 WRONG_NORMAL, WRONG_FORCE = 3e-3, 0.01
-"""Errors in the middle of a cell, of N and over mu N, from which on its patches are solved instead of looked up."""
+"""Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice or the solver."""
+
+WORTH = 4.0
+"""Where a cell misses by less than so many times that, half its steps are tried."""
+
+NODES, CELLS, SLOTS = 300_000, 40_000, 100_003
+"""Room for nodes, cells with corners, and cells."""
 
 _PATIENCE = 3.0
 """Solving takes this long before it says so, and files are written this often, s."""
@@ -64,35 +72,33 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock, self._tools = table_folder() / f"pair_{digest}.h5", contact, Lock(), None
-        self._cells, self._nodes = np.zeros((2, *COUNTS), np.uint8), np.zeros((2, *COUNTS, 3, NUMBERS), np.float32)
-        self._known = np.zeros((2, *COUNTS, 3), np.uint8)
-        self._told, self._new, self._spent, self._written, self.misses = False, 0, 0.0, time.monotonic(), {}
-        self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)(self._fill)
+        self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
+        self._corners, self._nodes = np.zeros((CELLS, CORNERS), np.int32), np.zeros((NODES, NUMBERS), np.float32)
+        self._rows, self._used, self.cells, self._ready, self.misses = {}, 0, {}, 0, {}
+        self._told, self._new, self._spent, self._written = False, 0, 0.0, time.monotonic()
+        self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
+        drop_unused(self.path.parent, "pair_*.h5")
         self._read()
 
     @property
     def __array_interface__(self):
-        """The cells: who holds an array of them holds the pair."""
-        return self._cells.__array_interface__
+        """The keys: who holds an array of them holds the pair."""
+        return self._keys.__array_interface__
 
     def table(self):
         """`PairTable` for kernels, which keeps the pair alive."""
         address = ctypes.cast(self._call, ctypes.c_void_p).value
-        return PairTable(np.asarray(self), self._nodes, creep_modes().values, address)
+        return PairTable(np.asarray(self), self._states, self._corners, self._nodes, creep_modes().values, address)
 
-    def _fill(self, *cell):
+    def _fill(self, key):
         """Solve what a cell needs; kernels call this."""
         with self._lock:
-            if self._cells[cell] != EMPTY:
+            if key in self.cells:
                 return
             begin = time.monotonic()
             try:
-                found = READY if all([self._solve(node) for node in _nodes_of(*cell)]) else HARD
-                if found == READY:
-                    self.misses[cell] = miss = self._miss(*cell)
-                    found = READY if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE else HARD
-                self._cells[cell] = found
-            except BaseException as error:  # a kernel cannot hand it on; the cell stays EMPTY, as if never met
+                self._keep(key, self._solved(key))
+            except BaseException as error:  # a kernel cannot hand it on; the cell stays as if never met
                 _hand_on(error)
             self._spent += time.monotonic() - begin
             if self._spent > _PATIENCE and not self._told:
@@ -101,18 +107,63 @@ class Pair:
             if time.monotonic() - self._written > _PATIENCE:
                 self.write()
 
-    def _solve(self, node):
-        """Solve a node unless that was done; whether it has a solution."""
-        if not self._known[node]:
-            branch, i, j, k, yaw = node
-            numbers = self._at(branch, i, j, k, _YAWS[yaw])
-            self._nodes[node], self._known[node], self._new = numbers, 1 + math.isnan(numbers[0]), self._new + 1
-        return self._known[node] == 1
+    def _solved(self, key):
+        """State of a cell: 1 where its nodes have solutions and its middle is right."""
+        for node in _nodes_of(key):
+            if node not in self._rows:
+                self._rows[node] = self._add(self._at(*node[:-1], _YAWS[node[-1]]))
+                self._new += 1
+        corners = self._corners_of(key)
+        self.misses[key] = miss = (math.nan, math.nan) if corners is None else self._miss(key, corners)
+        if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE:
+            return 1
+        promising = miss[0] < WORTH * WRONG_NORMAL and miss[1] < WORTH * WRONG_FORCE
+        return FINER if promising and corner_of(key)[0] + 1 < LEVELS else HARD
 
-    def _at(self, branch, i, j, k, yaw):
-        """Numbers of a place in steps of the lattice; NaN where there is no solution."""
-        modes, (t, slope, log_depth) = creep_modes(), np.array(FIRST) + np.array(STEPS) * (i, j, k)
-        found = self.solve((t, slope, math.exp(log_depth), yaw, bool(branch)), modes.points)
+    def _keep(self, key, state):
+        """Let kernels see a cell."""
+        if 10 * len(self.cells) > 9 * SLOTS:
+            raise MemoryError(f"no room for more than {len(self.cells)} cells of {self.path.name}")
+        if state > 0:
+            self._corners[self._ready + 1] = self._corners_of(key)
+            self._ready += 1
+        slot = key % SLOTS
+        while self._keys[slot]:
+            slot = (slot + 1) % SLOTS
+        self._states[slot] = self._ready if state > 0 else state
+        self._keys[slot], self.cells[key] = key, state
+
+    def _add(self, numbers):
+        """Row of new numbers."""
+        row = self._used
+        self._nodes[row] = numbers
+        self._used += 1
+        return row
+
+    def _corners_of(self, key):
+        """Rows that a cell is looked up from; None if one of its own corners has no solution. Those beyond that have
+        none go on as a straight line does."""
+        nodes = _nodes_of(key)
+        rows = np.array([self._rows[node] for node in nodes])
+        lost = np.isnan(self._nodes[rows, 0])
+        if lost[_OWN].any():
+            return None
+        for n in np.flatnonzero(lost):
+            place = np.unravel_index(n, (4, 4, 4))
+            near = np.clip(place, 1, 2)
+            numbers = self._nodes[rows[np.ravel_multi_index(near, (4, 4, 4))]].copy()
+            for axis in np.flatnonzero(place != near):
+                far = near.copy()
+                far[axis] = 3 - near[axis]
+                numbers += self._nodes[rows[np.ravel_multi_index(near, (4, 4, 4))]]
+                numbers -= self._nodes[rows[np.ravel_multi_index(far, (4, 4, 4))]]
+            rows[n] = self._add(numbers)
+        return rows.astype(np.int32)
+
+    def _at(self, level, part, i, j, k, yaw):
+        """Numbers of a place in steps of a lattice; NaN where there is no solution."""
+        modes, (t, slope, log_depth) = creep_modes(), np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
+        found = self.solve((t, slope, math.exp(log_depth), yaw, FIELD + part * PART), modes.points)
         if found is None:
             return np.full(NUMBERS, np.nan)
         numbers, remainder = found
@@ -128,10 +179,11 @@ class Pair:
             self._tools = Handle(self.contact), Handle(strip_work(self.contact.strips, 1))
         return solve_place(self.contact, *self._tools, place, points)
 
-    def _miss(self, branch, i, j, k):
+    def _miss(self, key, corners):
         """Errors in the middle of a cell: of N, and of the creep force over mu N at rest and where modes are found."""
-        exact, found, modes = self._at(branch, i + 0.5, j + 0.5, k + 0.5, 0.0), np.empty(NUMBERS), creep_modes()
-        columns.look_up(self._nodes[branch], i, j, k, 0.5, 0.5, 0.5, 0.0, found)
+        level, part, i, j, k = corner_of(key)
+        exact, found, modes = self._at(level, part, i + 0.5, j + 0.5, k + 0.5, 0.0), np.empty(NUMBERS), creep_modes()
+        columns.look_up(self._nodes, corners, 0.5, 0.5, 0.5, 0.0, found)
         both = np.stack([exact, found])
         mode, force = both[:, columns.MODE : columns.MODE + MODES], both[:, columns.FORCE : columns.MODE]
         forces = mode @ np.linalg.pinv(modes.inverse).T
@@ -144,15 +196,17 @@ class Pair:
         """Take what the file knows."""
         if self.path.exists():
             try:
+                os.utime(self.path)
                 with checked_hdf5(self.path, "a pair's table") as file:
-                    places, cells = file["places"][...], file["cells"][...]
-                    numbers, misses = file["numbers"][...], file["misses"][...]
-                self._nodes[tuple(places[:, :5].T)], self._known[tuple(places[:, :5].T)] = numbers, places[:, 5]
-                self._cells[tuple(cells[:, :4].T)] = cells[:, 4]
-                self.misses |= {
-                    tuple(map(int, cell[:4])): tuple(miss) for cell, miss in zip(cells, misses, strict=True)
-                }
-            except (InputError, IndexError) as error:
+                    places, numbers, cells, misses = (file[name][...] for name in _PARTS)
+                for place, row in zip(map(tuple, places.tolist()), numbers, strict=True):
+                    if place not in self._rows:
+                        self._rows[place] = self._add(row)
+                for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
+                    if key not in self.cells:
+                        self._keep(key, state)
+                        self.misses[key] = miss
+            except (InputError, KeyError, ValueError, IndexError, OSError) as error:
                 warn(f"{error}; it is solved anew")
 
     def __del__(self):
@@ -163,29 +217,28 @@ class Pair:
         if self._new:
             try:
                 self._read()
-                places, cells = np.argwhere(self._known), np.argwhere(self._cells)
+                misses = [self.misses[key] for key in self.cells]
+                parts = list(self._rows), self._nodes[list(self._rows.values())], list(self.cells.items()), misses
                 with new_hdf5(self.path) as file:
-                    file["places"] = np.column_stack([places, self._known[tuple(places.T)]]).astype(np.int16)
-                    file["numbers"] = self._nodes[tuple(places.T)]
-                    file["cells"] = np.column_stack([cells, self._cells[tuple(cells.T)]]).astype(np.int16)
-                    file["misses"] = np.array([self.misses.get(tuple(map(int, c)), (np.nan, np.nan)) for c in cells])
+                    for name, part in zip(_PARTS, parts, strict=True):
+                        file[name] = part
                 self._new, self._written = 0, time.monotonic()
             except OSError as error:
                 warn(f"{self.path}: {error.strerror}; what was solved is not kept")
                 self._new = 0
 
 
-def _nodes_of(branch, i, j, k):
+_PARTS = "places", "numbers", "cells", "misses"
+
+_OWN = [n for n in range(64) if all(1 <= place <= 2 for place in np.unravel_index(n, (4, 4, 4)))] + list(range(64, 80))
+"""Corners of a cell among what it is looked up from."""
+
+
+def _nodes_of(key):
     """Nodes that a cell is looked up from."""
-    for a in range(-1, 3):
-        for b in range(-1, 3):
-            for c in range(-1, 3):
-                yield branch, i + a, j + b, k + c, 0
-    for a in (0, 1):
-        for b in (0, 1):
-            for c in (0, 1):
-                for yaw in (1, 2):
-                    yield branch, i + a, j + b, k + c, yaw
+    level, part, i, j, k = corner_of(key)
+    ranges = [(-1, 0, 1, 2)] * 3 + [(0,)], [(0, 1)] * 3 + [(1, 2)]
+    return [(level, part, i + a, j + b, k + c, yaw) for each in ranges for a, b, c, yaw in itertools.product(*each)]
 
 
 def _hand_on(error):

@@ -1,13 +1,14 @@
-"""Exact contact, looked up: a lattice of solutions of one wheel on one rail, solved where it is first needed.
+"""Exact contact, looked up: lattices of solutions of one wheel on one rail, solved where they are first needed.
 
-A wheel's place over its own rail decides its patch: t, the distance of its tape circle from the rail's origin across
-the track; the slope of its axle; its yaw; and the depth D that the overlaps of the patch imply,
+A patch consists of lobes: overlaps that lie near each other are one. A lobe's place over the rail decides its contact:
+t, the distance of the wheel's tape circle from the rail's origin across the track; the slope of the wheel's axle; its
+yaw; the part of the wheel's profile where it lies; and the depth D that its overlaps imply,
 
     M0 = sum of int g^2 ds,   D = (15/16 sqrt(B0) M0)^0.4,
 
 which stays smooth where overlaps merge. Between nodes: Catmull-Rom in t, slope and ln D at no yaw; what yaw changes, a
 parabola through three nodes, is linear in the other three. A node depends on its place alone, not on what was solved
-before it.
+before it. Where the lattice is too coarse another one with half its steps takes over.
 
 A node's numbers (`NUMBERS`) give the normal problem, and the creep force: the creep table at the ellipse of equal
 moments, with the creepages scaled so that both slopes at rest are exact, and a remainder in fixed modes over the two
@@ -21,30 +22,41 @@ from wrcore.contact import reduction
 from wrcore.contact.patch.model import MODES, NUMBERS
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
+from wrcore.kernels.handles import call_c
 from wrcore.kernels.jit import FAST, FUSED, jit
 
 STEPS = 2e-4, 5e-4, 0.25
-"""Of the lattice in t (m), slope of the axle and ln D."""
+"""Of the coarsest lattice in t (m), slope of the axle and ln D."""
 
-FIRST = -0.024, -0.02, math.log(4e-6)
-"""Its first places."""
+LEVELS = 2
+"""Lattices, each with half the steps of the one before."""
 
-COUNTS = 141, 81, 20
+FIRST = -0.05, -0.1, math.log(4e-6)
+"""Their first places."""
+
+COUNTS = 500, 400, 19
+"""Steps of the coarsest lattice."""
 
 YAW = 0.015
 """Nodes have yaw 0 and plus and minus this, rad; looked up is half as much again."""
 
-SPAN = 0.6
-"""Contact angle from which patches have a lattice of their own: those of the flange, rad."""
+APART = 8e-3
+"""Distance on the wheel's profile from which on neighbouring overlaps are two lobes, m."""
+
+PART, FIELD = 4e-3, -0.1
+"""Width of the parts of the wheel's profile, and where they begin, m."""
 
 CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
 
-(LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, HEIGHT, FORCE) = range(12)
+CORNERS = 80
+"""Nodes of a cell: 4 x 4 x 4 without yaw, and 2 x 2 x 2 in their middle with it to the left and to the right."""
+
+LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, FORCE = range(11)
 MODE = FORCE + 3
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
-plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages; height over the rail's
-surface (m); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage; and its coefficients of modes."""
+plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages; the remainder of Fx, Fy
+(over mu N) and Mz (over mu N c) at no creepage; and its coefficients of modes."""
 
 ROUND = 0.1
 """Modes set in from this radius on in the disk of the creepages, where the slopes at rest shall stay what they are."""
@@ -52,20 +64,32 @@ ROUND = 0.1
 LOCKED = 0.3
 """Deviation from free rolling at which the remainder has faded out."""
 
-EMPTY, READY, HARD = 0, 1, 2
+EMPTY, FINER, HARD = 0, -1, -2
+"""States of a cell that has no corners: not met yet, left to the next lattice, left to the exact solver."""
+
 _TABLE = LAWS["table"]
 
 
 @jit(allocates=False)
-def depth_of(rows, first, last):
-    """D of the overlaps of a patch, m, and whether it is the flange's."""
-    deepest, angle, total = 0.0, 0.0, 0.0
+def lobe_end(rows, first, last):
+    """End of the lobe of overlaps from ``first``."""
+    end = first + 1
+    while end < last and abs(rows[end, reduction.U_WHEEL] - rows[end - 1, reduction.U_WHEEL]) < APART:
+        end += 1
+    return end
+
+
+@jit(allocates=False)
+def depth_of(rows, first, last, lift):
+    """D of the overlaps of a lobe that is lifted (m), and its place on the wheel's profile as if it were not, m."""
+    total = weight = mean = 0.0
     for k in range(first, last):
-        d = rows[k, reduction.PENETRATION]
-        total += 16.0 / 15.0 * d * d * math.sqrt(d / rows[k, reduction.CURVATURE_Y])
-        if d > deepest:
-            deepest, angle = d, rows[k, reduction.ANGLE]
-    return (15.0 / 16.0 * math.sqrt(CURVATURE) * total) ** 0.4, abs(angle) > SPAN
+        d, root = rows[k, reduction.PENETRATION], math.sqrt(rows[k, reduction.CURVATURE_Y])
+        left, share = max(d - lift, 0.0), d * d * math.sqrt(d) / root
+        total += left * left * math.sqrt(left) / root
+        weight += share
+        mean += share * rows[k, reduction.U_WHEEL]
+    return (math.sqrt(CURVATURE) * total) ** 0.4, mean / weight
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -75,26 +99,72 @@ def _weights(f):
     return -0.5 * f * g * g, 1.0 + f * f * (1.5 * f - 2.5), 1.0 + g * g * (1.5 * g - 2.5), -0.5 * g * f * f
 
 
-@jit(allocates=False, fastmath=FUSED)
-def cell_of(t, slope, depth, yaw):
-    """First corner of the cell of a place, its parts of a step beyond that, and whether it lies in the lattice."""
-    x, y = (t - FIRST[0]) / STEPS[0], (slope - FIRST[1]) / STEPS[1]
-    z = (math.log(depth) - FIRST[2]) / STEPS[2] if depth > 0.0 else 0.0
-    inside = 1.0 <= x < COUNTS[0] - 2 and 1.0 <= y < COUNTS[1] - 2 and 1.0 <= z < COUNTS[2] - 2
-    i, j, k = int(x), int(y), int(z)
-    return i, j, k, x - i, y - j, z - k, inside and abs(yaw) <= 1.5 * YAW
+@jit(allocates=False, forceinline=True)
+def key_of(level, part, i, j, k):
+    """One number, not 0, for the cell with this first corner; `corner_of` reads it."""
+    return ((((level + 1) * 64 + part) * 4096 + i) * 4096 + j) * 256 + k
+
+
+def corner_of(key):
+    """Level, part of the profile and first corner of a cell."""
+    key, k = divmod(key, 256)
+    key, j = divmod(key, 4096)
+    key, i = divmod(key, 4096)
+    level, part = divmod(key, 64)
+    return level - 1, part, i, j, k
+
+
+@jit(allocates=False)
+def state_of(keys, states, key):
+    """State of a cell, or number of its corners."""
+    slot = key % len(keys)
+    while keys[slot] != key:
+        if keys[slot] == 0:
+            return EMPTY
+        slot = (slot + 1) % len(keys)
+    return states[slot]
+
+
+@jit(allocates=False)
+def locate(table, u, t, slope, depth):
+    """Number of the corners of the cell where a lobe lies, 0 if it is to be solved, and its parts of a step beyond the
+    first one. A lobe that only just touches is looked up at the least depth."""
+    part, scale = int((u - FIELD) / PART + 0.5), 1.0
+    for level in range(LEVELS):
+        x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
+        z = max(scale * (math.log(depth) - FIRST[2]) / STEPS[2], 1.0)
+        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
+            break
+        i, j, k = int(x), int(y), int(z)
+        key = key_of(level, part, i, j, k)
+        state = state_of(table.keys, table.states, key)
+        if state == EMPTY:
+            call_c(table.fill, key)
+            state = state_of(table.keys, table.states, key)
+        if state > 0:
+            return state, x - i, y - j, z - k
+        if state != FINER:
+            break
+        scale *= 2.0
+    return 0, 0.0, 0.0, 0.0
 
 
 @jit(allocates=False, fastmath=FAST)
-def look_up(lattice, i, j, k, fx, fy, fz, yaw, numbers):
-    """Fill ``numbers`` (NUMBERS,) at a place in a cell of a `lattice`, (*COUNTS, 3, NUMBERS)."""
+def look_up(nodes, corners, fx, fy, fz, yaw, numbers):
+    """Fill ``numbers`` (NUMBERS,) at a place in the cell of the ``nodes`` (n, NUMBERS) that ``corners`` (CORNERS,)
+    names."""
     wx, wy, (w0, w1, w2, w3) = _weights(fx), _weights(fy), _weights(fz)
     for m in range(NUMBERS):
         numbers[m] = 0.0
     for a in range(4):
         for b in range(4):
-            nodes, w = lattice[i - 1 + a, j - 1 + b], wx[a] * wy[b]
-            one, two, three, four = nodes[k - 1, 0], nodes[k, 0], nodes[k + 1, 0], nodes[k + 2, 0]
+            n, w = 16 * a + 4 * b, wx[a] * wy[b]
+            one, two, three, four = (
+                nodes[corners[n]],
+                nodes[corners[n + 1]],
+                nodes[corners[n + 2]],
+                nodes[corners[n + 3]],
+            )
             v0, v1, v2, v3 = w * w0, w * w1, w * w2, w * w3
             for m in range(NUMBERS):
                 numbers[m] += v0 * one[m] + v1 * two[m] + v2 * three[m] + v3 * four[m]
@@ -102,11 +172,11 @@ def look_up(lattice, i, j, k, fx, fy, fz, yaw, numbers):
     odd, even = 0.5 * s, 0.5 * s * s
     for a in range(2):
         for b in range(2):
-            nodes, w = lattice[i + a, j + b], (fx if a else 1.0 - fx) * (fy if b else 1.0 - fy)
+            w = (fx if a else 1.0 - fx) * (fy if b else 1.0 - fy)
             for c in range(2):
-                v = w * (fz if c else 1.0 - fz)
+                v, n = w * (fz if c else 1.0 - fz), 64 + 8 * a + 4 * b + 2 * c
                 left, right, middle = v * (even + odd), v * (even - odd), v * s * s
-                one, two, three = nodes[k + c, 0], nodes[k + c, 1], nodes[k + c, 2]
+                one, two, three = nodes[corners[16 * a + 4 * b + c + 21]], nodes[corners[n]], nodes[corners[n + 1]]
                 for m in range(NUMBERS):
                     numbers[m] += left * two[m] + right * three[m] - middle * one[m]
 

@@ -318,7 +318,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                     work.wrench[1, k] *= 1.0 - share
                 more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work)
                 found = _mean(found, more, share)
-    _fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
+    fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z
     for k in range(6):
         wrench[k] += work.wrench[0, k] + work.wrench[1, k]
@@ -338,7 +338,7 @@ def _mean(one, other, share):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _fill_row(frame, y, z, found, wrenches, out):
+def fill_row(frame, y, z, found, wrenches, out):
     """Row of a patch about the pressure's centroid, from the wrenches of pressure and friction.
 
     The pressure's resultant is the normal; the force along it holds what friction in the strips' planes has there.

@@ -1,39 +1,55 @@
-"""Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer."""
+"""Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer.
+
+Lobes that are apart are looked up one by one, and act on each other as points that load a half-space. The others'
+pressure presses a lobe's surfaces apart, by Boussinesq's formula and the ellipses' second moments, and their friction
+lets them slip, by Cerruti's and the displacement's slope over x (K. L. Johnson, Contact Mechanics, 3.2, 3.6):
+
+    w_i = sum of (1 - nu) N_j cos(delta_i - delta_j) / (pi G r) (1 + e),
+    dxi_i = -sum of nu Fy_j / (pi G r^2) (1 + 3 e),   deta_i likewise with Fx_j,   both with the sign of s_i - s_j,
+    e = ((b_i^2 + b_j^2) / 5 - (a_i^2 + a_j^2) / 10) / r^2.
+"""
 
 import math
+from typing import NamedTuple
 
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
+from wrcore.contact.patch.gap import add_force
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import EMPTY, READY, cell_of, depth_of, look_up, tabulated_force
-from wrcore.dynamics.strip_wheel import NOTHING, Solution, group_wrench, lifted_overlaps
+from wrcore.dynamics.pair_table import YAW, depth_of, lobe_end, locate, look_up, tabulated_force
+from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, group_wrench, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
-from wrcore.kernels.handles import call_c
 from wrcore.kernels.jit import FUSED, jit
+
+NORMAL, LIFT, FORCE_X, FORCE_S = range(4)
+"""Columns of a lobe: its load (N), what others lift it by (m), and friction on it (N)."""
+
+TURNS, STEPS, ROLLS = 3, 6, 3
+"""Lobes are looked up so many times, with so many steps towards balance between, and rolled so many times."""
 
 
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """As `group_wrench`, looked up."""
-    pose, low, high, _, left, _, _ = lifted_overlaps(model, m, spatial, rows, first, last, out, work)
+    pose, low, high, frame, left, _, _ = lifted_overlaps(model, m, spatial, rows, first, last, out, work)
     if high == low or left <= 0.0:
         out[reduction.NORMAL] = 0.0
         return NOTHING
-    depth, flange = depth_of(work.rows, low, high)
-    geometry, table, ahead, branch = model.geometry, model.strips.table, 1.0, 1 if flange else 0
-    if m.vx < 0.0:
-        ahead = -1.0
-    t, yaw = pose.y + geometry.half_distance * m.ey - geometry.rail_distance, ahead * m.ex
-    i, j, k, fx, fy, fz, inside = cell_of(t, m.ez, depth, yaw)
-    if inside and table.cells[branch, i, j, k] == EMPTY:
-        call_c(table.fill, branch, i, j, k)
-    if not inside or table.cells[branch, i, j, k] != READY:
+    ahead = -1.0 if m.vx < 0.0 else 1.0
+    lobes = _look_lobes_up(model, pose, m.ey, m.ez, ahead * m.ex, low, high, work)
+    if lobes == 0:
         counters[SOLVED] += 1
         return group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
-    look_up(table.nodes[branch], i, j, k, fx, fy, fz, yaw, work.numbers)
-    return _wrench_of_numbers(model, m, pose, depth, ahead, work.numbers, work.modes, out, wrench, counters, work.sums)
+    work.wrench[:] = 0.0
+    y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
+    found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
+    fill_row(frame, y, z, found, work.wrench, out)
+    out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
+    for k in range(6):
+        wrench[k] += work.wrench[0, k] + work.wrench[1, k]
+    return found
 
 
 @jit(allocates=False)
@@ -43,36 +59,164 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _wrench_of_numbers(model, m, pose, depth, ahead, numbers, modes, out, wrench, counters, extent):
-    """Row and wrench of a patch from a node's numbers. A wheel that rolls back is the mirror image, along x, of one
-    that rolls ahead."""
-    half, radius = model.geometry.half_distance, model.geometry.rolling_radius
-    modulus, angle = contact_modulus(model.shear_modulus, model.poisson_ratio), numbers[columns.ANGLE]
-    normal = modulus * depth * math.sqrt(depth) * math.exp(numbers[columns.LOG_NORMAL])
-    cosine, sine = math.cos(angle), math.sin(angle)
-    px = numbers[columns.PLACE_X] + half * ahead * m.ex
+def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
+    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of overlaps; returns how many there are, 0 if one of them
+    is in no lattice."""
+    geometry, table, lobes, rows = model.geometry, model.strips.table, work.lobes, work.rows
+    t = pose.y + geometry.half_distance * ey - geometry.rail_distance
+    modulus, alone = contact_modulus(model.shear_modulus, model.poisson_ratio), lobe_end(rows, low, high) == high
+    lobes[:] = 0.0
+    if abs(yaw) > 1.5 * YAW:
+        return 0
+    count = 0
+    for _ in range(1 if alone else TURNS):
+        first = low
+        count = 0
+        while first < high:
+            last = lobe_end(rows, first, high)
+            depth, u = depth_of(rows, first, last, lobes[count, LIFT])
+            lobes[count, NORMAL] = 0.0
+            if depth > 0.0:
+                cell, fx, fy, fz = locate(table, u, t, slope, depth)
+                if cell == 0:
+                    return 0
+                look_up(table.nodes, table.corners[cell], fx, fy, fz, yaw, work.numbers[count])
+                lobes[count, NORMAL] = _load(modulus, work.numbers[count], depth)
+            count += 1
+            first = last
+        if not alone:
+            for _ in range(STEPS):
+                _balance(model, modulus, low, high, count, work)
+    return count
+
+
+@jit(allocates=False, forceinline=True)
+def _load(modulus, numbers, depth):
+    return modulus * depth * math.sqrt(depth) * math.exp(numbers[columns.LOG_NORMAL])
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _apart(one, other):
+    """Distance of two lobes, from their numbers, and e of the module's formulas."""
+    dx, dy = one[columns.PLACE_X] - other[columns.PLACE_X], one[columns.PLACE_Y] - other[columns.PLACE_Y]
+    dz = one[columns.PLACE_Z] - other[columns.PLACE_Z]
+    square = dx * dx + dy * dy + dz * dz
+    long = math.exp(2.0 * one[columns.LOG_A]) + math.exp(2.0 * other[columns.LOG_A])
+    wide = math.exp(2.0 * one[columns.LOG_B]) + math.exp(2.0 * other[columns.LOG_B])
+    return math.sqrt(square), (0.2 * wide - 0.1 * long) / square
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _balance(model, modulus, low, high, count, work):
+    """One step towards balance of the lobes' loads and of what they lift each other by."""
+    lobes, numbers = work.lobes, work.numbers
+    unit = (1.0 - model.poisson_ratio) / (math.pi * model.shear_modulus)
+    for i in range(count):
+        lift = 0.0
+        for j in range(count):
+            if j != i:
+                distance, e = _apart(numbers[i], numbers[j])
+                load = lobes[j, NORMAL] * math.cos(numbers[i, columns.ANGLE] - numbers[j, columns.ANGLE])
+                lift += unit * load / distance * (1.0 + e)
+        lobes[i, LIFT] = lift
+    first = low
+    for i in range(count):
+        last = lobe_end(work.rows, first, high)
+        depth, _ = depth_of(work.rows, first, last, lobes[i, LIFT])
+        lobes[i, NORMAL] = _load(modulus, numbers[i], depth)
+        first = last
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _slip_of_others(model, i, count, work):
+    """Creepages of a lobe by the friction on the others."""
+    lobes, numbers, xi, eta = work.lobes, work.numbers, 0.0, 0.0
+    for j in range(count):
+        if j != i and lobes[j, NORMAL] > 0.0:
+            distance, e = _apart(numbers[i], numbers[j])
+            unit = -model.poisson_ratio / (math.pi * model.shear_modulus * distance * distance) * (1.0 + 3.0 * e)
+            if numbers[i, columns.PLACE_Y] < numbers[j, columns.PLACE_Y]:
+                unit = -unit
+            xi, eta = xi + unit * lobes[j, FORCE_S], eta + unit * lobes[j, FORCE_X]
+    return xi, eta
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
+    """`Solution` of the lobes together; adds what acts on them to ``work.wrench``. ``y``, ``z``: of the frame's origin
+    from the wheelset's centre. A wheel that rolls back is the mirror image, along x, of one that rolls ahead."""
+    for _ in range(ROLLS - 1 if count > 1 else 0):
+        for q in range(count):
+            if work.lobes[q, NORMAL] > 0.0:
+                rolled = _roll_lobe(model, m, ahead, q, count, counters, work)
+                work.lobes[q, FORCE_X], work.lobes[q, FORCE_S] = ahead * rolled.f1, rolled.f2
+    extent, modulus = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio)
+    load = x = s = xx = ss = xi = eta = phi = phi_x = peak = power = 0.0
+    x_min = s_min = 1.0
+    x_max = s_max = -1.0
+    for q in range(count):
+        normal, numbers = work.lobes[q, NORMAL], work.numbers[q]
+        if normal <= 0.0:
+            continue
+        r = _roll_lobe(model, m, ahead, q, count, counters, work)
+        add_force(r.px, r.py, r.pz, 0.0, -normal * r.sine, normal * r.cosine, work.wrench[0])
+        add_force(r.px, r.py, r.pz, r.f1, r.f2 * r.cosine, r.f2 * r.sine, work.wrench[1])
+        work.wrench[1, 4] -= r.m3 * r.sine
+        work.wrench[1, 5] += r.m3 * r.cosine
+        at_x, at_s = r.px - frame.x, (r.py - y) * frame.cosine + (r.pz - z) * frame.sine
+        a, b = math.exp(numbers[columns.LOG_A]), math.exp(numbers[columns.LOG_B])
+        load, x, s = load + normal, x + normal * at_x, s + normal * at_s
+        xx, ss = xx + normal * (at_x * at_x + 0.2 * a * a), ss + normal * (at_s * at_s + 0.2 * b * b)
+        xi, eta, phi = xi + normal * r.xi, eta + normal * r.eta, phi + normal * r.phi
+        phi_x, power = phi_x + normal * r.phi * at_x, power + r.f1 * r.xi + r.f2 * r.eta + r.m3 * r.phi
+        peak = max(peak, modulus * math.exp(numbers[columns.LOG_PEAK]))
+        x_min, x_max = min(x_min, at_x - a), max(x_max, at_x + a)
+        s_min, s_max = min(s_min, at_s - b), max(s_max, at_s + b)
+    x, s, xi, phi = x / load, s / load, xi / load, phi / load
+    eta = (eta - phi_x) / load + phi * x
+    a, b = math.sqrt(5.0 * max(xx / load - x * x, 1e-14)), math.sqrt(5.0 * max(ss / load - s * s, 1e-14))
+    extent[solve.LOAD], extent[solve.MEAN_X], extent[solve.MEAN_S] = load, x, s
+    extent[solve.X_MIN], extent[solve.X_MAX], extent[solve.S_MIN], extent[solve.S_MAX] = x_min, x_max, s_min, s_max
+    return Solution(xi, eta, phi, load, x, s, a, b, peak, power)
+
+
+class Rolled(NamedTuple):
+    """Creep force on a lobe."""
+
+    px: float
+    py: float
+    pz: float
+    """Where it slips, from the wheelset's centre, m."""
+    cosine: float
+    sine: float
+    """Of its contact angle."""
+    xi: float
+    eta: float
+    phi: float
+    f1: float
+    f2: float
+    m3: float
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _roll_lobe(model, m, ahead, q, count, counters, work):
+    """`Rolled` of a lobe."""
+    half, radius, numbers = model.geometry.half_distance, model.geometry.rolling_radius, work.numbers[q]
+    speed, cosine, sine = (
+        max(abs(m.vx), model.least_speed),
+        math.cos(numbers[columns.ANGLE]),
+        math.sin(numbers[columns.ANGLE]),
+    )
+    px = ahead * numbers[columns.PLACE_X] + half * m.ex
     py, pz = numbers[columns.PLACE_Y] + half * m.ey, numbers[columns.PLACE_Z] + half * m.ez - radius
-    speed, wy, wz = max(abs(m.vx), model.least_speed), ahead * m.wy, ahead * m.wz
-    xi, eta, phi, _ = creepages(ahead * m.vx, m.vy, m.vz, m.wx, wy, wz, px, py, pz, cosine, sine, speed)
-    limit = falling(model, m.friction, xi, eta, speed) * normal
-    turning = wy * radius / speed - 1.0
-    f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, xi, eta, phi, limit, turning, modes)
+    xi, eta, phi, _ = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
+    more_xi = more_eta = 0.0
+    if count > 1:
+        more_xi, more_eta = _slip_of_others(model, q, count, work)
+    limit = falling(model, m.friction, xi, eta, speed) * work.lobes[q, NORMAL]
+    f1, f2, m3, missed = tabulated_force(
+        model, model.strips.table.modes, numbers, ahead * xi + more_xi, eta + more_eta, ahead * phi, limit,
+        ahead * m.wy * radius / speed - 1.0, work.modes,
+    )  # fmt: skip
     counters[OUT_OF_RANGE] += missed
-    gy, gz = f2 * cosine - normal * sine, f2 * sine + normal * cosine
-    wrench[0] += ahead * f1
-    wrench[1] += gy
-    wrench[2] += gz
-    wrench[3] += py * gz - pz * gy
-    wrench[4] += ahead * (pz * f1 - px * gz - m3 * sine)
-    wrench[5] += ahead * (px * gy - py * f1 + m3 * cosine)
-    a, b, height = math.exp(numbers[columns.LOG_A]), math.exp(numbers[columns.LOG_B]), numbers[columns.HEIGHT]
-    p_max, x, xi, phi = modulus * math.exp(numbers[columns.LOG_PEAK]), ahead * px, ahead * xi, ahead * phi
-    out[reduction.ANGLE], out[reduction.COSINE], out[reduction.SINE] = angle, cosine, sine
-    out[reduction.X], out[reduction.Y], out[reduction.Z] = x, pose.y + py + height * sine, pose.z + pz - height * cosine
-    out[reduction.SEMI_A], out[reduction.SEMI_B], out[reduction.NORMAL], out[reduction.P_MAX] = a, b, normal, p_max
-    out[reduction.FX], out[reduction.FY], out[reduction.MZ] = ahead * f1, f2, ahead * m3
-    out[reduction.XI], out[reduction.ETA], out[reduction.PHI] = xi, eta, phi
-    extent[solve.LOAD], extent[solve.MEAN_X], extent[solve.MEAN_S] = normal, 0.0, 0.0
-    extent[solve.X_MIN], extent[solve.X_MAX], extent[solve.S_MIN], extent[solve.S_MAX] = -a, a, -b, b
-    power = f1 * ahead * xi + f2 * eta + m3 * ahead * phi
-    return Solution(xi, eta, phi, normal, 0.0, 0.0, a, b, p_max, power)
+    return Rolled(px, py, pz, cosine, sine, xi, eta, phi, ahead * f1, f2, ahead * m3)

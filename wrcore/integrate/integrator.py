@@ -27,7 +27,7 @@ import numpy as np
 from wrcore.dynamics.contract import begin, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
-from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE
+from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, SOLVED
 from wrcore.errors import InputError
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import new_system
@@ -134,7 +134,7 @@ def integrate(
         wall, Checkpoint(method, float(last), memory, linear, *(place.copy() for place in places(work))),
         float(last if completed else memory.clock[engine.T]),
         (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
-        int(work.counters[ON_GRID]), int(work.flexible_track.unbalanced[0]),
+        int(work.counters[ON_GRID]), int(work.counters[SOLVED]), int(work.flexible_track.unbalanced[0]),
     )  # fmt: skip
 
 

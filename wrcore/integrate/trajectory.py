@@ -63,5 +63,7 @@ class Trajectory:
     """Steps that were rejected three times in a row or more."""
     on_grid: int = 0
     """Patches that strips did not solve and a grid did."""
+    not_tabulated: int = 0
+    """Patches that were to be looked up and had to be solved."""
     unbalanced: int = 0
     """Evaluations in which rails without mass found no balance."""

@@ -132,6 +132,14 @@ def _drop_old(kernels):
                 os.rmdir(folder)
 
 
+def drop_unused(folder, pattern):
+    """Drop a folder's files that nobody used for two weeks."""
+    for old in folder.glob(pattern):
+        with suppress(OSError):
+            if time.time() - old.stat().st_mtime > _KEEP_SECONDS:
+                old.unlink()
+
+
 def _remove_own(root, process):
     if os.getpid() == process:  # not in a fork
         shutil.rmtree(root, ignore_errors=True)

@@ -49,13 +49,14 @@ def splines(places, cells=CELLS):
 
 
 def collect(pair, poses, points, seed=5):
-    """Remainder (poses, n + 1, 3) at no creepage and at ``points``, of random places of a wheel on its tread."""
+    """Remainder (poses, n + 1, 3) at no creepage and at ``points``, of random places of a wheel."""
     random, rows = np.random.default_rng(seed), []
     middle = pair.contact.geometry.half_distance - pair.contact.geometry.rail_distance
     while len(rows) < poses:
         yaw = 0.0 if random.random() < 0.65 else random.uniform(-0.015, 0.015)
         depth = math.exp(random.uniform(math.log(2e-5), math.log(1.2e-4)))
-        found = pair.solve((middle + random.uniform(-7e-3, 4.3e-3), random.normal(0, 1e-3), depth, yaw, False), points)
+        place = middle + random.uniform(-7e-3, 4.3e-3), random.normal(0, 1e-3), depth, yaw, random.uniform(-0.04, 0.02)
+        found = pair.solve(place, points)
         if found is not None:
             rows.append(np.vstack([found[0][columns.FORCE : columns.MODE], found[1]]))
     return np.array(rows)

@@ -273,15 +273,15 @@ def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, fo
     for i in range(len(centre)):
         px, py, pz, cosine, sine = material_point(geometry, pose, frame, centre[i], middle[i], height[i], tilt[i])
         fx, fs, turn = share * force[0, i], share * force[1, i], share * force[2, i]
-        _add_force(px, py, pz, fx, fs * cosine, fs * sine, friction)
+        add_force(px, py, pz, fx, fs * cosine, fs * sine, friction)
         friction[4] -= turn * sine
         friction[5] += turn * cosine
         along = share * load[i] * math.sqrt(1.0 + tilt[i] * tilt[i])
-        _add_force(px, py, pz, 0.0, -along * sine, along * cosine, pressure)
+        add_force(px, py, pz, 0.0, -along * sine, along * cosine, pressure)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _add_force(px, py, pz, fx, fy, fz, wrench):
+def add_force(px, py, pz, fx, fy, fz, wrench):
     """Add a force at a point to a wrench."""
     wrench[0] += fx
     wrench[1] += fy

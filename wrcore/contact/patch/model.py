@@ -22,22 +22,31 @@ SLIPS = ("surfaces", "creepages")
 
 
 class PairTable(NamedTuple):
-    """Exact contact of a wheel on its rail at the nodes of a lattice, see `wrcore.dynamics.pair_table`; empty where it
+    """Exact contact of a wheel on its rail at the nodes of lattices, see `wrcore.dynamics.pair_table`; empty where it
     is not looked up."""
 
-    cells: np.ndarray
-    """(2, ...) uint8: EMPTY, READY or HARD, by a cell's first corner; of tread and flange."""
+    keys: np.ndarray
+    states: np.ndarray
+    """(n,) int64 and int32: cells by their keys, each with the number of its corners or its state."""
+    corners: np.ndarray
+    """(n, CORNERS) int32: the nodes of each cell."""
     nodes: np.ndarray
-    """(2, ..., 3, NUMBERS) float32: without yaw, and with it to the left and to the right."""
+    """(n, NUMBERS) float32."""
     modes: np.ndarray
     """(n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages."""
     fill: int
     """Address of what solves a cell's nodes."""
 
 
-NO_TABLE = PairTable(np.zeros((0,) * 4, np.uint8), np.zeros((0,) * 6, np.float32), np.zeros((0,) * 3, np.float32), 0)
+NO_TABLE = PairTable(
+    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0, 0), np.int32), np.zeros((0, 0), np.float32),
+    np.zeros((0,) * 3, np.float32), 0,
+)  # fmt: skip
 NUMBERS, MODES = 32, 16
 """Numbers of a node, and modes of the creep force that are among them."""
+
+LOBE_COLUMNS = 4
+"""Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
 
 
 class StripModel(NamedTuple):
@@ -87,9 +96,10 @@ class StripWork(NamedTuple):
     sums: np.ndarray
     solved: np.ndarray
     """(2,) int: strips of the last solution, and 1 if they are slender."""
+    lobes: np.ndarray
     numbers: np.ndarray
     modes: np.ndarray
-    """(NUMBERS,) and (3 MODES,): of a patch that is looked up."""
+    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS) and (3 MODES,): of a patch that is looked up."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -124,12 +134,16 @@ def _strip_model(patch, resolution, slip, nu, friction):
 
 def strip_work(model, wheelsets):
     """Scratch arrays for a `StripModel` and a number of wheelsets; next to nothing where patches are ellipses."""
-    count, wheels = (MAX_STRIPS, (wheelsets, 2, MAX_PATCHES)) if model.strips else (1, (0, 0, 0))
+    count, wheels, normal = MAX_STRIPS, (wheelsets, 2, MAX_PATCHES), normal_work()
+    if not model.strips:
+        count, wheels = 1, (0, 0, 0)
+        normal = NormalWork(*(np.zeros((0,) * part.ndim, part.dtype) for part in normal))
     return StripWork(
         np.zeros((*wheels, MEMORY)), np.zeros(MEMORY),
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
-        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64), np.zeros(NUMBERS), np.zeros(3 * MODES),
-        normal_work(),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64),
+        np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(3 * MODES),
+        normal,
         *(rolling_work(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
     )  # fmt: skip
