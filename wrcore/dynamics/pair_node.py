@@ -89,7 +89,9 @@ def solve_motions(model, y, z, axle, place, velocities, forces, sums, counters, 
     first, last, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
     if first == last:
         return False
-    pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), work.rows[first:last, PENETRATION].max()
+    pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), 0.0
+    for k in range(first, last):
+        deepest = max(deepest, work.rows[k, PENETRATION])
     sums[:] = 0.0
     forces[:] = 0.0
     for turn in range(2):

@@ -248,7 +248,8 @@ def _hand_on(error):
 
         _thread.interrupt_main()
     else:
-        _warn_once(f"exact contact: {error!r}; patches are solved without a table")
+        first = str(error).strip().partition("\n")[0]
+        _warn_once(f"exact contact: {type(error).__name__}: {first}; patches are solved without a table")
 
 
 @cache
