@@ -263,12 +263,10 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def lifted_overlaps(model, m, spatial, rows, first, last, out, work):
-    """Overlaps in ``work.rows`` of a left wheel that the damping lifts: its pose, their first and end, their frame as
-    they are, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row."""
+def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work):
+    """Overlaps in ``work.rows`` of a left wheel, with a pose and a frame, that the damping lifts: its pose then, their
+    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row."""
     speed = max(abs(m.vx), model.least_speed)
-    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
-    frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
     depth, u, low, high = 0.0, 0.0, first, first
     for k in range(first, last):
         if rows[k, reduction.PENETRATION] > depth:
@@ -285,7 +283,7 @@ def lifted_overlaps(model, m, spatial, rows, first, last, out, work):
     lift = (1.0 - factor * inverse_cube_root(factor)) * depth
     if lift < depth:
         pose, low, high = _lifted(model, m.y - lift * frame.sine, m.z + lift * frame.cosine, m, spatial, u, work.rows)
-    return pose, low, high, frame, depth - lift, (xi, eta, phi), friction
+    return pose, low, high, depth - lift, (xi, eta, phi), friction
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -293,7 +291,11 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
     wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
     speed, windows = max(abs(m.vx), model.least_speed), 0
-    pose, low, high, frame, depth, creepage, friction = lifted_overlaps(model, m, spatial, rows, first, last, out, work)
+    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
+    frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
+    pose, low, high, depth, creepage, friction = lifted_overlaps(
+        model, m, pose, frame, spatial, rows, first, last, out, work
+    )
     if depth > 0.0:
         if high == low:
             out[reduction.NORMAL] = 0.0

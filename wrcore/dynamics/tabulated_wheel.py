@@ -16,7 +16,8 @@ from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import add_force
+from wrcore.contact.patch.gap import add_force, frame_of_rows
+from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import YAW, depth_of, lobe_end, locate, look_up, tabulated_force
 from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, group_wrench, lifted_overlaps
@@ -33,7 +34,9 @@ TURNS, STEPS, ROLLS = 3, 6, 3
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """As `group_wrench`, looked up."""
-    pose, low, high, frame, left, _, _ = lifted_overlaps(model, m, spatial, rows, first, last, out, work)
+    frame = frame_of_rows(rows, first, last)
+    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
+    pose, low, high, left, _, _ = lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work)
     if high == low or left <= 0.0:
         out[reduction.NORMAL] = 0.0
         return NOTHING

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_WHEEL
+from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Z
 from wrcore.contact.strip import cubic_at, curvature_at, gap_at, strip_point, wheel_slope
 from wrcore.kernels.jit import FUSED, jit
 
@@ -87,6 +87,19 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
     angle = _mean_angle(geometry, pose, patches, first, last, math.atan(0.5 * (wheel_slope(pose, slope, along) + df)))
     x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
     return Frame(math.cos(angle), math.sin(angle), x, ur, f, u)
+
+
+@jit(allocates=False)
+def frame_of_rows(patches, first, last):
+    """As `frame_of_overlaps`, from the rows alone: means over g^2.5 of what they have at their deepest points."""
+    weight = angle = x = ur = z = u = 0.0
+    for k in range(first, last):
+        row = patches[k]
+        share = row[PENETRATION] * row[PENETRATION] * math.sqrt(row[PENETRATION] / row[CURVATURE_Y])
+        weight, angle, x = weight + share, angle + share * row[ANGLE], x + share * row[X]
+        ur, z, u = ur + share * row[U_RAIL], z + share * row[Z], u + share * row[U_WHEEL]
+    angle /= weight
+    return Frame(math.cos(angle), math.sin(angle), x / weight, ur / weight, z / weight, u / weight)
 
 
 @jit(allocates=False)
