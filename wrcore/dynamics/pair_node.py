@@ -38,9 +38,10 @@ REACH = 2.0 * PART
 
 @jit(allocates=False)
 def lobe_at(geometry, y, z, ex, ey, ez, place, rows):
-    """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, and their depth D; 0, 0, 0
-    where there is none."""
-    low, high, found, nearest, first = 0, 0, 0.0, REACH, 0
+    """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, their depth D and their own
+    place; 0, 0, 0 and the place where there is none."""
+    low, high, found, at, first = 0, 0, 0.0, place, 0
+    nearest = REACH
     count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
     while first < count:
         group = group_end(rows, count, first)
@@ -48,9 +49,9 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, rows):
             last = lobe_end(rows, first, group)
             depth, u = depth_of(rows, first, last, 0.0)
             if abs(u - place) < nearest:
-                low, high, found, nearest = first, last, depth, abs(u - place)
+                low, high, found, at, nearest = first, last, depth, u, abs(u - place)
             first = last
-    return low, high, found
+    return low, high, found, at
 
 
 @jit(allocates=False)
@@ -62,8 +63,12 @@ def least_gap(geometry, y, z, ex, ey, ez, place):
     return least
 
 
-def _height(geometry, y, axle, depth, u, rows):
-    """Height at which the lobe nearest to ``u`` has a depth D; NaN where there is none."""
+def lobe_of(geometry, place, rows):
+    """Pose of the wheelset (y, z, axle) at which the lobe of a place, see `solve_place`, has its depth, and where it
+    then lies on the wheel's profile; None where there is none."""
+    t, slope, depth, yaw, u = place
+    axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
+    y = t + geometry.rail_distance - geometry.half_distance * axle[1]
     level = geometry.rolling_radius - geometry.half_distance * axle[2]
     level -= least_gap(geometry, y, level, *axle, u) + 0.5 * depth
 
@@ -74,7 +79,8 @@ def _height(geometry, y, axle, depth, u, rows):
         return found - depth
 
     z = height_of_zero(excess, level)
-    return z if abs(lobe_at(geometry, y, z, *axle, u, rows)[2] - depth) < 1e-6 * depth else math.nan
+    _, _, found, at = lobe_at(geometry, y, z, *axle, u, rows)
+    return ((y, z, axle), at) if abs(found - depth) < 1e-6 * depth else None
 
 
 @jit(allocates=False)
@@ -86,7 +92,7 @@ def solve_motions(model, y, z, axle, place, velocities, forces, sums, counters, 
     wrench of pressure, place of the slip from the centre, semi-axes and p_max. Returns whether strips found a solution.
     """
     finer, share, geometry, (ex, ey, ez) = work.normal.more, 0.0, model.geometry, axle
-    first, last, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
+    first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
     if first == last:
         return False
     pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), 0.0
@@ -134,13 +140,12 @@ def solve_place(contact, handle, work, place, points):
     ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``work``: handle of a `StripWork`;
     ``place``: t, slope of the axle, depth D, yaw, and place on the wheel's profile, m.
     """
-    (t, slope, depth, yaw, u), geometry = place, contact.geometry
+    (_, _, depth, _, u), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
-    axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
-    y = t + geometry.rail_distance - half * axle[1]
-    z = _height(geometry, y, axle, depth, u, work.value.rows)
-    if math.isnan(z):
+    found = lobe_of(geometry, place, work.value.rows)
+    if found is None:
         return None
+    (y, z, axle), _ = found
     sums, counters = np.zeros(SUMS), np.zeros(4, np.int64)
 
     def forces_at(velocities):

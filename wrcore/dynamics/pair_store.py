@@ -71,10 +71,11 @@ class Pair:
     """The table of a `ContactModel` with exact patches and one pair of profiles."""
 
     def __init__(self, contact, digest):
-        self.path, self.contact, self._lock, self._tools = table_folder() / f"pair_{digest}.h5", contact, Lock(), None
+        self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
+        self._tools = Handle(contact), Handle(strip_work(contact.strips, 1))
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._corners, self._nodes = np.zeros((CELLS, CORNERS), np.int32), np.zeros((NODES, NUMBERS), np.float32)
-        self._rows, self._used, self.cells, self._ready, self.misses = {}, 0, {}, 0, {}
+        self._solved_at, self._rows, self._used, self.cells, self._ready, self.misses = {}, {}, 0, {}, 0, {}
         self._told, self._new, self._spent, self._written = False, 0, 0.0, time.monotonic()
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
@@ -111,8 +112,7 @@ class Pair:
         """State of a cell: 1 where its nodes have solutions and its middle is right."""
         for node in _nodes_of(key):
             if node not in self._rows:
-                self._rows[node] = self._add(self._at(*node[:-1], _YAWS[node[-1]]))
-                self._new += 1
+                self._rows[node] = self._row_of(node)
         corners = self._corners_of(key)
         self.misses[key] = miss = (math.nan, math.nan) if corners is None else self._miss(key, corners)
         if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE:
@@ -132,6 +132,20 @@ class Pair:
             slot = (slot + 1) % SLOTS
         self._states[slot] = self._ready if state > 0 else state
         self._keys[slot], self.cells[key] = key, state
+
+    def _row_of(self, node):
+        """Row of a node: solved under the part of the profile in which its lobe then lies, once for all parts."""
+        from wrcore.dynamics.pair_node import lobe_of
+
+        level, part, *corner = node
+        found = lobe_of(self.contact.geometry, _place(*node[:-1], _YAWS[node[-1]]), self._tools[1].value.rows)
+        if found is not None:
+            part = int((found[1] - FIELD) / PART + 0.5)
+        key = level, part, *corner
+        if key not in self._solved_at:
+            self._solved_at[key] = self._add(self._at(*key[:-1], _YAWS[key[-1]]))
+            self._new += 1
+        return self._solved_at[key]
 
     def _add(self, numbers):
         """Row of new numbers."""
@@ -162,8 +176,8 @@ class Pair:
 
     def _at(self, level, part, i, j, k, yaw):
         """Numbers of a place in steps of a lattice; NaN where there is no solution."""
-        modes, (t, slope, log_depth) = creep_modes(), np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
-        found = self.solve((t, slope, math.exp(log_depth), yaw, FIELD + part * PART), modes.points)
+        modes = creep_modes()
+        found = self.solve(_place(level, part, i, j, k, yaw), modes.points)
         if found is None:
             return np.full(NUMBERS, np.nan)
         numbers, remainder = found
@@ -175,8 +189,6 @@ class Pair:
         """`solve_place` with the pair's own scratch arrays."""
         from wrcore.dynamics.pair_node import solve_place
 
-        if self._tools is None:
-            self._tools = Handle(self.contact), Handle(strip_work(self.contact.strips, 1))
         return solve_place(self.contact, *self._tools, place, points)
 
     def _miss(self, key, corners):
@@ -198,10 +210,13 @@ class Pair:
             try:
                 os.utime(self.path)
                 with checked_hdf5(self.path, "a pair's table") as file:
-                    places, numbers, cells, misses = (file[name][...] for name in _PARTS)
-                for place, row in zip(map(tuple, places.tolist()), numbers, strict=True):
-                    if place not in self._rows:
-                        self._rows[place] = self._add(row)
+                    places, numbers, nodes, cells, misses = (file[name][...] for name in _PARTS)
+                places = list(map(tuple, places.tolist()))
+                for place, row in zip(places, numbers, strict=True):
+                    if place not in self._solved_at:
+                        self._solved_at[place] = self._add(row)
+                for *node, place in nodes.tolist():
+                    self._rows[tuple(node)] = self._solved_at[places[place]]
                 for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
                     if key not in self.cells:
                         self._keep(key, state)
@@ -218,7 +233,10 @@ class Pair:
             try:
                 self._read()
                 misses = [self.misses[key] for key in self.cells]
-                parts = list(self._rows), self._nodes[list(self._rows.values())], list(self.cells.items()), misses
+                index = {row: n for n, row in enumerate(self._solved_at.values())}
+                nodes = [(*node, index[row]) for node, row in self._rows.items()]
+                numbers = self._nodes[list(index)]
+                parts = list(self._solved_at), numbers, nodes, list(self.cells.items()), misses
                 with new_hdf5(self.path) as file:
                     for name, part in zip(_PARTS, parts, strict=True):
                         file[name] = part
@@ -228,10 +246,16 @@ class Pair:
                 self._new = 0
 
 
-_PARTS = "places", "numbers", "cells", "misses"
+_PARTS = "places", "numbers", "nodes", "cells", "misses"
 
 _OWN = [n for n in range(64) if all(1 <= place <= 2 for place in np.unravel_index(n, (4, 4, 4)))] + list(range(64, 80))
 """Corners of a cell among what it is looked up from."""
+
+
+def _place(level, part, i, j, k, yaw):
+    """Place, as `solve_place` has it, of a node."""
+    t, slope, log_depth = np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
+    return t, slope, math.exp(log_depth), yaw, FIELD + part * PART
 
 
 def _nodes_of(key):

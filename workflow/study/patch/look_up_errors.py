@@ -101,7 +101,7 @@ def main():
             kept = pair_of(wheels._at_work(FRICTION).value)
             found = errors(*(rows[name][~solved] for name in ("exact", "tabulated")))
             told = {name: "/".join(f"{q:.2g}" for q in np.percentile(e, [50, 95, 100])) for name, e in found.items()}
-            nodes, states = len(kept._rows), np.array(list(kept.cells.values()))
+            nodes, states = len(kept._solved_at), np.array(list(kept.cells.values()))
             lines.append({"pair": pair, "poses": poses, "solved, %": 100.0 * solved.mean(), **told, "nodes": nodes,
                           "cells": len(states), "ready": (states > 0).sum(), "hard": (states == -2).sum(),
                           "s": spent})  # fmt: skip
