@@ -1,6 +1,7 @@
 """Exact contact, looked up: against the exact solver, its symmetries, and the same bits however full the table is."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ import wrcore as wr
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.detection import find_patches
+from wrcore.contact.patch.model import NO_TABLE
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics import pair_store, pair_table
+from wrcore.dynamics import pair_store, pair_table, tabulated_wheel
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, look_up
@@ -140,6 +142,90 @@ def test_lobes_that_are_apart():
         for column, unit in ((reduction.XI, 2e-5), (reduction.ETA, 2e-5), (reduction.PHI, 3e-3)):
             assert table[column] == pytest.approx(exact[column], abs=unit)
     assert models["tabulated"]._counters[3] == 0
+
+
+def points_of_hertz(a, b, n=16):
+    """Places (n^2, 2) in an ellipse that share its Hertz pressure alike."""
+    radius = np.sqrt(1.0 - (1.0 - (np.arange(n) + 0.5) / n) ** (2.0 / 3.0))
+    angle = 2.0 * math.pi * (np.arange(n) + 0.5) / n
+    return np.stack([a * np.outer(radius, np.cos(angle)).ravel(), b * np.outer(radius, np.sin(angle)).ravel()], axis=1)
+
+
+def test_lobes_act_on_each_other_as_loads_on_a_half_space_do():
+    """Against Boussinesq's and Cerruti's displacements, wheel's less rail's, of spread loads, averaged over the other
+    ellipse; a creepage of theirs is their fall over x, for material runs through the contact towards -x."""
+    shear, nu, gap, step = 8.2e10, 0.28, 0.012, 1e-5
+    forces, sizes = {"n": 4e4, "x": 7e3, "s": -3e3}, ((4e-3, 2e-3), (3e-3, 2.5e-3))
+    numbers, lobes = np.zeros((2, pair_table.NUMBERS)), np.zeros((2, 4))
+    for q, (a, b) in enumerate(sizes):
+        numbers[q, [pair_table.LOG_A, pair_table.LOG_B]] = math.log(a), math.log(b)
+    numbers[0, pair_table.PLACE_Y] = gap  # lobe 0 lies further out than the loaded lobe 1
+    lobes[1] = forces["n"], 0.0, forces["x"], forces["s"]
+    rows = np.zeros((2, PATCH_COLUMNS))
+    rows[:, reduction.U_WHEEL], rows[:, reduction.CURVATURE_Y] = (0.0, gap), 1.0
+    work = SimpleNamespace(lobes=lobes, numbers=numbers, rows=rows)
+    model = SimpleNamespace(shear_modulus=shear, poisson_ratio=nu)
+
+    def displaced(moved):
+        """Mean (ux, us, un) of lobe 0, moved along x."""
+        apart = points_of_hertz(*sizes[0])[:, None] + [moved, gap] - points_of_hertz(*sizes[1])[None]
+        (x, y), r = apart.transpose(2, 0, 1), np.hypot(*apart.transpose(2, 0, 1))
+        ux = forces["x"] * ((1.0 - nu) / r + nu * x * x / r**3) + forces["s"] * nu * x * y / r**3
+        us = forces["s"] * ((1.0 - nu) / r + nu * y * y / r**3) + forces["x"] * nu * x * y / r**3
+        return np.array([ux.mean(), us.mean(), (forces["n"] * (1.0 - nu) / r).mean()]) / (math.pi * shear)
+
+    slope = (displaced(step) - displaced(-step)) / (2.0 * step)
+    found = tabulated_wheel._slip_of_others.py_func(model, 0, 2, work)
+    np.testing.assert_allclose(found, -slope[:2], rtol=0.02)
+    assert min(map(abs, found)) > 5e-6
+    tabulated_wheel._balance.py_func(model, 1e11, 0, 2, 2, work)
+    assert lobes[0, tabulated_wheel.LIFT] == pytest.approx(displaced(0.0)[2], rel=0.005)
+
+
+def test_half_the_steps_where_a_cell_is_too_coarse():
+    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place."""
+    places = np.array([300.3, 200.6, 9.9]), np.array([600.6, 401.2, 19.8])
+    t, slope, log_depth = np.array(pair_table.FIRST) + places[0] * pair_table.STEPS
+    u, (coarse, fine) = 0.011, [list(map(int, place)) for place in places]
+    part = round((u - pair_table.FIELD) / pair_table.PART)
+    keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
+    for level, corner, state in ((0, coarse, pair_table.FINER), (1, fine, 5)):
+        key = pair_table.key_of(level, part, *corner)
+        keys[key % 1009], states[key % 1009] = key, state
+    table = NO_TABLE._replace(keys=keys, states=states)
+    state, *parts = pair_table.locate(table, u, t, slope, math.exp(log_depth))
+    assert state == 5
+    np.testing.assert_allclose(parts, places[1] - fine, atol=1e-9)
+
+
+def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
+    """Where a cell's own corners have solutions; where one of those has none, the cell has none."""
+    key, nodes = pair_table.key_of(0, 7, 300, 200, 9), np.zeros((200, pair_table.NUMBERS), np.float32)
+    places = pair_store._nodes_of(key)
+    for n, (_, _, i, j, k, _) in enumerate(places):
+        nodes[n] = 2.0 * (i - 300) - 3.0 * (j - 200) + 0.5 * (k - 9)
+    expected, used = nodes.copy(), []
+    pair = SimpleNamespace(_nodes=nodes, _rows={place: n for n, place in enumerate(places)})
+
+    def add(numbers):
+        used.append(80 + len(used))
+        nodes[used[-1]] = numbers
+        return used[-1]
+
+    pair._add = add
+    nodes[[0, 3, 21 + 32]] = np.nan  # two of the outermost, and one beyond a side
+    corners = pair_store.Pair._corners_of(pair, key)
+    assert len(used) == 3
+    np.testing.assert_allclose(nodes[corners], expected[:80], atol=1e-5)
+    nodes[21] = np.nan
+    assert pair_store.Pair._corners_of(pair, key) is None
+
+
+def test_planar_detection_is_solved(benchmark_pair):
+    """The lattices are of spatial detection."""
+    models = [LoadedWheels(benchmark_pair, name, detection="planar") for name in ("exact", "tabulated")]
+    (exact,), (table,) = (model.at_height("left", -1.5e-3, Z, yaw=5e-3, rolling=Rolling(SPEED)) for model in models)
+    np.testing.assert_array_equal(table.row, exact.row)
 
 
 def test_a_right_wheel_is_the_mirror_image_of_a_left_one(rolling_wheels):

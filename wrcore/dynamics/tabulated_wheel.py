@@ -4,9 +4,9 @@ Lobes that are apart are looked up one by one, and act on each other as points t
 pressure presses a lobe's surfaces apart, by Boussinesq's formula and the ellipses' second moments, and their friction
 lets them slip, by Cerruti's and the displacement's slope over x (K. L. Johnson, Contact Mechanics, 3.2, 3.6):
 
-    w_i = sum of (1 - nu) N_j cos(delta_i - delta_j) / (pi G r) (1 + e),
-    dxi_i = -sum of nu Fy_j / (pi G r^2) (1 + 3 e),   deta_i likewise with Fx_j,   both with the sign of s_i - s_j,
-    e = ((b_i^2 + b_j^2) / 5 - (a_i^2 + a_j^2) / 10) / r^2.
+    w_i = sum of (1 - nu) N_j cos(delta_i - delta_j) / (pi G r) (1 + 0.2 b - 0.1 a),
+    dxi_i = -sum of nu Fy_j / (pi G r^2) (1 + 0.6 b - 0.9 a),   deta_i likewise with Fx_j,
+    a = (a_i^2 + a_j^2) / r^2,   b = (b_i^2 + b_j^2) / r^2,   both creepages with the sign of s_i - s_j.
 """
 
 import math
@@ -41,8 +41,8 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
         out[reduction.NORMAL] = 0.0
         return NOTHING
     ahead = -1.0 if m.vx < 0.0 else 1.0
-    lobes = _look_lobes_up(model, pose, m.ey, m.ez, ahead * m.ex, low, high, work)
-    if lobes == 0:
+    lobes = _look_lobes_up(model, pose, m.ey, m.ez, ahead * m.ex, low, high, work) if spatial else 0
+    if lobes == 0:  # the lattices are of spatial detection
         counters[SOLVED] += 1
         return group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
     work.wrench[:] = 0.0
@@ -100,13 +100,13 @@ def _load(modulus, numbers, depth):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _apart(one, other):
-    """Distance of two lobes, from their numbers, and e of the module's formulas."""
+    """r, a and b of the module's formulas from two lobes' numbers."""
     dx, dy = one[columns.PLACE_X] - other[columns.PLACE_X], one[columns.PLACE_Y] - other[columns.PLACE_Y]
     dz = one[columns.PLACE_Z] - other[columns.PLACE_Z]
     square = dx * dx + dy * dy + dz * dz
     long = math.exp(2.0 * one[columns.LOG_A]) + math.exp(2.0 * other[columns.LOG_A])
     wide = math.exp(2.0 * one[columns.LOG_B]) + math.exp(2.0 * other[columns.LOG_B])
-    return math.sqrt(square), (0.2 * wide - 0.1 * long) / square
+    return math.sqrt(square), long / square, wide / square
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -118,9 +118,9 @@ def _balance(model, modulus, low, high, count, work):
         lift = 0.0
         for j in range(count):
             if j != i:
-                distance, e = _apart(numbers[i], numbers[j])
+                distance, a, b = _apart(numbers[i], numbers[j])
                 load = lobes[j, NORMAL] * math.cos(numbers[i, columns.ANGLE] - numbers[j, columns.ANGLE])
-                lift += unit * load / distance * (1.0 + e)
+                lift += unit * load / distance * (1.0 + 0.2 * b - 0.1 * a)
         lobes[i, LIFT] = lift
     first = low
     for i in range(count):
@@ -136,8 +136,9 @@ def _slip_of_others(model, i, count, work):
     lobes, numbers, xi, eta = work.lobes, work.numbers, 0.0, 0.0
     for j in range(count):
         if j != i and lobes[j, NORMAL] > 0.0:
-            distance, e = _apart(numbers[i], numbers[j])
-            unit = -model.poisson_ratio / (math.pi * model.shear_modulus * distance * distance) * (1.0 + 3.0 * e)
+            distance, a, b = _apart(numbers[i], numbers[j])
+            unit = -model.poisson_ratio / (math.pi * model.shear_modulus * distance * distance)
+            unit *= 1.0 + 0.6 * b - 0.9 * a
             if numbers[i, columns.PLACE_Y] < numbers[j, columns.PLACE_Y]:
                 unit = -unit
             xi, eta = xi + unit * lobes[j, FORCE_S], eta + unit * lobes[j, FORCE_X]

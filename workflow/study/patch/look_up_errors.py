@@ -41,6 +41,7 @@ POSES = {
     "hunting": ((-4e-3, 4e-3), 2e-4, 4.5e-3, (3.5e4, 7.5e4)),
     "rough track": ((-4e-3, 4e-3), 1e-3, 3e-3, (2e4, 1.1e5)),
     "curve": ((4e-3, 7e-3), 3e-4, 1.2e-2, (2e4, 1.1e5)),
+    "edges of the hollow": ((3e-4, 7e-4), 0.0, 2e-3, (5.9e4, 6.1e4)),
 }
 """Range of y (m), spread of roll beside that of balance and range of yaw (rad), and range of the load (N)."""
 
