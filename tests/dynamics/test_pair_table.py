@@ -33,19 +33,34 @@ def own_cache(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_what_is_linear_is_looked_up_exactly():
-    """And what depends on yaw as a parabola."""
-    key = pair_table.key_of(1, 7, 300, 200, 9)
-    assert pair_table.corner_of(key) == (1, 7, 300, 200, 9)
-    nodes = np.zeros((pair_table.CORNERS + 1, pair_table.NUMBERS), np.float32)
-    for n, (_, _, i, j, k, w) in enumerate(pair_store._nodes_of(key), 1):
-        nodes[n, :2] = (
-            2.0 * (i - 300) - 3.0 * (j - 200) + 0.5 * (k - 9),
-            (i - 300) + 4.0 * (0, 1, -1)[w] + 2.0 * (w > 0),
-        )
-    numbers = np.empty(pair_table.NUMBERS)
-    look_up(nodes, np.arange(1, pair_table.CORNERS + 1, dtype=np.int32), 0.3, 0.6, 0.9, 0.4 * YAW, numbers)
-    np.testing.assert_allclose(numbers[:2], [2 * 0.3 - 3 * 0.6 + 0.5 * 0.9, 0.3 + 1.6 + 0.32], rtol=1e-6)
+def known_numbers(i, j, k, yaw=0):
+    """Two numbers of a node: one with all powers that a cell gives exactly, one with what yaw adds."""
+    x, y, z, w = i - 300, j - 200, k - 9, (0, 1, -1)[yaw]
+    return x * x - 3.0 * y * y + 0.5 * z * z + x * y * z + 2.0 * y, x + 4.0 * w * y + 2.0 * w * w * z
+
+
+def pair_of_known_numbers(lost=()):
+    """A `Pair` as far as its cells go; the ``lost`` have no solution."""
+
+    def numbers(node):
+        row = np.zeros(pair_table.NUMBERS, np.float32)
+        row[:2] = (math.nan,) * 2 if node[2:] in lost else known_numbers(*node[2:])
+        return row
+
+    return SimpleNamespace(_numbers=numbers)
+
+
+@pytest.mark.parametrize("first", [(300, 200, 9), (301, 199, 10)])
+def test_what_a_cell_gives_exactly(first):
+    """Squares along each axis, what is linear in all, and what depends on yaw as a parabola; also from odd corners."""
+    key = pair_table.key_of(1, 7, *first)
+    assert pair_table.corner_of(key) == (1, 7, *first)
+    rows, numbers = pair_store.Pair._rows_of(pair_of_known_numbers(), key), np.empty(pair_table.NUMBERS)
+    part = np.array([0.3, 0.6, 0.9])
+    look_up(rows, *part, *0.5 * (part + np.array(first) % 2), 0.4 * YAW, numbers)
+    x, y, z = part + first - (300, 200, 9)
+    expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z
+    np.testing.assert_allclose(numbers[:2], expected, rtol=1e-6)
 
 
 def test_modes_leave_the_slopes_at_rest():
@@ -108,7 +123,7 @@ def test_power_of_the_wrench_is_that_of_the_patch(rolling_wheels, vx):
     m = WheelMotion(1.0, -1.5e-3, z, ex, math.sqrt(1.0 - ex * ex - ez * ez), ez, *velocity, 0.0, 0.0, 0.3)
     rows, row, wrench = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(6)
     count = find_patches(wheels.geometry, *m[:6], True, reduction.MOMENT, rows)
-    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, row, wheels._work_handle)
+    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, wheels._work_handle)
     place = row[[reduction.X, reduction.Y, reduction.Z]] - [0.0, m.y, m.z]
     drift = velocity[:3] + np.cross(velocity[3:], place)
     approach = drift[1] * row[reduction.SINE] - drift[2] * row[reduction.COSINE]
@@ -195,30 +210,33 @@ def test_half_the_steps_where_a_cell_is_too_coarse():
     table = NO_TABLE._replace(keys=keys, states=states)
     state, *parts = pair_table.locate(table, u, t, slope, math.exp(log_depth))
     assert state == 5
-    np.testing.assert_allclose(parts, places[1] - fine, atol=1e-9)
+    expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
+    np.testing.assert_allclose(parts, expected, atol=1e-9)
 
 
 def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
     """Where a cell's own corners have solutions; where one of those has none, the cell has none."""
-    key, nodes = pair_table.key_of(0, 7, 300, 200, 9), np.zeros((200, pair_table.NUMBERS), np.float32)
-    places = pair_store._nodes_of(key)
-    for n, (_, _, i, j, k, _) in enumerate(places):
-        nodes[n] = 2.0 * (i - 300) - 3.0 * (j - 200) + 0.5 * (k - 9)
-    expected, used = nodes.copy(), []
-    pair = SimpleNamespace(_nodes=nodes, _rows={place: n for n, place in enumerate(places)})
+    key = pair_table.key_of(0, 7, 300, 200, 9)
+    whole = pair_store.Pair._rows_of(pair_of_known_numbers(), key)
+    rows = pair_store.Pair._rows_of(pair_of_known_numbers([(299, 200, 9, 0), (300, 201, 11, 0)]), key)
+    changed = np.flatnonzero(abs(rows - whole).max(axis=1))
+    assert len(changed) == 2
+    lines = [
+        2.0 * known_numbers(300, 200, 9)[0] - known_numbers(301, 200, 9)[0],
+        2.0 * known_numbers(300, 201, 10)[0] - known_numbers(300, 201, 9)[0],
+    ]
+    np.testing.assert_allclose(sorted(rows[changed, 0]), sorted(lines))
+    assert pair_store.Pair._rows_of(pair_of_known_numbers([(300, 200, 9, 0)]), key) is None
 
-    def add(numbers):
-        used.append(80 + len(used))
-        nodes[used[-1]] = numbers
-        return used[-1]
 
-    pair._add = add
-    nodes[[0, 3, 21 + 32]] = np.nan  # two of the outermost, and one beyond a side
-    corners = pair_store.Pair._corners_of(pair, key)
-    assert len(used) == 3
-    np.testing.assert_allclose(nodes[corners], expected[:80], atol=1e-5)
-    nodes[21] = np.nan
-    assert pair_store.Pair._corners_of(pair, key) is None
+def test_where_yaw_has_no_solution_it_adds_what_it_adds_elsewhere():
+    """If that is known at half of the corners at least."""
+    key = pair_table.key_of(0, 7, 300, 200, 9)
+    corners = [(300 + a, 200 + b, 8 + c, 1) for a in (0, 2) for b in (0, 2) for c in (0, 2)]
+    rows = pair_store.Pair._rows_of(pair_of_known_numbers(corners[:4]), key)[32:].reshape(8, 2, -1)
+    np.testing.assert_allclose(rows[:4], np.broadcast_to(rows[4:].mean(axis=0), (4, *rows.shape[1:])))
+    assert np.ptp(rows[4:, 0, 1]) > 1.0
+    assert pair_store.Pair._rows_of(pair_of_known_numbers(corners[:5]), key) is None
 
 
 def test_planar_detection_is_solved(benchmark_pair):

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrcore.contact.detection import find_patches
 from wrcore.contact.normal import contact_modulus
-from wrcore.contact.patch import solve
+from wrcore.contact.patch import rolling, solve
 from wrcore.contact.patch.gap import group_end, material_point
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
@@ -22,7 +22,7 @@ from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
 SUMS = 12
-"""Of `solve_motions`."""
+"""Of `press_lobe`."""
 
 PROBE = 0.06
 """Creepages, over those of saturation, between which the slopes at rest are taken; where spin leaves less than a fifth
@@ -84,76 +84,94 @@ def lobe_of(geometry, place, rows):
 
 
 @jit(allocates=False)
-def solve_motions(model, y, z, axle, place, velocities, forces, sums, counters, work):
-    """Exact solution of a left wheel's lobe near a ``place`` on its profile (m) for several velocities (n, 6) of its
-    wheelset, linear and angular: the mean of those with less and with more strips.
+def press_lobe(model, y, z, axle, place, velocity, more, sums, counters, work):
+    """Exact solution of a left wheel's lobe near a ``place`` on its profile (m), with ``more`` strips, for a velocity
+    (6,) of its wheelset, linear and angular.
 
-    Fills ``forces`` (n, 6), wrenches of friction about the wheelset's centre at V = 1 m/s, and ``sums`` (SUMS,):
-    wrench of pressure, place of the slip from the centre, semi-axes and p_max. Returns whether strips found a solution.
+    Fills ``sums`` (SUMS,): wrench of pressure about the wheelset's centre, place of the slip from there, semi-axes and
+    p_max. Returns the number of windows, 0 where strips find no solution, their frame, the depth of the deepest
+    overlap, and the weight of the solution with more strips.
     """
-    finer, share, geometry, (ex, ey, ez) = work.normal.more, 0.0, model.geometry, axle
+    finer, geometry, (ex, ey, ez) = work.normal.more, model.geometry, axle
     first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
-    if first == last:
-        return False
     pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), 0.0
     for k in range(first, last):
         deepest = max(deepest, work.rows[k, PENETRATION])
+    finer[WIDENED], work.spare[0] = more, 0.0
+    windows, frame = solve_overlaps(model, pose, first, last, work.spare, work)
+    finer[WIDENED] = 1.0
+    share = finer[WEIGHT]
+    if windows == 0:
+        return 0, frame, deepest, share
+    found = _roll_on(model, y, z, axle, pose, frame, windows, deepest, velocity, rolling.AUTO, counters, work)
     sums[:] = 0.0
-    forces[:] = 0.0
-    for turn in range(2):
-        finer[WIDENED], work.spare[0] = MORE if turn else 1.0, 0.0
-        windows, frame = solve_overlaps(model, pose, first, last, work.spare, work)
-        finer[WIDENED] = 1.0
-        if windows == 0:
-            return False
-        if turn == 0:
-            share = finer[WEIGHT]
-        weight = share if turn else 1.0 - share
-        for k in range(len(velocities)):
-            v = velocities[k]
-            m = WheelMotion(1.0, y, z, ex, ey, ez, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
-            for q in range(6):
-                work.wrench[0, q] = work.wrench[1, q] = 0.0
-            found = roll_patch(model, m, pose, frame, windows, deepest, 1.0, model.friction, 1.0, counters, work)
-            for q in range(6):
-                forces[k, q] += weight * work.wrench[1, q]
-        for i in range(work.normal.start[windows]):
-            height, part = work.strips[solve.WHEEL_HEIGHT, i], weight * work.strips[solve.STRIP_LOAD, i] / found.load
-            px, py, pz, _, _ = material_point(
-                geometry, pose, frame, work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i], height,
-                work.strips[solve.STRIP_TILT, i],
-            )  # fmt: skip
-            sums[6], sums[7], sums[8] = sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz
+    for i in range(work.normal.start[windows]):
+        part = work.strips[solve.STRIP_LOAD, i] / found.load
+        px, py, pz, _, _ = material_point(
+            geometry, pose, frame, work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i],
+            work.strips[solve.WHEEL_HEIGHT, i], work.strips[solve.STRIP_TILT, i],
+        )  # fmt: skip
+        sums[6], sums[7], sums[8] = sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz
+    for q in range(6):
+        sums[q] = work.wrench[0, q]
+    sums[9], sums[10], sums[11] = found.a, found.b, found.p_max
+    return windows, frame, deepest, share
+
+
+@jit(allocates=False)
+def _roll_on(model, y, z, axle, pose, frame, windows, depth, v, method, counters, work):
+    """`Solution` of a lobe for a velocity at V = 1 m/s; its wrenches are in ``work.wrench``."""
+    m = WheelMotion(1.0, y, z, *axle, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
+    for q in range(6):
+        work.wrench[0, q] = work.wrench[1, q] = 0.0
+    return roll_patch(model, m, pose, frame, windows, depth, 1.0, model.friction, 1.0, counters, work, method)
+
+
+@jit(allocates=False)
+def roll_lobe_on(model, y, z, axle, frame, windows, depth, velocities, forces, counters, work):
+    """Wrenches of friction (n, 6) about the wheelset's centre on a lobe pressed in ``work``, for velocities (n, 6)."""
+    pose = make_pose(1.0, y, z, axle[0], axle[1], axle[2], True)
+    for k in range(len(velocities)):
+        _roll_on(model, y, z, axle, pose, frame, windows, depth, velocities[k], rolling.AGAIN, counters, work)
         for q in range(6):
-            sums[q] += weight * work.wrench[0, q]
-        for q, value in ((9, found.a), (10, found.b), (11, found.p_max)):
-            sums[q] += weight * value
-        if not share > 0.0:
-            break
-    return True
+            forces[k, q] = work.wrench[1, q]
 
 
-def solve_place(contact, handle, work, place, points):
+def solve_place(contact, handle, works, place, points):
     """Numbers of a node at a place, all but those of its modes, and the remainder (n, 3) of its creep force at
     creepages (n, 2) over those of saturation; None where strips find no solution.
 
-    ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``work``: handle of a `StripWork`;
-    ``place``: t, slope of the axle, depth D, yaw, and place on the wheel's profile, m.
+    ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``works``: handles of two
+    `StripWork`, for less and for more strips; ``place``: t, slope of the axle, depth D, yaw, and place on the wheel's
+    profile, m.
     """
     (_, _, depth, _, u), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
-    found = lobe_of(geometry, place, work.value.rows)
+    found = lobe_of(geometry, place, works[0].value.rows)
     if found is None:
         return None
     (y, z, axle), _ = found
-    sums, counters = np.zeros(SUMS), np.zeros(4, np.int64)
+    at, sums, each, counters, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), np.zeros(4, np.int64), []
+    for work, more in zip(works, (1.0, MORE), strict=True):
+        windows, frame, deepest, share = press_lobe(
+            handle, *at, u, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, counters, work
+        )
+        if windows == 0:
+            return None
+        weight = 1.0 - pressed[0][0] if pressed else 1.0 - max(share, 0.0)
+        pressed.append((weight, (frame, windows, deepest), work))
+        sums += weight * each
+        if weight == 1.0:
+            break
 
     def forces_at(velocities):
-        forces = np.zeros((len(velocities), 6))
-        return solve_motions(handle, y, z, tuple(axle), u, velocities, forces, sums, counters, work), forces
+        total = 0.0
+        for weight, lobe, work in pressed:
+            forces = np.zeros((len(velocities), 6))
+            roll_lobe_on(handle, *at, *lobe, velocities, forces, counters, work)
+            total += weight * forces
+        return total
 
-    if not forces_at(np.array([[1.0, 0.0, 0.0, *(axle / radius)]]))[0]:
-        return None
     slip, (a, b), normal = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])
     cosine, sine = sums[2] / normal, -sums[1] / normal
     numbers = np.zeros(NUMBERS)
@@ -174,21 +192,21 @@ def solve_place(contact, handle, work, place, points):
         creepages = 3.0 * points / (kalker * factors)
         velocities = np.tile(free, (len(points), 1))
         velocities[:, :2] += creepages / (unit * np.array([1.0, cosine]))
-        solved, found = forces_at(velocities)
+        found = forces_at(velocities)
         moment, table = found[:, 3:] - np.cross(slip, found[:, :3]), np.zeros((len(points), 3))
         across, turn = found[:, 1] * cosine + found[:, 2] * sine, moment[:, 2] * cosine - moment[:, 1] * sine
         scaled = np.column_stack([creepages * factors, np.full(len(points), spin * unit * c)])
         creep_forces(LAWS["table"], contact.creep, np.full(len(points), a / b), np.zeros(len(points)), scaled, table)
-        return solved, np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
+        return np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
 
-    solved, exact, table = exact_and_table(AT_REST, np.ones(2))
+    exact, table = exact_and_table(AT_REST, np.ones(2))
     of_exact, of_table = (np.diag(force[[0, 2]] - force[[1, 3]]) for force in (exact, table))
     linear = np.clip(2.5 * np.abs(of_table) / (6.0 * PROBE) - 0.5, 0.0, 1.0)
     factors = 1.0 + linear**2 * (3.0 - 2.0 * linear) * (np.clip(of_exact / of_table, 0.5, 2.0) - 1.0)
     numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
     numbers[columns.FORCE : columns.MODE] = exact[4] - table[4]
-    solved_too, exact, table = exact_and_table(points, factors)
-    return (numbers, exact - table) if solved and solved_too and np.isfinite(exact).all() else None
+    exact, table = exact_and_table(points, factors)
+    return (numbers, exact - table) if np.isfinite(exact).all() else None
 
 
 def _modulus(contact):

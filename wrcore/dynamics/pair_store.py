@@ -23,7 +23,7 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES, NUMBERS, PairTable, strip_work
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import CORNERS, FIELD, FINER, FIRST, HARD, LEVELS, PART, STEPS, YAW, corner_of
+from wrcore.dynamics.pair_table import FIELD, FINER, FIRST, HARD, LEVELS, NODES, PART, STEPS, YAW, corner_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
@@ -38,8 +38,8 @@ WRONG_NORMAL, WRONG_FORCE = 3e-3, 0.01
 WORTH = 4.0
 """Where a cell misses by less than so many times that, half its steps are tried."""
 
-NODES, CELLS, SLOTS = 300_000, 40_000, 100_003
-"""Room for nodes, cells with corners, and cells."""
+CELLS, SLOTS = 40_000, 100_003
+"""Room for cells that can be looked up, and for all."""
 
 _PATIENCE = 3.0
 """Solving takes this long before it says so, and files are written this often, s."""
@@ -72,10 +72,10 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
-        self._tools = Handle(contact), Handle(strip_work(contact.strips, 1))
+        self._contact, self._works = Handle(contact), [Handle(strip_work(contact.strips, 1)) for _ in range(2)]
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
-        self._corners, self._nodes = np.zeros((CELLS, CORNERS), np.int32), np.zeros((NODES, NUMBERS), np.float32)
-        self._solved_at, self._rows, self._used, self.cells, self._ready, self.misses = {}, {}, 0, {}, 0, {}
+        self._cells = np.zeros((CELLS, NODES, NUMBERS), np.float32)
+        self._solved_at, self._parts, self.cells, self._ready, self.misses = {}, {}, {}, 0, {}
         self._told, self._new, self._spent, self._written = False, 0, 0.0, time.monotonic()
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
@@ -89,7 +89,7 @@ class Pair:
     def table(self):
         """`PairTable` for kernels, which keeps the pair alive."""
         address = ctypes.cast(self._call, ctypes.c_void_p).value
-        return PairTable(np.asarray(self), self._states, self._corners, self._nodes, creep_modes().values, address)
+        return PairTable(np.asarray(self), self._states, self._cells, creep_modes().values, address)
 
     def _fill(self, key):
         """Solve what a cell needs; kernels call this."""
@@ -110,11 +110,8 @@ class Pair:
 
     def _solved(self, key):
         """State of a cell: 1 where its nodes have solutions and its middle is right."""
-        for node in _nodes_of(key):
-            if node not in self._rows:
-                self._rows[node] = self._row_of(node)
-        corners = self._corners_of(key)
-        self.misses[key] = miss = (math.nan, math.nan) if corners is None else self._miss(key, corners)
+        rows = self._rows_of(key)
+        self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
         if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE:
             return 1
         promising = miss[0] < WORTH * WRONG_NORMAL and miss[1] < WORTH * WRONG_FORCE
@@ -122,10 +119,10 @@ class Pair:
 
     def _keep(self, key, state):
         """Let kernels see a cell."""
-        if 10 * len(self.cells) > 9 * SLOTS:
+        if 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS:
             raise MemoryError(f"no room for more than {len(self.cells)} cells of {self.path.name}")
         if state > 0:
-            self._corners[self._ready + 1] = self._corners_of(key)
+            self._cells[self._ready + 1] = self._rows_of(key)
             self._ready += 1
         slot = key % SLOTS
         while self._keys[slot]:
@@ -133,46 +130,52 @@ class Pair:
         self._states[slot] = self._ready if state > 0 else state
         self._keys[slot], self.cells[key] = key, state
 
-    def _row_of(self, node):
-        """Row of a node: solved under the part of the profile in which its lobe then lies, once for all parts."""
+    def _numbers(self, node):
+        """Numbers (NUMBERS,) of a node: solved under the part of the profile in which its lobe then lies, once for all
+        parts; NaN where there is no solution."""
         from wrcore.dynamics.pair_node import lobe_of
 
         level, part, *corner = node
-        found = lobe_of(self.contact.geometry, _place(*node[:-1], _YAWS[node[-1]]), self._tools[1].value.rows)
-        if found is not None:
-            part = int((found[1] - FIELD) / PART + 0.5)
-        key = level, part, *corner
+        if node not in self._parts:
+            found = lobe_of(self.contact.geometry, _place(*node[:-1], _YAWS[node[-1]]), self._works[0].value.rows)
+            self._parts[node] = part if found is None else int((found[1] - FIELD) / PART + 0.5)
+        key = level, self._parts[node], *corner
         if key not in self._solved_at:
-            self._solved_at[key] = self._add(self._at(*key[:-1], _YAWS[key[-1]]))
+            self._solved_at[key] = self._at(*key[:-1], _YAWS[key[-1]]).astype(np.float32)
             self._new += 1
         return self._solved_at[key]
 
-    def _add(self, numbers):
-        """Row of new numbers."""
-        row = self._used
-        self._nodes[row] = numbers
-        self._used += 1
-        return row
+    def _rows_of(self, key):
+        """Rows (NODES, NUMBERS) that a cell is looked up from; None if one of its own corners, or what yaw adds, has no
+        solution. A corner beyond that has none goes on as a straight line does; what yaw adds where less than half of
+        its corners have none is the others' mean."""
+        level, part, i, j, k = corner_of(key)
+        rows = np.empty((NODES, NUMBERS), np.float32)
 
-    def _corners_of(self, key):
-        """Rows that a cell is looked up from; None if one of its own corners has no solution. Those beyond that have
-        none go on as a straight line does."""
-        nodes = _nodes_of(key)
-        rows = np.array([self._rows[node] for node in nodes])
-        lost = np.isnan(self._nodes[rows, 0])
-        if lost[_OWN].any():
-            return None
-        for n in np.flatnonzero(lost):
-            place = np.unravel_index(n, (4, 4, 4))
-            near = np.clip(place, 1, 2)
-            numbers = self._nodes[rows[np.ravel_multi_index(near, (4, 4, 4))]].copy()
-            for axis in np.flatnonzero(place != near):
-                far = near.copy()
-                far[axis] = 3 - near[axis]
-                numbers += self._nodes[rows[np.ravel_multi_index(near, (4, 4, 4))]]
-                numbers -= self._nodes[rows[np.ravel_multi_index(far, (4, 4, 4))]]
-            rows[n] = self._add(numbers)
-        return rows.astype(np.int32)
+        def numbers(a, b, c, yaw=0):
+            return self._numbers((level, part, i + a, j + b, k + c, yaw))
+
+        def beyond(near, axis):
+            far, out = list(near), list(near)
+            far[axis], out[axis] = 1 - near[axis], 3 * near[axis] - 1
+            found = numbers(*out)
+            return 2.0 * numbers(*near) - numbers(*far) if np.isnan(found[0]) else found
+
+        for a, b in itertools.product((0, 1), repeat=2):
+            n = 4 * (2 * a + b)
+            rows[n : n + 2] = [numbers(a, b, c) for c in (0, 1)]
+            rows[n + 2 : n + 4] = [beyond((a, b, c), 2) for c in (0, 1)]
+            rows[n + 16 : n + 20] = [beyond((c, a, b), 0) for c in (0, 1)] + [beyond((a, c, b), 1) for c in (0, 1)]
+            for c in (0, 1):
+                corner = 2 * a - i % 2, 2 * b - j % 2, 2 * c - k % 2
+                middle, left, right = (numbers(*corner, yaw) for yaw in range(3))
+                m = 32 + n + 2 * c
+                rows[m], rows[m + 1] = left - right, left + right - 2.0 * middle
+        yawed = rows[32:].reshape(8, 2, NUMBERS)
+        lost = np.isnan(yawed[..., 0]).any(axis=1)
+        if lost.sum() <= 4:  # they are further away than the cell's corners
+            yawed[lost] = yawed[~lost].mean(axis=0)
+        return None if np.isnan(rows[:, 0]).any() else rows
 
     def _at(self, level, part, i, j, k, yaw):
         """Numbers of a place in steps of a lattice; NaN where there is no solution."""
@@ -189,13 +192,13 @@ class Pair:
         """`solve_place` with the pair's own scratch arrays."""
         from wrcore.dynamics.pair_node import solve_place
 
-        return solve_place(self.contact, *self._tools, place, points)
+        return solve_place(self.contact, self._contact, self._works, place, points)
 
-    def _miss(self, key, corners):
+    def _miss(self, key, rows):
         """Errors in the middle of a cell: of N, and of the creep force over mu N at rest and where modes are found."""
         level, part, i, j, k = corner_of(key)
         exact, found, modes = self._at(level, part, i + 0.5, j + 0.5, k + 0.5, 0.0), np.empty(NUMBERS), creep_modes()
-        columns.look_up(self._nodes, corners, 0.5, 0.5, 0.5, 0.0, found)
+        columns.look_up(rows, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0, 0.0, found)
         both = np.stack([exact, found])
         mode, force = both[:, columns.MODE : columns.MODE + MODES], both[:, columns.FORCE : columns.MODE]
         forces = mode @ np.linalg.pinv(modes.inverse).T
@@ -210,13 +213,9 @@ class Pair:
             try:
                 os.utime(self.path)
                 with checked_hdf5(self.path, "a pair's table") as file:
-                    places, numbers, nodes, cells, misses = (file[name][...] for name in _PARTS)
-                places = list(map(tuple, places.tolist()))
-                for place, row in zip(places, numbers, strict=True):
-                    if place not in self._solved_at:
-                        self._solved_at[place] = self._add(row)
-                for *node, place in nodes.tolist():
-                    self._rows[tuple(node)] = self._solved_at[places[place]]
+                    places, numbers, parts, cells, misses = (file[name][...] for name in _PARTS)
+                self._solved_at = dict(zip(map(tuple, places.tolist()), numbers, strict=True)) | self._solved_at
+                self._parts = {tuple(node): part for *node, part in parts.tolist()} | self._parts
                 for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
                     if key not in self.cells:
                         self._keep(key, state)
@@ -233,12 +232,10 @@ class Pair:
             try:
                 self._read()
                 misses = [self.misses[key] for key in self.cells]
-                index = {row: n for n, row in enumerate(self._solved_at.values())}
-                nodes = [(*node, index[row]) for node, row in self._rows.items()]
-                numbers = self._nodes[list(index)]
-                parts = list(self._solved_at), numbers, nodes, list(self.cells.items()), misses
+                parts = [(*node, part) for node, part in self._parts.items()]
+                solved = list(self._solved_at), list(self._solved_at.values())
                 with new_hdf5(self.path) as file:
-                    for name, part in zip(_PARTS, parts, strict=True):
+                    for name, part in zip(_PARTS, (*solved, parts, list(self.cells.items()), misses), strict=True):
                         file[name] = part
                 self._new, self._written = 0, time.monotonic()
             except OSError as error:
@@ -246,23 +243,13 @@ class Pair:
                 self._new = 0
 
 
-_PARTS = "places", "numbers", "nodes", "cells", "misses"
-
-_OWN = [n for n in range(64) if all(1 <= place <= 2 for place in np.unravel_index(n, (4, 4, 4)))] + list(range(64, 80))
-"""Corners of a cell among what it is looked up from."""
+_PARTS = "places", "numbers", "parts", "cells", "misses"
 
 
 def _place(level, part, i, j, k, yaw):
     """Place, as `solve_place` has it, of a node."""
     t, slope, log_depth = np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
     return t, slope, math.exp(log_depth), yaw, FIELD + part * PART
-
-
-def _nodes_of(key):
-    """Nodes that a cell is looked up from."""
-    level, part, i, j, k = corner_of(key)
-    ranges = [(-1, 0, 1, 2)] * 3 + [(0,)], [(0, 1)] * 3 + [(1, 2)]
-    return [(level, part, i + a, j + b, k + c, yaw) for each in ranges for a, b, c, yaw in itertools.product(*each)]
 
 
 def _hand_on(error):

@@ -6,9 +6,15 @@ yaw; the part of the wheel's profile where it lies; and the depth D that its ove
 
     M0 = sum of int g^2 ds,   D = (15/16 sqrt(B0) M0)^0.4,
 
-which stays smooth where overlaps merge. Between nodes: Catmull-Rom in t, slope and ln D at no yaw; what yaw changes, a
-parabola through three nodes, is linear in the other three. A node depends on its place alone, not on what was solved
-before it. Where the lattice is too coarse another one with half its steps takes over.
+which stays smooth where overlaps merge. Between nodes at no yaw: Catmull-Rom along each of t, slope and ln D, linear in
+the other two, the three together less twice what is linear in all (a Boolean sum, which wants 32 nodes in place of 64
+and errs by the product of two curvatures more). What yaw changes is a parabola through three nodes, linear between
+nodes of a lattice with twice the steps. A node depends on its place alone, not on what was solved before it. Where the
+lattice is too coarse another one with half its steps takes over.
+
+References
+----------
+Gordon, SIAM J. Numer. Anal. 8 (1971) 158 (Boolean sums of interpolations).
 
 A node's numbers (`NUMBERS`) give the normal problem, and the creep force: the creep table at the ellipse of equal
 moments, with the creepages scaled so that both slopes at rest are exact, and a remainder in fixed modes over the two
@@ -49,8 +55,9 @@ PART, FIELD = 4e-3, -0.1
 CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
 
-CORNERS = 80
-"""Nodes of a cell: 4 x 4 x 4 without yaw, and 2 x 2 x 2 in their middle with it to the left and to the right."""
+NODES = 48
+"""Rows of a cell: its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what yaw adds at
+the 8 corners of the cell with twice the steps in which it lies."""
 
 LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, FORCE = range(11)
 MODE = FORCE + 3
@@ -127,8 +134,9 @@ def state_of(keys, states, key):
 
 @jit(allocates=False)
 def locate(table, u, t, slope, depth):
-    """Number of the corners of the cell where a lobe lies, 0 if it is to be solved, and its parts of a step beyond the
-    first one. A lobe that only just touches is looked up at the least depth."""
+    """Number of the cell where a lobe lies, 0 if it is to be solved, and its parts of a step beyond the first corner,
+    and of two steps beyond that of the cell with twice the steps. A lobe that only just touches is looked up at the
+    least depth."""
     part, scale = int((u - FIELD) / PART + 0.5), 1.0
     for level in range(LEVELS):
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
@@ -142,43 +150,43 @@ def locate(table, u, t, slope, depth):
             call_c(table.fill, key)
             state = state_of(table.keys, table.states, key)
         if state > 0:
-            return state, x - i, y - j, z - k
+            return state, x - i, y - j, z - k, 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
         if state != FINER:
             break
         scale *= 2.0
-    return 0, 0.0, 0.0, 0.0
+    return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+@jit(allocates=False, forceinline=True, fastmath=FAST)
+def _add_four(rows, n, w0, w1, w2, w3, numbers):
+    """Add four rows from the n-th on with their weights."""
+    one, two, three, four = rows[n], rows[n + 1], rows[n + 2], rows[n + 3]
+    for m in range(NUMBERS):
+        numbers[m] += w0 * one[m] + w1 * two[m] + w2 * three[m] + w3 * four[m]
 
 
 @jit(allocates=False, fastmath=FAST)
-def look_up(nodes, corners, fx, fy, fz, yaw, numbers):
-    """Fill ``numbers`` (NUMBERS,) at a place in the cell of the ``nodes`` (n, NUMBERS) that ``corners`` (CORNERS,)
-    names."""
-    wx, wy, (w0, w1, w2, w3) = _weights(fx), _weights(fy), _weights(fz)
+def look_up(rows, fx, fy, fz, gx, gy, gz, yaw, numbers):
+    """Fill ``numbers`` (NUMBERS,) at a place in the cell with these ``rows`` (NODES, NUMBERS), see `locate`."""
+    (x0, x1, x2, x3), (y0, y1, y2, y3), (z0, z1, z2, z3) = _weights(fx), _weights(fy), _weights(fz)
     for m in range(NUMBERS):
         numbers[m] = 0.0
-    for a in range(4):
-        for b in range(4):
-            n, w = 16 * a + 4 * b, wx[a] * wy[b]
-            one, two, three, four = (
-                nodes[corners[n]],
-                nodes[corners[n + 1]],
-                nodes[corners[n + 2]],
-                nodes[corners[n + 3]],
-            )
-            v0, v1, v2, v3 = w * w0, w * w1, w * w2, w * w3
-            for m in range(NUMBERS):
-                numbers[m] += v0 * one[m] + v1 * two[m] + v2 * three[m] + v3 * four[m]
+    for a in range(2):
+        lx, cx = (fx, x2) if a else (1.0 - fx, x1)
+        for b in range(2):
+            ly, cy = (fy, y2) if b else (1.0 - fy, y1)
+            along = cx * ly + lx * cy - 2.0 * lx * ly
+            w0, w1 = along * (1.0 - fz) + lx * ly * z1, along * fz + lx * ly * z2
+            _add_four(rows, 4 * (2 * a + b), w0, w1, lx * ly * z0, lx * ly * z3, numbers)
+            mx, my, lz = (fx if a else 1.0 - fx), (fy if a else 1.0 - fy), (fz if b else 1.0 - fz)
+            _add_four(rows, 16 + 4 * (2 * a + b), my * lz * x0, my * lz * x3, mx * lz * y0, mx * lz * y3, numbers)
     s = yaw / YAW
     odd, even = 0.5 * s, 0.5 * s * s
     for a in range(2):
         for b in range(2):
-            w = (fx if a else 1.0 - fx) * (fy if b else 1.0 - fy)
-            for c in range(2):
-                v, n = w * (fz if c else 1.0 - fz), 64 + 8 * a + 4 * b + 2 * c
-                left, right, middle = v * (even + odd), v * (even - odd), v * s * s
-                one, two, three = nodes[corners[16 * a + 4 * b + c + 21]], nodes[corners[n]], nodes[corners[n + 1]]
-                for m in range(NUMBERS):
-                    numbers[m] += left * two[m] + right * three[m] - middle * one[m]
+            w = (gx if a else 1.0 - gx) * (gy if b else 1.0 - gy)
+            w0, w1 = w * (1.0 - gz), w * gz
+            _add_four(rows, 32 + 4 * (2 * a + b), w0 * odd, w0 * even, w1 * odd, w1 * even, numbers)
 
 
 @jit(allocates=False, forceinline=True)

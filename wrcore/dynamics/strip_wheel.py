@@ -149,27 +149,21 @@ def _creep_by_law(model, limit, xi, eta, phi, load, x, a, b, strips, force, coun
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _roll_at(model, friction, library, work, strips, slip, force, count):
-    """Creep force on the strips at a library's resolution."""
+def _roll(model, friction, settings, strips, slip, force, count, slender, windows, work, method):
+    """Creep force on the strips with the library whose ellipses have as many."""
+    library, own = settings.library, work.rolling
+    if slender:
+        library, own = settings.slender, work.slender
+    elif windows == 1 and count == settings.wider.level.strips:
+        library = settings.wider
+    elif windows == 1 and count == settings.widest.level.strips:
+        library = settings.widest
     rolling.rolling_force(
         strips[solve.OWN_PLACE, :count], strips[solve.OWN_WIDTH, :count], strips[solve.HALF_LENGTH, :count],
         strips[solve.MIDDLE, :count], strips[solve.PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count],
-        slip[3, :count], model.shear_modulus, friction, library, work, rolling.AUTO,
+        slip[3, :count], model.shear_modulus, friction, library, own, method,
     )  # fmt: skip
-    rolling.read_forces(count, work, force)
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _roll(model, friction, settings, strips, slip, force, count, slender, windows, work):
-    """Creep force on the strips with the library whose ellipses have as many."""
-    if slender:
-        _roll_at(model, friction, settings.slender, work.slender, strips, slip, force, count)
-    elif windows == 1 and count == settings.wider.level.strips:
-        _roll_at(model, friction, settings.wider, work.rolling, strips, slip, force, count)
-    elif windows == 1 and count == settings.widest.level.strips:
-        _roll_at(model, friction, settings.widest, work.rolling, strips, slip, force, count)
-    else:
-        _roll_at(model, friction, settings.library, work.rolling, strips, slip, force, count)
+    rolling.read_forces(count, own, force)
 
 
 @jit(allocates=False)
@@ -208,8 +202,9 @@ def _add_wrenches(geometry, pose, frame, count, share, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work):
-    """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``."""
+def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work, method):
+    """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``.
+    ``method``: of `rolling_force`."""
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
     count = solve.publish(model.shear_modulus / (1.0 - model.poisson_ratio), work.normal, windows, strips, sums)
     load, x, s = sums[solve.LOAD], sums[solve.MEAN_X], sums[solve.MEAN_S]
@@ -238,7 +233,7 @@ def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, co
         )
     else:
         work.solved[0], work.solved[1] = count, a > SLENDER * b
-        _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work)
+        _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work, method)
     if back:
         _turn_round(strips, slip, work.friction, count)
     power = _add_wrenches(model.geometry, pose, frame, count, share, work)
@@ -309,7 +304,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
-        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, counters, work)
+        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, counters, work, rolling.AUTO)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE
             windows, frame = solve_overlaps(model, pose, low, high, memory, work)
@@ -318,13 +313,21 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                 for k in range(6):
                     work.wrench[0, k] *= 1.0 - share
                     work.wrench[1, k] *= 1.0 - share
-                more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work)
+                more = roll_patch(
+                    model, m, pose, frame, windows, depth, speed, friction, share, counters, work, rolling.AUTO
+                )
                 found = _mean(found, more, share)
     fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z
     for k in range(6):
         wrench[k] += work.wrench[0, k] + work.wrench[1, k]
     return found
+
+
+@jit(allocates=False)
+def add_group(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
+    """`group_wrench` for who calls it by its address."""
+    group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -398,13 +401,10 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 last = group_end(rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
                 work.spare[0] = 0.0
-                if contact.strips.group != 0:
-                    call_address(
-                        contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters,
-                        memory, work,
-                    )  # fmt: skip
-                else:
-                    group_wrench(contact, m, spatial, rows, first, last, work.out, wrench, counters, memory, work)
+                call_address(
+                    contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
+                    work,
+                )  # fmt: skip
                 group += 1
                 if work.out[reduction.NORMAL] > 0.0:
                     copy_into(rows[kept], work.out)

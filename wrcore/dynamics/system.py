@@ -284,18 +284,23 @@ def with_fallback(contact):
     return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
 
 
-def with_look_up(contact, work):
-    """Contact with the address of the kernel that looks patches up, if it asks for one."""
-    if not contact.strips.looked_up:
-        return contact
-    from wrcore.dynamics.tabulated_wheel import add_tabulated
+def with_groups(contact, work):
+    """Contact on strips with the addresses of the kernels of its patches."""
+    from wrcore.dynamics.strip_wheel import add_group
 
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
-    kernel = Kernel(
-        add_tabulated, Kind(contact._replace(geometries=())), m, True, row[None], 0, 0, row, row, np.zeros(4, np.int64),
-        row, Kind(work),
-    )  # fmt: skip
-    return contact._replace(strips=contact.strips._replace(group=kernel.address))
+
+    def address(kernel):
+        kind, counters = Kind(contact._replace(geometries=())), np.zeros(4, np.int64)
+        return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
+
+    contact = with_fallback(contact)
+    solver = group = address(add_group)
+    if contact.strips.looked_up:
+        from wrcore.dynamics.tabulated_wheel import add_tabulated
+
+        group = address(add_tabulated)
+    return contact._replace(strips=contact.strips._replace(solver=solver, group=group))
 
 
 def with_kernels(model, work):
@@ -305,7 +310,7 @@ def with_kernels(model, work):
     if contact.strips.strips and len(work.motions):
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
-        wrenches, contact = strip_wrenches, with_look_up(with_fallback(contact), work.strips)
+        wrenches, contact = strip_wrenches, with_groups(contact, work.strips)
     elif shaped(contact):
         from wrcore.dynamics.shaped_wheel import shaped_wrenches
 

@@ -20,9 +20,12 @@ from wrcore.contact.patch.gap import add_force, frame_of_rows
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import YAW, depth_of, lobe_end, locate, look_up, tabulated_force
-from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, group_wrench, lifted_overlaps
+from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
+from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
+
+UNKNOWN = NOTHING._replace(load=-1.0)
 
 NORMAL, LIFT, FORCE_X, FORCE_S = range(4)
 """Columns of a lobe: its load (N), what others lift it by (m), and friction on it (N)."""
@@ -32,8 +35,8 @@ TURNS, STEPS, ROLLS = 3, 6, 3
 
 
 @jit(allocates=False, fastmath=FUSED)
-def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """As `group_wrench`, looked up."""
+def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
+    """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
     frame = frame_of_rows(rows, first, last)
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     pose, low, high, left, _, _ = lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work)
@@ -44,7 +47,7 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     lobes = _look_lobes_up(model, pose, m.ey, m.ez, ahead * m.ex, low, high, work) if spatial else 0
     if lobes == 0:  # the lattices are of spatial detection
         counters[SOLVED] += 1
-        return group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
+        return UNKNOWN
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
@@ -57,8 +60,10 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
 
 @jit(allocates=False)
 def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """`tabulated_wrench` for who calls it by its address."""
-    tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
+    """`tabulated_wrench`, or what the solver finds, for who calls it by its address."""
+    found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work)
+    if found.load < 0.0:
+        call_address(model.strips.solver, model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -80,10 +85,10 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
             depth, u = depth_of(rows, first, last, lobes[count, LIFT])
             lobes[count, NORMAL] = 0.0
             if depth > 0.0:
-                cell, fx, fy, fz = locate(table, u, t, slope, depth)
+                cell, fx, fy, fz, gx, gy, gz = locate(table, u, t, slope, depth)
                 if cell == 0:
                     return 0
-                look_up(table.nodes, table.corners[cell], fx, fy, fz, yaw, work.numbers[count])
+                look_up(table.cells[cell], fx, fy, fz, gx, gy, gz, yaw, work.numbers[count])
                 lobes[count, NORMAL] = _load(modulus, work.numbers[count], depth)
             count += 1
             first = last

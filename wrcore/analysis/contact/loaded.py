@@ -32,7 +32,7 @@ from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
 from wrcore.dynamics.pair_store import with_pair
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
 from wrcore.dynamics.system import with_fallback
-from wrcore.dynamics.tabulated_wheel import tabulated_wrench
+from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
 from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
@@ -189,9 +189,13 @@ class LoadedWheels:
         while first < count:
             last, before = group_end(overlaps, count, first), self._counters[ON_GRID]
             work.spare[0] = 0.0
-            find = tabulated_wrench if contact.value.strips.looked_up else group_wrench
-            found = find(contact, left, self.spatial, overlaps, first, last, out[0], wrench, self._counters,
-                         work.spare, self._work_handle)  # fmt: skip
+            found = UNKNOWN
+            if contact.value.strips.looked_up:
+                found = tabulated_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
+                                         self._counters, self._work_handle)  # fmt: skip
+            if found.load < 0.0:
+                found = group_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
+                                     self._counters, work.spare, self._work_handle)  # fmt: skip
             sums = work.sums
             x = out[0, columns.X] - sums[solve.MEAN_X]
             extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]

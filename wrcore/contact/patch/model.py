@@ -27,11 +27,9 @@ class PairTable(NamedTuple):
 
     keys: np.ndarray
     states: np.ndarray
-    """(n,) int64 and int32: cells by their keys, each with the number of its corners or its state."""
-    corners: np.ndarray
-    """(n, CORNERS) int32: the nodes of each cell."""
-    nodes: np.ndarray
-    """(n, NUMBERS) float32."""
+    """(n,) int64 and int32: cells by their keys, each with its number or its state."""
+    cells: np.ndarray
+    """(n, NODES, NUMBERS) float32: what a cell is looked up from."""
     modes: np.ndarray
     """(n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages."""
     fill: int
@@ -39,8 +37,7 @@ class PairTable(NamedTuple):
 
 
 NO_TABLE = PairTable(
-    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0, 0), np.int32), np.zeros((0, 0), np.float32),
-    np.zeros((0,) * 3, np.float32), 0,
+    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0,) * 3, np.float32), 0,
 )  # fmt: skip
 NUMBERS, MODES = 32, 16
 """Numbers of a node, and modes of the creep force that are among them."""
@@ -73,8 +70,9 @@ class StripModel(NamedTuple):
     fallback: int = 0
     """Address of the kernel that solves a patch on a grid."""
     table: PairTable = NO_TABLE
+    solver: int = 0
     group: int = 0
-    """Address of the kernel that looks a patch up in the table; 0: it is solved."""
+    """Addresses of the kernels that solve a patch, and that add what acts on one: looked up in the table or solved."""
 
 
 class StripWork(NamedTuple):

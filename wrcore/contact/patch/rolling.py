@@ -30,7 +30,7 @@ from wrcore.contact.patch.resolvent import factorise, multiply, substitute, take
 from wrcore.contact.patch.rolling_influence import StripLayout, assemble, lay_out, second_window
 from wrcore.kernels.jit import FUSED, jit
 
-AUTO, LIBRARY, BAND, DIRECT = 0, 1, 2, 3
+AUTO, LIBRARY, BAND, DIRECT, AGAIN = range(5)
 FASTEST = 100.0
 """Largest rigid slip that is iterated, over mu N/(G c^2)."""
 
@@ -44,7 +44,7 @@ _RHO = np.float32(1.6)
 _RAMP = np.float32(10)
 _TINY = np.float32(1e-30)
 
-LENGTH, LOAD, BOUND, TO_UNIT, SLOWED = range(5)
+LENGTH, LOAD, BOUND, TO_UNIT, SLOWED, USED = range(6)
 
 
 class Level(NamedTuple):
@@ -84,7 +84,8 @@ class RollingWork(NamedTuple):
     """(3, n (n + 1)): slip of one strip by another, components xx, ss, xs."""
     strip: StripLayout
     scale: np.ndarray
-    """(5,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), SLOWED: what slips are divided by."""
+    """(6,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), SLOWED: what slips are divided by, USED:
+    the method of the last solution."""
     bound: np.ndarray
     step: np.ndarray
     z: np.ndarray
@@ -107,7 +108,7 @@ def rolling_work(strips, n):
     single = [np.zeros(m, np.float32) for _ in range(11)]
     return RollingWork(
         np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
-        np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(5),
+        np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(6),
         *single, np.zeros(n + 2, np.float32),
     )  # fmt: skip
 
@@ -244,42 +245,58 @@ def rolling_force(
 
     ``method``: AUTO is LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else
     BAND, and DIRECT with more iterations if the residual then exceeds LIMIT; or LIBRARY (falls back on BAND), BAND,
-    DIRECT. ``work`` afterwards holds what `read_field` needs."""
-    panels, level = library.panels, library.level
-    count = centre.size
-    size = 2 * panels.n * count
+    DIRECT; or AGAIN, for the strips of the last solution with other slips, whose matrices are kept. ``work`` afterwards
+    holds what `read_field` needs."""
+    panels, scale, count, again = library.panels, work.scale, centre.size, method == AGAIN
     split = second_window(centre, width)
     windows = 1 if split == count else 2
-    c, load = lay_out(centre, width, half_length, middle, peak, split, work.strip)
-    bound = mu * load
-    work.scale[BOUND] = bound
+    if not again:
+        scale[LENGTH], scale[LOAD] = lay_out(centre, width, half_length, middle, peak, split, work.strip)
+    c, bound = scale[LENGTH], mu * scale[LOAD]
+    scale[BOUND] = bound
     if not bound > 0:
         return 0.0 * bound, 0.0 * bound, 0.0 * bound, 0.0 * bound, DIRECT
-    assemble(panels, count, library.nu, work)
-    scale = work.scale
-    scale[LENGTH], scale[LOAD], scale[BOUND], scale[TO_UNIT] = c, load, bound, shear_modulus * c * c / bound
+    used = int(scale[USED])
+    if not again:
+        assemble(panels, count, library.nu, work)
+        used = _prepare(panels, library, count, windows, split, method, work)
+    scale[TO_UNIT] = shear_modulus * c * c / bound
     scale[SLOWED] = _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work)
-    if (method == AUTO or method == LIBRARY) and take_from_library(library, count, windows, split, work):
-        used = LIBRARY
-        residual = _iterate(panels, size, LIBRARY, 0, windows, level.iterations, work)
-    elif method != DIRECT:
-        used = BAND
-        residual = _solve_factorised(panels, size, level.reach, level.iterations, work)
-    if method == DIRECT or (method == AUTO and residual > LIMIT):
+    residual = _solve(panels, library.level, count, windows, used, work)
+    if (again or method == AUTO) and used != DIRECT and residual > LIMIT:
         used = DIRECT
-        residual = _solve_factorised(panels, size, count, DIRECT_ITERATIONS, work)
+        _factorise(panels, count, count, work)
+        residual = _solve(panels, library.level, count, windows, DIRECT, work)
+    scale[USED] = used
     fx, fs, mn = _resultant(panels, count, work)
     return bound * fx, bound * fs, bound * c * mn, float(residual), used
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _solve_factorised(panels, size, reach, iterations, work):
-    """Iterate with the factors of I + B, as far as ``reach`` strips apart."""
+def _prepare(panels, library, count, windows, split, method, work):
+    """Take factors from the library, or make them; returns the method to use."""
+    if (method == AUTO or method == LIBRARY) and take_from_library(library, count, windows, split, work):
+        return LIBRARY
+    _factorise(panels, count, count if method == DIRECT else library.level.reach, work)
+    return DIRECT if method == DIRECT else BAND
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _factorise(panels, count, reach, work):
+    """Factors of I + B, as far as ``reach`` strips apart."""
+    size = 2 * panels.n * count
     matrix = work.matrix[: size * size].reshape((size, size))
-    factors = work.factors[: size * size].reshape((size, size))
-    factorise(matrix, 2 * panels.n, reach, factors)
-    whole = 2 * panels.n * (reach + 1) >= size
-    return _iterate(panels, size, DIRECT if whole else BAND, reach, 1, iterations, work)
+    factorise(matrix, 2 * panels.n, reach, work.factors[: size * size].reshape((size, size)))
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _solve(panels, level, count, windows, used, work):
+    """Iterate by a method whose factors are made; returns the residual."""
+    reach = count if used == DIRECT else level.reach
+    whole = used != LIBRARY and reach + 1 >= count
+    iterations = DIRECT_ITERATIONS if used == DIRECT else level.iterations
+    method, windows = (DIRECT if whole else used), (windows if used == LIBRARY else 1)
+    return _iterate(panels, 2 * panels.n * count, method, reach, windows, iterations, work)
 
 
 @jit(allocates=False, fastmath=FUSED)
