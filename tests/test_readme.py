@@ -60,5 +60,5 @@ def test_the_table_of_choices_is_that_of_the_measurements():
 def test_terms_are_explained_before_they_are_used():
     page = TEXTS["reports/accuracy.md"]
     terms, rest = page.partition("## Errors of integration")[::2]
-    for term in ("planar", "spatial", "`moment`", "`maximum`", "`strips`", "`exact`", "rtol", "μN", "CONTACT", "creep"):
+    for term in ("planar", "spatial", "`moment`", "`maximum`", "`exact`", "rtol", "μN", "CONTACT", "creep"):
         assert term in terms and term in rest

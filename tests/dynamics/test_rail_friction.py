@@ -15,7 +15,6 @@ MODELS = {
     "table": {}, "linear": {"contact.creep.model": "linear"}, "she": {"contact.creep.model": "she"},
     "polach": {"contact.creep.model": "polach"}, "fastsim": {"contact.creep.model": "fastsim"},
     "shape numbers": {"contact.creep.planes": "sdec", "contact.creep.tolerance": 0.05},
-    "strips": {"contact.patch": "strips", "contact.resolution": "coarse"},
     "exact": {"contact.patch": "exact", "contact.resolution": "coarse"},
     "exact, creepages": {"contact.patch": "exact", "contact.resolution": "coarse", "contact.slip": "creepages"},
 }  # fmt: skip
@@ -50,7 +49,7 @@ def slipping(state, part=0.03):
     return state
 
 
-COMPILED = {name: pytest.mark.check for name in ("strips", "shape numbers")}  # kernels of their own, a minute each
+COMPILED = {"shape numbers": pytest.mark.check}  # kernels of their own, a minute
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=COMPILED.get(name, ())) for name in MODELS])

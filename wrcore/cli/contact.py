@@ -54,7 +54,7 @@ def add(commands):
         help="search in the wheelset's cross-section only, or ahead and behind it, too",
     )  # fmt: skip
     command.add_argument(
-        "--patch", choices=("maximum", "moment", "strips", "exact", "tabulated", "grid"), default="moment",
+        "--patch", choices=("maximum", "moment", "exact", "tabulated", "grid"), default="moment",
         help="reduction of an overlap to an ellipse, or the real patch",
     )  # fmt: skip
     command.add_argument(

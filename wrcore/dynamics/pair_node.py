@@ -84,7 +84,7 @@ def lobe_of(geometry, place, rows):
 
 
 @jit(allocates=False)
-def press_lobe(model, y, z, axle, place, velocity, more, sums, counters, work):
+def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     """Exact solution of a left wheel's lobe near a ``place`` on its profile (m), with ``more`` strips, for a velocity
     (6,) of its wheelset, linear and angular.
 
@@ -103,7 +103,7 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, counters, work):
     share = finer[WEIGHT]
     if windows == 0:
         return 0, frame, deepest, share
-    found = _roll_on(model, y, z, axle, pose, frame, windows, deepest, velocity, rolling.AUTO, counters, work)
+    found = _roll_on(model, y, z, axle, pose, frame, windows, deepest, velocity, rolling.AUTO, work)
     sums[:] = 0.0
     for i in range(work.normal.start[windows]):
         part = work.strips[solve.STRIP_LOAD, i] / found.load
@@ -119,20 +119,20 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, counters, work):
 
 
 @jit(allocates=False)
-def _roll_on(model, y, z, axle, pose, frame, windows, depth, v, method, counters, work):
+def _roll_on(model, y, z, axle, pose, frame, windows, depth, v, method, work):
     """`Solution` of a lobe for a velocity at V = 1 m/s; its wrenches are in ``work.wrench``."""
     m = WheelMotion(1.0, y, z, *axle, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
     for q in range(6):
         work.wrench[0, q] = work.wrench[1, q] = 0.0
-    return roll_patch(model, m, pose, frame, windows, depth, 1.0, model.friction, 1.0, counters, work, method)
+    return roll_patch(model, m, pose, frame, windows, depth, 1.0, model.friction, 1.0, work, method)
 
 
 @jit(allocates=False)
-def roll_lobe_on(model, y, z, axle, frame, windows, depth, velocities, forces, counters, work):
+def roll_lobe_on(model, y, z, axle, frame, windows, depth, velocities, forces, work):
     """Wrenches of friction (n, 6) about the wheelset's centre on a lobe pressed in ``work``, for velocities (n, 6)."""
     pose = make_pose(1.0, y, z, axle[0], axle[1], axle[2], True)
     for k in range(len(velocities)):
-        _roll_on(model, y, z, axle, pose, frame, windows, depth, velocities[k], rolling.AGAIN, counters, work)
+        _roll_on(model, y, z, axle, pose, frame, windows, depth, velocities[k], rolling.AGAIN, work)
         for q in range(6):
             forces[k, q] = work.wrench[1, q]
 
@@ -151,10 +151,10 @@ def solve_place(contact, handle, works, place, points):
     if found is None:
         return None
     (y, z, axle), _ = found
-    at, sums, each, counters, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), np.zeros(4, np.int64), []
+    at, sums, each, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), []
     for work, more in zip(works, (1.0, MORE), strict=True):
         windows, frame, deepest, share = press_lobe(
-            handle, *at, u, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, counters, work
+            handle, *at, u, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
         )
         if windows == 0:
             return None
@@ -168,7 +168,7 @@ def solve_place(contact, handle, works, place, points):
         total = 0.0
         for weight, lobe, work in pressed:
             forces = np.zeros((len(velocities), 6))
-            roll_lobe_on(handle, *at, *lobe, velocities, forces, counters, work)
+            roll_lobe_on(handle, *at, *lobe, velocities, forces, work)
             total += weight * forces
         return total
 

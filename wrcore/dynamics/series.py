@@ -35,7 +35,7 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
-        strips[:5], sizes,
+        strips[:3], sizes,
     )  # fmt: skip
 
 

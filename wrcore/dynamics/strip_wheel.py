@@ -1,9 +1,8 @@
 """Wrench of the rails on wheelsets with the real patch: contact on strips in place of an ellipse.
 
-``exact`` solves the normal and the rolling problem on Galerkin strips; ``strips`` takes the shape-corrected virtual
-penetration for the normal one and the creep law at the ellipse of equal moments of pressure. The rigid slip is that of
-the wheel's over the rail's surface, strip by strip, or follows one set of creepages. Where strips do not converge a
-uniform grid takes over (counted).
+The normal and the rolling problem are solved on Galerkin strips. The rigid slip is that of the wheel's over the rail's
+surface, strip by strip, or follows one set of creepages. Where strips do not converge a uniform grid takes over
+(counted).
 
 Pressure and friction act in each strip's own plane, on the wheel's material points, where the slip is taken: friction
 takes from the wheelset what it dissipates. A right wheel is solved as the mirror image of a left one: no choice can
@@ -30,11 +29,10 @@ from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import make_pose
-from wrcore.creep.laws import creep_force_at
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, contact_of, detect_patches, falling, wheel_wrenches
+from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, wheel_wrenches
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -128,24 +126,9 @@ def solve_overlaps(model, pose, low, high, memory, work):
     """Number of windows, 0 where strips find no solution, and frame of the overlaps of a lifted wheel."""
     settings = model.strips
     return solve.solve_patch(
-        model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, settings.normal,
-        memory, work.normal,
+        model.geometry, pose, model.hertz, settings.values, work.rows, low, high, settings.strips, memory,
+        work.normal,
     )  # fmt: skip
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _creep_by_law(model, limit, xi, eta, phi, load, x, a, b, strips, force, count):
-    """Creep force of the scene's law at the ellipse of equal moments, spread as the pressure; look-ups missed."""
-    c = math.sqrt(a * b)
-    scale = model.shear_modulus * c * c / limit
-    f1, f2, m3, missed = creep_force_at(
-        model.law, model.creep, math.log(a / b), a / b, 0.0, xi * scale, eta * scale, phi * scale * c
-    )
-    for i in range(count):
-        share = strips[solve.STRIP_LOAD, i] / load * limit
-        force[0, i], force[1, i] = share * f1, share * f2
-        force[2, i] = share * (c * m3 + (x - strips[solve.MIDDLE, i]) * f2)
-    return missed
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -202,7 +185,7 @@ def _add_wrenches(geometry, pose, frame, count, share, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, counters, work, method):
+def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work, method):
     """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``.
     ``method``: of `rolling_force`."""
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
@@ -226,14 +209,8 @@ def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, co
     back = m.vx < 0.0  # rolling is always towards x
     if back:
         _turn_round(strips, slip, work.friction, count)
-    if settings.rolling == 0:
-        turned_eta, turned_x = (-eta, -x) if back else (eta, x)
-        counters[OUT_OF_RANGE] += _creep_by_law(
-            model, friction * load, xi, turned_eta, phi, load, turned_x, a, b, strips, work.friction, count
-        )
-    else:
-        work.solved[0], work.solved[1] = count, a > SLENDER * b
-        _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work, method)
+    work.solved[0], work.solved[1] = count, a > SLENDER * b
+    _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work, method)
     if back:
         _turn_round(strips, slip, work.friction, count)
     power = _add_wrenches(model.geometry, pose, frame, count, share, work)
@@ -304,7 +281,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
-        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, counters, work, rolling.AUTO)
+        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work, rolling.AUTO)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE
             windows, frame = solve_overlaps(model, pose, low, high, memory, work)
@@ -313,9 +290,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                 for k in range(6):
                     work.wrench[0, k] *= 1.0 - share
                     work.wrench[1, k] *= 1.0 - share
-                more = roll_patch(
-                    model, m, pose, frame, windows, depth, speed, friction, share, counters, work, rolling.AUTO
-                )
+                more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work, rolling.AUTO)
                 found = _mean(found, more, share)
     fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z

@@ -63,11 +63,10 @@ class StripPatch:
 
 
 class NormalContact:
-    """Normal contact of the wheels of a wheelset on strips; ``modulus`` is E* (Pa), ``model`` exact or strips."""
+    """Normal contact of the wheels of a wheelset on strips; ``modulus`` is E* (Pa)."""
 
-    def __init__(self, geometry, modulus, resolution="middle", model="exact"):
+    def __init__(self, geometry, modulus, resolution="middle"):
         self.geometry, self.modulus, self.resolution = geometry, modulus, RESOLUTIONS[resolution]
-        self.model = {"exact": solve.EXACT, "strips": solve.STRIPS}[model]
         self._hertz, self._values = hertz_table(), influence_table()
         self._patches = np.zeros((MAX_PATCHES, PATCH_COLUMNS))
         self._work, self._memories = normal_work(), {}
@@ -123,7 +122,7 @@ class NormalContact:
     def _on_strips(self, pose, first, last, memory):
         """One solution of the overlaps: number of windows, frame, strips and sums."""
         windows, frame = solve.solve_patch(self.geometry, pose, self._hertz, self._values, self._patches, first, last,
-                                           self.resolution, self.model, memory, self._work)  # fmt: skip
+                                           self.resolution, memory, self._work)  # fmt: skip
         if not windows:
             return 0, frame, self._strips[:, :0], np.full(solve.SUMS, np.nan)
         count = solve.publish(self.modulus, self._work, windows, self._strips, self._sums)

@@ -20,11 +20,11 @@ def test_each_claim_names_its_cases_and_its_worst():
     rows = creep_claims(creep).set_index("cases")
     assert rows.loc["CONTACT, all", "worst"] == pytest.approx(40.0) and rows.loc["CONTACT, a", "count"] == 1
     front = pd.read_csv(ROOT / "wrcore" / "run" / "accuracy_front.csv")
-    patches = pd.DataFrame({"model": ["strips"], "zone": "everywhere", "quantity": "normal force", "unit": "%",
+    patches = pd.DataFrame({"model": ["exact, coarse"], "zone": "everywhere", "quantity": "normal force", "unit": "%",
                             "count": 4, "median": 0.1, "q95": 0.2, "worst": 0.3, "worst_y_m": 0.0})  # fmt: skip
     whole = claims(contact, creep, patches, front)
     assert "Polach" in claims_markdown(whole) and len(whole) == 8 + 3 + 1 + len(speed_claims(front))
-    assert whole[whole["of"] == "strips"]["cases"].tolist() == ["poses everywhere"]
+    assert whole[whole["of"] == "exact, coarse"]["cases"].tolist() == ["poses everywhere"]
 
 
 def test_vehicles_are_as_fast_as_the_readme_says():

@@ -17,7 +17,6 @@ MODELS = (
     ("spatial, formula or FASTSIM", "#E69F00", "^"),
     ("planar", "#CC79A7", "v"),
     ("reduction to the maximum", "0.6", "x"),
-    ("strips", "#009E73", "+"),
 )
 """Kinds of model: label, colour (Okabe-Ito; dark to light in grey) and marker."""
 
@@ -28,7 +27,7 @@ INTEGRATION, MODEL = "#0072B2", "#E69F00"
 def model_kind(row, finest):
     """Which of ``MODELS`` a row of the study belongs to."""
     if row["patch"] != "moment":
-        return MODELS[5 if row["patch"] == "maximum" else 6][0]
+        return MODELS[5][0]
     if row["detection"] != "spatial":
         return MODELS[4][0]
     if not row["creep"].startswith("table"):
@@ -95,6 +94,6 @@ def _marks(axes, rows, label, color, marker, apart):
         axes.scatter(rows["y_rms_m"], speed, c=color, label=label, **size)
         return
     axes.scatter([], [], c="0.2", label=label, **size)
-    hollow = {"c": MODEL} if marker in "x+" else {"facecolors": "none", "edgecolors": MODEL}
+    hollow = {"c": MODEL} if marker == "x" else {"facecolors": "none", "edgecolors": MODEL}
     axes.scatter(rows["model_y_rms_m"], speed, **hollow, **size | {"lw": 1.0, "s": 14})
     axes.scatter(rows["integration_y_rms_m"], speed, c=INTEGRATION, **size)

@@ -20,7 +20,6 @@ from wrcore.contact.patch.result import Patch
 LINES = (
     {"color": "#CC79A7", "linestyle": "-", "linewidth": 0.8},
     {"color": "#009E73", "linestyle": (0, (4, 2))},
-    {"color": "#E69F00", "linestyle": "-.", "linewidth": 1.0},
     {"color": "#56B4E9", "linestyle": (0, (1, 1)), "linewidth": 1.8},
     {"color": "#0072B2", "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.0},
     {"color": "0.55", "linestyle": (0, (3, 3)), "linewidth": 0.8},

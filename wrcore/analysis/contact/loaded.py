@@ -92,7 +92,7 @@ class LoadedWheels:
     """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
 
     Strips and grids have a ``resolution`` (coarse, middle, fine) and a rigid ``slip`` (of the real surfaces, or one set
-    of creepages); where exact strips find no solution a grid takes over.
+    of creepages); where strips find no solution a grid takes over.
     """
 
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
@@ -117,9 +117,8 @@ class LoadedWheels:
         )  # fmt: skip
         if strips.strips:
             contact = with_fallback(contact)
-        self._still = contact._replace(strips=contact.strips._replace(rolling=0))
-        self._still_handle, self._work_handle, self._rolling = Handle(self._still), Handle(self._work), {}
-        self._exact = contact if strips.rolling else None
+        self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
+        self._rolling = {}
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(4, np.int64)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
@@ -130,8 +129,6 @@ class LoadedWheels:
         if rolling is not None:
             motion = rolling.motion(roll, yaw, self._free_rate(pose, rolling))
             contact = self._at_work(friction if self.tabulated and not fields else 0.0)
-        elif fields and self._exact:
-            contact, friction = self._at_work(), SMOOTH
         else:
             friction = SMOOTH
         found = list(self._patches(contact, pose, motion, friction, fields))
@@ -144,8 +141,8 @@ class LoadedWheels:
         """The contact that rolls: exact, by the creep table, or looked up in a pair's table for a coefficient of
         friction."""
         if looked_up not in self._rolling:
-            contact = self._exact or self._still
-            if looked_up or not self._exact:
+            contact = self._still
+            if looked_up or not contact.strips.strips:
                 contact = contact._replace(law=LAWS["table"], creep=_table(self.poisson_ratio))
             if looked_up:
                 contact = with_pair(contact._replace(strips=contact.strips._replace(looked_up=float(looked_up))))
@@ -184,6 +181,8 @@ class LoadedWheels:
     def _on_strips(self, contact, left, pose, motion, friction, fields):
         """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
         sign, work, overlaps = SIDES[pose[0]], self._work, self._rows
+        if not fields and (motion is None or fields is None):
+            left = left._replace(friction=0.0)  # without friction no rolling problem is solved
         count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
@@ -204,7 +203,7 @@ class LoadedWheels:
             if fields is not None and (self.always or self._counters[ON_GRID] > before):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
-                patch = self._fields(out[0], found.load, pose, friction) if fields and self._exact else None
+                patch = self._fields(out[0], found.load, pose, friction) if fields else None
                 yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, patch)
             first = last
 

@@ -9,13 +9,13 @@ from wrcore.contact.patch.library import Library, make_library
 from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.panels import make_panels
 from wrcore.contact.patch.rolling import LEVELS, Level, RollingWork, rolling_work
-from wrcore.contact.patch.solve import EXACT, STRIP_ROWS, STRIPS, SUMS
+from wrcore.contact.patch.solve import STRIP_ROWS, SUMS
 from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, NormalWork, normal_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.errors import InputError, one_of
 
-PATCHES = ("maximum", "moment", "strips", "exact", "tabulated")
-"""Patch models by name: two reductions to an ellipse, cheap and exact strips."""
+PATCHES = ("maximum", "moment", "exact", "tabulated")
+"""Patch models by name: two reductions to an ellipse, exact strips, and these looked up."""
 
 RESOLUTIONS = ("coarse", "middle", "fine")
 SLIPS = ("surfaces", "creepages")
@@ -51,10 +51,6 @@ class StripModel(NamedTuple):
 
     strips: int
     """Strips of a window; 0: patches are ellipses."""
-    normal: int
-    """EXACT or STRIPS (virtual penetration) of `solve`."""
-    rolling: int
-    """1: the rolling problem is solved on the strips, 0: the scene's creep law at the ellipse of equal moments."""
     surfaces: int
     """1: rigid slip of the surfaces, strip by strip; 0: one set of creepages."""
     looked_up: float
@@ -122,12 +118,11 @@ def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0
 @lru_cache(maxsize=8)
 def _strip_model(patch, resolution, slip, nu, friction):
     if patch in ("maximum", "moment"):
-        return StripModel(0, 0, 0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
-    exact, level = patch != "strips", LEVELS[resolution]
+        return StripModel(0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
+    level = LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
-    libraries = (make_library(each, nu) if exact else _no_library(nu) for each in (*levels, LEVELS["slender"]))
-    normal, surfaces = EXACT if exact else STRIPS, int(slip == "surfaces")
-    return StripModel(level.strips, normal, int(exact), surfaces, friction, influence_table(), *libraries)
+    libraries = (make_library(each, nu) for each in (*levels, LEVELS["slender"]))
+    return StripModel(level.strips, int(slip == "surfaces"), friction, influence_table(), *libraries)
 
 
 def strip_work(model, wheelsets):

@@ -25,9 +25,6 @@ from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
 from wrcore.contact.patch.windows import drop_starved, guess_squares, guess_windows, merge_close, newborn, start_strips
 from wrcore.kernels.jit import FUSED, jit
 
-EXACT, STRIPS = 0, 1
-"""``strips``: the shape-corrected virtual penetration that ``exact`` starts from."""
-
 _ROUNDS = 5
 """Sets of windows that are tried for one patch."""
 
@@ -55,20 +52,20 @@ SUMS = 10
 
 
 @jit(allocates=False)
-def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, model, memory, work):
+def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution, memory, work):
     """Normal problem of the overlaps from ``first`` to before ``last`` of ``patches`` (as `find_patches` fills it, by
     moments), which count as one patch. Fills ``work``; returns the number of windows (0 where no solution was found)
     and their `Frame`.
 
-    ``resolution``: strips of a window. ``model``: EXACT or STRIPS. ``values``: of `influence_table`. ``memory``
-    (MEMORY,): a solution to start from if it fits (its first number 0: none), which leaves the result the same to the
-    square of the iteration's tolerance; filled with this one."""
+    ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
+    if it fits (its first number 0: none), which leaves the result the same to the square of the iteration's tolerance;
+    filled with this one."""
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
-    guess_squares(hertz, patches, first, work, stretches, model == EXACT)
+    guess_squares(hertz, patches, first, work, stretches)
     windows = guess_windows(work, stretches, resolution)
     kinds = 2 if pose.ex == 0.0 else 3
-    if model == EXACT and _resume(frame, memory, work, windows):
+    if _resume(frame, memory, work, windows):
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
             place_strips(geometry, pose, frame, work, windows)
@@ -77,10 +74,6 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 return windows, frame
         windows = guess_windows(work, stretches, resolution)
     memory[0] = 0.0
-    if windows > 0:
-        start_strips(geometry, pose, frame, work, windows, stretches)
-    if model == STRIPS:
-        return windows, frame
     for extra in range(0, _MORE_STRIPS + 1, 2):
         strips = resolution + extra
         found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds)

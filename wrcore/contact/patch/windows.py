@@ -10,7 +10,7 @@ from wrcore.contact.normal import hertz_ellipse
 from wrcore.contact.patch.gap import CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
 from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
 from wrcore.contact.patch.strips import GUESS, MAX_STRIPS, MAX_WINDOWS, WEIGHT, WIDENED, gap_under_load, place_strips
-from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y, PENETRATION
+from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y
 from wrcore.kernels.jit import FUSED, jit
 
 FEWEST_STRIPS, SLENDER_WINDOW = 8, 4.0
@@ -30,12 +30,11 @@ _MERGE = 0.3
 
 
 @jit(allocates=False, fastmath=FUSED)
-def guess_squares(hertz, patches, first, work, stretches, by_lobes):
+def guess_squares(hertz, patches, first, work, stretches):
     """First guess of c and Q at the nodes: shape-corrected virtual penetration of every lobe.
 
     For a lobe of depth d, c = (k_a/k_b) (k_b d - (g - min g))/A with k_a = A a^2/d, k_b = B b^2/d of Hertz's ellipse of
-    the overlap, and Q of that ellipse: exact for an ellipse. Else (not ``by_lobes``) d - min g is that ellipse's, too,
-    and Q gives its force."""
+    the overlap, and Q of that ellipse: exact for an ellipse."""
     nodes = work.nodes
     begin = 0
     for k in range(stretches):
@@ -66,17 +65,10 @@ def guess_squares(hertz, patches, first, work, stretches, by_lobes):
                 i += 1
             stop = end if i >= end else top_at + 1
             for j in range(start, stop):
-                depth = max(-bottom, 0.0) if by_lobes else row[PENETRATION]
+                depth = max(-bottom, 0.0)
                 v = -nodes[NODE_GAP, j] - (1.0 - k_b) * depth
                 nodes[NODE_SQUARE, j], nodes[NODE_SHARE, j] = k_a / k_b * v / nodes[NODE_SHAPE, j], share
             i = max(stop, start + 1)
-        if not by_lobes:
-            total = 0.0
-            for j in range(begin + 1, end - 1):
-                total += max(nodes[NODE_SQUARE, j], 0.0) * 0.5 * (nodes[S, j + 1] - nodes[S, j - 1])
-            force = stiffness * row[PENETRATION] * math.sqrt(row[PENETRATION])
-            for j in range(begin, end):
-                nodes[NODE_SHARE, j] = 2.0 * force / (math.pi * math.pi * max(total, 1e-300))
         begin = end
 
 
