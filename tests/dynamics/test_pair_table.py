@@ -20,6 +20,7 @@ from wrcore.dynamics.pair_table import YAW, look_up
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
+from wrcore.run.validity import look_up_errors
 
 SPEED, Z = 20.0, 0.45973
 """Rolling speed, m/s, and height of the wheelset, m."""
@@ -340,3 +341,17 @@ def test_a_run_beside_the_exact_one():
     y = run["wheelset"].y_m
     assert abs(table[:, 0] - y).max() < 2e-3 * abs(y).max()
     assert np.sqrt(np.mean((table[:, 1] / load(run) - 1.0) ** 2)) < 5e-3
+    assert "look_up_normal_error" not in run.counters
+
+
+def test_a_run_says_how_far_it_is_from_the_exact_solver(benchmark_pair):
+    """At some of its output times, and where it is further away there it says so: beside a pose solved by hand."""
+    run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.05, "contact.patch": "tabulated"})
+    normal, force = (run.counters[name] for name in ("look_up_normal_error", "look_up_force_error"))
+    assert 0.0 < normal < 0.003 and 0.0 < force < 0.01
+    rows = np.full((1, 1, 2, MAX_PATCHES, PATCH_COLUMNS), math.nan)
+    rows[0, 0, :, 0, [reduction.NORMAL, reduction.FX, reduction.FY]] = [[5e4, 4e4], [3e3, 0.0], [0.0, 1e3]]
+    other = rows.copy()
+    other[0, 0, 1, 0, [reduction.NORMAL, reduction.FX]] += [400.0, 240.0]
+    found = look_up_errors(other, rows, 0.3)
+    assert found == {"look_up_normal_error": pytest.approx(0.01), "look_up_force_error": pytest.approx(0.02)}

@@ -83,7 +83,7 @@ def _to_accuracy(options, scene, out):
 
 def _print_run(done, as_json):
     """How a run ended, what it cost, and which limits of validity it exceeded."""
-    from wrcore.run.validity import LIMITS
+    from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS
 
     counters = done.counters
     factor = counters["simulated_s"] / counters["wall_s"] if counters["wall_s"] > 0.0 else 0.0
@@ -92,6 +92,8 @@ def _print_run(done, as_json):
         "wall_s": counters["wall_s"], "real_time_factor": factor,
     }  # fmt: skip
     summary |= {n: counters[n] for n in ("steps", "rejected", "rhs_evaluations", "compile_s", "patches", *LIMITS)}
+    errors = {name: counters[name] for name in LOOK_UP_ERRORS if name in counters}
+    summary |= errors
     if as_json:
         print(json.dumps(summary))
         return
@@ -103,3 +105,8 @@ def _print_run(done, as_json):
     exceeded = [f"{counters[name]} {text}" for name, text in LIMITS.items() if counters[name]]
     if exceeded:
         print(f"beyond the models' limits: {', '.join(exceeded)}; {counters['patches']} patches at the output times")
+    if errors:
+        normal, force = (f"{100.0 * error:.2g} %" for error in errors.values())
+        print(
+            f"looked-up contact, now and then beside the exact solver: N within {normal}, creep force {force} of mu N"
+        )

@@ -27,11 +27,14 @@ from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.run import Run
 from wrcore.run.state import State, from_state
-from wrcore.run.validity import exceeded
+from wrcore.run.validity import exceeded, look_up_errors
 from wrcore.scene.description import Scene, compile_scene
 
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
+
+CHECKED_TIMES = 5
+"""Output times at which looked-up contact is held against the exact solver."""
 
 COUNTERS = {
     "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
@@ -183,7 +186,19 @@ class Simulation:
         standing = poses[:, wheelsets]
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
-        return groups, limits | {"beyond_irregularity": int(beyond)}
+        limits |= {"beyond_irregularity": int(beyond)}
+        return groups, limits | self._look_up_errors(trajectory, patches)
+
+    def _look_up_errors(self, trajectory, patches):
+        """Of some output times, if exact contact is looked up: contacts are solved there."""
+        contact = self.model.contact
+        if not contact.strips.looked_up or not len(trajectory.t):
+            return {}
+        some = np.unique(np.linspace(0, len(trajectory.t) - 1, CHECKED_TIMES).round().astype(int))
+        part = replace(trajectory, t=trajectory.t[some], states=trajectory.states[some])
+        solved = self.model._replace(contact=contact._replace(strips=contact.strips._replace(looked_up=0.0)))
+        exact, _, _ = evaluated(solved, part, self._workspace())
+        return look_up_errors(patches[some], exact, contact.strips.looked_up)
 
     def _contact_channels(self, name, patches):
         """Channels of the contacts of a wheelset's wheels by group."""

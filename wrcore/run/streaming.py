@@ -33,6 +33,7 @@ from wrcore.run.results import join_runs, read_part, write_going_on, write_run
 from wrcore.run.run import Run
 from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
 from wrcore.run.simulation import ArcLengths, Simulation
+from wrcore.run.validity import LOOK_UP_ERRORS
 from wrcore.scene.description import Scene
 
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
@@ -150,6 +151,8 @@ class Summary:
         for name, value in run.counters.items():
             if name == "smallest_step_s":
                 self.counters[name] = min(value, self.counters.get(name, math.inf))
+            elif name in LOOK_UP_ERRORS:
+                self.counters[name] = max(value, self.counters.get(name, 0.0))
             elif name != "compile_s":
                 self.counters[name] = self.counters.get(name, 0) + value
             else:

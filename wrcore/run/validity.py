@@ -48,6 +48,9 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
+LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error"
+"""Counters of a run that looks exact contact up: how far it is from the exact solver, see :func:`look_up_errors`."""
+
 _OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # those that look at the profiles
 
 
@@ -80,6 +83,19 @@ def exceeded(contact, patches, roll, yaw):
         "hollow_ahead": int(np.sum(1.0 - sine_square + hollow * sine_square < 0.0)),
         "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
     }
+
+
+def look_up_errors(found, exact, friction):
+    """`LOOK_UP_ERRORS` of patches (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up, beside exact ones in the
+    same states: the largest errors of a wheel's normal force, over it, and of its creep force, over ``friction`` times
+    the normal force.
+    """
+    forces = [reduction.NORMAL, reduction.FX, reduction.FY]
+    found, exact = (np.nansum(rows[..., forces], axis=-2).reshape(-1, 3) for rows in (found, exact))
+    wheels = exact[:, 0] > 0.0
+    difference, normal = (found - exact)[wheels], exact[wheels, 0]
+    errors = abs(difference[:, 0]) / normal, np.hypot(difference[:, 1], difference[:, 2]) / (friction * normal)
+    return dict(zip(LOOK_UP_ERRORS, (float(np.max(each, initial=0.0)) for each in errors), strict=True))
 
 
 def _exceeded_by_each(contact, patches, roll, yaw):
