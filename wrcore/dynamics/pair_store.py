@@ -32,11 +32,8 @@ from wrcore.kernels.handles import Handle
 SHIPPED = Path(__file__).parent / "tables"
 """Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
-WRONG_NORMAL, WRONG_FORCE = 3e-3, 0.01
-"""Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice or the solver."""
-
-WORTH = 4.0
-"""Where a cell misses by less than so many times that, half its steps are tried."""
+WRONG = (3e-3, 0.01), (0.02, 0.05)
+"""Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice; to the solver."""
 
 CELLS, SLOTS = 40_000, 100_003
 """Room for cells that can be looked up, and for all."""
@@ -112,10 +109,10 @@ class Pair:
         """State of a cell: 1 where its nodes have solutions and its middle is right."""
         rows = self._rows_of(key)
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
-        if miss[0] < WRONG_NORMAL and miss[1] < WRONG_FORCE:
-            return 1
-        promising = miss[0] < WORTH * WRONG_NORMAL and miss[1] < WORTH * WRONG_FORCE
-        return FINER if promising and corner_of(key)[0] + 1 < LEVELS else HARD
+        level = corner_of(key)[0]
+        if rows is None or not np.less(miss, WRONG[level]).all():
+            return HARD if rows is None or level + 1 == LEVELS else FINER
+        return 1
 
     def _keep(self, key, state):
         """Let kernels see a cell."""
@@ -146,34 +143,39 @@ class Pair:
         return self._solved_at[key]
 
     def _rows_of(self, key):
-        """Rows (NODES, NUMBERS) that a cell is looked up from; None if one of its own corners, or what yaw adds, has no
-        solution. A corner beyond that has none goes on as a straight line does; what yaw adds where less than half of
-        its corners have none is the others' mean."""
+        """Rows (NODES, NUMBERS) that a cell is looked up from; None where too few of its nodes have a solution.
+
+        Corners that have none lie in the plane of those that have; one beyond goes on as a straight line does; what yaw
+        adds where it is not known is the mean of the others."""
         level, part, i, j, k = corner_of(key)
-        rows = np.empty((NODES, NUMBERS), np.float32)
 
         def numbers(a, b, c, yaw=0):
             return self._numbers((level, part, i + a, j + b, k + c, yaw))
+
+        own = np.array([numbers(*corner) for corner in _CORNERS])
+        lost = np.isnan(own[:, 0])
+        if lost.sum() > 3:
+            return None
+        if lost.any():
+            plane = np.column_stack([np.ones(8), _CORNERS])
+            own[lost] = plane[lost] @ np.linalg.lstsq(plane[~lost], own[~lost])[0]
+        own, rows = own.reshape(2, 2, 2, NUMBERS), np.empty((NODES, NUMBERS), np.float32)
 
         def beyond(near, axis):
             far, out = list(near), list(near)
             far[axis], out[axis] = 1 - near[axis], 3 * near[axis] - 1
             found = numbers(*out)
-            return 2.0 * numbers(*near) - numbers(*far) if np.isnan(found[0]) else found
+            return 2.0 * own[near] - own[tuple(far)] if np.isnan(found[0]) else found
 
-        for a, b in itertools.product((0, 1), repeat=2):
-            n = 4 * (2 * a + b)
-            rows[n : n + 2] = [numbers(a, b, c) for c in (0, 1)]
-            rows[n + 2 : n + 4] = [beyond((a, b, c), 2) for c in (0, 1)]
+        for n, (a, b) in zip(range(0, 16, 4), itertools.product((0, 1), repeat=2), strict=True):
+            rows[n : n + 4] = *own[a, b], beyond((a, b, 0), 2), beyond((a, b, 1), 2)
             rows[n + 16 : n + 20] = [beyond((c, a, b), 0) for c in (0, 1)] + [beyond((a, c, b), 1) for c in (0, 1)]
-            for c in (0, 1):
-                corner = 2 * a - i % 2, 2 * b - j % 2, 2 * c - k % 2
-                middle, left, right = (numbers(*corner, yaw) for yaw in range(3))
-                m = 32 + n + 2 * c
-                rows[m], rows[m + 1] = left - right, left + right - 2.0 * middle
         yawed = rows[32:].reshape(8, 2, NUMBERS)
+        for pair, corner in zip(yawed, 2 * np.array(_CORNERS) - (i % 2, j % 2, k % 2), strict=True):
+            middle, left, right = (numbers(*map(int, corner), yaw) for yaw in range(3))
+            pair[:] = left - right, left + right - 2.0 * middle
         lost = np.isnan(yawed[..., 0]).any(axis=1)
-        if lost.sum() <= 4:  # they are further away than the cell's corners
+        if lost.sum() <= 4:
             yawed[lost] = yawed[~lost].mean(axis=0)
         return None if np.isnan(rows[:, 0]).any() else rows
 
@@ -244,6 +246,9 @@ class Pair:
 
 
 _PARTS = "places", "numbers", "parts", "cells", "misses"
+
+
+_CORNERS = list(itertools.product((0, 1), repeat=3))
 
 
 def _place(level, part, i, j, k, yaw):
