@@ -7,7 +7,7 @@ import numpy as np
 from wrcore.contact.detection import find_patches
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import rolling, solve
-from wrcore.contact.patch.gap import group_end, material_point
+from wrcore.contact.patch.gap import group_end, material_point, rigid_slip, strip_wrenches
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MOMENT, PENETRATION
@@ -18,11 +18,14 @@ from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_table import NUMBERS, PART, depth_of, lobe_end
-from wrcore.dynamics.strip_wheel import roll_patch, solve_overlaps
+from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
 SUMS = 12
 """Of `press_lobe`."""
+
+SLIPS = 12
+"""Of a lobe that are solved at once."""
 
 PROBE = 0.06
 """Creepages, over those of saturation, between which the slopes at rest are taken; where spin leaves less than a fifth
@@ -89,8 +92,8 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     (6,) of its wheelset, linear and angular.
 
     Fills ``sums`` (SUMS,): wrench of pressure about the wheelset's centre, place of the slip from there, semi-axes and
-    p_max. Returns the number of windows, 0 where strips find no solution, their frame, the depth of the deepest
-    overlap, and the weight of the solution with more strips.
+    p_max. Returns the number of windows, 0 where strips find no solution, their frame, and the weight of the solution
+    with more strips.
     """
     finer, geometry, (ex, ey, ez) = work.normal.more, model.geometry, axle
     first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
@@ -102,8 +105,12 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     finer[WIDENED] = 1.0
     share = finer[WEIGHT]
     if windows == 0:
-        return 0, frame, deepest, share
-    found = _roll_on(model, y, z, axle, pose, frame, windows, deepest, velocity, rolling.AUTO, work)
+        return 0, frame, share
+    v = velocity
+    m = WheelMotion(1.0, y, z, ex, ey, ez, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
+    for q in range(6):
+        work.wrench[0, q] = 0.0
+    found = roll_patch(model, m, pose, frame, windows, deepest, 1.0, model.friction, 1.0, work)
     sums[:] = 0.0
     for i in range(work.normal.start[windows]):
         part = work.strips[solve.STRIP_LOAD, i] / found.load
@@ -115,26 +122,27 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     for q in range(6):
         sums[q] = work.wrench[0, q]
     sums[9], sums[10], sums[11] = found.a, found.b, found.p_max
-    return windows, frame, deepest, share
+    return windows, frame, share
 
 
 @jit(allocates=False)
-def _roll_on(model, y, z, axle, pose, frame, windows, depth, v, method, work):
-    """`Solution` of a lobe for a velocity at V = 1 m/s; its wrenches are in ``work.wrench``."""
-    m = WheelMotion(1.0, y, z, *axle, v[0], v[1], v[2], v[3], v[4], v[5], 0.0, 0.0, model.friction)
-    for q in range(6):
-        work.wrench[0, q] = work.wrench[1, q] = 0.0
-    return roll_patch(model, m, pose, frame, windows, depth, 1.0, model.friction, 1.0, work, method)
-
-
-@jit(allocates=False)
-def roll_lobe_on(model, y, z, axle, frame, windows, depth, velocities, forces, work):
-    """Wrenches of friction (n, 6) about the wheelset's centre on a lobe pressed in ``work``, for velocities (n, 6)."""
+def roll_lobe_on(model, y, z, axle, frame, velocities, slips, forces, wrenches, work):
+    """Wrenches of friction (n, 6) about the wheelset's centre on the lobe pressed last in ``work``, for velocities
+    (n, 6) at V = 1 m/s; ``slips`` (n, 4, strips) and ``forces`` (n, 3, strips) are scratch."""
+    strips, count, (library, own) = work.strips, work.solved[0], library_of(model.strips, work)
     pose = make_pose(1.0, y, z, axle[0], axle[1], axle[2], True)
+    centre, middle = strips[solve.CENTRE, :count], strips[solve.MIDDLE, :count]
+    height, tilt = strips[solve.WHEEL_HEIGHT, :count], strips[solve.STRIP_TILT, :count]
     for k in range(len(velocities)):
-        _roll_on(model, y, z, axle, pose, frame, windows, depth, velocities[k], rolling.AGAIN, work)
-        for q in range(6):
-            forces[k, q] = work.wrench[1, q]
+        v = velocities[k]
+        velocity = v[0], v[1], v[2], v[3], v[4], v[5], 1.0
+        rigid_slip(model.geometry, pose, frame, velocity, centre, middle, height, tilt, slips[k])
+    rolling.roll_again(slips, library, own, forces)
+    for k in range(len(velocities)):
+        strip_wrenches(
+            model.geometry, pose, frame, centre, middle, height, tilt, strips[solve.STRIP_LOAD, :count], forces[k], 1.0,
+            work.wrench[0], wrenches[k],
+        )  # fmt: skip
 
 
 def solve_place(contact, handle, works, place, points):
@@ -153,23 +161,26 @@ def solve_place(contact, handle, works, place, points):
     (y, z, axle), _ = found
     at, sums, each, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), []
     for work, more in zip(works, (1.0, MORE), strict=True):
-        windows, frame, deepest, share = press_lobe(
+        windows, frame, share = press_lobe(
             handle, *at, u, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
         )
         if windows == 0:
             return None
         weight = 1.0 - pressed[0][0] if pressed else 1.0 - max(share, 0.0)
-        pressed.append((weight, (frame, windows, deepest), work))
+        pressed.append((weight, frame, work))
         sums += weight * each
         if weight == 1.0:
             break
 
     def forces_at(velocities):
-        total = 0.0
-        for weight, lobe, work in pressed:
-            forces = np.zeros((len(velocities), 6))
-            roll_lobe_on(handle, *at, *lobe, velocities, forces, work)
-            total += weight * forces
+        total = np.zeros((len(velocities), 6))
+        for weight, frame, work in pressed:
+            for first in range(0, len(velocities), SLIPS):
+                some, count = velocities[first : first + SLIPS], work.value.solved[0]
+                slips, forces = (np.zeros((len(some), rows, count)) for rows in (4, 3))
+                wrenches = np.zeros((len(some), 6))
+                roll_lobe_on(handle, *at, frame, some, slips, forces, wrenches, work)
+                total[first : first + SLIPS] += weight * wrenches
         return total
 
     slip, (a, b), normal = sums[6:9].copy(), sums[9:11], math.hypot(sums[1], sums[2])

@@ -23,6 +23,7 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES, NUMBERS, PairTable, strip_work
 from wrcore.dynamics import pair_table as columns
+from wrcore.dynamics.pair_node import SLIPS, lobe_of, solve_place
 from wrcore.dynamics.pair_table import FIELD, FINER, FIRST, HARD, LEVELS, NODES, PART, STEPS, YAW, corner_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
@@ -69,7 +70,7 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
-        self._contact, self._works = Handle(contact), [Handle(strip_work(contact.strips, 1)) for _ in range(2)]
+        self._contact, self._works = Handle(contact), [Handle(strip_work(contact.strips, 1, SLIPS)) for _ in range(2)]
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells = np.zeros((CELLS, NODES, NUMBERS), np.float32)
         self._solved_at, self._parts, self.cells, self._ready, self.misses = {}, {}, {}, 0, {}
@@ -130,8 +131,6 @@ class Pair:
     def _numbers(self, node):
         """Numbers (NUMBERS,) of a node: solved under the part of the profile in which its lobe then lies, once for all
         parts; NaN where there is no solution."""
-        from wrcore.dynamics.pair_node import lobe_of
-
         level, part, *corner = node
         if node not in self._parts:
             found = lobe_of(self.contact.geometry, _place(*node[:-1], _YAWS[node[-1]]), self._works[0].value.rows)
@@ -192,8 +191,6 @@ class Pair:
 
     def solve(self, place, points):
         """`solve_place` with the pair's own scratch arrays."""
-        from wrcore.dynamics.pair_node import solve_place
-
         return solve_place(self.contact, self._contact, self._works, place, points)
 
     def _miss(self, key, rows):

@@ -131,20 +131,27 @@ def solve_overlaps(model, pose, low, high, memory, work):
     )  # fmt: skip
 
 
-@jit(allocates=False, fastmath=FUSED)
-def _roll(model, friction, settings, strips, slip, force, count, slender, windows, work, method):
-    """Creep force on the strips with the library whose ellipses have as many."""
-    library, own = settings.library, work.rolling
+@jit(allocates=False, forceinline=True)
+def library_of(settings, work):
+    """The library whose ellipses have as many strips as the patch that is solved, and the scratch arrays with it."""
+    count, slender, windows = work.solved
     if slender:
-        library, own = settings.slender, work.slender
-    elif windows == 1 and count == settings.wider.level.strips:
-        library = settings.wider
-    elif windows == 1 and count == settings.widest.level.strips:
-        library = settings.widest
+        return settings.slender, work.slender
+    if windows == 1 and count == settings.wider.level.strips:
+        return settings.wider, work.rolling
+    if windows == 1 and count == settings.widest.level.strips:
+        return settings.widest, work.rolling
+    return settings.library, work.rolling
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _roll(model, friction, strips, slip, force, work):
+    """Creep force on the strips."""
+    count, (library, own) = work.solved[0], library_of(model.strips, work)
     rolling.rolling_force(
         strips[solve.OWN_PLACE, :count], strips[solve.OWN_WIDTH, :count], strips[solve.HALF_LENGTH, :count],
         strips[solve.MIDDLE, :count], strips[solve.PEAK, :count], slip[0, :count], slip[1, :count], slip[2, :count],
-        slip[3, :count], model.shear_modulus, friction, library, own, method,
+        slip[3, :count], model.shear_modulus, friction, library, own, rolling.AUTO,
     )  # fmt: skip
     rolling.read_forces(count, own, force)
 
@@ -185,9 +192,8 @@ def _add_wrenches(geometry, pose, frame, count, share, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work, method):
-    """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``.
-    ``method``: of `rolling_force`."""
+def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work):
+    """`Solution` with friction of a solution of the normal problem; adds ``share`` of it to ``work.wrench``."""
     settings, strips, slip, sums = model.strips, work.strips, work.slip, work.sums
     count = solve.publish(model.shear_modulus / (1.0 - model.poisson_ratio), work.normal, windows, strips, sums)
     load, x, s = sums[solve.LOAD], sums[solve.MEAN_X], sums[solve.MEAN_S]
@@ -209,8 +215,8 @@ def roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, wo
     back = m.vx < 0.0  # rolling is always towards x
     if back:
         _turn_round(strips, slip, work.friction, count)
-    work.solved[0], work.solved[1] = count, a > SLENDER * b
-    _roll(model, friction, settings, strips, slip, work.friction, count, work.solved[1] == 1, windows, work, method)
+    work.solved[0], work.solved[1], work.solved[2] = count, a > SLENDER * b, windows
+    _roll(model, friction, strips, slip, work.friction, work)
     if back:
         _turn_round(strips, slip, work.friction, count)
     power = _add_wrenches(model.geometry, pose, frame, count, share, work)
@@ -281,7 +287,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
-        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work, rolling.AUTO)
+        found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE
             windows, frame = solve_overlaps(model, pose, low, high, memory, work)
@@ -290,7 +296,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                 for k in range(6):
                     work.wrench[0, k] *= 1.0 - share
                     work.wrench[1, k] *= 1.0 - share
-                more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work, rolling.AUTO)
+                more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work)
                 found = _mean(found, more, share)
     fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z

@@ -17,6 +17,7 @@ from wrcore.contact.patch.rolling import (
     LIBRARY,
     LIMIT,
     Level,
+    roll_again,
     rolling_force,
     rolling_work,
 )
@@ -417,6 +418,20 @@ def test_no_history():
     assert first == again
     found = solve(one, (3e-4, 0, 0.1), "coarse")
     assert first[:3] == pytest.approx((found.Fx, found.Fs, found.Mn), rel=1e-6)
+
+
+@pytest.mark.parametrize(("patch", "level"), [(lobes(8, 2.5e-3, 0.6), "coarse"), (sdec(8, 5e-3, 3e-3, 0.2), "slender")])
+def test_other_slips_of_the_same_patch_at_once(patch, level):
+    """An odd number of them, in two windows and in one, by the library and by factors; one of them slides fast."""
+    creepages = [(3e-4, 1e-4, 0.1), (0.0, -2e-4, 0.4), (0.5, 0.2, -0.1)]
+    library = make_library(level)
+    work = rolling_work(patch[0].size, library.panels.n, 4)
+    rolling_force(*patch, *slip_of(patch, 1e-3, 0.0, 0.0), G, MU, library, work, AUTO)
+    forces = np.zeros((3, 3, patch[0].size))
+    roll_again(np.array([slip_of(patch, *each) for each in creepages]), library, work, forces)
+    for found, each in zip(forces, creepages, strict=True):
+        alone = solve(patch, each, level)
+        np.testing.assert_allclose(found.sum(axis=1), alone.force.sum(axis=1), rtol=1e-4)
 
 
 def test_influence_integrals():

@@ -50,7 +50,7 @@ def matrices(patch, method, far):
         *force, residual, _ = rolling_force(*strips, *slip, G, MU, library, work, method)
         found[:, k] = np.array(force) / (G * unit) / [c * c, c * c, c**3]
         matrix, step = work.matrix[: size * size].reshape(size, size).astype(float), work.step[:size].astype(float)
-        panel = np.linalg.solve(matrix, -work.rigid[:size] / step).reshape(count, 2, n)
+        panel = np.linalg.solve(matrix, -work.rigid[0, :size] / step).reshape(count, 2, n)
         x = work.strip.middle[:count, None] + work.strip.half[:count, None] * library.panels.load
         moment = (x * panel[:, 1] - work.strip.line[:count, None] * panel[:, 0]).sum() * work.scale[LENGTH] / c
         stuck[:, k] = np.array([panel[:, 0].sum(), panel[:, 1].sum(), moment]) * work.scale[BOUND] / (G * unit * c * c)

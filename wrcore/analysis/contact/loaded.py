@@ -210,7 +210,7 @@ class LoadedWheels:
     def _fields(self, row, load, pose, friction):
         """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid."""
         work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
-        count, slender = work.solved
+        count, slender, _ = work.solved
         rolling, library = (work.slender, settings.slender) if slender else (work.rolling, settings.library)
         field = np.empty((9, count * library.panels.n))
         read_field(library.panels, count, rolling, field)

@@ -45,11 +45,11 @@ def _invert(block, work, resolvent):
     factorise(work.matrix.reshape((size, size)), block, size // block, factors)
     for k in range(size):
         for i in range(size):
-            work.r[i] = 0.0
-        work.r[k] = 1.0
-        substitute(factors, block, size // block, work.r, work.y)
+            work.r[0, i] = 0.0
+        work.r[0, k] = 1.0
+        substitute(factors, block, size // block, work.r[0], work.y[0])
         for i in range(size):
-            resolvent[i, k] = work.y[i]
+            resolvent[i, k] = work.y[0, i]
 
 
 @lru_cache(maxsize=16)

@@ -89,7 +89,7 @@ class StripWork(NamedTuple):
     """(2, 6): of pressure and of friction."""
     sums: np.ndarray
     solved: np.ndarray
-    """(2,) int: strips of the last solution, and 1 if they are slender."""
+    """(3,) int: strips of the last solution, 1 if they are slender, and windows."""
     lobes: np.ndarray
     numbers: np.ndarray
     modes: np.ndarray
@@ -125,8 +125,9 @@ def _strip_model(patch, resolution, slip, nu, friction):
     return StripModel(level.strips, int(slip == "surfaces"), friction, influence_table(), *libraries)
 
 
-def strip_work(model, wheelsets):
-    """Scratch arrays for a `StripModel` and a number of wheelsets; next to nothing where patches are ellipses."""
+def strip_work(model, wheelsets, slips=1):
+    """Scratch arrays for a `StripModel`, a number of wheelsets, and so many ``slips`` of a patch at once; next to
+    nothing where patches are ellipses."""
     count, wheels, normal = MAX_STRIPS, (wheelsets, 2, MAX_PATCHES), normal_work()
     if not model.strips:
         count, wheels = 1, (0, 0, 0)
@@ -135,8 +136,8 @@ def strip_work(model, wheelsets):
         np.zeros((*wheels, MEMORY)), np.zeros(MEMORY),
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
-        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(2, np.int64),
+        np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(3 * MODES),
         normal,
-        *(rolling_work(count, max(one.level.panels, 2)) for one in (model.library, model.slender)),
+        *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip

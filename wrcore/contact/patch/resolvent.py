@@ -14,25 +14,43 @@ _ZERO, _ONE = np.float32(0), np.float32(1)
 
 
 @jit(allocates=False, fastmath=FAST)
-def multiply(matrix, x, y):
-    """y = matrix x, four rows at a time."""
-    size = x.size
-    last = y.size - y.size % 4
+def multiply(matrix, x, y, count, first):
+    """y = matrix x for ``count`` rows of x and y, of which the columns from ``first`` on take part; four rows of the
+    matrix by two of x at a time."""
+    size = matrix.shape[0]
+    last = size - size % 4
     for i in range(0, last, 4):
         a, b, c, d = matrix[i], matrix[i + 1], matrix[i + 2], matrix[i + 3]
-        p, q, s, t = _ZERO, _ZERO, _ZERO, _ZERO
-        for j in range(size):
-            v = x[j]
-            p += a[j] * v
-            q += b[j] * v
-            s += c[j] * v
-            t += d[j] * v
-        y[i], y[i + 1], y[i + 2], y[i + 3] = p, q, s, t
-    for i in range(last, y.size):
-        row, p = matrix[i], _ZERO
-        for j in range(size):
-            p += row[j] * x[j]
-        y[i] = p
+        for k in range(0, count - 1, 2):
+            one, two = x[k][first : first + size], x[k + 1][first : first + size]
+            p, q, s, t = _ZERO, _ZERO, _ZERO, _ZERO
+            e, f, g, h = _ZERO, _ZERO, _ZERO, _ZERO
+            for j in range(size):
+                v, w = one[j], two[j]
+                p += a[j] * v
+                q += b[j] * v
+                s += c[j] * v
+                t += d[j] * v
+                e += a[j] * w
+                f += b[j] * w
+                g += c[j] * w
+                h += d[j] * w
+            to = first + i
+            y[k, to], y[k, to + 1], y[k, to + 2], y[k, to + 3] = p, q, s, t
+            y[k + 1, to], y[k + 1, to + 1], y[k + 1, to + 2], y[k + 1, to + 3] = e, f, g, h
+        if count % 2:
+            one, out = x[count - 1][first : first + size], y[count - 1][first : first + size]
+            p, q, s, t = _ZERO, _ZERO, _ZERO, _ZERO
+            for j in range(size):
+                v = one[j]
+                p += a[j] * v
+                q += b[j] * v
+                s += c[j] * v
+                t += d[j] * v
+            out[i], out[i + 1], out[i + 2], out[i + 3] = p, q, s, t
+    for k in range(count):
+        for i in range(last, size):
+            y[k, first + i] = _dot(matrix[i], x[k][first : first + size])
 
 
 @jit(allocates=False, fastmath=FUSED)

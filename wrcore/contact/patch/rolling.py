@@ -30,7 +30,7 @@ from wrcore.contact.patch.resolvent import factorise, multiply, substitute, take
 from wrcore.contact.patch.rolling_influence import StripLayout, assemble, lay_out, second_window
 from wrcore.kernels.jit import FUSED, jit
 
-AUTO, LIBRARY, BAND, DIRECT, AGAIN = range(5)
+AUTO, LIBRARY, BAND, DIRECT = range(4)
 FASTEST = 100.0
 """Largest rigid slip that is iterated, over mu N/(G c^2)."""
 
@@ -44,7 +44,7 @@ _RHO = np.float32(1.6)
 _RAMP = np.float32(10)
 _TINY = np.float32(1e-30)
 
-LENGTH, LOAD, BOUND, TO_UNIT, SLOWED, USED = range(6)
+LENGTH, LOAD, BOUND, TO_UNIT, USED = range(5)
 
 
 class Level(NamedTuple):
@@ -84,8 +84,7 @@ class RollingWork(NamedTuple):
     """(3, n (n + 1)): slip of one strip by another, components xx, ss, xs."""
     strip: StripLayout
     scale: np.ndarray
-    """(6,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), SLOWED: what slips are divided by, USED:
-    the method of the last solution."""
+    """(5,): LENGTH c (m), LOAD N (N), BOUND mu N (N), TO_UNIT G c^2/(mu N), USED: the method of the last solution."""
     bound: np.ndarray
     step: np.ndarray
     z: np.ndarray
@@ -97,19 +96,24 @@ class RollingWork(NamedTuple):
     shift: np.ndarray
     delta: np.ndarray
     ramp: np.ndarray
-    """(m,): vectors of the iteration; component x of a strip's panels, then component s, strip by strip."""
+    """(m,) the first two, (K, m) the rest, for K slips at once: vectors of the iteration; component x of a strip's
+    panels, then component s, strip by strip."""
     elastic: np.ndarray
     """(n + 2,): elastic slip along a strip between two zeros."""
+    slowed: np.ndarray
+    residual: np.ndarray
+    """(K,): what slips are divided by, and residuals."""
 
 
-def rolling_work(strips, n):
-    """`RollingWork` for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each."""
+def rolling_work(strips, n, slips=1):
+    """`RollingWork` for patches of up to ``strips`` strips (of all windows together) with ``n`` panels each, and for so
+    many ``slips`` at once."""
     m = 2 * n * strips
-    single = [np.zeros(m, np.float32) for _ in range(11)]
+    vectors = [np.zeros(m, np.float32) for _ in range(2)] + [np.zeros((slips, m), np.float32) for _ in range(9)]
     return RollingWork(
         np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
-        np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(6),
-        *single, np.zeros(n + 2, np.float32),
+        np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(5),
+        *vectors, np.zeros(n + 2, np.float32), np.zeros(slips), np.zeros(slips),
     )  # fmt: skip
 
 
@@ -127,64 +131,93 @@ def _project(size, n, z, bound, force, ramp):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _shift_slip(panels, start, relaxation, work):
-    """Relax delta towards the change of slip between where it holds and the load, in one strip's sliding panels; the
-    elastic part of the slip is h (F - z) - delta - w."""
-    n, elastic, force, z = panels.n, work.elastic, work.force, work.z
+def _shift_slip(panels, start, relaxation, work, q):
+    """Relax delta of the q-th slip towards the change of slip between where it holds and the load, in one strip's
+    sliding panels; the elastic part of the slip is h (F - z) - delta - w."""
+    n, elastic, force, z, delta, rigid = panels.n, work.elastic, work.force[q], work.z[q], work.delta[q], work.rigid[q]
+    ramp, shift = work.ramp[q], work.shift[q]
     for i in range(n):
         j = start + i
-        elastic[i + 1] = work.step[j] * (force[j] - z[j]) - work.delta[j] - work.rigid[j]
+        elastic[i + 1] = work.step[j] * (force[j] - z[j]) - delta[j] - rigid[j]
     for i in range(n):
         j = start + i
         gain = panels.ahead[i] * (elastic[i + 1] - elastic[i]) + panels.behind[i] * (elastic[i + 2] - elastic[i + 1])
-        work.delta[j] += relaxation * (work.ramp[j] * (gain + work.shift[j]) - work.delta[j])
+        delta[j] += relaxation * (ramp[j] * (gain + shift[j]) - delta[j])
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _iterate(panels, size, method, reach, windows, iterations, work):
-    """Fixed number of iterations; returns the last sum of abs(y - F) over that of abs(F), these in ``work.force``."""
-    n = panels.n
-    block = size // windows
-    matrix = work.matrix[: size * size].reshape((size, size))
-    factors = work.factors[: size * size].reshape((size, size))
-    z, force, y, r = work.z[:size], work.force[:size], work.y[:size], work.r[:size]
-    old = work.product[:size]
+def _begin(size, work, q):
+    """Start of the q-th slip's iteration."""
+    y, r, old, delta, z, rigid = work.y[q], work.r[q], work.product[q], work.delta[q], work.z[q], work.rigid[q]
     for i in range(size):
-        y[i] = r[i] = old[i] = work.delta[i] = _ZERO
-        z[i] = -work.rigid[i] / work.step[i]
-    change = total = _ZERO
-    for count in range(iterations):
-        _project(size, n, z, work.bound, force, work.ramp)
-        relaxation = np.float32(0.6) if count < 10 else np.float32(0.3)
-        if count < 32:
-            for start in range(0, size, n):
-                _shift_slip(panels, start, relaxation, work)
-        if method != DIRECT and count > 0:
-            multiply(matrix, y, old)
-            for i in range(size):
-                old[i] -= r[i] - y[i]
+        y[i] = r[i] = old[i] = delta[i] = _ZERO
+        z[i] = -rigid[i] / work.step[i]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _bracket(size, lags, work, q):
+    """What the resolvent is applied to; B y, which it lags behind, is in ``work.product``."""
+    y, r, old, delta, z = work.y[q], work.r[q], work.product[q], work.delta[q], work.z[q]
+    rigid, force = work.rigid[q], work.force[q]
+    if lags:
         for i in range(size):
-            r[i] = _TWO * force[i] - z[i] - (work.rigid[i] + work.delta[i]) / work.step[i] - old[i]
-        if method == LIBRARY:
-            for window in range(windows):
-                first, last = window * block, (window + 1) * block
-                resolvent = work.factors[first * block : last * block].reshape((block, block))
-                multiply(resolvent, r[first:last], y[first:last])
-        else:
-            substitute(factors, 2 * n, reach, r, y)
-        change, total = _ZERO, _TINY
-        for i in range(size):
-            move = y[i] - force[i]
-            z[i] += _RHO * move
-            change += abs(move)
-            total += abs(force[i])
-    _project(size, n, z, work.bound, force, work.ramp)
+            old[i] -= r[i] - y[i]
+    for i in range(size):
+        r[i] = _TWO * force[i] - z[i] - (rigid[i] + delta[i]) / work.step[i] - old[i]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _move(size, work, q):
+    """Step of the q-th slip's iteration; returns the residual."""
+    y, z, force, change, total = work.y[q], work.z[q], work.force[q], _ZERO, _TINY
+    for i in range(size):
+        move = y[i] - force[i]
+        z[i] += _RHO * move
+        change += abs(move)
+        total += abs(force[i])
     return change / total
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work):
-    """Bounds and rigid slip of the panels, over mu N and over mu N/(G c^2); returns what the slip was divided by."""
+def _iterate(panels, size, method, reach, windows, iterations, slips, work):
+    """Fixed number of iterations for so many slips; leaves forces in ``work.force``, and in ``work.residual`` the last
+    sum of abs(y - F) over that of abs(F)."""
+    n = panels.n
+    block = size // windows
+    matrix = work.matrix[: size * size].reshape((size, size))
+    factors = work.factors[: size * size].reshape((size, size))
+    for q in range(slips):
+        _begin(size, work, q)
+    for count in range(iterations):
+        relaxation = np.float32(0.6) if count < 10 else np.float32(0.3)
+        for q in range(slips):
+            _project(size, n, work.z[q], work.bound, work.force[q], work.ramp[q])
+            if count < 32:
+                for start in range(0, size, n):
+                    _shift_slip(panels, start, relaxation, work, q)
+        lags = method != DIRECT and count > 0
+        if lags:
+            multiply(matrix, work.y, work.product, slips, 0)
+        for q in range(slips):
+            _bracket(size, lags, work, q)
+        if method == LIBRARY:
+            for window in range(windows):
+                first, last = window * block, (window + 1) * block
+                resolvent = work.factors[first * block : last * block].reshape((block, block))
+                multiply(resolvent, work.r, work.y, slips, first)
+        else:
+            for q in range(slips):
+                substitute(factors, 2 * n, reach, work.r[q][:size], work.y[q][:size])
+        for q in range(slips):
+            work.residual[q] = _move(size, work, q)
+    for q in range(slips):
+        _project(size, n, work.z[q], work.bound, work.force[q], work.ramp[q])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work, q):
+    """Bounds and q-th rigid slip of the panels, over mu N and over mu N/(G c^2), and what the slip was divided by."""
+    rigid, shift = work.rigid[q], work.shift[q]
     n, strip, scale = panels.n, work.strip, work.scale[TO_UNIT]
     scale_dx = scale * work.scale[LENGTH]
     largest = 0.0
@@ -198,32 +231,33 @@ def _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work):
         for k in range(n):
             i = 2 * n * j + k
             work.bound[i] = np.float32(strip.share[j] * panels.share[k]) + _TINY
-            x, shift = strip.half[j] * panels.slip[k], strip.half[j] * (panels.load[k] - panels.slip[k])
-            work.rigid[i], work.rigid[i + n] = here_x + change_x * x, here_s + change_s * x
-            work.shift[i], work.shift[i + n] = change_x * shift, change_s * shift
-    return slow
+            x, apart = strip.half[j] * panels.slip[k], strip.half[j] * (panels.load[k] - panels.slip[k])
+            rigid[i], rigid[i + n] = here_x + change_x * x, here_s + change_s * x
+            shift[i], shift[i + n] = change_x * apart, change_s * apart
+    work.slowed[q] = slow
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _resultant(panels, count, work):
-    """(fx, fs, mn) of the panel forces over mu N and mu N c; those of the strips into ``work.strip``.
+def _resultant(panels, count, work, q):
+    """(fx, fs, mn) of the q-th panel forces over mu N and mu N c; those of the strips into ``work.strip``.
 
     At a slip that had to be divided by ``slow`` the force differs from that of the rigid slip alone by 1/slow of what
     it does at the reduced slip."""
-    n, strip, slow = panels.n, work.strip, work.scale[SLOWED]
+    n, strip, slow = panels.n, work.strip, work.slowed[q]
+    force, rigid, shift = work.force[q], work.rigid[q], work.shift[q]
     fx = fs = mn = 0.0
     for j in range(count):
         strip.force_x[j] = strip.force_s[j] = strip.turn[j] = 0.0
         for k in range(n):
             i = 2 * n * j + k
             if slow > 1:
-                sx, ss = work.rigid[i] + work.shift[i], work.rigid[i + n] + work.shift[i + n]
+                sx, ss = rigid[i] + shift[i], rigid[i + n] + shift[i + n]
                 traction = work.bound[i] / np.sqrt(sx * sx + ss * ss + _TINY)
-                work.force[i] = -traction * sx + (work.force[i] + traction * sx) / slow
-                work.force[i + n] = -traction * ss + (work.force[i + n] + traction * ss) / slow
-            strip.force_x[j] += work.force[i]
-            strip.force_s[j] += work.force[i + n]
-            strip.turn[j] += strip.half[j] * panels.load[k] * work.force[i + n]
+                force[i] = -traction * sx + (force[i] + traction * sx) / slow
+                force[i + n] = -traction * ss + (force[i + n] + traction * ss) / slow
+            strip.force_x[j] += force[i]
+            strip.force_s[j] += force[i + n]
+            strip.turn[j] += strip.half[j] * panels.load[k] * force[i + n]
         fx, fs = fx + strip.force_x[j], fs + strip.force_s[j]
         mn += strip.turn[j] + strip.middle[j] * strip.force_s[j] - strip.line[j] * strip.force_x[j]
     return fx, fs, mn
@@ -245,31 +279,36 @@ def rolling_force(
 
     ``method``: AUTO is LIBRARY where each window has ``library.level.strips`` strips and is similar to an ellipse, else
     BAND, and DIRECT with more iterations if the residual then exceeds LIMIT; or LIBRARY (falls back on BAND), BAND,
-    DIRECT; or AGAIN, for the strips of the last solution with other slips, whose matrices are kept. ``work`` afterwards
-    holds what `read_field` needs."""
-    panels, scale, count, again = library.panels, work.scale, centre.size, method == AGAIN
+    DIRECT. ``work`` afterwards holds what `read_field` and `roll_again` need."""
+    panels, scale, count = library.panels, work.scale, centre.size
     split = second_window(centre, width)
     windows = 1 if split == count else 2
-    if not again:
-        scale[LENGTH], scale[LOAD] = lay_out(centre, width, half_length, middle, peak, split, work.strip)
+    scale[LENGTH], scale[LOAD] = lay_out(centre, width, half_length, middle, peak, split, work.strip)
     c, bound = scale[LENGTH], mu * scale[LOAD]
     scale[BOUND] = bound
     if not bound > 0:
         return 0.0 * bound, 0.0 * bound, 0.0 * bound, 0.0 * bound, DIRECT
-    used = int(scale[USED])
-    if not again:
-        assemble(panels, count, library.nu, work)
-        used = _prepare(panels, library, count, windows, split, method, work)
+    assemble(panels, count, library.nu, work)
+    scale[USED] = _prepare(panels, library, count, windows, split, method, work)
     scale[TO_UNIT] = shear_modulus * c * c / bound
-    scale[SLOWED] = _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work)
-    residual = _solve(panels, library.level, count, windows, used, work)
-    if (again or method == AUTO) and used != DIRECT and residual > LIMIT:
-        used = DIRECT
-        _factorise(panels, count, count, work)
-        residual = _solve(panels, library.level, count, windows, DIRECT, work)
-    scale[USED] = used
-    fx, fs, mn = _resultant(panels, count, work)
-    return bound * fx, bound * fs, bound * c * mn, float(residual), used
+    _load_case(panels, slip_x, slip_x_dx, slip_s, slip_s_dx, work, 0)
+    residual = _solve(panels, library.level, count, windows, 1, method == AUTO, work)
+    fx, fs, mn = _resultant(panels, count, work, 0)
+    return bound * fx, bound * fs, bound * c * mn, residual, int(scale[USED])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def roll_again(slips, library, work, forces):
+    """Forces (K, 3, M) as of `read_forces` for other ``slips`` (K, 4, M) of the strips solved last, with their
+    friction."""
+    panels, strip, (many, _, count) = library.panels, work.strip, slips.shape
+    split = second_window(strip.centre[:count], strip.width[:count])
+    for q in range(many):
+        _load_case(panels, slips[q, 0], slips[q, 1], slips[q, 2], slips[q, 3], work, q)
+    _solve(panels, library.level, count, 1 if split == count else 2, many, True, work)
+    for q in range(many):
+        _resultant(panels, count, work, q)
+        read_forces(count, work, forces[q])
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -290,13 +329,25 @@ def _factorise(panels, count, reach, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _solve(panels, level, count, windows, used, work):
-    """Iterate by a method whose factors are made; returns the residual."""
-    reach = count if used == DIRECT else level.reach
-    whole = used != LIBRARY and reach + 1 >= count
-    iterations = DIRECT_ITERATIONS if used == DIRECT else level.iterations
-    method, windows = (DIRECT if whole else used), (windows if used == LIBRARY else 1)
-    return _iterate(panels, 2 * panels.n * count, method, reach, windows, iterations, work)
+def _solve(panels, level, count, windows, slips, retry, work):
+    """Iterate by the method whose factors are made, and if asked to ``retry`` by DIRECT where that is not enough;
+    returns the largest residual."""
+    residual = LIMIT
+    for _ in range(2):
+        used = int(work.scale[USED])
+        reach = count if used == DIRECT else level.reach
+        whole = used != LIBRARY and reach + 1 >= count
+        iterations = DIRECT_ITERATIONS if used == DIRECT else level.iterations
+        method, parts = (DIRECT if whole else used), (windows if used == LIBRARY else 1)
+        _iterate(panels, 2 * panels.n * count, method, reach, parts, iterations, slips, work)
+        residual = 0.0
+        for q in range(slips):
+            residual = max(residual, work.residual[q])
+        if not retry or used == DIRECT or residual <= LIMIT:
+            break
+        work.scale[USED] = DIRECT
+        _factorise(panels, count, count, work)
+    return residual
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -318,18 +369,19 @@ def read_field(panels, count, work, field):
 
     The power is that of traction and slip times one factor, with which it adds up to what the force does on the rigid
     slip: the upwind slip alone misses 10 to 40 % of it at the coarser levels."""
-    n, strip, scale = panels.n, work.strip, work.scale
+    n, strip, scale, force, z = panels.n, work.strip, work.scale, work.force[0], work.z[0]
+    rigid, shift = work.rigid[0], work.shift[0]
     c = scale[LENGTH]
-    to_slip = scale[SLOWED] / scale[TO_UNIT]
+    to_slip = work.slowed[0] / scale[TO_UNIT]
     work_done = power = 0.0
     for j in range(count):
         for k in range(n):
             i, out = 2 * n * j + k, n * j + k
             area = c * c * strip.width[j] * strip.half[j] * (panels.edges[k] - panels.edges[k + 1])
-            tx, ts = scale[BOUND] * work.force[i] / area, scale[BOUND] * work.force[i + n] / area
-            sx = to_slip * work.step[i] * (work.force[i] - work.z[i])
-            ss = to_slip * work.step[i] * (work.force[i + n] - work.z[i + n])
-            slides = np.sqrt(work.z[i] ** 2 + work.z[i + n] ** 2) > work.bound[i]
+            tx, ts = scale[BOUND] * force[i] / area, scale[BOUND] * force[i + n] / area
+            sx = to_slip * work.step[i] * (force[i] - z[i])
+            ss = to_slip * work.step[i] * (force[i + n] - z[i + n])
+            slides = np.sqrt(z[i] ** 2 + z[i + n] ** 2) > work.bound[i]
             field[0, out] = c * (strip.middle[j] + strip.half[j] * panels.load[k])
             field[1, out] = c * strip.line[j]
             field[2, out], field[3, out] = tx, ts
@@ -338,7 +390,7 @@ def read_field(panels, count, work, field):
             field[7, out] = 1.0 if slides else 0.0
             field[8, out] = -(tx * sx + ts * ss)
             power += area * field[8, out]
-            rigid_x, rigid_s = work.rigid[i] + work.shift[i], work.rigid[i + n] + work.shift[i + n]
+            rigid_x, rigid_s = rigid[i] + shift[i], rigid[i + n] + shift[i + n]
             work_done -= area * to_slip * (tx * rigid_x + ts * rigid_s)
     if power > 0:
         for out in range(count * n):
