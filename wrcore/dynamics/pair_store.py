@@ -33,7 +33,7 @@ from wrcore.kernels.handles import Handle
 SHIPPED = Path(__file__).parent / "tables"
 """Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
-WRONG = (3e-3, 0.01), (0.02, 0.05)
+WRONG = (3e-3, 0.01), (0.01, 0.03)
 """Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice; to the solver."""
 
 CELLS, SLOTS = 40_000, 100_003
@@ -96,7 +96,7 @@ class Pair:
                 return
             begin = time.monotonic()
             try:
-                self._keep(key, self._solved(key))
+                self._keep(key, *self._solved(key))
             except BaseException as error:  # a kernel cannot hand it on; the cell stays as if never met
                 _hand_on(error)
             self._spent += time.monotonic() - begin
@@ -107,25 +107,25 @@ class Pair:
                 self.write()
 
     def _solved(self, key):
-        """State of a cell: 1 where its nodes have solutions and its middle is right."""
+        """State of a cell, 1 where its nodes have solutions and its middle is right, and its rows."""
         rows = self._rows_of(key)
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
         level = corner_of(key)[0]
         if rows is None or not np.less(miss, WRONG[level]).all():
-            return HARD if rows is None or level + 1 == LEVELS else FINER
-        return 1
+            return HARD if rows is None or level + 1 == LEVELS else FINER, rows
+        return 1, rows
 
-    def _keep(self, key, state):
-        """Let kernels see a cell."""
+    def _keep(self, key, state, rows):
+        """Let kernels see a cell; where it has a state above 0, this becomes its number."""
         if 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS:
             raise MemoryError(f"no room for more than {len(self.cells)} cells of {self.path.name}")
         if state > 0:
-            self._cells[self._ready + 1] = self._rows_of(key)
             self._ready += 1
+            self._cells[self._ready], state = rows, self._ready
         slot = key % SLOTS
         while self._keys[slot]:
             slot = (slot + 1) % SLOTS
-        self._states[slot] = self._ready if state > 0 else state
+        self._states[slot] = state
         self._keys[slot], self.cells[key] = key, state
 
     def _numbers(self, node):
@@ -212,12 +212,12 @@ class Pair:
             try:
                 os.utime(self.path)
                 with checked_hdf5(self.path, "a pair's table") as file:
-                    places, numbers, parts, cells, misses = (file[name][...] for name in _PARTS)
+                    places, numbers, parts, cells, misses, rows = (file[name][...] for name in _PARTS)
                 self._solved_at = dict(zip(map(tuple, places.tolist()), numbers, strict=True)) | self._solved_at
                 self._parts = {tuple(node): part for *node, part in parts.tolist()} | self._parts
                 for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
                     if key not in self.cells:
-                        self._keep(key, state)
+                        self._keep(key, state, rows[state - 1] if state > 0 else None)
                         self.misses[key] = miss
             except (InputError, KeyError, ValueError, IndexError, OSError) as error:
                 warn(f"{error}; it is solved anew")
@@ -230,11 +230,13 @@ class Pair:
         if self._new:
             try:
                 self._read()
-                misses = [self.misses[key] for key in self.cells]
-                parts = [(*node, part) for node, part in self._parts.items()]
-                solved = list(self._solved_at), list(self._solved_at.values())
+                data = (
+                    list(self._solved_at), list(self._solved_at.values()),
+                    [(*node, part) for node, part in self._parts.items()], list(self.cells.items()),
+                    [self.misses[key] for key in self.cells], self._cells[1 : self._ready + 1],
+                )  # fmt: skip
                 with new_hdf5(self.path) as file:
-                    for name, part in zip(_PARTS, (*solved, parts, list(self.cells.items()), misses), strict=True):
+                    for name, part in zip(_PARTS, data, strict=True):
                         file[name] = part
                 self._new, self._written = 0, time.monotonic()
             except OSError as error:
@@ -242,7 +244,7 @@ class Pair:
                 self._new = 0
 
 
-_PARTS = "places", "numbers", "parts", "cells", "misses"
+_PARTS = "places", "numbers", "parts", "cells", "misses", "rows"
 
 
 _CORNERS = list(itertools.product((0, 1), repeat=3))
