@@ -1,8 +1,9 @@
 """What looking exact contact up costs and errs: ``python -m study.patch.look_up [SCENE ...]``.
 
-Each scene runs with ``moment``, ``tabulated`` and ``exact``. Times real time are of a second run's integration; errors are rms differences to the run with ``exact``: of the lateral position of the first wheelset, and of the normal
-forces over their mean. ``filled`` is what the first run took longer than the second, compiling apart, and ``solved``
-how many patches had to be solved for want of an answer of the table.
+Each scene runs with ``moment``, ``tabulated`` and ``exact``. Times real time are of a second run's integration; errors
+are rms differences to the run with ``exact``: of the lateral position of the first wheelset, and of the normal forces
+over their mean. ``filled`` is what the first run took longer than the second, compiling apart, and ``solved`` how many
+patches had to be solved for want of an answer of the table.
 """
 
 import argparse
