@@ -1,6 +1,5 @@
 """Hard cases over a long time: hunting for an hour, streamed to a file, broken off and taken up again."""
 
-import gc
 import tracemalloc
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -59,10 +58,7 @@ def hunting(vehicles, name, changes, duration, rate=200.0):
 
 
 def _with_memory(scene, path, block, duration):
-    """A run, and the peak of its memory in the second half over that in the first.
-
-    What the process holds already is kept out of garbage collection: how often that looks at the run's own garbage
-    depends on how much there is."""
+    """A run, and the peak of its memory in the second half over that in the first."""
     peaks = []
 
     def half_way(t):
@@ -70,15 +66,12 @@ def _with_memory(scene, path, block, duration):
             peaks.append(tracemalloc.get_traced_memory()[1])
             tracemalloc.reset_peak()
 
-    gc.collect()
-    gc.freeze()
     tracemalloc.start()
     try:
         run, _ = simulate_to(scene, path, half_way, block=block)
         peaks.append(tracemalloc.get_traced_memory()[1])
     finally:
         tracemalloc.stop()
-        gc.unfreeze()
     return run, peaks[-1] / peaks[0]
 
 
