@@ -36,7 +36,7 @@ SHIPPED = Path(__file__).parent / "tables"
 WRONG = (3e-3, 0.01), (0.01, 0.03)
 """Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice; to the solver."""
 
-CELLS, SLOTS = 40_000, 100_003
+CELLS, SLOTS = 20_000, 100_003
 """Room for cells that can be looked up, and for all."""
 
 _PATIENCE = 3.0

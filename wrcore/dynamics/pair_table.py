@@ -43,7 +43,7 @@ FIRST = -0.05, -0.1, math.log(4e-6)
 COUNTS = 500, 400, 19
 """Steps of the coarsest lattice."""
 
-YAW = 0.015
+YAW = 0.01
 """Nodes have yaw 0 and plus and minus this, rad; looked up is half as much again."""
 
 APART = 8e-3
