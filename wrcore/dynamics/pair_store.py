@@ -33,8 +33,9 @@ from wrcore.kernels.handles import Handle
 SHIPPED = Path(__file__).parent / "tables"
 """Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
-WRONG = (3e-3, 0.01), (0.01, 0.03)
-"""Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice; to the solver."""
+WRONG = 3e-3, 0.01
+"""Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice, and in the end to
+the solver."""
 
 CELLS, SLOTS = 20_000, 100_003
 """Room for cells that can be looked up, and for all."""
@@ -110,9 +111,8 @@ class Pair:
         """State of a cell, 1 where its nodes have solutions and its middle is right, and its rows."""
         rows = self._rows_of(key)
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
-        level = corner_of(key)[0]
-        if rows is None or not np.less(miss, WRONG[level]).all():
-            return HARD if rows is None or level + 1 == LEVELS else FINER, rows
+        if rows is None or not np.less(miss, WRONG).all():
+            return HARD if rows is None or corner_of(key)[0] + 1 == LEVELS else FINER, rows
         return 1, rows
 
     def _keep(self, key, state, rows):
@@ -144,20 +144,16 @@ class Pair:
     def _rows_of(self, key):
         """Rows (NODES, NUMBERS) that a cell is looked up from; None where too few of its nodes have a solution.
 
-        Corners that have none lie in the plane of those that have; one beyond goes on as a straight line does; what yaw
-        adds where it is not known is the mean of the others."""
+        All corners must have one; where one beyond has none, a straight line goes on; what yaw adds where it is not
+        known is the mean of the others."""
         level, part, i, j, k = corner_of(key)
 
         def numbers(a, b, c, yaw=0):
             return self._numbers((level, part, i + a, j + b, k + c, yaw))
 
         own = np.array([numbers(*corner) for corner in _CORNERS])
-        lost = np.isnan(own[:, 0])
-        if lost.sum() > 3:
+        if np.isnan(own[:, 0]).any():
             return None
-        if lost.any():
-            plane = np.column_stack([np.ones(8), _CORNERS])
-            own[lost] = plane[lost] @ np.linalg.lstsq(plane[~lost], own[~lost])[0]
         own, rows = own.reshape(2, 2, 2, NUMBERS), np.empty((NODES, NUMBERS), np.float32)
 
         def beyond(near, axis):
