@@ -10,13 +10,13 @@ import wrcore as wr
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.detection import find_patches
-from wrcore.contact.patch.model import NO_TABLE
+from wrcore.contact.patch.model import LOBE_COLUMNS, MODES, NO_TABLE
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics import pair_store, pair_table, tabulated_wheel
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
-from wrcore.dynamics.pair_table import YAW, look_up
+from wrcore.dynamics.pair_table import YAW, YAWS, look_up
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -34,19 +34,20 @@ def own_cache(tmp_path, monkeypatch):
     return tmp_path
 
 
-def known_numbers(i, j, k, yaw=0):
+def known_numbers(i, j, k, turn=3):
     """Two numbers of a node: one with all powers that a cell gives exactly, one with what yaw adds."""
-    x, y, z, w = i - 300, j - 200, k - 9, (0, 1, -1)[yaw]
+    x, y, z, w = i - 300, j - 200, k - 9, turn - 3
     return x * x - 3.0 * y * y + 0.5 * z * z + x * y * z + 2.0 * y, x + 4.0 * w * y + 2.0 * w * w * z
 
 
 def pair_of_known_numbers(lost=()):
     """A `Pair` as far as its cells go; the ``lost`` have no solution."""
 
-    def numbers(node):
-        row = np.zeros(pair_table.NUMBERS, np.float32)
-        row[:2] = (math.nan,) * 2 if node[2:] in lost else known_numbers(*node[2:])
-        return row
+    def numbers(nodes):
+        rows = np.zeros((len(nodes), pair_table.NUMBERS), np.float32)
+        for row, (_, _, turn, *corner) in zip(rows, nodes, strict=True):
+            row[:2] = (math.nan,) * 2 if (turn, *corner) in lost else known_numbers(*corner, turn)
+        return rows
 
     return SimpleNamespace(_numbers=numbers)
 
@@ -54,11 +55,12 @@ def pair_of_known_numbers(lost=()):
 @pytest.mark.parametrize("first", [(300, 200, 9), (301, 199, 10)])
 def test_what_a_cell_gives_exactly(first):
     """Squares along each axis, what is linear in all, and what depends on yaw as a parabola; also from odd corners."""
-    key = pair_table.key_of(1, 7, *first)
-    assert pair_table.corner_of(key) == (1, 7, *first)
-    rows, numbers = pair_store.Pair._rows_of(pair_of_known_numbers(), key), np.empty(pair_table.NUMBERS)
+    key, pair, numbers = pair_table.key_of(1, 71, 1, *first), pair_of_known_numbers(), np.empty(pair_table.NUMBERS)
+    assert pair_table.corner_of(key) == (1, 71, 1, *first)
+    rows = pair_store.Pair._rows_of(pair, key)
+    assert pair_store.Pair._add_yaw(pair, key, rows)
     part = np.array([0.3, 0.6, 0.9])
-    look_up(rows, *part, *0.5 * (part + np.array(first) % 2), 0.4 * YAW, numbers)
+    look_up(rows, *part, *0.5 * (part + np.array(first) % 2), 0.4, numbers)
     x, y, z = part + first - (300, 200, 9)
     expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z
     np.testing.assert_allclose(numbers[:2], expected, rtol=1e-6)
@@ -66,9 +68,10 @@ def test_what_a_cell_gives_exactly(first):
 
 def test_modes_leave_the_slopes_at_rest():
     """Near no creepage the remainder is the one stored there, to second order."""
-    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(48)
+    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(3 * MODES)
+    numbers[pair_table.LINEAR] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
-    numbers[pair_table.MODE :][:16] = 1.0
+    numbers[pair_table.MODE :][:MODES] = 1.0
     near, far = (pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums) for x in (1e-4, 0.5))
     np.testing.assert_allclose(near, [0.1, 0.2, 0.3], atol=1e-5)
     assert max(map(abs, np.subtract(far, near))) > 1e-3
@@ -160,6 +163,22 @@ def test_lobes_that_are_apart():
     assert models["tabulated"]._counters[3] == 0
 
 
+@pytest.mark.parametrize(("y", "load", "yaw", "spin", "drift", "most"), [
+    (5.5e-3, 3.4e4, 0.0, -1.5e-3, -4e-3, 0.01), (6.0e-3, 3.4e4, -5e-3, 0.0, -3.5e-3, 0.01),
+    (4.6e-3, 7.2e4, -5.7e-3, 1e-3, 1e-3, 0.02),
+])  # fmt: skip
+def test_in_the_root_of_the_flange(benchmark_pair, y, load, yaw, spin, drift, most):
+    """Where a lobe is slender, spins and turns, and where one is about to be born beside it: its cells are finer."""
+    models = {name: LoadedWheels(benchmark_pair, name) for name in ("exact", "tabulated")}
+    roll, _ = models["exact"].settled(y, load)
+    z = models["exact"].height("left", y, load, roll, yaw)
+    rolling = Rolling(SPEED, SPEED / 0.46 * (1.0 + spin), SPEED * (yaw + drift))
+    exact, table = (models[name].at_height("left", y, z, roll, yaw, rolling)[0].row for name in models)
+    assert models["tabulated"]._counters[3] == 0
+    assert table[reduction.NORMAL] == pytest.approx(exact[reduction.NORMAL], rel=3e-3)
+    assert math.hypot(*(table - exact)[[reduction.FX, reduction.FY]]) < most * 0.3 * exact[reduction.NORMAL]
+
+
 def points_of_hertz(a, b, n=16):
     """Places (n^2, 2) in an ellipse that share its Hertz pressure alike."""
     radius = np.sqrt(1.0 - (1.0 - (np.arange(n) + 0.5) / n) ** (2.0 / 3.0))
@@ -172,11 +191,12 @@ def test_lobes_act_on_each_other_as_loads_on_a_half_space_do():
     ellipse; a creepage of theirs is their fall over x, for material runs through the contact towards -x."""
     shear, nu, gap, step = 8.2e10, 0.28, 0.012, 1e-5
     forces, sizes = {"n": 4e4, "x": 7e3, "s": -3e3}, ((4e-3, 2e-3), (3e-3, 2.5e-3))
-    numbers, lobes = np.zeros((2, pair_table.NUMBERS)), np.zeros((2, 4))
+    numbers, lobes = np.zeros((2, pair_table.NUMBERS)), np.zeros((2, LOBE_COLUMNS))
     for q, (a, b) in enumerate(sizes):
         numbers[q, [pair_table.LOG_A, pair_table.LOG_B]] = math.log(a), math.log(b)
     numbers[0, pair_table.PLACE_Y] = gap  # lobe 0 lies further out than the loaded lobe 1
-    lobes[1] = forces["n"], 0.0, forces["x"], forces["s"]
+    lobes[0, tabulated_wheel.END] = 1.0
+    lobes[1] = forces["n"], 0.0, forces["x"], forces["s"], 2.0
     rows = np.zeros((2, PATCH_COLUMNS))
     rows[:, reduction.U_WHEEL], rows[:, reduction.CURVATURE_Y] = (0.0, gap), 1.0
     work = SimpleNamespace(lobes=lobes, numbers=numbers, rows=rows)
@@ -194,32 +214,34 @@ def test_lobes_act_on_each_other_as_loads_on_a_half_space_do():
     found = tabulated_wheel._slip_of_others.py_func(model, 0, 2, work)
     np.testing.assert_allclose(found, -slope[:2], rtol=0.02)
     assert min(map(abs, found)) > 5e-6
-    tabulated_wheel._balance.py_func(model, 1e11, 0, 2, 2, work)
+    tabulated_wheel._balance.py_func(model, 1e11, 0, 2, work)
     assert lobes[0, tabulated_wheel.LIFT] == pytest.approx(displaced(0.0)[2], rel=0.005)
 
 
 def test_half_the_steps_where_a_cell_is_too_coarse():
-    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place."""
+    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place and
+    in a third of the cell in yaw."""
     places = np.array([300.3, 200.6, 9.9]), np.array([600.6, 401.2, 19.8])
     t, slope, log_depth = np.array(pair_table.FIRST) + places[0] * pair_table.STEPS
     u, (coarse, fine) = 0.011, [list(map(int, place)) for place in places]
     part = round((u - pair_table.FIELD) / pair_table.PART)
     keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
-    for level, corner, state in ((0, coarse, pair_table.FINER), (1, fine, 5)):
-        key = pair_table.key_of(level, part, *corner)
+    for level, turn, corner, state in ((0, 1, coarse, pair_table.FINER), (1, 5, fine, 5)):
+        key = pair_table.key_of(level, part, turn, *corner)
         keys[key % 1009], states[key % 1009] = key, state
     table = NO_TABLE._replace(keys=keys, states=states)
-    state, *parts = pair_table.locate(table, u, t, slope, math.exp(log_depth))
+    state, *parts, turn = pair_table.locate(table, u, False, t, slope, math.exp(log_depth), 0.375 * YAW)
     assert state == 5
     expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
     np.testing.assert_allclose(parts, expected, atol=1e-9)
+    assert turn == pytest.approx(0.375 * 3.0 - 2.0)
 
 
 def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
     """Beyond a cell; where one of its own corners has none, the cell has none."""
-    key = pair_table.key_of(0, 7, 300, 200, 9)
+    key = pair_table.key_of(0, 7, 1, 300, 200, 9)
     whole = pair_store.Pair._rows_of(pair_of_known_numbers(), key)
-    rows = pair_store.Pair._rows_of(pair_of_known_numbers([(299, 200, 9, 0), (300, 201, 11, 0)]), key)
+    rows = pair_store.Pair._rows_of(pair_of_known_numbers([(3, 299, 200, 9), (3, 300, 201, 11)]), key)
     changed = np.flatnonzero(abs(rows - whole).max(axis=1))
     assert len(changed) == 2
     lines = [
@@ -227,17 +249,18 @@ def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
         2.0 * known_numbers(300, 201, 10)[0] - known_numbers(300, 201, 9)[0],
     ]
     np.testing.assert_allclose(sorted(rows[changed, 0]), sorted(lines))
-    assert pair_store.Pair._rows_of(pair_of_known_numbers([(300, 201, 10, 0)]), key) is None
+    assert pair_store.Pair._rows_of(pair_of_known_numbers([(3, 300, 201, 10)]), key) is None
 
 
 def test_where_yaw_has_no_solution_it_adds_what_it_adds_elsewhere():
     """If that is known at half of the corners at least."""
-    key = pair_table.key_of(0, 7, 300, 200, 9)
-    corners = [(300 + a, 200 + b, 8 + c, 1) for a in (0, 2) for b in (0, 2) for c in (0, 2)]
-    rows = pair_store.Pair._rows_of(pair_of_known_numbers(corners[:4]), key)[32:].reshape(8, 2, -1)
+    key, empty = pair_table.key_of(0, 7, 1, 300, 200, 9), np.zeros((pair_table.NODES, pair_table.NUMBERS), np.float32)
+    corners = [(4, 300 + a, 200 + b, 8 + c) for a in (0, 2) for b in (0, 2) for c in (0, 2)]
+    assert pair_store.Pair._add_yaw(pair_of_known_numbers(corners[:4]), key, empty)
+    rows = empty[32:].reshape(8, 2, -1)
     np.testing.assert_allclose(rows[:4], np.broadcast_to(rows[4:].mean(axis=0), (4, *rows.shape[1:])))
     assert np.ptp(rows[4:, 0, 1]) > 1.0
-    assert pair_store.Pair._rows_of(pair_of_known_numbers(corners[:5]), key) is None
+    assert not pair_store.Pair._add_yaw(pair_of_known_numbers(corners[:5]), key, empty.copy())
 
 
 def test_planar_detection_is_solved(benchmark_pair):
@@ -276,7 +299,8 @@ def test_what_lies_outside_is_solved(rolling_wheels):
     models = rolling_wheels[0]
     rolling = Rolling(SPEED, SPEED / 0.46)
     (table,), (exact,) = (
-        models[name].at_height("left", -1.5e-3, Z, yaw=1.6 * YAW, rolling=rolling) for name in ("tabulated", "exact")
+        models[name].at_height("left", -1.5e-3, Z, yaw=1.02 * YAWS * YAW, rolling=rolling)
+        for name in ("tabulated", "exact")
     )
     np.testing.assert_array_equal(table.row, exact.row)
     models["tabulated"]._counters[:] = 0

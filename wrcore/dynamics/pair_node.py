@@ -17,7 +17,7 @@ from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import NUMBERS, PART, depth_of, lobe_end
+from wrcore.dynamics.pair_table import NUMBERS, PART, WIDE, depth_of, lobe_end, tabulated_force
 from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
@@ -28,8 +28,11 @@ SLIPS = 12
 """Of a lobe that are solved at once."""
 
 PROBE = 0.06
-"""Creepages, over those of saturation, between which the slopes at rest are taken; where spin leaves less than a fifth
-of the table's slope, its factor is 1."""
+"""Creepages, over those of saturation, between which the slopes at rest are taken."""
+
+SPUN = 0.5, 0.8
+"""Where spin leaves less than the first part of the table's slope, its factor is 1; where more than the second, it
+makes the slope exact."""
 
 AT_REST = PROBE * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0, 0]])
 """Creepages with which slopes and force at rest are found."""
@@ -39,17 +42,17 @@ REACH = 2.0 * PART
 """A lobe this far from a place on the wheel's profile may still be meant, m."""
 
 
-@jit(allocates=False)
-def lobe_at(geometry, y, z, ex, ey, ez, place, rows):
+@jit(allocates=False, nogil=True)
+def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows):
     """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, their depth D and their own
     place; 0, 0, 0 and the place where there is none."""
     low, high, found, at, first = 0, 0, 0.0, place, 0
-    nearest = REACH
+    nearest, pose = REACH, make_pose(1.0, y, z, ex, ey, ez, True)
     count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
     while first < count:
         group = group_end(rows, count, first)
         while first < group:
-            last = lobe_end(rows, first, group)
+            last = lobe_end(geometry, pose, rows, first, group, limits)
             depth, u = depth_of(rows, first, last, 0.0)
             if abs(u - place) < nearest:
                 low, high, found, at, nearest = first, last, depth, u, abs(u - place)
@@ -57,7 +60,7 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, rows):
     return low, high, found, at
 
 
-@jit(allocates=False)
+@jit(allocates=False, nogil=True)
 def least_gap(geometry, y, z, ex, ey, ez, place):
     """Smallest vertical gap about a place on the wheel's profile, m."""
     pose, least = make_pose(1.0, y, z, ex, ey, ez, True), 1.0
@@ -67,27 +70,28 @@ def least_gap(geometry, y, z, ex, ey, ez, place):
 
 
 def lobe_of(geometry, place, rows):
-    """Pose of the wheelset (y, z, axle) at which the lobe of a place, see `solve_place`, has its depth, and where it
-    then lies on the wheel's profile; None where there is none."""
-    t, slope, depth, yaw, u = place
+    """Pose of the wheelset (y, z, axle) at which the lobe of a place, see `solve_place`, has its depth, where it then
+    lies on the wheel's profile, and whether others lie beside it; None where there is none."""
+    t, slope, depth, yaw, u, limits = place
     axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
     y = t + geometry.rail_distance - geometry.half_distance * axle[1]
     level = geometry.rolling_radius - geometry.half_distance * axle[2]
     level -= least_gap(geometry, y, level, *axle, u) + 0.5 * depth
 
     def excess(z):
-        found = lobe_at(geometry, y, z, *axle, u, rows)[2]
+        found = lobe_at(geometry, y, z, *axle, u, limits, rows)[2]
         if found == 0.0 and least_gap(geometry, y, z, *axle, u) < 0.0:  # one with its neighbours
             return depth
         return found - depth
 
     z = height_of_zero(excess, level)
-    _, _, found, at = lobe_at(geometry, y, z, *axle, u, rows)
-    return ((y, z, axle), at) if abs(found - depth) < 1e-6 * depth else None
+    first, last, found, at = lobe_at(geometry, y, z, *axle, u, limits, rows)
+    beside = (first, last) != lobe_at(geometry, y, z, *axle, u, WIDE, rows)[:2]
+    return ((y, z, axle), at, beside) if abs(found - depth) < 1e-6 * depth else None
 
 
-@jit(allocates=False)
-def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
+@jit(allocates=False, nogil=True)
+def press_lobe(model, y, z, axle, place, limits, velocity, more, sums, work):
     """Exact solution of a left wheel's lobe near a ``place`` on its profile (m), with ``more`` strips, for a velocity
     (6,) of its wheelset, linear and angular.
 
@@ -96,7 +100,7 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     with more strips.
     """
     finer, geometry, (ex, ey, ez) = work.normal.more, model.geometry, axle
-    first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, work.rows)
+    first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, limits, work.rows)
     pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), 0.0
     for k in range(first, last):
         deepest = max(deepest, work.rows[k, PENETRATION])
@@ -125,7 +129,7 @@ def press_lobe(model, y, z, axle, place, velocity, more, sums, work):
     return windows, frame, share
 
 
-@jit(allocates=False)
+@jit(allocates=False, nogil=True)
 def roll_lobe_on(model, y, z, axle, frame, velocities, slips, forces, wrenches, work):
     """Wrenches of friction (n, 6) about the wheelset's centre on the lobe pressed last in ``work``, for velocities
     (n, 6) at V = 1 m/s; ``slips`` (n, 4, strips) and ``forces`` (n, 3, strips) are scratch."""
@@ -150,19 +154,19 @@ def solve_place(contact, handle, works, place, points):
     creepages (n, 2) over those of saturation; None where strips find no solution.
 
     ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``works``: handles of two
-    `StripWork`, for less and for more strips; ``place``: t, slope of the axle, depth D, yaw, and place on the wheel's
-    profile, m.
+    `StripWork`, for less and for more strips; ``place``: t, slope of the axle, depth D, yaw, place on the wheel's
+    profile (m), and limits of `lobe_end`.
     """
-    (_, _, depth, _, u), geometry = place, contact.geometry
+    (_, _, depth, _, u, limits), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
     found = lobe_of(geometry, place, works[0].value.rows)
     if found is None:
         return None
-    (y, z, axle), _ = found
+    (y, z, axle), *_ = found
     at, sums, each, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), []
     for work, more in zip(works, (1.0, MORE), strict=True):
         windows, frame, share = press_lobe(
-            handle, *at, u, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
+            handle, *at, u, limits, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
         )
         if windows == 0:
             return None
@@ -212,12 +216,31 @@ def solve_place(contact, handle, works, place, points):
 
     exact, table = exact_and_table(AT_REST, np.ones(2))
     of_exact, of_table = (np.diag(force[[0, 2]] - force[[1, 3]]) for force in (exact, table))
-    linear = np.clip(2.5 * np.abs(of_table) / (6.0 * PROBE) - 0.5, 0.0, 1.0)
-    factors = 1.0 + linear**2 * (3.0 - 2.0 * linear) * (np.clip(of_exact / of_table, 0.5, 2.0) - 1.0)
+    linear = np.clip((np.abs(of_table) / (6.0 * PROBE) - SPUN[0]) / (SPUN[1] - SPUN[0]), 0.0, 1.0)
+    linear *= linear * (3.0 - 2.0 * linear)
+    factors = 1.0 + linear * (np.clip(of_exact / of_table, 0.5, 2.0) - 1.0)
+    numbers[columns.LINEAR] = linear.min()
     numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
     numbers[columns.FORCE : columns.MODE] = exact[4] - table[4]
     exact, table = exact_and_table(points, factors)
     return (numbers, exact - table) if np.isfinite(exact).all() else None
+
+
+@jit(allocates=False, nogil=True)
+def unlike(model, modes, one, other, depth, spin, points, sums):
+    """Largest difference over mu N of the creep forces that two sets of numbers give a lobe at creepages ``points``
+    (n, 2) over those of saturation."""
+    log_a, log_b, worst = one[columns.LOG_A], one[columns.LOG_B], 0.0
+    limit = model.friction * contact_modulus(model.shear_modulus, model.poisson_ratio) * depth**1.5
+    limit *= math.exp(one[columns.LOG_NORMAL])
+    c11, c22, _, _ = coefficients_at(log_a - log_b, model.creep.table.kalker)
+    unit = 3.0 * limit / (model.shear_modulus * math.exp(log_a + log_b))
+    for k in range(len(points)):
+        xi, eta = unit * points[k, 0] / c11, unit * points[k, 1] / c22
+        f1, f2, _, _ = tabulated_force(model, modes, one, xi, eta, spin, limit, 0.0, sums)
+        g1, g2, _, _ = tabulated_force(model, modes, other, xi, eta, spin, limit, 0.0, sums)
+        worst = max(worst, abs(f1 - g1), abs(f2 - g2))
+    return worst / limit
 
 
 def _modulus(contact):

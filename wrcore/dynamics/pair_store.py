@@ -13,8 +13,10 @@ import itertools
 import math
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
+from queue import LifoQueue
 from threading import Lock
 from typing import NamedTuple
 from weakref import WeakValueDictionary
@@ -23,8 +25,23 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES, NUMBERS, PairTable, strip_work
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_node import SLIPS, lobe_of, solve_place
-from wrcore.dynamics.pair_table import FIELD, FINER, FIRST, HARD, LEVELS, NODES, PART, STEPS, YAW, corner_of
+from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
+from wrcore.dynamics.pair_table import (
+    BESIDE,
+    FIELD,
+    FINER,
+    FIRST,
+    HARD,
+    LEVELS,
+    NARROW,
+    NODES,
+    PART,
+    STEPS,
+    WIDE,
+    YAW,
+    YAWS,
+    corner_of,
+)
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
@@ -37,13 +54,17 @@ WRONG = 3e-3, 0.01
 """Errors in the middle of a cell, of N and over mu N, from which on it is left to the next lattice, and in the end to
 the solver."""
 
-CELLS, SLOTS = 20_000, 100_003
+LIGHT = 2e-5
+"""Errors of a lobe of less depth are beside the load of this one, m: some 6 kN."""
+
+THREADS = min(len(os.sched_getaffinity(0)), 8)
+"""Nodes that are solved side by side."""
+
+CELLS, SLOTS = 50_000, 200_003
 """Room for cells that can be looked up, and for all."""
 
 _PATIENCE = 3.0
 """Solving takes this long before it says so, and files are written this often, s."""
-
-_YAWS = 0.0, YAW, -YAW
 
 
 class Modes(NamedTuple):
@@ -56,7 +77,18 @@ class Modes(NamedTuple):
     inverse: np.ndarray
     """(MODES, 3 n): coefficients from the remainder there."""
     weights: np.ndarray
-    """(n,): of the modes there."""
+    """(n,): of the modes there, where slopes at rest are exact."""
+
+    def seen(self, numbers, remainder):
+        """What modes are to give at the points in place of a node's remainder (n, 3) there."""
+        own = mode_weights(self.weights, numbers[columns.LINEAR])[:, None]
+        return (remainder - (1.0 - own) * numbers[columns.FORCE : columns.MODE]) * self.weights[:, None] / own
+
+
+def mode_weights(weights, linear):
+    """Weights of the modes for other values of `LINEAR`, from those for 1."""
+    square = weights / (1.0 - weights)
+    return square / (square + linear)
 
 
 @cache
@@ -71,7 +103,9 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
-        self._contact, self._works = Handle(contact), [Handle(strip_work(contact.strips, 1, SLIPS)) for _ in range(2)]
+        self._contact, self._works = Handle(contact), LifoQueue()
+        for _ in range(THREADS):
+            self._works.put([Handle(strip_work(contact.strips, 1, SLIPS)) for _ in range(2)])
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells = np.zeros((CELLS, NODES, NUMBERS), np.float32)
         self._solved_at, self._parts, self.cells, self._ready, self.misses = {}, {}, {}, 0, {}
@@ -111,9 +145,11 @@ class Pair:
         """State of a cell, 1 where its nodes have solutions and its middle is right, and its rows."""
         rows = self._rows_of(key)
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
-        if rows is None or not np.less(miss, WRONG).all():
-            return HARD if rows is None or corner_of(key)[0] + 1 == LEVELS else FINER, rows
-        return 1, rows
+        if rows is not None and np.less(miss, WRONG).all() and self._add_yaw(key, rows):
+            self.misses[key] = miss = tuple(np.maximum(miss, self._miss(key, rows, 0.5)))
+            if np.less(miss, WRONG).all():
+                return 1, rows
+        return HARD if corner_of(key)[0] + 1 == LEVELS else FINER, None
 
     def _keep(self, key, state, rows):
         """Let kernels see a cell; where it has a state above 0, this becomes its number."""
@@ -128,79 +164,101 @@ class Pair:
         self._states[slot] = state
         self._keys[slot], self.cells[key] = key, state
 
-    def _numbers(self, node):
-        """Numbers (NUMBERS,) of a node: solved under the part of the profile in which its lobe then lies, once for all
-        parts; NaN where there is no solution."""
-        level, part, *corner = node
-        if node not in self._parts:
-            found = lobe_of(self.contact.geometry, _place(*node[:-1], _YAWS[node[-1]]), self._works[0].value.rows)
-            self._parts[node] = part if found is None else int((found[1] - FIELD) / PART + 0.5)
-        key = level, self._parts[node], *corner
-        if key not in self._solved_at:
-            self._solved_at[key] = self._at(*key[:-1], _YAWS[key[-1]]).astype(np.float32)
-            self._new += 1
-        return self._solved_at[key]
+    def _numbers(self, nodes):
+        """Numbers (nodes, NUMBERS) of nodes (level, part, yaw, t, slope, ln D), solved side by side where they are new;
+        NaN where there is no solution.
+
+        A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
+        new = [node for node in dict.fromkeys(nodes) if node not in self._parts]
+        self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
+        keys = [(node[0], self._parts[node], *node[2:]) for node in nodes]
+        new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
+        self._solved_at |= zip(new, _side_by_side(self._at, new), strict=True)
+        self._new += len(new)
+        return np.array([self._solved_at[key] for key in keys])
+
+    def _part(self, node):
+        """Part of the wheel's profile in which a node's lobe lies, and `BESIDE`."""
+        works, part = self._works.get(), node[1]
+        try:
+            found = lobe_of(self.contact.geometry, _place(*node), works[0].value.rows)
+        finally:
+            self._works.put(works)
+        if found is None:
+            return part
+        return int((found[1] - FIELD) / PART + 0.5) + (BESIDE if found[2] and part >= BESIDE else 0)
 
     def _rows_of(self, key):
-        """Rows (NODES, NUMBERS) that a cell is looked up from; None where too few of its nodes have a solution.
+        """Rows (NODES, NUMBERS) that a cell is looked up from, those of yaw still empty; None where one of its corners
+        has no solution. Where a node beyond has none, a straight line goes on."""
+        level, part, turn, *first = corner_of(key)
 
-        All corners must have one; where one beyond has none, a straight line goes on; what yaw adds where it is not
-        known is the mean of the others."""
-        level, part, i, j, k = corner_of(key)
+        def numbers(corners):
+            return self._numbers([(level, part, 2 * turn + 1, *np.add(first, corner).tolist()) for corner in corners])
 
-        def numbers(a, b, c, yaw=0):
-            return self._numbers((level, part, i + a, j + b, k + c, yaw))
-
-        own = np.array([numbers(*corner) for corner in _CORNERS])
+        rows, own = np.zeros((NODES, NUMBERS), np.float32), numbers(_CORNERS)
         if np.isnan(own[:, 0]).any():
             return None
-        own, rows = own.reshape(2, 2, 2, NUMBERS), np.empty((NODES, NUMBERS), np.float32)
-
-        def beyond(near, axis):
-            far, out = list(near), list(near)
-            far[axis], out[axis] = 1 - near[axis], 3 * near[axis] - 1
-            found = numbers(*out)
-            return 2.0 * own[near] - own[tuple(far)] if np.isnan(found[0]) else found
-
+        own, ends = own.reshape(2, 2, 2, NUMBERS), []
         for n, (a, b) in zip(range(0, 16, 4), itertools.product((0, 1), repeat=2), strict=True):
-            rows[n : n + 4] = *own[a, b], beyond((a, b, 0), 2), beyond((a, b, 1), 2)
-            rows[n + 16 : n + 20] = [beyond((c, a, b), 0) for c in (0, 1)] + [beyond((a, c, b), 1) for c in (0, 1)]
+            rows[n : n + 2] = own[a, b]
+            for row, axis, near in ((n + 2, 2, (a, b, 0)), (n + 16, 0, (0, a, b)), (n + 18, 1, (a, 0, b))):
+                ends += [(row, axis, near), (row + 1, axis, _moved(near, axis, 1))]
+        beyond = numbers([_moved(near, axis, 3 * near[axis] - 1) for _, axis, near in ends])
+        for found, (row, axis, near) in zip(beyond, ends, strict=True):
+            line = 2.0 * own[near] - own[_moved(near, axis, 1 - near[axis])]
+            rows[row] = line if np.isnan(found[0]) else found
+        return rows
+
+    def _add_yaw(self, key, rows):
+        """Fill a cell's rows of yaw; those of up to four corners that are not known are the mean of the others. False
+        where more are not."""
+        level, part, turn, *first = corner_of(key)
+        corners = (2 * (np.array(_CORNERS) + np.array(first) // 2)).tolist()
+        found = self._numbers([(level, part, 2 * turn + at, *corner) for corner in corners for at in range(3)])
+        left, middle, right = found.reshape(8, 3, NUMBERS).swapaxes(0, 1)
         yawed = rows[32:].reshape(8, 2, NUMBERS)
-        for pair, corner in zip(yawed, 2 * np.array(_CORNERS) - (i % 2, j % 2, k % 2), strict=True):
-            middle, left, right = (numbers(*map(int, corner), yaw) for yaw in range(3))
-            pair[:] = left - right, left + right - 2.0 * middle
+        yawed[:, 0], yawed[:, 1] = right - left, left + right - 2.0 * middle
         lost = np.isnan(yawed[..., 0]).any(axis=1)
         if lost.sum() <= 4:
             yawed[lost] = yawed[~lost].mean(axis=0)
-        return None if np.isnan(rows[:, 0]).any() else rows
+        return not np.isnan(rows[:, 0]).any()
 
-    def _at(self, level, part, i, j, k, yaw):
+    def _at(self, node):
         """Numbers of a place in steps of a lattice; NaN where there is no solution."""
         modes = creep_modes()
-        found = self.solve(_place(level, part, i, j, k, yaw), modes.points)
+        found = self.solve(_place(*node), modes.points)
         if found is None:
-            return np.full(NUMBERS, np.nan)
+            return np.full(NUMBERS, np.nan, np.float32)
         numbers, remainder = found
-        remainder -= (1.0 - modes.weights)[:, None] * numbers[columns.FORCE : columns.MODE]
-        numbers[columns.MODE : columns.MODE + MODES] = modes.inverse @ remainder.ravel()
-        return numbers
+        numbers[columns.MODE : columns.MODE + MODES] = modes.inverse @ modes.seen(numbers, remainder).ravel()
+        return numbers.astype(np.float32)
 
     def solve(self, place, points):
         """`solve_place` with the pair's own scratch arrays."""
-        return solve_place(self.contact, self._contact, self._works, place, points)
+        works = self._works.get()
+        try:
+            return solve_place(self.contact, self._contact, works, place, points)
+        finally:
+            self._works.put(works)
 
-    def _miss(self, key, rows):
-        """Errors in the middle of a cell: of N, and of the creep force over mu N at rest and where modes are found."""
-        level, part, i, j, k = corner_of(key)
-        exact, found, modes = self._at(level, part, i + 0.5, j + 0.5, k + 0.5, 0.0), np.empty(NUMBERS), creep_modes()
-        columns.look_up(rows, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0, 0.0, found)
-        both = np.stack([exact, found])
-        mode, force = both[:, columns.MODE : columns.MODE + MODES], both[:, columns.FORCE : columns.MODE]
-        forces = mode @ np.linalg.pinv(modes.inverse).T
-        forces = forces.reshape(2, -1, 3) + (1.0 - modes.weights)[:, None] * force[:, None]
-        slopes = both[:, columns.SLOPE_XI : columns.SLOPE_ETA + 1]
-        creep = np.abs(forces[0] - forces[1])[:, :2].max()
-        return abs(math.expm1(found[0] - exact[0])), max(creep, np.abs(slopes[0] - slopes[1]).max())
+    def _miss(self, key, rows, turn=0.0):
+        """Errors in the middle of a cell, ``turn`` off in yaw: of N, and over mu N of the creep force and of its slopes
+        at rest; see `LIGHT`."""
+        level, part, at, *first = corner_of(key)
+        node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
+        place, found, sums = _place(*node), np.empty(NUMBERS, np.float32), np.empty(3 * MODES)
+        exact = self._at(node)
+        if np.isnan(exact[0]):
+            return math.nan, math.nan
+        double = [0.5 * (0.5 + n % 2) for n in first]
+        columns.look_up(rows, 0.5, 0.5, 0.5, *double, turn, found)
+        light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
+        spin = -math.sin(exact[columns.ANGLE] - place[1]) / self.contact.geometry.rolling_radius
+        points = np.vstack([modes.points, AT_REST])
+        creep = unlike(self._contact, modes.values, exact, found, place[2], spin, points, sums)
+        slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
+        return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 
     def _read(self):
         """Take what the file knows."""
@@ -246,10 +304,24 @@ _PARTS = "places", "numbers", "parts", "cells", "misses", "rows"
 _CORNERS = list(itertools.product((0, 1), repeat=3))
 
 
-def _place(level, part, i, j, k, yaw):
+def _place(level, part, turn, i, j, k):
     """Place, as `solve_place` has it, of a node."""
     t, slope, log_depth = np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
-    return t, slope, math.exp(log_depth), yaw, FIELD + part * PART
+    yaw, (beside, part) = YAW * (turn / 3.0**level - YAWS), divmod(part, BESIDE)
+    return t, slope, math.exp(log_depth), yaw, FIELD + part * PART, NARROW if beside else WIDE
+
+
+def _moved(corner, axis, to):
+    """A corner with another place along an axis."""
+    return (*corner[:axis], to, *corner[axis + 1 :])
+
+
+def _side_by_side(solve, places):
+    """What ``solve`` finds at places."""
+    if len(places) < 2 or THREADS < 2:
+        return [solve(place) for place in places]
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(solve, places))
 
 
 def _hand_on(error):

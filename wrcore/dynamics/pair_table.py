@@ -1,16 +1,16 @@
 """Exact contact, looked up: lattices of solutions of one wheel on one rail, solved where they are first needed.
 
-A patch consists of lobes: overlaps that lie near each other are one. A lobe's place over the rail decides its contact:
-t, the distance of the wheel's tape circle from the rail's origin across the track; the slope of the wheel's axle; its
-yaw; the part of the wheel's profile where it lies; and the depth D that its overlaps imply,
+A patch consists of lobes: overlaps that lie near each other, or are about to be one, are one. A lobe's place over the
+rail decides its contact: t, the distance of the wheel's tape circle from the rail's origin across the track; the slope
+of the wheel's axle; its yaw; the part of the wheel's profile where it lies; and the depth D that its overlaps imply,
 
     M0 = sum of int g^2 ds,   D = (15/16 sqrt(B0) M0)^0.4,
 
 which stays smooth where overlaps merge. Between nodes at no yaw: Catmull-Rom along each of t, slope and ln D, linear in
 the other two, the three together less twice what is linear in all (a Boolean sum, which wants 32 nodes in place of 64
-and errs by the product of two curvatures more). What yaw changes is a parabola through three nodes, linear between
-nodes of a lattice with twice the steps. A node depends on its place alone, not on what was solved before it. Where the
-lattice is too coarse another one with half its steps takes over.
+and errs by the product of two curvatures more). What yaw changes from the middle of a cell is a parabola through three
+nodes, linear between nodes of a lattice with twice the steps. A node depends on its place alone, not on what was solved
+before it. Where the lattice is too coarse another one with half its steps (in yaw a third) takes over.
 
 References
 ----------
@@ -26,6 +26,7 @@ import math
 
 from wrcore.contact import reduction
 from wrcore.contact.patch.model import MODES, NUMBERS
+from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
 from wrcore.kernels.handles import call_c
@@ -34,7 +35,7 @@ from wrcore.kernels.jit import FAST, FUSED, jit
 STEPS = 2e-4, 5e-4, 0.25
 """Of the coarsest lattice in t (m), slope of the axle and ln D."""
 
-LEVELS = 2
+LEVELS = 4
 """Lattices, each with half the steps of the one before."""
 
 FIRST = -0.05, -0.1, math.log(4e-6)
@@ -43,11 +44,19 @@ FIRST = -0.05, -0.1, math.log(4e-6)
 COUNTS = 500, 400, 19
 """Steps of the coarsest lattice."""
 
-YAW = 0.01
-"""Nodes have yaw 0 and plus and minus this, rad; looked up is half as much again."""
+YAW, YAWS = 8e-3, 3
+"""Half of a cell of the coarsest lattice in yaw (rad), and how many there are; each lattice has three for one of that
+before."""
 
-APART = 8e-3
-"""Distance on the wheel's profile from which on neighbouring overlaps are two lobes, m."""
+APART, FAR, SADDLE = 8e-3, 1.4e-2, 2e-5
+"""Neighbouring overlaps are one lobe where their distance on the wheel's profile (m) is below the first; or the second,
+and the gap between them (m) is nowhere more than the last."""
+
+NARROW, WIDE = (6e-3, 1.4e-2, 1e-5), (1e-2, 1.4e-2, 4e-5)
+"""The same in nodes for lobes with others beside them and for lobes alone: nodes about a lobe are of its kind."""
+
+BESIDE = 64
+"""Added to the part of the wheel's profile in places of lobes with others beside them."""
 
 PART, FIELD = 4e-3, -0.1
 """Width of the parts of the wheel's profile, and where they begin, m."""
@@ -59,14 +68,15 @@ NODES = 48
 """Rows of a cell: its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what yaw adds at
 the 8 corners of the cell with twice the steps in which it lies."""
 
-LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, FORCE = range(11)
+LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, LINEAR, FORCE = range(12)
 MODE = FORCE + 3
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
-plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages; the remainder of Fx, Fy
+plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make the
+slopes exact (1; 0 where spin rules); the remainder of Fx, Fy
 (over mu N) and Mz (over mu N c) at no creepage; and its coefficients of modes."""
 
 ROUND = 0.1
-"""Modes set in from this radius on in the disk of the creepages, where the slopes at rest shall stay what they are."""
+"""Where slopes at rest are exact, modes set in from this radius on in the disk of the creepages, to leave them so."""
 
 LOCKED = 0.3
 """Deviation from free rolling at which the remainder has faded out."""
@@ -78,10 +88,20 @@ _TABLE = LAWS["table"]
 
 
 @jit(allocates=False)
-def lobe_end(rows, first, last):
-    """End of the lobe of overlaps from ``first``."""
+def lobe_end(geometry, pose, rows, first, last, limits):
+    """End of the lobe of overlaps from ``first``; ``limits`` as `APART`, `FAR`, `SADDLE`."""
+    apart, far, saddle = limits
     end = first + 1
-    while end < last and abs(rows[end, reduction.U_WHEEL] - rows[end - 1, reduction.U_WHEEL]) < APART:
+    while end < last:
+        u, step = rows[end - 1, reduction.U_WHEEL], rows[end, reduction.U_WHEEL] - rows[end - 1, reduction.U_WHEEL]
+        if abs(step) >= far:
+            break
+        if abs(step) >= apart:
+            gap = 0.0
+            for k in range(1, 16):
+                gap = max(gap, gap_at(geometry, pose, u + k / 16.0 * step)[0])
+            if gap > saddle:
+                break
         end += 1
     return end
 
@@ -107,18 +127,18 @@ def _weights(f):
 
 
 @jit(allocates=False, forceinline=True)
-def key_of(level, part, i, j, k):
-    """One number, not 0, for the cell with this first corner; `corner_of` reads it."""
-    return ((((level + 1) * 64 + part) * 4096 + i) * 4096 + j) * 256 + k
+def key_of(level, part, turn, i, j, k):
+    """One number, not 0, for the cell with this place in yaw and first corner; `corner_of` reads it."""
+    return (((((level + 1) * 128 + part) * 128 + turn) * 4096 + i) * 4096 + j) * 256 + k
 
 
 def corner_of(key):
-    """Level, part of the profile and first corner of a cell."""
-    key, k = divmod(key, 256)
-    key, j = divmod(key, 4096)
-    key, i = divmod(key, 4096)
-    level, part = divmod(key, 64)
-    return level - 1, part, i, j, k
+    """Level, part of the profile, place in yaw and first corner of a cell."""
+    found = []
+    for count in (256, 4096, 4096, 128, 128):
+        key, rest = divmod(key, count)
+        found.append(rest)
+    return key - 1, *reversed(found)
 
 
 @jit(allocates=False)
@@ -133,28 +153,31 @@ def state_of(keys, states, key):
 
 
 @jit(allocates=False)
-def locate(table, u, t, slope, depth):
-    """Number of the cell where a lobe lies, 0 if it is to be solved, and its parts of a step beyond the first corner,
-    and of two steps beyond that of the cell with twice the steps. A lobe that only just touches is looked up at the
-    least depth."""
-    part, scale = int((u - FIELD) / PART + 0.5), 1.0
+def locate(table, u, beside, t, slope, depth, yaw):
+    """Number of the cell where a lobe lies, 0 if it is to be solved; its parts of a step beyond the first corner, and
+    of two steps beyond that of the cell with twice the steps; and its yaw from the cell's middle over half of the cell.
+    A lobe that only just touches is looked up at the least depth."""
+    part, scale, half = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW
     for level in range(LEVELS):
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z = max(scale * (math.log(depth) - FIRST[2]) / STEPS[2], 1.0)
+        z, w = max(scale * (math.log(depth) - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
         if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
             break
-        i, j, k = int(x), int(y), int(z)
-        key = key_of(level, part, i, j, k)
+        if not 0.0 <= w < YAWS * YAW / half:
+            break
+        i, j, k, turn = int(x), int(y), int(z), int(w)
+        key = key_of(level, part, turn, i, j, k)
         state = state_of(table.keys, table.states, key)
         if state == EMPTY:
             call_c(table.fill, key)
             state = state_of(table.keys, table.states, key)
         if state > 0:
-            return state, x - i, y - j, z - k, 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
+            gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
+            return state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0
         if state != FINER:
             break
-        scale *= 2.0
-    return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        scale, half = 2.0 * scale, half / 3.0
+    return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @jit(allocates=False, forceinline=True, fastmath=FAST)
@@ -166,7 +189,7 @@ def _add_four(rows, n, w0, w1, w2, w3, numbers):
 
 
 @jit(allocates=False, fastmath=FAST)
-def look_up(rows, fx, fy, fz, gx, gy, gz, yaw, numbers):
+def look_up(rows, fx, fy, fz, gx, gy, gz, turn, numbers):
     """Fill ``numbers`` (NUMBERS,) at a place in the cell with these ``rows`` (NODES, NUMBERS), see `locate`."""
     (x0, x1, x2, x3), (y0, y1, y2, y3), (z0, z1, z2, z3) = _weights(fx), _weights(fy), _weights(fz)
     for m in range(NUMBERS):
@@ -180,8 +203,7 @@ def look_up(rows, fx, fy, fz, gx, gy, gz, yaw, numbers):
             _add_four(rows, 4 * (2 * a + b), w0, w1, lx * ly * z0, lx * ly * z3, numbers)
             mx, my, lz = (fx if a else 1.0 - fx), (fy if a else 1.0 - fy), (fz if b else 1.0 - fz)
             _add_four(rows, 16 + 4 * (2 * a + b), my * lz * x0, my * lz * x3, mx * lz * y0, mx * lz * y3, numbers)
-    s = yaw / YAW
-    odd, even = 0.5 * s, 0.5 * s * s
+    odd, even = 0.5 * turn, 0.5 * turn * turn
     for a in range(2):
         for b in range(2):
             w = (gx if a else 1.0 - gx) * (gy if b else 1.0 - gy)
@@ -190,9 +212,9 @@ def look_up(rows, fx, fy, fz, gx, gy, gz, yaw, numbers):
 
 
 @jit(allocates=False, forceinline=True)
-def round_part(square):
-    """Weight of the modes at the square of a radius in the disk."""
-    return square / (square + ROUND * ROUND)
+def round_part(square, linear):
+    """Weight of the modes at the square of a radius in the disk; `LINEAR`."""
+    return square / (square + linear * ROUND * ROUND + 1e-12)
 
 
 @jit(allocates=False, fastmath=FAST)
@@ -200,7 +222,7 @@ def remainder(modes, numbers, x, y, sums):
     """Remainder of Fx, Fy, Mz at creepages over those of saturation; ``sums`` is scratch."""
     cells, root = modes.shape[0] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
     p, q = x * root, y * root
-    weight = round_part(p * p + q * q)
+    weight = round_part(p * p + q * q, numbers[LINEAR])
     u, v = 0.5 * (p + 1.0) * cells, 0.5 * (q + 1.0) * cells
     i, j = min(int(u), cells - 1), min(int(v), cells - 1)
     f, g = u - i, v - j

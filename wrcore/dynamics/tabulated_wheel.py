@@ -19,7 +19,7 @@ from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import add_force, frame_of_rows
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import YAW, depth_of, lobe_end, locate, look_up, tabulated_force
+from wrcore.dynamics.pair_table import APART, FAR, SADDLE, depth_of, lobe_end, locate, look_up, tabulated_force
 from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address
@@ -27,8 +27,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 UNKNOWN = NOTHING._replace(load=-1.0)
 
-NORMAL, LIFT, FORCE_X, FORCE_S = range(4)
-"""Columns of a lobe: its load (N), what others lift it by (m), and friction on it (N)."""
+NORMAL, LIFT, FORCE_X, FORCE_S, END = range(5)
+"""Columns of a lobe: its load (N), what others lift it by (m), friction on it (N), and the end of its overlaps."""
 
 TURNS, STEPS, ROLLS = 3, 6, 3
 """Lobes are looked up so many times, with so many steps towards balance between, and rolled so many times."""
@@ -72,29 +72,29 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
     is in no lattice."""
     geometry, table, lobes, rows = model.geometry, model.strips.table, work.lobes, work.rows
     t = pose.y + geometry.half_distance * ey - geometry.rail_distance
-    modulus, alone = contact_modulus(model.shear_modulus, model.poisson_ratio), lobe_end(rows, low, high) == high
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
     lobes[:] = 0.0
-    if abs(yaw) > 1.5 * YAW:
-        return 0
-    count = 0
-    for _ in range(1 if alone else TURNS):
+    count, last = 0, low
+    while last < high:
+        last = lobe_end(geometry, pose, rows, last, high, (APART, FAR, SADDLE))
+        lobes[count, END] = last
+        count += 1
+    for _ in range(TURNS if count > 1 else 1):
         first = low
-        count = 0
-        while first < high:
-            last = lobe_end(rows, first, high)
-            depth, u = depth_of(rows, first, last, lobes[count, LIFT])
-            lobes[count, NORMAL] = 0.0
+        for q in range(count):
+            last = int(lobes[q, END])
+            depth, u = depth_of(rows, first, last, lobes[q, LIFT])
+            lobes[q, NORMAL] = 0.0
             if depth > 0.0:
-                cell, fx, fy, fz, gx, gy, gz = locate(table, u, t, slope, depth)
+                cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, count > 1, t, slope, depth, yaw)
                 if cell == 0:
                     return 0
-                look_up(table.cells[cell], fx, fy, fz, gx, gy, gz, yaw, work.numbers[count])
-                lobes[count, NORMAL] = _load(modulus, work.numbers[count], depth)
-            count += 1
+                look_up(table.cells[cell], fx, fy, fz, gx, gy, gz, turn, work.numbers[q])
+                lobes[q, NORMAL] = _load(modulus, work.numbers[q], depth)
             first = last
-        if not alone:
+        if count > 1:
             for _ in range(STEPS):
-                _balance(model, modulus, low, high, count, work)
+                _balance(model, modulus, low, count, work)
     return count
 
 
@@ -115,7 +115,7 @@ def _apart(one, other):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _balance(model, modulus, low, high, count, work):
+def _balance(model, modulus, low, count, work):
     """One step towards balance of the lobes' loads and of what they lift each other by."""
     lobes, numbers = work.lobes, work.numbers
     unit = (1.0 - model.poisson_ratio) / (math.pi * model.shear_modulus)
@@ -129,7 +129,7 @@ def _balance(model, modulus, low, high, count, work):
         lobes[i, LIFT] = lift
     first = low
     for i in range(count):
-        last = lobe_end(work.rows, first, high)
+        last = int(lobes[i, END])
         depth, _ = depth_of(work.rows, first, last, lobes[i, LIFT])
         lobes[i, NORMAL] = _load(modulus, numbers[i], depth)
         first = last

@@ -14,12 +14,13 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_store import SHIPPED, Modes, Pair
+from wrcore.dynamics.pair_store import SHIPPED, Modes, Pair, mode_weights
+from wrcore.dynamics.pair_table import WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.scene.examples import example
 
-SAMPLES, CELLS, SOLUTIONS = 900, 20, 12
+SAMPLES, CELLS, SOLUTIONS = 900, 20, 16
 """Creepages of a pose, cells of the splines across the disk, and solutions from which a node's coefficients come."""
 
 SMOOTHING, NOISE = 1e-3, 2e-3
@@ -49,24 +50,26 @@ def splines(places, cells=CELLS):
 
 
 def collect(pair, poses, points, seed=5):
-    """Remainder (poses, n + 1, 3) at no creepage and at ``points``, of random places of a wheel."""
+    """Numbers (poses, NUMBERS) and remainder (poses, n, 3) at ``points``, of random places of a wheel."""
     random, rows = np.random.default_rng(seed), []
     middle = pair.contact.geometry.half_distance - pair.contact.geometry.rail_distance
     while len(rows) < poses:
         yaw = 0.0 if random.random() < 0.65 else random.uniform(-0.015, 0.015)
         depth = math.exp(random.uniform(math.log(2e-5), math.log(1.2e-4)))
-        place = middle + random.uniform(-7e-3, 4.3e-3), random.normal(0, 1e-3), depth, yaw, random.uniform(-0.04, 0.02)
+        t, u = middle + random.uniform(-7e-3, 7e-3), random.uniform(-0.045, 0.02)
+        place = t, random.normal(0, 1e-3), depth, yaw, u, WIDE
         found = pair.solve(place, points)
         if found is not None:
-            rows.append(np.vstack([found[0][columns.FORCE : columns.MODE], found[1]]))
-    return np.array(rows)
+            rows.append(found)
+    return (np.array(part) for part in zip(*rows, strict=True))
 
 
-def train(rows, places, points):
+def train(numbers, remainder, places, points):
     """`Modes` from what `collect` found, and the error (poses, n, 3) of the remainder that a node then gives."""
     square = (places**2).sum(axis=1)
     weights = square / (square + columns.ROUND**2)
-    free = rows[:, 1:] - (1.0 - weights)[:, None] * rows[:, :1]
+    own = mode_weights(weights, numbers[:, columns.LINEAR, None])[..., None]
+    free = (remainder - (1.0 - own) * numbers[:, None, columns.FORCE : columns.MODE]) * weights[:, None] / own
     values, bends = weights[:, None] * splines(places), np.diff(np.eye(CELLS + 2), 2, axis=0)
     smooth = np.vstack([np.kron(bends, np.eye(CELLS + 2)), np.kron(np.eye(CELLS + 2), bends)])
     normal = values.T @ values + SMOOTHING * smooth.T @ smooth + 1e-9 * np.eye(values.shape[1])
@@ -79,7 +82,7 @@ def train(rows, places, points):
     seen_there = shapes[chosen].reshape(-1, MODES)
     inverse = np.linalg.solve(seen_there.T @ seen_there + NOISE**2 * np.diag(prior**-2), seen_there.T)
     found = np.einsum("ke,pe->pk", inverse, free[:, chosen].reshape(len(free), -1))
-    errors = np.einsum("pk,nqk->pnq", found, shapes) - free
+    errors = (np.einsum("pk,nqk->pnq", found, shapes) - free) * own / weights[:, None]
     side = CELLS + 2
     table = modes.reshape(MODES, 3, side, side).transpose(2, 3, 1, 0).reshape(side, side, -1)
     return Modes(table.astype(np.float32), points[chosen], inverse, weights[chosen]), errors
@@ -99,14 +102,14 @@ def _most_telling(blocks, allowed):
 def main():
     """Train modes on the default profiles, print what they leave, write them."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("poses", nargs="?", type=int, default=150)
+    parser.add_argument("poses", nargs="?", type=int, default=500)
     parser.add_argument("--out", default=SHIPPED / "creep_modes.h5")
     chosen = parser.parse_args()
     model, _ = compile_scene(load_scene(example("suspended_wheelset"), {"contact.patch": "exact"}))
     contact = model.contact
     pair = Pair(contact._replace(strips=contact.strips._replace(looked_up=contact.friction)), "modes")
     places, points = disk(SAMPLES)
-    modes, errors = train(collect(pair, chosen.poses, points), places, points)
+    modes, errors = train(*collect(pair, chosen.poses, points), places, points)
     for name, size in (("force", np.hypot(errors[..., 0], errors[..., 1])), ("moment", np.abs(errors[..., 2]))):
         print(name, *(f"{100 * value:.3f}" for value in np.percentile(size, [50, 95, 99])))
     with new_hdf5(chosen.out) as file:

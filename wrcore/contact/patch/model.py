@@ -39,10 +39,10 @@ class PairTable(NamedTuple):
 NO_TABLE = PairTable(
     np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0,) * 3, np.float32), 0,
 )  # fmt: skip
-NUMBERS, MODES = 32, 16
+NUMBERS, MODES = 40, 24
 """Numbers of a node, and modes of the creep force that are among them."""
 
-LOBE_COLUMNS = 4
+LOBE_COLUMNS = 5
 """Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
 
 

@@ -28,6 +28,10 @@ from wrcore.kernels.jit import FUSED, jit
 _ROUNDS = 5
 """Sets of windows that are tried for one patch."""
 
+_BORN, _HARDLY = 1e-3, 1e-2
+"""Shares of the deepest penetration by which loaded surfaces interpenetrate where a lobe is born. The second is for
+lobes that barely touch: they are born with the first and starve, again and again."""
+
 _MORE_STRIPS = 2
 """Strips by which a window's number may rise where no solution was found with less."""
 
@@ -69,26 +73,27 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
             place_strips(geometry, pose, frame, work, windows)
-            if newborn(values, work, windows, stretches, resolution) == windows:
+            if newborn(values, work, windows, stretches, resolution, _BORN) == windows:
                 _remember(frame, work, windows, memory)
                 return windows, frame
         windows = guess_windows(work, stretches, resolution)
     memory[0] = 0.0
-    for extra in range(0, _MORE_STRIPS + 1, 2):
-        strips = resolution + extra
-        found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds)
-        if found > 0:
-            if attempts == 1 and extra == 0:
-                _remember(frame, work, found, memory)
-            return found, frame
-        windows = work.guessed[0] = 0
+    for born in (_BORN, _HARDLY):
+        for extra in range(0, _MORE_STRIPS + 1, 2):
+            strips = resolution + extra
+            found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds, born)
+            if found > 0:
+                if attempts == 1 and extra == 0 and born == _BORN:
+                    _remember(frame, work, found, memory)
+                return found, frame
+            windows = work.guessed[0] = 0
     return 0, frame
 
 
 @jit(allocates=False)
-def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds):
-    """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be.
-    Returns the number of windows, 0 where no solution was found, and of attempts."""
+def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds, born):
+    """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be;
+    ``born``: see `newborn`. Returns the number of windows, 0 where no solution was found, and of attempts."""
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if attempt == 1 or again:
@@ -109,7 +114,7 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
             windows = drop_starved(work, windows, resolution)
         else:
             place_strips(geometry, pose, frame, work, windows)
-            more = newborn(values, work, windows, stretches, resolution)
+            more = newborn(values, work, windows, stretches, resolution, born)
             if more == windows:
                 return windows, attempt + 1
             windows = more

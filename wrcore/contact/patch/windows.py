@@ -223,8 +223,9 @@ def take_fresh(work, found, largest, resolution):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def newborn(values, work, windows, stretches, resolution):
-    """Windows where the loaded surfaces interpenetrate outside the windows are added. Returns the new number."""
+def newborn(values, work, windows, stretches, resolution, least):
+    """Windows where the loaded surfaces interpenetrate outside the windows, by ``least`` of the deepest penetration,
+    are added. Returns the new number."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     depth = 0.0
     for i in range(count):
@@ -245,7 +246,7 @@ def newborn(values, work, windows, stretches, resolution):
             for j in (work.start[k], work.start[k + 1] - 1):
                 if abs(s - work.centre[j]) < best:
                     best, crest = abs(s - work.centre[j]), work.gap[j, CREST]
-        inside = free and gap_under_load(values, work, windows, s, crest, gap) < -1e-3 * depth
+        inside = free and gap_under_load(values, work, windows, s, crest, gap) < -least * depth
         if inside and open_at < 0 and found < MAX_WINDOWS:
             open_at = i
             lows[found] = s - 0.5 * abs(nodes[S, max(i, 1)] - nodes[S, max(i, 1) - 1])
