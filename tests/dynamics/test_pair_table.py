@@ -21,6 +21,7 @@ from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.run.validity import look_up_errors
+from wrcore.scene.description import compile_scene, load_scene
 
 SPEED, Z = 20.0, 0.45973
 """Rolling speed, m/s, and height of the wheelset, m."""
@@ -177,6 +178,18 @@ def test_in_the_root_of_the_flange(benchmark_pair, y, load, yaw, spin, drift, mo
     assert models["tabulated"]._counters[3] == 0
     assert table[reduction.NORMAL] == pytest.approx(exact[reduction.NORMAL], rel=3e-3)
     assert math.hypot(*(table - exact)[[reduction.FX, reduction.FY]]) < most * 0.3 * exact[reduction.NORMAL]
+
+
+def test_a_lobe_that_barely_touches_is_left_out(own_cache):
+    """Without it the loaded surfaces meet where it would be, with it it bears nothing: strips find a solution still."""
+    model, _ = compile_scene(load_scene(wr.example("trailer_vehicle"), {"contact.patch": "exact"}))
+    strips = model.contact.strips._replace(looked_up=model.contact.friction)
+    pair, found = pair_store.Pair(model.contact._replace(strips=strips), "barely"), []
+    for t in (-5.2e-3, -5.1875e-3, -5.175e-3):
+        place = t, 3.75e-4, 7.315235792977453e-05, -2.37037037e-3, -0.028, pair_table.WIDE
+        found.append(pair.solve(place, creep_modes().points[:2])[0][pair_table.LOG_NORMAL])
+    before, here, beyond = found
+    assert before < here < beyond < before + 0.02
 
 
 def points_of_hertz(a, b, n=16):
