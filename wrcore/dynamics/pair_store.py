@@ -50,10 +50,10 @@ from wrcore.kernels.handles import Handle
 SHIPPED = Path(__file__).parent / "tables"
 """Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
 
-WRONG = (3e-3, 0.01), (3e-3, 0.015), (4e-3, 0.02), (0.03, 0.1)
+WRONG = (3e-3, 0.01), (3e-3, 0.015), (4e-3, 0.02), (0.1, 0.3)
 """Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
-in the end to the solver. Fine lattices are where a lobe is born: there forces bend, or jump with what the solver takes
-for one patch, and steps through solutions would be as small as they can."""
+in the end to the solver. Fine lattices are where a lobe is born. There forces bend, or the solver's own ones jump by a
+few percent, and steps through solutions would be as small as they can: in the finest only nonsense is refused."""
 
 LIGHT = 2e-5
 """Errors of a lobe of less depth are beside the load of this one, m: some 6 kN."""

@@ -28,8 +28,8 @@ _REACH = 1.4
 """Half of the range that is looked at, over the half width that the overlap's moments give."""
 
 # Rows of the nodes over the overlaps.
-S, NODE_GAP, NODE_SHAPE, NODE_SQUARE, NODE_SHARE = range(5)
-NODE_ROWS = 5
+S, NODE_GAP, NODE_SHAPE, NODE_CREST, NODE_SQUARE, NODE_SHARE = range(6)
+NODE_ROWS = 6
 
 # Rows of the strip gap: what `strip_gap` fills.
 GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, TILT, U, UR = range(10)
@@ -192,9 +192,9 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
 @jit(allocates=False)
 def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
-    """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m) and A (1/m) of ``nodes`` (NODE_ROWS, n),
-    and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u. Returns the number of
-    stretches."""
+    """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m), A (1/m) and x of the least gap (m) of
+    ``nodes`` (NODE_ROWS, n), and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u.
+    Returns the number of stretches."""
     count = stretches = 0
     stop = -1e9
     for k in range(first, last):
@@ -226,7 +226,8 @@ def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends)
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _fill_node(geometry, pose, frame, u, nodes, k):
-    """Node k: s, gap and A of the wheel's strip at u, from the vertical gap (right to second order of the overlap)."""
+    """Node k: s, gap, A and crest of the wheel's strip at u, from the vertical gap (right to second order of the
+    overlap)."""
     ur, z, radius, slope, _, along = strip_point(geometry, pose, u)
     gap, df = gap_at(geometry, pose, u)
     nodes[S, k] = (ur - frame.ur) * frame.cosine + (z - frame.z) * frame.sine
@@ -238,6 +239,7 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
     lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
     nodes[NODE_GAP, k] = gap * (frame.cosine - frame.sine * fall) * lean
     nodes[NODE_SHAPE, k] = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+    nodes[NODE_CREST, k] = radius * along * pose.q + (geometry.half_distance + u) * pose.ex - frame.x
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -7,7 +7,7 @@ that does not depend on where its iteration started.
 import math
 
 from wrcore.contact.normal import hertz_ellipse
-from wrcore.contact.patch.gap import CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
+from wrcore.contact.patch.gap import CREST, NODE_CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
 from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
 from wrcore.contact.patch.strips import GUESS, MAX_STRIPS, MAX_WINDOWS, WEIGHT, WIDENED, gap_under_load, place_strips
 from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y
@@ -238,15 +238,10 @@ def newborn(values, work, windows, stretches, resolution, least):
     for i in range(count):
         s, gap = nodes[S, i], nodes[NODE_GAP, i]
         free = gap < 0.0
-        crest = 0.0
-        best = 1e9
         for k in range(windows):
             w = work.width[work.start[k]]
             free = free and not work.low[k] - 0.7 * w < s < work.high[k] + 0.7 * w
-            for j in (work.start[k], work.start[k + 1] - 1):
-                if abs(s - work.centre[j]) < best:
-                    best, crest = abs(s - work.centre[j]), work.gap[j, CREST]
-        inside = free and gap_under_load(values, work, windows, s, crest, gap) < -least * depth
+        inside = free and gap_under_load(values, work, windows, s, nodes[NODE_CREST, i], gap) < -least * depth
         if inside and open_at < 0 and found < MAX_WINDOWS:
             open_at = i
             lows[found] = s - 0.5 * abs(nodes[S, max(i, 1)] - nodes[S, max(i, 1) - 1])
