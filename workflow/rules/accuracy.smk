@@ -15,7 +15,9 @@ def measured_scene(wildcards):
 
 def measured_settings(wildcards):
     entry, grids = ACCURACY["scenes"][wildcards.measured], ACCURACY["grids"]
-    own = {"models": entry.get("models", {}), "fastsim": entry.get("models", {})}
+    own = dict.fromkeys(["models", "fastsim", "looked_up"], entry.get("models", {}))
+    if "exact" not in entry:  # nothing to hold it against
+        grids = {name: grid for name, grid in grids.items() if name != "looked_up"}
     return {
         "overrides": changes(entry["set"]),
         "grids": [{**grid, **own.get(name, {})} for name, grid in grids.items()],

@@ -16,6 +16,7 @@ MODELS = (
     ("spatial, coarse table", "#56B4E9", "D"),
     ("spatial, formula or FASTSIM", "#E69F00", "^"),
     ("planar", "#CC79A7", "v"),
+    ("exact contact, looked up", "#009E73", "P"),
     ("reduction to the maximum", "0.6", "x"),
 )
 """Kinds of model: label, colour (Okabe-Ito; dark to light in grey) and marker."""
@@ -27,7 +28,7 @@ INTEGRATION, MODEL = "#0072B2", "#E69F00"
 def model_kind(row, finest):
     """Which of ``MODELS`` a row of the study belongs to."""
     if row["patch"] != "moment":
-        return MODELS[5][0]
+        return MODELS[5 if row["patch"] == "tabulated" else 6][0]
     if row["detection"] != "spatial":
         return MODELS[4][0]
     if not row["creep"].startswith("table"):
