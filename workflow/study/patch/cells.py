@@ -48,7 +48,7 @@ COLORS = "#B3DCF2", "#4FA3DB", "#00558C", "#E69F00"
 
 SOLVED_COLOR = "#CC3311"
 
-DOTS = {"marker": ".", "markersize": 1.2, "color": "k", "markeredgewidth": 0.0, "linestyle": ""}
+DOTS = {"marker": ".", "markersize": 1.6, "color": "k", "markeredgewidth": 0.0, "linestyle": ""}
 
 LINES = "-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1, 1, 1))
 """Of the lattices."""
@@ -74,7 +74,8 @@ class OwnPair(Pair):
     """A pair's table that takes nothing from what other runs solved, and leaves nothing to them."""
 
     def _read(self):
-        """Nothing is known before."""
+        """Nothing is known before, and nothing is to be said of a file."""
+        self._told = True
 
     def write(self):
         """Nothing is kept."""
@@ -170,7 +171,7 @@ def fig_cells(cells, lobes):
     for axes in places:
         axes.set_xlabel("place of the wheel on the rail, t / mm")
     depths = 1e6 * cells["D_low_m"].min(), 1e6 * cells["D_high_m"].max()
-    ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200) if depths[0] <= tick <= depths[1]]
+    ticks = [tick for tick in (5, 10, 20, 50, 100, 200, 500) if depths[0] <= tick <= depths[1]]
     places[0].set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     places[0].minorticks_off()
     draw_errors(errors[0], cells, "normal_error", [limits[0] for limits in WRONG])
@@ -195,7 +196,7 @@ def draw_cells(axes, cells, lobes, across):
 def look_of(level, state):
     """Face and edge of a cell."""
     color = SOLVED_COLOR if state == SOLVED else COLORS[level]
-    return {"facecolor": color, "edgecolor": "w", "linewidth": 0.25 if level < 2 else 0.0}
+    return {"facecolor": color, "edgecolor": color if level > 1 else "w", "linewidth": 0.8 if level > 1 else 0.25}
 
 
 def draw_errors(axes, cells, name, limits):
@@ -206,7 +207,7 @@ def draw_errors(axes, cells, name, limits):
         sure = np.sort(part[name].dropna())
         axes.step(100.0 * sure, 100.0 * np.arange(1, len(sure) + 1) / len(part), where="post", **look)
         axes.axvline(100.0 * limits[level], color=COLORS[level], linestyle=(0, (3, 2)), linewidth=0.9, zorder=1)
-    axes.set(xscale="log", ylim=(0.0, 100.0))
+    axes.set(xscale="log", xlim=(1e-3, 50.0), ylim=(0.0, 100.0))
 
 
 def legend_entries(cells):
@@ -214,7 +215,7 @@ def legend_entries(cells):
     entries = []
     for level in range(LEVELS):
         label = f"lattice {level + 1}: {MM * STEPS[0] * 0.5**level:g} mm"
-        entries.append(Line2D([], [], color=COLORS[level], linestyle=LINES[level], linewidth=4, label=label))
+        entries.append(Line2D([], [], color=COLORS[level], linestyle=LINES[level], linewidth=2.5, label=label))
     if (cells["state"] == SOLVED).any():
         entries.append(Rectangle((0, 0), 1, 1, facecolor=SOLVED_COLOR, label="left to the solver"))
     entries.append(Line2D([], [], label="lobes of the run", **(DOTS | {"markersize": 4})))
