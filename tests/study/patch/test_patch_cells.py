@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.colors import to_hex
 
 from study.patch import cells
 from study.report.legible import save_figure
@@ -64,11 +65,27 @@ def test_a_run_looks_up_where_its_lobes_lie():
         assert inside.any()
 
 
+def test_damping_at_rest_lifts_a_lobe():
+    """By 1 - 0.9^(2/3) of its depth, for at rest a damped contact has 0.9 of Hertz's force."""
+    contact = Simulation(load_scene("config/scenes/suspended_wheelset.yaml")).model.contact
+    assert contact.damping == 0.8
+    poses = np.array([[4e-3, 0.45972, 0.0, 1e-3]])
+    damped, free = (cells.lobes_of(one, poses) for one in (contact, contact._replace(damping=1.0)))
+    assert len(damped) == 2 and damped["t_m"].diff()[1] == pytest.approx(-8e-3)
+    assert damped["yaw_rad"].tolist() == pytest.approx([-1e-3, 1e-3])
+    assert (damped["D_m"] / free["D_m"]).to_numpy() == pytest.approx(0.9 ** (2.0 / 3.0), rel=0.02)
+
+
 def test_the_figure_has_cells_lobes_and_shares(table, tmp_path):
     lobes = pd.DataFrame({"t_m": [-0.0099], "slope": [2e-4], "yaw_rad": [0.0], "D_m": [8.5e-5]})
     figure = cells.fig_cells(table, lobes)
     places, errors = np.reshape(figure.axes, (2, 2))
     assert [len(axes.collections) for axes in places] == [2, 2]  # what is refined is not drawn
+    for level, shown in ((1, places[1].collections[0]), (3, places[1].collections[1])):
+        assert np.ptp(shown.get_paths()[0].vertices, axis=0) == pytest.approx([0.2 * 0.5**level, 0.5 * 0.5**level])
+    assert [to_hex(axes.collections[1].get_facecolor()[0], False).upper() for axes in places] == [
+        cells.SOLVED_COLOR
+    ] * 2
     (x, y), *_ = places[1].collections[0].get_paths()[0].vertices
     assert (x, y) == pytest.approx((-10.0, 0.0), abs=1e-9)
     shares = [
