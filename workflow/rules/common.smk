@@ -56,6 +56,7 @@ def check_config():
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
             scenes[f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"] = (entry["scene"], changes)
+    scenes["patch.cells"] = (config["patch"]["cells"]["scene"], config["patch"]["cells"]["set"])
     for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
         for name, model in config["patch"]["runs"]["models"].items():
             place = f"patch.runs.vehicles.{vehicle} with patch.runs.models.{name}"

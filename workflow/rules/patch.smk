@@ -56,6 +56,33 @@ rule wheel_on_rail:
         "../scripts/patch/wheel_on_rail.py"
 
 
+rule looked_up_cells:
+    message:
+        "Figure: cells of the table that exact contact is looked up in"
+    input:
+        core=CORE["patch"],
+        scenes=SCENES,
+        scene=PATCH["cells"]["scene"],
+        table=rules.creep_table.output,
+    output:
+        cells="<results>/patch/looked_up_cells.csv",
+        figure=report(
+            "<results>/patch/looked_up_cells.png",
+            caption="../report/patch/looked_up_cells.rst",
+            category="04 The real patch",
+            labels={"figure": "cells of looked-up contact"},
+        ),
+        svg="<results>/patch/looked_up_cells.svg",
+    log:
+        "<logs>/looked_up_cells.log",
+    benchmark:
+        "<benchmarks>/looked_up_cells.tsv"
+    params:
+        overrides=changes(PATCH["cells"]["set"]),
+    script:
+        "../scripts/patch/looked_up_cells.py"
+
+
 rule patch_errors:
     message:
         "Patch models against exact contact, pose by pose"
@@ -97,7 +124,7 @@ rule patch_errors:
         "<benchmarks>/patch_errors.tsv"
     params:
         pair=CONTACT_PAIR,
-        settings={name: PATCH[name] for name in PATCH if name != "cost"},
+        settings={name: PATCH[name] for name in PATCH if name not in ("cost", "cells")},
     script:
         "../scripts/patch/patch_errors.py"
 
@@ -220,4 +247,5 @@ rule patch_study:
         rules.patch_reference.output,
         rules.patch_costs.output,
         rules.wheel_on_rail.output,
+        rules.looked_up_cells.output,
         rules.patch_errors.output,
