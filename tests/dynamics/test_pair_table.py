@@ -1,6 +1,7 @@
 """Exact contact, looked up: against the exact solver, its symmetries, and the same bits however full the table is."""
 
 import math
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -76,6 +77,20 @@ def test_modes_leave_the_slopes_at_rest():
     near, far = (pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums) for x in (1e-4, 0.5))
     np.testing.assert_allclose(near, [0.1, 0.2, 0.3], atol=1e-5)
     assert max(map(abs, np.subtract(far, near))) > 1e-3
+
+
+def test_a_remainder_has_no_poles():
+    """Between nodes the number that tells how exact slopes are falls below 0."""
+    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(3 * MODES)
+    numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
+    numbers[pair_table.MODE :][:MODES] = 0.1
+
+    def largest(linear):
+        numbers[pair_table.LINEAR] = linear
+        places = np.geomspace(1e-3, 1.0, 3000)
+        return max(max(map(abs, pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums))) for x in places)
+
+    assert largest(-0.04) == pytest.approx(largest(0.0), rel=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -361,6 +376,35 @@ def test_what_went_wrong_while_solving_is_not_kept(own_cache, monkeypatch, capsy
     assert not list(own_cache.iterdir())
 
 
+def test_a_full_table_is_left_as_it_is(own_cache, monkeypatch, capsys):
+    """What has no room is solved: not more than once for the table."""
+    calls = []
+    monkeypatch.setattr(pair_store, "CELLS", 2)
+    solved = pair_store.Pair._solved
+    monkeypatch.setattr(pair_store.Pair, "_solved", lambda pair, key: calls.append(key) or solved(pair, key))
+    simulated()
+    assert capsys.readouterr().err.count("no room") == 1
+    assert len(calls) == len(set(calls))
+    (pair,) = pair_store._PAIRS.values()
+    assert pair._full()
+    pair.write()
+
+
+def test_an_interrupt_is_handed_on_after_the_call():
+    pair_store._hand_on(KeyboardInterrupt())  # as in a call from a kernel, where it would be lost
+    with pytest.raises(KeyboardInterrupt):
+        time.sleep(10.0)
+
+
+def test_implicit_steps_are_those_of_ellipses():
+    """Jacobians are of the table itself."""
+    steps, settings = {}, {"integration.method": "rodas4", "integration.rtol": 1e-4, "integration.duration": 0.5}
+    for patch in ("moment", "tabulated"):
+        run = wr.simulate(wr.example("suspended_wheelset"), **settings, **{"contact.patch": patch, "speed": 40.0})
+        steps[patch] = run.counters["steps"]
+    assert steps["tabulated"] < 1.2 * steps["moment"]
+
+
 def test_another_profile_or_friction_is_another_table(own_cache, benchmark_pair):
     wheels = LoadedWheels(benchmark_pair, "tabulated")
     contact = wheels._at_work(0.3).value
@@ -392,3 +436,5 @@ def test_a_run_says_how_far_it_is_from_the_exact_solver(benchmark_pair):
     other[0, 0, 1, 0, [reduction.NORMAL, reduction.FX]] += [400.0, 240.0]
     found = look_up_errors(other, rows, 0.3)
     assert found == {"look_up_normal_error": pytest.approx(0.01), "look_up_force_error": pytest.approx(0.02)}
+    found = look_up_errors(other, rows, np.array([[[0.3, 0.03]]]))
+    assert found["look_up_force_error"] == pytest.approx(0.2)

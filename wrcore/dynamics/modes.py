@@ -7,7 +7,8 @@ WARM = 1
 """Within a step: patches on strips start from their last solutions, part of what a run knows."""
 
 ELLIPSES = 2
-"""The ellipse of equal moments stands in for strips: differences want a smooth neighbour of the model."""
+"""The ellipse of equal moments stands in for strips that are solved: differences want a smooth neighbour of
+the model."""
 
 PATCHES_HELD = 4
 """Ellipses keep the patches found last: only velocities have changed."""

@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from queue import LifoQueue
-from threading import Lock
+from threading import Lock, Timer
 from typing import NamedTuple
 from weakref import WeakValueDictionary
 
@@ -63,6 +63,9 @@ THREADS = min(len(os.sched_getaffinity(0)), 8)
 
 CELLS, SLOTS = 50_000, 200_003
 """Room for cells that can be looked up, and for all."""
+
+_AFTER = 0.02
+"""Ctrl-C in a call from a kernel is said again so much later, s."""
 
 _PATIENCE = 3.0
 """Solving takes this long before it says so, and files are written this often, s."""
@@ -130,6 +133,9 @@ class Pair:
         with self._lock:
             if key in self.cells:
                 return
+            if self._full():
+                _warn_once(f"{self.path}: no room for more cells; patches in others are solved")
+                return
             begin = time.monotonic()
             try:
                 self._keep(key, *self._solved(key))
@@ -154,8 +160,8 @@ class Pair:
 
     def _keep(self, key, state, rows):
         """Let kernels see a cell; where it has a state above 0, this becomes its number."""
-        if 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS:
-            raise MemoryError(f"no room for more than {len(self.cells)} cells of {self.path.name}")
+        if self._full():  # of a file
+            return
         if state > 0:
             self._ready += 1
             self._cells[self._ready], state = rows, self._ready
@@ -164,6 +170,10 @@ class Pair:
             slot = (slot + 1) % SLOTS
         self._states[slot] = state
         self._keys[slot], self.cells[key] = key, state
+
+    def _full(self):
+        """Whether no more cells can be kept."""
+        return 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS
 
     def _numbers(self, nodes):
         """Numbers (nodes, NUMBERS) of nodes (level, part, yaw, t, slope, ln D), solved side by side where they are new;
@@ -331,11 +341,11 @@ def _side_by_side(solve, places):
 
 
 def _hand_on(error):
-    """Say later what went wrong in a call from a kernel: Ctrl-C once more, all else in a line."""
+    """Say later what went wrong in a call from a kernel: Ctrl-C once more, after the call, all else in a line."""
     if isinstance(error, KeyboardInterrupt):
         import _thread
 
-        _thread.interrupt_main()
+        Timer(_AFTER, _thread.interrupt_main).start()
     else:
         first = str(error).strip().partition("\n")[0]
         _warn_once(f"exact contact: {type(error).__name__}: {first}; patches are solved without a table")

@@ -214,7 +214,7 @@ def look_up(rows, fx, fy, fz, gx, gy, gz, turn, numbers):
 @jit(allocates=False, forceinline=True)
 def round_part(square, linear):
     """Weight of the modes at the square of a radius in the disk; `LINEAR`."""
-    return square / (square + linear * ROUND * ROUND + 1e-12)
+    return square / (square + max(linear, 0.0) * ROUND * ROUND + 1e-12)  # which a cubic takes below its nodes
 
 
 @jit(allocates=False, fastmath=FAST)
@@ -261,12 +261,14 @@ def base_force(model, log_a, log_b, limit, xi, eta, phi):
 
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_force(model, modes, numbers, xi, eta, phi, limit, turning, sums):
-    """Creep force Fx, Fy (N), Mz (N m) from a node's numbers, and look-ups missed. ``turning``: of the wheel's rate of
-    rolling over that of free rolling, less 1."""
+    """Creep force Fx, Fy (N), together no more than friction bears, Mz (N m) from a node's numbers, and look-ups
+    missed. ``turning``: of the wheel's rate of rolling over that of free rolling, less 1."""
     part = turning / LOCKED
     fade = max(0.0, 1.0 - part * part)
     fade *= fade
     lx, ly = 1.0 + fade * (numbers[SLOPE_XI] - 1.0), 1.0 + fade * (numbers[SLOPE_ETA] - 1.0)
     f1, f2, m3, x, y, missed, c = base_force(model, numbers[LOG_A], numbers[LOG_B], limit, lx * xi, ly * eta, phi)
     r1, r2, r3 = remainder(modes, numbers, x, y, sums)
-    return limit * (f1 + fade * r1), limit * (f2 + fade * r2), limit * c * (m3 + fade * r3), missed
+    fx, fy, mz = f1 + fade * r1, f2 + fade * r2, m3 + fade * r3
+    scale = limit / max(math.sqrt(fx * fx + fy * fy), 1.0)
+    return scale * fx, scale * fy, limit * c * mz, missed

@@ -19,7 +19,7 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
-from wrcore.contact.detection import find_patches
+from wrcore.contact.detection import SPATIAL, find_patches
 from wrcore.contact.normal import damping_factor, inverse_cube_root
 from wrcore.contact.patch import rolling, solve
 from wrcore.contact.patch.gap import frame_of_overlaps, group_end, rigid_slip
@@ -38,6 +38,9 @@ from wrcore.kernels.jit import FUSED, jit
 
 SLENDER = 3.0
 """Length over width from which strips get more panels along rolling."""
+
+UNSOLVED = 1
+"""Place in a spare memory: not 0 where what a table does not have is not to be solved."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
 """Elements along and across the patch of the grid, and the tolerance of its tractions."""
@@ -365,8 +368,10 @@ def mirror(rows, count, wrench):
 
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
-    """As `wheel_wrenches`, with patches on strips; arguments as there."""
-    if mode & ELLIPSES:
+    """As `wheel_wrenches`, with patches on strips; arguments as there. Ellipses stand in for what is solved, not for
+    what a table has."""
+    rough = mode & ELLIPSES > 0
+    if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
     for i in range(motions.shape[0]):
@@ -381,11 +386,14 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             while first < count:
                 last = group_end(rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
-                work.spare[0] = 0.0
+                work.spare[0], work.spare[UNSOLVED] = 0.0, 1.0 if rough else 0.0
                 call_address(
                     contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
                     work,
                 )  # fmt: skip
+                if rough and work.out[reduction.NORMAL] < 0.0:
+                    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, ELLIPSES)
+                    return
                 group += 1
                 if work.out[reduction.NORMAL] > 0.0:
                     copy_into(rows[kept], work.out)

@@ -20,7 +20,7 @@ from wrcore.contact.patch.gap import add_force, frame_of_rows
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import APART, FAR, SADDLE, depth_of, lobe_end, locate, look_up, tabulated_force
-from wrcore.dynamics.strip_wheel import NOTHING, Solution, fill_row, lifted_overlaps
+from wrcore.dynamics.strip_wheel import NOTHING, UNSOLVED, Solution, fill_row, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
@@ -60,9 +60,12 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
 
 @jit(allocates=False)
 def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """`tabulated_wrench`, or what the solver finds, for who calls it by its address."""
+    """`tabulated_wrench`, or what the solver finds, for who calls it by its address; a normal force below 0 where that
+    is not wanted."""
     found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work)
-    if found.load < 0.0:
+    if found.load < 0.0 and work.spare[UNSOLVED] > 0.0:
+        out[reduction.NORMAL] = -1.0
+    elif found.load < 0.0:
         call_address(model.strips.solver, model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 

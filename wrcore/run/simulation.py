@@ -187,10 +187,11 @@ class Simulation:
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
         limits |= {"beyond_irregularity": int(beyond)}
-        return groups, limits | self._look_up_errors(trajectory, patches)
+        return groups, limits | self._look_up_errors(trajectory, patches, standing[..., 0])
 
-    def _look_up_errors(self, trajectory, patches):
-        """Of some output times, if exact contact is looked up: contacts are solved there."""
+    def _look_up_errors(self, trajectory, patches, places):
+        """Of some output times, if exact contact is looked up: contacts are solved there. ``places``: arc lengths of
+        the wheelsets, m."""
         contact = self.model.contact
         if not contact.strips.looked_up or not len(trajectory.t):
             return {}
@@ -198,7 +199,11 @@ class Simulation:
         part = replace(trajectory, t=trajectory.t[some], states=trajectory.states[some])
         solved = self.model._replace(contact=contact._replace(strips=contact.strips._replace(looked_up=0.0)))
         exact, _, _ = evaluated(solved, part, self._workspace())
-        return look_up_errors(patches[some], exact, contact.strips.looked_up)
+        friction, schedules = contact.friction, self.model.friction
+        if len(schedules.points):
+            rails = [schedules.points[schedules.starts[rail] : schedules.starts[rail + 1]].T for rail in range(2)]
+            friction = np.stack([np.interp(places[some], *each) for each in rails], axis=-1)
+        return look_up_errors(patches[some], exact, friction)
 
     def _contact_channels(self, name, patches):
         """Channels of the contacts of a wheelset's wheels by group."""

@@ -87,14 +87,15 @@ def exceeded(contact, patches, roll, yaw):
 
 def look_up_errors(found, exact, friction):
     """`LOOK_UP_ERRORS` of patches (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up, beside exact ones in the
-    same states: the largest errors of a wheel's normal force, over it, and of its creep force, over ``friction`` times
-    the normal force.
+    same states: the largest errors of a wheel's normal force, over it, and of its creep force, over the normal force
+    times ``friction``, one number or of each wheel (n, k, 2).
     """
+    friction = np.broadcast_to(friction, found.shape[:3]).reshape(-1)
     forces = [reduction.NORMAL, reduction.FX, reduction.FY]
     found, exact = (np.nansum(rows[..., forces], axis=-2).reshape(-1, 3) for rows in (found, exact))
     wheels = exact[:, 0] > 0.0
     difference, normal = (found - exact)[wheels], exact[wheels, 0]
-    errors = abs(difference[:, 0]) / normal, np.hypot(difference[:, 1], difference[:, 2]) / (friction * normal)
+    errors = abs(difference[:, 0]) / normal, np.hypot(difference[:, 1], difference[:, 2]) / (friction[wheels] * normal)
     return dict(zip(LOOK_UP_ERRORS, (float(np.max(each, initial=0.0)) for each in errors), strict=True))
 
 
