@@ -30,9 +30,10 @@ SPEED, Z = 20.0, 0.45973
 
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
-    """Tables in a folder of their own, and none in memory."""
+    """Tables in a folder of their own, none in memory, and none of the package."""
     monkeypatch.setattr(pair_store, "table_folder", lambda: tmp_path)
     monkeypatch.setattr(pair_store, "_PAIRS", {})
+    monkeypatch.setattr(pair_store.Pair, "_take_shipped", lambda _: None)
     return tmp_path
 
 
@@ -405,6 +406,39 @@ def test_implicit_steps_are_those_of_ellipses():
     assert steps["tabulated"] < 1.2 * steps["moment"]
 
 
+def shipped_pair(**changes):
+    """The `Pair` of an example, as it comes with the package."""
+    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), **{"contact.patch": "tabulated", **changes}))
+    return pair_store.pair_of(model.contact)
+
+
+def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
+    monkeypatch.undo()
+    monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    pair, random, compared = shipped_pair(), np.random.default_rng(3), 0
+    assert len(pair._known) > 100
+    places = list(pair._solved_at)
+    for k in random.integers(len(places), size=12):
+        own, kept = pair._at(places[k]), pair._solved_at[places[k]]
+        np.testing.assert_allclose(own, kept, rtol=1e-4, atol=1e-3)
+        compared += np.isfinite(kept[0])
+    assert compared > 6
+    assert not shipped_pair(**{"contact.friction": 0.29})._known
+
+
+def test_an_example_solves_nothing(own_cache, monkeypatch):
+    monkeypatch.undo()
+    monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    monkeypatch.setattr(pair_store.Pair, "solve", None)
+    run = wr.simulate(
+        wr.example("suspended_wheelset"), **{"contact.patch": "tabulated", "speed": 60.0, "integration.duration": 0.5}
+    )
+    assert run.counters["patches_not_tabulated"] == 0
+    assert not list(own_cache.iterdir())
+
+
 def test_another_profile_or_friction_is_another_table(own_cache, benchmark_pair):
     wheels = LoadedWheels(benchmark_pair, "tabulated")
     contact = wheels._at_work(0.3).value
@@ -423,6 +457,13 @@ def test_a_run_beside_the_exact_one():
     assert abs(table[:, 0] - y).max() < 2e-3 * abs(y).max()
     assert np.sqrt(np.mean((table[:, 1] / load(run) - 1.0) ** 2)) < 5e-3
     assert "look_up_normal_error" not in run.counters
+
+
+def test_each_rail_has_a_table_of_its_own_friction():
+    """Against the exact solver at some times of a run, over what friction on the wheel's own rail bears."""
+    changes = {"contact.friction": {"left": 0.3, "right": 0.05}, "contact.patch": "tabulated", "initial.y": 0.003}
+    run = wr.simulate(wr.example("suspended_wheelset"), **{**changes, "integration.duration": 0.1})
+    assert 0.0 < run.counters["look_up_force_error"] < pair_store.WRONG[2][1]
 
 
 def test_a_run_says_how_far_it_is_from_the_exact_solver(benchmark_pair):

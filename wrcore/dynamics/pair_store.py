@@ -3,7 +3,7 @@
 What a table's numbers depend on (both surfaces and their places, material, friction, strips, creep table, modes, and
 the sources of all kernels) is in its file's name. A node depends on its place alone, and whether a cell may be looked
 up on its nodes and on an exact solution in its middle: a run gives the same numbers on a full table and on an empty
-one.
+one. Nodes and cells that the examples meet come with the package, for the pair of profiles of most of them.
 """
 
 import atexit
@@ -48,7 +48,8 @@ from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
 
 SHIPPED = Path(__file__).parent / "tables"
-"""Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``."""
+"""Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``, and nodes, by
+``python -m study.patch.shipped_nodes``."""
 
 WRONG = (3e-3, 0.01), (3e-3, 0.015), (4e-3, 0.02), (0.1, 0.3)
 """Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
@@ -112,10 +113,11 @@ class Pair:
             self._works.put([Handle(strip_work(contact.strips, 1, SLIPS)) for _ in range(2)])
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells = np.zeros((CELLS, NODES, NUMBERS), np.float32)
-        self._solved_at, self._parts, self.cells, self._ready, self.misses = {}, {}, {}, 0, {}
+        self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
         self._told, self._new, self._spent, self._written = False, 0, 0.0, time.monotonic()
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
+        self._take_shipped()
         self._read()
 
     @property
@@ -150,6 +152,12 @@ class Pair:
 
     def _solved(self, key):
         """State of a cell, 1 where its nodes have solutions and its middle is right, and its rows."""
+        if key in self._known:
+            self.misses[key], state = self._known[key]
+            rows = self._rows_of(key) if state > 0 else None
+            if rows is not None:
+                self._add_yaw(key, rows)
+            return state, rows
         rows, wrong = self._rows_of(key), WRONG[corner_of(key)[0]]
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
         if rows is not None and np.less(miss, wrong).all() and self._add_yaw(key, rows):
@@ -276,15 +284,28 @@ class Pair:
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
         return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 
+    def _take_shipped(self):
+        """Take what comes with the package, if it is of this pair."""
+        with checked_hdf5(SHIPPED / "nodes.h5", "nodes that come with the package") as file:
+            own, its = fingerprint(self.contact), file["fingerprint"][...]
+            if own.shape == its.shape and np.allclose(own, its, rtol=1e-9, atol=0.0):
+                *nodes, cells, misses = (file[name][...] for name in _PARTS[:-1])
+                self._take(*nodes)
+                self._known = {key: (miss, state) for (key, state), miss in zip(cells.tolist(), misses, strict=True)}
+
+    def _take(self, places, numbers, parts):
+        """Take nodes."""
+        self._solved_at = dict(zip(map(tuple, places.tolist()), numbers, strict=True)) | self._solved_at
+        self._parts = {tuple(node): part for *node, part in parts.tolist()} | self._parts
+
     def _read(self):
         """Take what the file knows."""
         if self.path.exists():
             try:
                 os.utime(self.path)
                 with checked_hdf5(self.path, "a pair's table") as file:
-                    places, numbers, parts, cells, misses, rows = (file[name][...] for name in _PARTS)
-                self._solved_at = dict(zip(map(tuple, places.tolist()), numbers, strict=True)) | self._solved_at
-                self._parts = {tuple(node): part for *node, part in parts.tolist()} | self._parts
+                    *nodes, cells, misses, rows = (file[name][...] for name in _PARTS)
+                self._take(*nodes)
                 for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
                     if key not in self.cells:
                         self._keep(key, state, rows[state - 1] if state > 0 else None)
@@ -385,6 +406,16 @@ def pair_of(contact):
         bare = contact._replace(geometries=(), wheels=(), damping=1.0, friction=settings.looked_up)
         pair = _PAIRS[name] = Pair(bare, name)
     return pair
+
+
+def fingerprint(contact):
+    """Numbers that two contact models share, but for rounding, if their nodes are the same."""
+    settings = contact.strips
+    numbers = [contact.friction, contact.shear_modulus, contact.poisson_ratio, settings.strips, settings.surfaces]
+    for part in _flat((contact.geometry, contact.creep.table, creep_modes(), settings.values)):
+        size = np.abs(np.asarray(part, float)).ravel()
+        numbers += [len(size), size.sum(), size @ (2.0 + np.cos(np.arange(len(size))))]
+    return np.array(numbers)
 
 
 def _flat(parts):

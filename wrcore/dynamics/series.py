@@ -5,7 +5,7 @@ import threading
 import numpy as np
 
 from wrcore.dynamics.suspension import with_laws
-from wrcore.dynamics.system import Equations, internal_states, with_wheels, workspace
+from wrcore.dynamics.system import Equations, internal_states, looked_up, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
 from wrcore.kernels.handles import Kind
 
@@ -35,7 +35,7 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
-        strips[:3], sizes,
+        strips[:3], sizes, len(set(looked_up(model))),
     )  # fmt: skip
 
 
@@ -45,7 +45,8 @@ def with_kernels_of(model, other):
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
     kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
-    return model._replace(contact=with_wheels(contact), elements=with_laws(model.elements), **kept)
+    contact = with_wheels(model._replace(contact=contact))
+    return model._replace(contact=contact, elements=with_laws(model.elements), **kept)
 
 
 def _addresses(contact):

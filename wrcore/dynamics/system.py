@@ -262,14 +262,27 @@ def frictionless(model):
     return model._replace(contact=contact, friction=pack_schedules([]))
 
 
-def with_wheels(contact):
-    """Contact with what each wheel runs on where they differ."""
-    alone, with_pair = contact._replace(geometries=()), (lambda each: each)
+def looked_up(model):
+    """Coefficients of friction at which contact on the left and on the right rail is looked up: the largest ones; 0
+    where it is not."""
+    strips, friction = model.contact.strips, model.friction
+    if not strips.looked_up or not len(friction.points):
+        return [strips.looked_up] * 2
+    return [float(rail[:, 1].max()) for rail in np.split(friction.points, friction.starts[1:-1])]
+
+
+def with_wheels(model):
+    """Contact of a model with what each wheel runs on where they differ."""
+    contact, of_rails, with_pair = model.contact, looked_up(model), (lambda each: each)
+    alone, wheels = contact._replace(geometries=()), []
     if contact.strips.looked_up:
         from wrcore.dynamics.pair_store import with_pair
-    if not contact.geometries:
+    if not contact.geometries and of_rails[0] == of_rails[1]:
         return with_pair(alone)
-    return alone._replace(wheels=tuple(with_pair(alone._replace(geometry=each)) for each in contact.geometries))
+    for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
+        strips = contact.strips._replace(looked_up=of_rails[k % 2])
+        wheels.append(with_pair(alone._replace(geometry=geometry, strips=strips)))
+    return alone._replace(wheels=tuple(wheels))
 
 
 def with_fallback(contact):
@@ -316,7 +329,7 @@ def with_kernels(model, work):
 
         wrenches = shaped_wrenches
     # what follows is compiled for the model as it will be
-    model = model._replace(contact=with_wheels(contact), elements=with_laws(model.elements))
+    model = model._replace(contact=with_wheels(model._replace(contact=contact)), elements=with_laws(model.elements))
     kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
     if model.joints.equations:
         kernels["reactions"] = Kernel(add_reactions, kind, 0.0, state, scratch)

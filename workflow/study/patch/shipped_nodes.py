@@ -1,0 +1,62 @@
+"""Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--out FILE]``.
+
+The scenes of `study.patch.look_up` run on an empty table. What they meet of the pair of profiles that they share is
+kept: nodes, and which cells may be looked up (``wrcore/dynamics/tables/nodes.h5``).
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import wrcore as wr
+from study.patch.look_up import SCENES
+from wrcore.dynamics import pair_store
+from wrcore.errors.checked_hdf5 import new_hdf5
+
+
+def met(scenes):
+    """`Pair` with what scenes, (name, settings), meet on an empty table of their own."""
+    pairs, shared = {}, (pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS)
+    with tempfile.TemporaryDirectory() as folder:
+        pair_store.Pair._take_shipped, pair_store.table_folder = (lambda _: None), (lambda: Path(folder))
+        pair_store._PAIRS = pairs
+        try:
+            for name, settings in scenes:
+                wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
+        finally:
+            pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS = shared
+        (pair,) = pairs.values()
+        pair.write()
+    return pair
+
+
+def write(pair, path):
+    """Keep a pair's nodes at whole steps, which cells are looked up from, and its cells."""
+    whole = [place for place in pair._solved_at if all(float(n).is_integer() for n in place)]
+    parts = [(*node, part) for node, part in pair._parts.items() if all(float(n).is_integer() for n in node)]
+    data = {
+        "places": np.array(whole, np.int32),
+        "numbers": np.array([pair._solved_at[place] for place in whole]),
+        "parts": np.array(parts, np.int32),
+        "cells": np.array([(key, np.sign(state) if state > 0 else state) for key, state in pair.cells.items()]),
+        "misses": np.array([pair.misses[key] for key in pair.cells], np.float32),
+        "fingerprint": pair_store.fingerprint(pair.contact),
+    }
+    with new_hdf5(path) as file:
+        for name, array in data.items():
+            file.create_dataset(name, data=array, compression="gzip", compression_opts=9, shuffle=True)
+
+
+def main():
+    """Run the scenes, write what they met, and say how much it is."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", default=str(pair_store.SHIPPED / "nodes.h5"))
+    path, pair = parser.parse_args().out, met(list(SCENES.values()))
+    write(pair, path)
+    print(f"{len(pair.cells)} cells, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
+
+
+if __name__ == "__main__":
+    main()
