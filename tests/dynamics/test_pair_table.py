@@ -1,6 +1,7 @@
 """Exact contact, looked up: against the exact solver, its symmetries, and the same bits however full the table is."""
 
 import math
+import signal
 import time
 from types import SimpleNamespace
 
@@ -392,9 +393,13 @@ def test_a_full_table_is_left_as_it_is(own_cache, monkeypatch, capsys):
 
 
 def test_an_interrupt_is_handed_on_after_the_call():
-    pair_store._hand_on(KeyboardInterrupt())  # as in a call from a kernel, where it would be lost
-    with pytest.raises(KeyboardInterrupt):
-        time.sleep(10.0)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs in the background ignores it
+    try:
+        pair_store._hand_on(KeyboardInterrupt())  # as in a call from a kernel, where it would be lost
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(10.0)
+    finally:
+        signal.signal(signal.SIGINT, handler)
 
 
 def test_implicit_steps_are_those_of_ellipses():
