@@ -9,12 +9,14 @@ import pytest
 from study.patch.rolling import solve_patch
 from tests.conftest import DATA
 from tests.contact.patch.strip_contact import RESOLUTIONS, NormalContact
-from wrcore.contact.detection import detect
+from wrcore.contact.detection import axle_direction, detect, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
+from wrcore.contact.patch import gap
 from wrcore.contact.patch.solve import even_length
 from wrcore.contact.patch.strips import MEMORY
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.statics import height_at_load
+from wrcore.contact.strip import make_pose
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -336,3 +338,19 @@ def test_a_load_is_carried(benchmark_pair):
         total = sum(p.normal_force * (math.cos(p.contact_angle) if vertical else 1.0) for p in patches)
         assert total == pytest.approx(55e3, rel=1e-6)
     assert contact.at_height("left", 0.0, z + 0.01) == []
+
+
+@pytest.mark.parametrize("yaw", [8e-3, -8e-3])
+def test_crests_of_nodes_are_those_of_strips(benchmark_pair, yaw):
+    """Births are judged where the wheel's strip comes nearest: with yaw millimetres ahead, or behind."""
+    pose = make_pose(1.0, 5.8e-3, 0.4596, *axle_direction(0.0, yaw), True)
+    rows, ends = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(MAX_PATCHES, np.int64)
+    nodes = np.zeros((gap.NODE_ROWS, MAX_PATCHES * gap.NODES))
+    count = find_patches(benchmark_pair, 1.0, 5.8e-3, 0.4596, *axle_direction(0.0, yaw), True, MOMENT, rows)
+    last = gap.group_end(rows, count, 0)
+    frame = gap.frame_of_overlaps(benchmark_pair, pose, rows, 0, last)
+    found = ends[gap.look_over_overlaps(benchmark_pair, pose, frame, rows, 0, last, nodes, ends) - 1]
+    pressed = nodes[:, :found][:, nodes[gap.NODE_GAP, :found] < 0.0]
+    strips = [gap.strip_gap(benchmark_pair, pose, frame, s, frame.u, frame.ur)[gap.CREST] for s in pressed[gap.S]]
+    assert np.ptp(strips) > 1e-3
+    np.testing.assert_allclose(pressed[gap.NODE_CREST], strips, atol=2e-5)

@@ -71,7 +71,8 @@ SLOPE = Across(("slope_low", "slope_high"), "slope", 1e3)
 
 
 class OwnPair(Pair):
-    """A pair's table that takes nothing from what other runs solved, and leaves nothing to them."""
+    """A pair's table that takes nothing from what other runs solved, and leaves nothing to them; it has the nodes that
+    come with the package, which are those that it would solve."""
 
     def _read(self):
         """Nothing is known before, and nothing is to be said of a file."""

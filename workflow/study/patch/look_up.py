@@ -59,8 +59,12 @@ def main():
     """Print a table of the scenes that are asked for, or all."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("scenes", nargs="*", default=list(SCENES))
-    for name in parser.parse_args().scenes:
-        table = pd.DataFrame(compared(*SCENES[name]))
+    parser.add_argument("--duration", type=float, help="of the runs, s")
+    arguments = parser.parse_args()
+    for name in arguments.scenes:
+        scene, settings = SCENES[name]
+        duration = arguments.duration or settings["integration.duration"]
+        table = pd.DataFrame(compared(scene, settings | {"integration.duration": duration}))
         table.insert(0, "scene", name)
         print(table.to_markdown(index=False, floatfmt=".3g"), flush=True)
 
