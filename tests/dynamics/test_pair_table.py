@@ -12,7 +12,7 @@ import wrcore as wr
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.detection import find_patches
-from wrcore.contact.patch.model import LOBE_COLUMNS, MODES, NO_TABLE
+from wrcore.contact.patch.model import LOBE_COLUMNS, MODES, NO_TABLE, NODES, NUMBERS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics import pair_store, pair_table, tabulated_wheel
@@ -50,7 +50,7 @@ def pair_of_known_numbers(lost=()):
     """A `Pair` as far as its cells go; the ``lost`` have no solution."""
 
     def numbers(nodes):
-        rows = np.zeros((len(nodes), pair_table.NUMBERS), np.float32)
+        rows = np.zeros((len(nodes), NUMBERS), np.float32)
         for row, (_, _, turn, *corner) in zip(rows, nodes, strict=True):
             row[:2] = (math.nan,) * 2 if (turn, *corner) in lost else known_numbers(*corner, turn)
         return rows
@@ -61,12 +61,14 @@ def pair_of_known_numbers(lost=()):
 @pytest.mark.parametrize("first", [(300, 200, 9), (301, 199, 10)])
 def test_what_a_cell_gives_exactly(first):
     """Squares along each axis, what is linear in all, and what depends on yaw as a parabola; also from odd corners."""
-    key, pair, numbers = pair_table.key_of(1, 71, 1, *first), pair_of_known_numbers(), np.empty(pair_table.NUMBERS)
+    key, pair, numbers = pair_table.key_of(1, 71, 1, *first), pair_of_known_numbers(), np.empty(NUMBERS)
     assert pair_table.corner_of(key) == (1, 71, 1, *first)
     rows = pair_store.Pair._rows_of(pair, key)
     assert pair_store.Pair._add_yaw(pair, key, rows)
     part = np.array([0.3, 0.6, 0.9])
-    look_up(rows, *part, *0.5 * (part + np.array(first) % 2), 0.4, numbers)
+    weights = np.empty(NODES)
+    pair_table.weigh(*part, *0.5 * (part + np.array(first) % 2), 0.4, weights)
+    look_up(rows, weights, numbers)
     x, y, z = part + first - (300, 200, 9)
     expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z
     np.testing.assert_allclose(numbers[:2], expected, rtol=1e-6)
@@ -74,7 +76,7 @@ def test_what_a_cell_gives_exactly(first):
 
 def test_modes_leave_the_slopes_at_rest():
     """Near no creepage the remainder is the one stored there, to second order."""
-    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(3 * MODES)
+    numbers, sums = np.zeros(NUMBERS), np.zeros(3 * MODES)
     numbers[pair_table.LINEAR] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
     numbers[pair_table.MODE :][:MODES] = 1.0
@@ -85,7 +87,7 @@ def test_modes_leave_the_slopes_at_rest():
 
 def test_a_remainder_has_no_poles():
     """Between nodes the number that tells how exact slopes are falls below 0."""
-    numbers, sums = np.zeros(pair_table.NUMBERS), np.zeros(3 * MODES)
+    numbers, sums = np.zeros(NUMBERS), np.zeros(3 * MODES)
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
     numbers[pair_table.MODE :][:MODES] = 0.1
 
@@ -100,7 +102,7 @@ def test_a_remainder_has_no_poles():
 @pytest.mark.parametrize("remainder", [(3.0, -4.0), (0.0, 0.2)])
 def test_no_more_force_than_friction_bears(benchmark_pair, remainder):
     """In the direction that it has: 3 to -4 where the remainder is far too large beside a creepage of nothing."""
-    contact, numbers = LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value, np.zeros(pair_table.NUMBERS)
+    contact, numbers = LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value, np.zeros(NUMBERS)
     numbers[[pair_table.LOG_A, pair_table.LOG_B]] = np.log([6e-3, 4e-3])
     numbers[[pair_table.SLOPE_XI, pair_table.SLOPE_ETA, pair_table.LINEAR]] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 2] = remainder
@@ -236,7 +238,7 @@ def test_lobes_act_on_each_other_as_loads_on_a_half_space_do():
     ellipse; a creepage of theirs is their fall over x, for material runs through the contact towards -x."""
     shear, nu, gap, step = 8.2e10, 0.28, 0.012, 1e-5
     forces, sizes = {"n": 4e4, "x": 7e3, "s": -3e3}, ((4e-3, 2e-3), (3e-3, 2.5e-3))
-    numbers, lobes = np.zeros((2, pair_table.NUMBERS)), np.zeros((2, LOBE_COLUMNS))
+    numbers, lobes = np.zeros((2, NUMBERS)), np.zeros((2, LOBE_COLUMNS))
     for q, (a, b) in enumerate(sizes):
         numbers[q, [pair_table.LOG_A, pair_table.LOG_B]] = math.log(a), math.log(b)
     numbers[0, pair_table.PLACE_Y] = gap  # lobe 0 lies further out than the loaded lobe 1
@@ -299,7 +301,7 @@ def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
 
 def test_where_yaw_has_no_solution_it_adds_what_it_adds_elsewhere():
     """If that is known at half of the corners at least."""
-    key, empty = pair_table.key_of(0, 7, 1, 300, 200, 9), np.zeros((pair_table.NODES, pair_table.NUMBERS), np.float32)
+    key, empty = pair_table.key_of(0, 7, 1, 300, 200, 9), np.zeros((pair_table.NODES, NUMBERS), np.float32)
     corners = [(4, 300 + a, 200 + b, 8 + c) for a in (0, 2) for b in (0, 2) for c in (0, 2)]
     assert pair_store.Pair._add_yaw(pair_of_known_numbers(corners[:4]), key, empty)
     rows = empty[32:].reshape(8, 2, -1)
@@ -441,7 +443,7 @@ def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
     places = list(pair._solved_at)
     for k in random.integers(len(places), size=12):
         own, kept = pair._at(places[k]), pair._solved_at[places[k]]
-        scales = np.where(np.isin(np.arange(pair_table.NUMBERS), METRES), 1e-6, 1e-3)
+        scales = np.where(np.isin(np.arange(NUMBERS), METRES), 1e-6, 1e-3)
         np.testing.assert_array_less(abs(own - kept)[np.isfinite(kept)], scales[np.isfinite(kept)])
         np.testing.assert_array_equal(np.isnan(own), np.isnan(kept))
         compared += np.isfinite(kept[0])

@@ -8,6 +8,7 @@ from wrcore.contact.detection import find_patches
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import rolling, solve
 from wrcore.contact.patch.gap import group_end, material_point, rigid_slip, strip_wrenches
+from wrcore.contact.patch.model import NUMBERS
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MOMENT, PENETRATION
@@ -17,7 +18,7 @@ from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import NUMBERS, PART, WIDE, depth_of, lobe_end, tabulated_force
+from wrcore.dynamics.pair_table import PART, WIDE, depth_of, lobe_end, tabulated_force
 from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
@@ -221,7 +222,7 @@ def solve_place(contact, handle, works, place, points):
     factors = 1.0 + linear * (np.clip(of_exact / of_table, 0.5, 2.0) - 1.0)
     numbers[columns.LINEAR] = linear.min()
     numbers[columns.SLOPE_XI : columns.SLOPE_ETA + 1] = factors
-    numbers[columns.FORCE : columns.MODE] = exact[4] - table[4]
+    numbers[columns.FORCE : columns.FORCE + 3] = exact[4] - table[4]
     exact, table = exact_and_table(points, factors)
     return (numbers, exact - table) if np.isfinite(exact).all() else None
 

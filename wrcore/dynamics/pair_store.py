@@ -23,7 +23,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from wrcore.contact.patch.model import MODES, NUMBERS, PairTable, strip_work
+from wrcore.contact.patch.model import MODES, NODES, NUMBERS, PairTable, strip_work
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
 from wrcore.dynamics.pair_table import (
@@ -34,7 +34,6 @@ from wrcore.dynamics.pair_table import (
     HARD,
     LEVELS,
     NARROW,
-    NODES,
     PART,
     STEPS,
     WIDE,
@@ -79,15 +78,20 @@ class Modes(NamedTuple):
     """As in `PairTable`."""
     points: np.ndarray
     """(n, 2): creepages over those of saturation at which a node is solved."""
-    inverse: np.ndarray
-    """(MODES, 3 n): coefficients from the remainder there."""
+    shapes: np.ndarray
+    """(3 n, 2 MODES): both families there."""
+    prior: np.ndarray
+    """(2 MODES,): size of their coefficients over a solution's error."""
     weights: np.ndarray
     """(n,): of the modes there, where slopes at rest are exact."""
 
-    def seen(self, numbers, remainder):
-        """What modes are to give at the points in place of a node's remainder (n, 3) there."""
+    def coefficients(self, numbers, remainder):
+        """Of all modes (2 MODES,), from a node's other numbers and its remainder (n, 3) at the points."""
         own = mode_weights(self.weights, numbers[columns.LINEAR])[:, None]
-        return (remainder - (1.0 - own) * numbers[columns.FORCE : columns.MODE]) * self.weights[:, None] / own
+        seen = (remainder - (1.0 - own) * numbers[columns.FORCE : columns.FORCE + 3]) * self.weights[:, None] / own
+        part = columns.flank_part(numbers[columns.ANGLE])
+        shapes = self.shapes * np.repeat([1.0 - part, part], MODES)
+        return np.linalg.solve(shapes.T @ shapes + np.diag(self.prior**-2.0), shapes.T @ seen.ravel())
 
 
 def mode_weights(weights, linear):
@@ -253,7 +257,7 @@ class Pair:
         if found is None:
             return np.full(NUMBERS, np.nan, np.float32)
         numbers, remainder = found
-        numbers[columns.MODE : columns.MODE + MODES] = modes.inverse @ modes.seen(numbers, remainder).ravel()
+        numbers[columns.MODE :] = modes.coefficients(numbers, remainder)
         return numbers.astype(np.float32)
 
     def solve(self, place, points):
@@ -269,14 +273,16 @@ class Pair:
         at rest; see `LIGHT`. Where the middle has no solution the finest lattice's is held against a corner."""
         level, part, at, *first = corner_of(key)
         node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
-        place, found, sums = _place(*node), np.empty(NUMBERS, np.float32), np.empty(3 * MODES)
+        place, found, weights, sums = _place(*node), np.zeros(NUMBERS, np.float32), np.empty(NODES), np.empty(3 * MODES)
         exact = self._at(node)
         if np.isnan(exact[0]):
             if level + 1 < LEVELS:
                 return math.nan, math.nan
             exact = rows[0]
         double = [0.5 * (0.5 + n % 2) for n in first]
-        columns.look_up(rows, 0.5, 0.5, 0.5, *double, turn, found)
+        columns.weigh(0.5, 0.5, 0.5, *double, turn, weights)
+        columns.look_up(rows, weights, found)
+        columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
         spin = -math.sin(exact[columns.ANGLE] - place[1]) / self.contact.geometry.rolling_radius
         points = np.vstack([modes.points, AT_REST])

@@ -19,13 +19,14 @@ Gordon, SIAM J. Numer. Anal. 8 (1971) 158 (Boolean sums of interpolations).
 A node's numbers (`NUMBERS`) give the normal problem, and the creep force: the creep table at the ellipse of equal
 moments, with the creepages scaled so that both slopes at rest are exact, and a remainder in fixed modes over the two
 creepages. Spin is no input of its own: a wheel that rolls has the spin of its contact angle, and the remainder is that
-of just this spin. It fades out where a wheel slides or stands.
+of just this spin. It fades out where a wheel slides or stands. Contacts of little and of much spin have a family of
+modes each, as what the table lacks differs: a tread's flat patches, a flange's slender and bent ones.
 """
 
 import math
 
 from wrcore.contact import reduction
-from wrcore.contact.patch.model import MODES, NUMBERS
+from wrcore.contact.patch.model import MODES, NODES
 from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
@@ -64,16 +65,17 @@ PART, FIELD = 4e-3, -0.1
 CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
 
-NODES = 48
-"""Rows of a cell: its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what yaw adds at
-the 8 corners of the cell with twice the steps in which it lies."""
-
 LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, LINEAR, FORCE = range(12)
-MODE = FORCE + 3
+MODE = 16
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
 plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make the
 slopes exact (1; 0 where spin rules); the remainder of Fx, Fy
-(over mu N) and Mz (over mu N c) at no creepage; and its coefficients of modes."""
+(over mu N) and Mz (over mu N c) at no creepage; two that are not used; and its coefficients of both families'
+modes. The rows of a cell are its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what
+yaw adds at the 8 corners of the cell with twice the steps in which it lies."""
+
+FLANKS = 0.2, 0.4
+"""Contact angles up to which the first family of modes counts alone, and from which on the second one."""
 
 ROUND = 0.1
 """Where slopes at rest are exact, modes set in from this radius on in the disk of the creepages, to leave them so."""
@@ -180,35 +182,60 @@ def locate(table, u, beside, t, slope, depth, yaw):
     return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-@jit(allocates=False, forceinline=True, fastmath=FAST)
-def _add_four(rows, n, w0, w1, w2, w3, numbers):
-    """Add four rows from the n-th on with their weights."""
-    one, two, three, four = rows[n], rows[n + 1], rows[n + 2], rows[n + 3]
-    for m in range(NUMBERS):
-        numbers[m] += w0 * one[m] + w1 * two[m] + w2 * three[m] + w3 * four[m]
-
-
 @jit(allocates=False, fastmath=FAST)
-def look_up(rows, fx, fy, fz, gx, gy, gz, turn, numbers):
-    """Fill ``numbers`` (NUMBERS,) at a place in the cell with these ``rows`` (NODES, NUMBERS), see `locate`."""
+def weigh(fx, fy, fz, gx, gy, gz, turn, weights):
+    """Fill the weights (NODES,) of a cell's rows at a place in it, see `locate`."""
     (x0, x1, x2, x3), (y0, y1, y2, y3), (z0, z1, z2, z3) = _weights(fx), _weights(fy), _weights(fz)
-    for m in range(NUMBERS):
-        numbers[m] = 0.0
+    odd, even = 0.5 * turn, 0.5 * turn * turn
     for a in range(2):
         lx, cx = (fx, x2) if a else (1.0 - fx, x1)
         for b in range(2):
-            ly, cy = (fy, y2) if b else (1.0 - fy, y1)
+            ly, cy, n = (fy, y2, 4 * (2 * a + b)) if b else (1.0 - fy, y1, 8 * a)
             along = cx * ly + lx * cy - 2.0 * lx * ly
-            w0, w1 = along * (1.0 - fz) + lx * ly * z1, along * fz + lx * ly * z2
-            _add_four(rows, 4 * (2 * a + b), w0, w1, lx * ly * z0, lx * ly * z3, numbers)
+            weights[n], weights[n + 1] = along * (1.0 - fz) + lx * ly * z1, along * fz + lx * ly * z2
+            weights[n + 2], weights[n + 3] = lx * ly * z0, lx * ly * z3
             mx, my, lz = (fx if a else 1.0 - fx), (fy if a else 1.0 - fy), (fz if b else 1.0 - fz)
-            _add_four(rows, 16 + 4 * (2 * a + b), my * lz * x0, my * lz * x3, mx * lz * y0, mx * lz * y3, numbers)
-    odd, even = 0.5 * turn, 0.5 * turn * turn
-    for a in range(2):
-        for b in range(2):
+            weights[n + 16], weights[n + 17] = my * lz * x0, my * lz * x3
+            weights[n + 18], weights[n + 19] = mx * lz * y0, mx * lz * y3
             w = (gx if a else 1.0 - gx) * (gy if b else 1.0 - gy)
-            w0, w1 = w * (1.0 - gz), w * gz
-            _add_four(rows, 32 + 4 * (2 * a + b), w0 * odd, w0 * even, w1 * odd, w1 * even, numbers)
+            weights[n + 32], weights[n + 33] = w * (1.0 - gz) * odd, w * (1.0 - gz) * even
+            weights[n + 34], weights[n + 35] = w * gz * odd, w * gz * even
+
+
+@jit(allocates=False, forceinline=True, fastmath=FAST)
+def _sum_rows(rows, weights, first, count, numbers):
+    """Fill some of the ``numbers`` with the weighted sum of rows."""
+    found = numbers[first : first + count]
+    for m in range(count):
+        found[m] = 0.0
+    for n in range(0, NODES, 4):
+        one, two = rows[n, first : first + count], rows[n + 1, first : first + count]
+        three, four = rows[n + 2, first : first + count], rows[n + 3, first : first + count]
+        w0, w1, w2, w3 = weights[n], weights[n + 1], weights[n + 2], weights[n + 3]
+        for m in range(count):
+            found[m] += w0 * one[m] + w1 * two[m] + w2 * three[m] + w3 * four[m]
+
+
+@jit(allocates=False, fastmath=FAST)
+def look_up(rows, weights, numbers):
+    """Fill ``numbers`` (NUMBERS,), but for coefficients of modes, from a cell's ``rows`` (NODES, NUMBERS)."""
+    _sum_rows(rows, weights, 0, MODE, numbers)
+
+
+@jit(allocates=False, fastmath=FAST)
+def look_modes_up(rows, weights, numbers):
+    """As `look_up`, after it: the coefficients of modes that count."""
+    part = flank_part(numbers[ANGLE])
+    for family in range(2):
+        if (part if family else 1.0 - part) > 0.0:
+            _sum_rows(rows, weights, MODE + MODES * family, MODES, numbers)
+
+
+@jit(allocates=False)
+def flank_part(angle):
+    """Weight of the second family of modes at a contact angle."""
+    part = min(max((abs(angle) - FLANKS[0]) / (FLANKS[1] - FLANKS[0]), 0.0), 1.0)
+    return part * part * (3.0 - 2.0 * part)
 
 
 @jit(allocates=False, forceinline=True)
@@ -220,25 +247,29 @@ def round_part(square, linear):
 @jit(allocates=False, fastmath=FAST)
 def remainder(modes, numbers, x, y, sums):
     """Remainder of Fx, Fy, Mz at creepages over those of saturation; ``sums`` is scratch."""
-    cells, root = modes.shape[0] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
+    cells, root = modes.shape[1] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
     p, q = x * root, y * root
-    weight = round_part(p * p + q * q, numbers[LINEAR])
+    weight, part = round_part(p * p + q * q, numbers[LINEAR]), flank_part(numbers[ANGLE])
     u, v = 0.5 * (p + 1.0) * cells, 0.5 * (q + 1.0) * cells
     i, j = min(int(u), cells - 1), min(int(v), cells - 1)
     f, g = u - i, v - j
     b0, b1, b2 = 0.5 * (1.0 - g) * (1.0 - g), 0.5 + g * (1.0 - g), 0.5 * g * g
-    for m in range(3 * MODES):
-        sums[m] = 0.0
-    for r in range(3):
-        a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
-        one, two, three = modes[i + r, j], modes[i + r, j + 1], modes[i + r, j + 2]
-        a0, a1, a2 = a * b0, a * b1, a * b2
-        for m in range(3 * MODES):
-            sums[m] += a0 * one[m] + a1 * two[m] + a2 * three[m]
     fx = fy = mz = 0.0
-    for m in range(MODES):
-        c = numbers[MODE + m]
-        fx, fy, mz = fx + c * sums[m], fy + c * sums[MODES + m], mz + c * sums[2 * MODES + m]
+    for family in range(2):
+        share, first = (part, MODE + MODES) if family else (1.0 - part, MODE)
+        if share == 0.0:
+            continue
+        for m in range(3 * MODES):
+            sums[m] = 0.0
+        for r in range(3):
+            a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
+            one, two, three = modes[family, i + r, j], modes[family, i + r, j + 1], modes[family, i + r, j + 2]
+            a0, a1, a2 = share * a * b0, share * a * b1, share * a * b2
+            for m in range(3 * MODES):
+                sums[m] += a0 * one[m] + a1 * two[m] + a2 * three[m]
+        for m in range(MODES):
+            c = numbers[first + m]
+            fx, fy, mz = fx + c * sums[m], fy + c * sums[MODES + m], mz + c * sums[2 * MODES + m]
     rest = 1.0 - weight
     return (
         rest * numbers[FORCE] + weight * fx, rest * numbers[FORCE + 1] + weight * fy,

@@ -19,7 +19,18 @@ from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import add_force, frame_of_rows
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import APART, FAR, SADDLE, depth_of, lobe_end, locate, look_up, tabulated_force
+from wrcore.dynamics.pair_table import (
+    APART,
+    FAR,
+    SADDLE,
+    depth_of,
+    lobe_end,
+    locate,
+    look_modes_up,
+    look_up,
+    tabulated_force,
+    weigh,
+)
 from wrcore.dynamics.strip_wheel import NOTHING, UNSOLVED, Solution, fill_row, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address
@@ -82,7 +93,9 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
         last = lobe_end(geometry, pose, rows, last, high, (APART, FAR, SADDLE))
         lobes[count, END] = last
         count += 1
-    for _ in range(TURNS if count > 1 else 1):
+    left = TURNS if count > 1 else 1
+    while left > 0:
+        left -= 1
         first = low
         for q in range(count):
             last = int(lobes[q, END])
@@ -92,7 +105,11 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
                 cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, count > 1, t, slope, depth, yaw)
                 if cell == 0:
                     return 0
-                look_up(table.cells[cell], fx, fy, fz, gx, gy, gz, turn, work.numbers[q])
+                rows_of_cell = table.cells[cell]
+                weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
+                look_up(rows_of_cell, work.weights, work.numbers[q])
+                if left == 0:
+                    look_modes_up(rows_of_cell, work.weights, work.numbers[q])
                 lobes[q, NORMAL] = _load(modulus, work.numbers[q], depth)
             first = last
         if count > 1:

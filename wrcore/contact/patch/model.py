@@ -31,16 +31,17 @@ class PairTable(NamedTuple):
     cells: np.ndarray
     """(n, NODES, NUMBERS) float32: what a cell is looked up from."""
     modes: np.ndarray
-    """(n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages."""
+    """(2, n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages, of both
+    families."""
     fill: int
     """Address of what solves a cell's nodes."""
 
 
 NO_TABLE = PairTable(
-    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0,) * 3, np.float32), 0,
+    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0,) * 4, np.float32), 0,
 )  # fmt: skip
-NUMBERS, MODES = 40, 24
-"""Numbers of a node, and modes of the creep force that are among them."""
+NODES, NUMBERS, MODES = 48, 64, 24
+"""Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
 LOBE_COLUMNS = 5
 """Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
@@ -92,8 +93,9 @@ class StripWork(NamedTuple):
     """(3,) int: strips of the last solution, 1 if they are slender, and windows."""
     lobes: np.ndarray
     numbers: np.ndarray
+    weights: np.ndarray
     modes: np.ndarray
-    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS) and (3 MODES,): of a patch that is looked up."""
+    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and (3 MODES,): of a patch that is looked up."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -137,7 +139,7 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
-        np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(3 * MODES),
+        np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES), np.zeros(3 * MODES),
         normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip
