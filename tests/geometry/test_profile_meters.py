@@ -113,12 +113,13 @@ def test_what_a_file_states_is_not_assumed(tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_a_count_that_differs_and_offsets_are_said(tmp_path):
+def test_a_count_that_differs_and_offsets_are_said(tmp_path, capsys):
     x, y = wheel_points()
     head = KEYS.format("X,Y", 9).replace("Xoffset=0.0000", "Xoffset=2.5").replace("Yoffset=", "Yoffset=1.0") + "\n"
     curve = read_profile(file_of(tmp_path, "w.whl", head + rows(x - 2.5, y)), "wheel")
     assert off(curve) < 1e-6
-    assert "MiniProf, 9 points by its header, moved by 2.5 and 1 mm" in curve.source
+    assert "MiniProf, moved by 2.5 and 1 mm" in curve.source and ", 1321 points, 9 by its header, left" in curve.source
+    assert "1321 points, 9 by its header left out, tape_circle assumed" in capsys.readouterr().err
 
 
 FLANGE_BACK = 1e-3 * (1e3 * TAPE - wheel_points()[0].min())

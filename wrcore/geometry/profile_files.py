@@ -62,11 +62,12 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
         smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing,
     )  # fmt: skip
     left_out = np.setdiff1d(lines, lines[inside][curve.outline.followed(STEEPEST)])
-    if left_out.size or assumed:
-        kept = f"{left_out.size} of {lines.size} points left out" if left_out.size else f"{lines.size} points"
+    count = f"{lines.size} points{stated.odd}"
+    if left_out.size or assumed or stated.odd:
+        kept = f"{left_out.size} of " * bool(left_out.size) + count + " left out" * bool(left_out.size)
         guess = "".join(f", {key} assumed" for key in assumed)
         warn(f"{path}: {kept}{guess} ('wrcore profiles' shows it)")
-    told += f", {lines.size} points" + (f", left out ({_REASONS}): lines {_ranges(left_out)}" if left_out.size else "")
+    told += f", {count}" + (f", left out ({_REASONS}): lines {_ranges(left_out)}" if left_out.size else "")
     return replace(curve, source=f"{curve.source}: {told}")
 
 
@@ -83,7 +84,8 @@ def _read(path, text, spec, kind):
     if ending in _SIMPACK:
         _check_type(path, text, kind)
         u, f, lines = read_simpack(path, text, "smoothing" in spec)
-        stated = Stated("SIMPACK")
+        beyond = _simpack_points(path, text, _header(path, text)[1])[2].size - lines.size
+        stated = Stated("SIMPACK", odd=f" and {beyond} beyond its bounds" if beyond else "")
     elif ending in VAMPIRE_FILES:
         u, f, lines, stated = profile_meters.read_vampire(path, text, kind, spec.get("side", "right"))
     elif profile_meters.is_meter_file(path, text):

@@ -43,6 +43,8 @@ class Stated(NamedTuple):
     """Which of these nobody has stated."""
     offset: tuple[float, float] = (0.0, 0.0)
     """Added to the file's two coordinates, m."""
+    odd: str = ""
+    """What a reader should look at."""
     trimmed: bool = True
     """Whether side faces are left out instead of refused."""
 
@@ -69,15 +71,14 @@ def read_meter(path, text, kind, unit, part=None):
             raise InputError(path, f"line {number}", f"expected two numbers, got {line[:40]!r}") from None
         lines.append(number)
     x, y = np.array(points, dtype=float).reshape(-1, 2).T * unit
-    count = keys.get("xypoints", "").strip()
-    if count.isdigit() and int(count) != len(lines):
-        about += f", {count} points by its header"
+    count = keys.get("xypoints", "")
+    odd = f", {count} by its header" if count.isdecimal() and int(count) != len(lines) else ""
     offset = tuple(_key(path, keys, name) * unit for name in ("xoffset", "yoffset"))
     if kind == "rail":
-        return x, y, lines, Stated(about, None, None, 0.0, ("mirrored",), offset)
+        return x, y, lines, Stated(about, None, None, 0.0, ("mirrored",), offset, odd)
     tape = _key(path, keys, "wheeldiametertaperline") * unit
     assumed = () if tape else ("tape_circle",)
-    return x, y, lines, Stated(about, None, None, tape or TAPE_CIRCLE, assumed, offset)
+    return x, y, lines, Stated(about, None, None, tape or TAPE_CIRCLE, assumed, offset, odd)
 
 
 def _rows(text):
