@@ -38,8 +38,9 @@ ROOMS = (
     "analysis.stability.limit_cycles", "analysis.to_accuracy", "analysis.contact.poses", "analysis.contact.loaded",
     "contact.wheel_on_rail", "contact.conicity",
     "contact.first_touch", "contact.pose_file", "contact.detection", "contact.normal", "creep.cases", "creep.kalker",
-    "creep.laws", "creep.table", "geometry.profile", "geometry.standards", "geometry.irregularity", "geometry.track",
-    "run.channels", "run.validity", "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",
+    "creep.laws", "creep.table", "geometry.profile", "geometry.profile_files", "geometry.profile_meters",
+    "geometry.standards", "geometry.irregularity", "geometry.track", "run.channels", "run.validity",
+    "scene.description", "sweep.measures", "sweep.plan", "sweep.batch",
 )  # fmt: skip
 """Modules that scripts use beside the public names."""
 

@@ -42,6 +42,16 @@ def test_the_three_forms_of_a_profile_are_the_same_wheel(folder):
     assert np.ptp(hollow) == pytest.approx(3e-4, rel=0.01)
 
 
+def test_a_meters_file_is_the_same_wheel(folder):
+    old = wr.named_profile(folder / "old.whl", "wheel")
+    u = np.linspace(-0.05, 0.05, 101)
+    np.testing.assert_allclose(old(u), wr.named_profile(folder / "worn.csv", "wheel")(u), rtol=0, atol=3e-7)
+    assert "left out" in old.source and "lines 5-24, 625-644" in old.source
+    one, other = (pd.read_csv(folder / name) for name in ("conicity.csv", "conicity_meter.csv"))
+    np.testing.assert_allclose(one.equivalent_conicity, other.equivalent_conicity, rtol=2e-3)
+    assert (folder / "old.svg").is_file()
+
+
 def test_runs_feel_what_was_brought(folder):
     worn, rough, curve = (wr.load_run(folder / name) for name in ("worn.h5", "rough.h5", "curve.h5"))
     assert {run.status for run in (worn, rough, curve)} == {"completed"}

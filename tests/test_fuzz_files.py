@@ -57,12 +57,26 @@ def profile_text(kind, form):
             "  units.len.f = 1000\n  units.ang.f = 1\n  mirror.y = 0\n  mirror.z = 0\n  inversion = 0\n  shift.y = 0\n"
             f"  bound.y.min = 1\n  bound.y.max = 0\n  point.begin\n{rows}\n  point.end\nspline.end\n"
         )
+    if form == "whl":
+        u, head = u + 70.0, "MINIPROF 1\nStock:\n\n"
+        return head + "\n".join(f"{a:.6f} {-b:.6f} 0.0" for a, b in zip(u, f, strict=True)) + "\n"
+    if form == "ban":
+        head = "Xoffset=0.0\nColumnDef=X,Y\nXYPoints=41\n\n"
+        return head + "\n".join(f"{-a:.6f} {b:.6f}" for a, b in zip(u, f, strict=True)) + "\n"
+    if form == "whe":
+        head, y = "WHEELPROFILE\nt\nTREADDATUM EUROPEAN\nFLANGEBACK 1360\n", u + 750.0
+        return head + "\n".join(f"{-a:.6f} {-b:.6f} {a:.6f} {-b:.6f}" for a, b in zip(y, f, strict=True)) + "\n"
     head = "u_mm,f_mm\n" if form == "csv" else "# two columns, mm\n"
     return head + "\n".join(f"{a:.6f}{',' if form == 'csv' else ' '}{b:.6f}" for a, b in zip(u, f, strict=True)) + "\n"
 
 
 number_text = st.characters(codec="ascii", categories=["Nd", "Po", "Zs"], include_characters="-+eE.,;\n\t nan")
-forms = st.sampled_from([("wheel", "csv"), ("rail", "csv"), ("wheel", "dat"), ("wheel", "prw"), ("rail", "prr")])
+forms = st.sampled_from(
+    [
+        ("wheel", "csv"), ("rail", "csv"), ("wheel", "dat"), ("wheel", "prw"), ("rail", "prr"), ("wheel", "whl"),
+        ("rail", "ban"), ("wheel", "whe"),
+    ]
+)  # fmt: skip
 
 
 @st.composite

@@ -1,13 +1,19 @@
 """The built wheel in an empty folder: what it carries, without the checkout."""
 
 import importlib.util
+import json
 import os
+import re
 import subprocess
 import sys
+import zipfile
+from email import message_from_string
 
 import pytest
+import yaml
 
 from tests.conftest import ROOT
+from wrcore import __version__
 
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
 LOADED = """
@@ -39,3 +45,41 @@ def test_a_stranger_starts_from_the_wheel_alone(installed):
     assert "wrcore simulate" in told
     where = subprocess.run([sys.executable, "-c", LOADED], **python).stdout
     assert where.startswith(str(installed / "site"))
+
+
+def test_the_package_alone_pulls_no_snakemake_and_no_jupyter(installed):
+    """What `pip install wrcore` asks for is what computes and draws; the rest belongs to extras."""
+    (wheel,) = (installed / "built").glob("wrcore-*.whl")
+    with zipfile.ZipFile(wheel) as content:
+        (name,) = (name for name in content.namelist() if name.endswith(".dist-info/METADATA"))
+        metadata = message_from_string(content.read(name).decode("utf-8"))
+    needs = [re.match(r"([\w.-]+)([^;]*);?(.*)", line).groups() for line in metadata.get_all("Requires-Dist")]
+    always = {name for name, _, marker in needs if "extra" not in marker}
+    assert always == {"numpy", "scipy", "numba", "h5py", "pandas", "matplotlib", "pyyaml", "jsonschema", "tqdm"}
+    study = {name for name, _, marker in needs if re.search(r"extra == .study.", marker)}
+    assert study == {"snakemake", "ipykernel", "jupyterlab", "nbclient", "nbconvert"}
+    assert metadata["Version"] == __version__
+
+
+def test_versions_and_dates_are_one():
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    described = json.loads((ROOT / "codemeta.json").read_text("utf-8"))
+    released = re.findall(r"^## (\d\S*) - (\d{4}-\d\d-\d\d)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert {cited["version"], described["version"], released[0][0]} == {__version__}
+    assert {str(cited["date-released"]), described["dateModified"]} == {released[0][1]}
+
+
+def test_what_is_claimed_of_pythons_is_what_runs():
+    """Classifiers, the least version, the matrix of the hosted tests and their command are the README's."""
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    claimed = [c.rpartition(" ")[2] for c in project["classifiers"] if re.search(r"Python :: \d\.\d", c)]
+    jobs = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text("utf-8"))["jobs"]
+    assert jobs["test"]["strategy"]["matrix"]["python"] == claimed
+    assert project["requires-python"] == f">={claimed[0]}"
+    commands = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    assert commands == ["make test", "make lint"]
+    assert "    make test " in (ROOT / "README.md").read_text("utf-8")
+    needs = json.loads((ROOT / "codemeta.json").read_text("utf-8"))["softwareRequirements"]
+    assert needs == [re.match(r"[\w.-]+", line)[0] for line in project["dependencies"]]

@@ -18,7 +18,7 @@ rolling speed; forces act on the wheel. Units are SI throughout.
 from importlib import import_module
 from pathlib import Path
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LINES = map(str.split, Path(__file__).with_suffix(".pyi").read_text("utf-8").splitlines())
 _PUBLIC = {words[3]: words[1] for words in _LINES if words[:1] == ["from"]}

@@ -125,6 +125,28 @@ def test_files_to_start_from_are_copied_and_never_written_over(tmp_path, capsys)
     assert main(["init", str(tmp_path / "mine")]) == 2 and "not written over" in capsys.readouterr().err
 
 
+def test_a_profile_of_a_file_is_shown(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    u = [0.5 * k for k in range(-60, 61)]
+    text = "header.begin\ntype = 1\nheader.end\nspline.begin\nunits.len.f = 1000\npoint.begin\n% 1 2\n"
+    points = "".join(f"{k + 100} {-0.05 * k}\n" for k in u)
+    (tmp_path / "cone.prw").write_text(f"{text}{points}point.end\nspline.end\n")
+    assert main(["profiles", "{points: cone.prw, tape_circle: 0.1}", "--out", "cone.svg"]) == 0
+    source, shape = capsys.readouterr().out.splitlines()
+    assert source == "measured points, cone.prw: SIMPACK, tape circle 100 mm from the file's origin, 121 points"
+    assert shape == (
+        "wheel, u from -30.00 to 30.00 mm, 1201 nodes; flange 1.50 mm high, slope at the tape circle 0.0500"
+    )
+    assert "<svg" in (tmp_path / "cone.svg").read_text()
+    assert main(["profiles", "cone.prw"]) == 2
+    assert "got it outside: tape_circle or flange_back says where" in capsys.readouterr().err
+    (tmp_path / "top.csv").write_text("u_mm,f_mm\n" + "".join(f"{k},{-k * k / 600}\n" for k in u))
+    assert main(["profiles", "top.csv"]) == 2
+    assert "wrcore profiles: --kind: expected wheel or rail" in capsys.readouterr().err
+    assert main(["profiles", "top.csv", "--kind", "rail"]) == 0
+    assert "rail, u from -30.00 to 30.00 mm, 1201 nodes; it ends above the 14 mm" in capsys.readouterr().out
+
+
 def test_the_module_is_the_command():
     done = subprocess.run([sys.executable, "-m", "wrcore", "--version"], capture_output=True, text=True, cwd=ROOT)
     assert done.stdout.strip() == f"wrcore {wr.__version__}"

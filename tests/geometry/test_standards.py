@@ -279,7 +279,7 @@ def test_a_path_may_hold_a_name(tmp_path, monkeypatch):
         named_profile(Path("60E1"), "rail")
     monkeypatch.chdir(tmp_path)
     Path("worn").write_text("u_m,f_m\n" + "".join(f"{u},{0.05 * u}\n" for u in np.linspace(-0.03, 0.03, 61)))
-    assert named_profile(Path("worn"), "wheel").source == "measured points, worn"
+    assert named_profile(Path("worn"), "wheel").source == "measured points, worn: columns, 61 points"
 
 
 @pytest.mark.parametrize(

@@ -62,9 +62,10 @@ def as_runs(*names):
 
 def add_pair(command):
     """Options of a wheel on a rail."""
-    command.add_argument("--wheel", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
-    command.add_argument("--rail", required=True, metavar="NAME|FILE", help="profile: 'wrcore profiles', or points")
-    command.add_argument("--unit", choices=("m", "mm"), help="of profile files without a header")
+    what = "profile: a name ('wrcore profiles'), a file of points, or '{points: FILE, ...}'"
+    command.add_argument("--wheel", required=True, metavar="NAME|FILE", help=what)
+    command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what)
+    command.add_argument("--unit", choices=("m", "mm", "inch"), help="of profile files that do not state it")
     command.add_argument("--smoothing", type=float, metavar="m", help="by which the curve may leave a file's points, m")
     command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
     command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="m, 14 mm below the rails' tops")
@@ -91,14 +92,21 @@ def profile_of(options, spec, kind):
     """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply."""
     from wrcore.geometry.standards import named_profile
 
-    if os.path.isfile(spec):
-        described = {"points": spec}
-        if options.unit and Path(spec).suffix.lower() not in (".prw", ".prr"):
-            described["unit"] = options.unit
-        if options.smoothing is not None:
-            described["smoothing"] = options.smoothing
-        spec = described if len(described) > 1 else spec
-    return named_profile(spec, kind, ratio(options.inclination))
+    return named_profile(profile_spec(options, spec), kind, ratio(options.inclination))
+
+
+def profile_spec(options, spec):
+    """A profile's name, or the mapping of a file and how to read it."""
+    from wrcore.errors.checked_yaml import parse_value
+
+    described = parse_value(spec) if spec.lstrip().startswith("{") else {"points": spec}
+    if not isinstance(described, dict) or not os.path.isfile(str(described.get("points"))):
+        return spec
+    if options.unit and Path(described["points"]).suffix.lower() not in (".prw", ".prr"):
+        described.setdefault("unit", options.unit)
+    if options.smoothing is not None:
+        described.setdefault("smoothing", options.smoothing)
+    return described if len(described) > 1 else spec
 
 
 def ratio(text):

@@ -1,60 +1,144 @@
-"""Profile files: CSV or columns of points, SIMPACK .prw/.prr. All conversions to the package's axes happen here.
+"""Profile files: CSV or columns of points, SIMPACK .prw/.prr, profile meters, Vampire. All conversions to the package's
+axes happen here.
 
 Point files list u (lateral, positive to the field side) and f (positive up), one point a line; ``#``, ``%`` or ``!``
 starts a comment. The unit stands in a header line ``u_m,f_m`` or ``u_mm,f_mm``, or is declared beside the path. Columns
 may be separated by commas, semicolons, tabs or blanks; beside semicolons and tabs numbers may have decimal commas.
 Further columns are not read; a header names them all. The UIC 519 / EN 15302 reference profiles (``*.dat``) follow this
-convention without a header: declare ``unit: mm``. Files of profile meters (MiniProf) begin with
-lines ``Name=value``, which are passed over; in which directions their columns count, and from where, is declared beside
-the path: ``mirrored``, ``downwards``, ``shift``.
+convention without a header: declare ``unit: mm``. Lines ``Name=value`` before the points are passed over; in which
+directions the columns count, and from where, is declared beside the path: ``mirrored``, ``downwards``, ``shift``.
 
-SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down).
+SIMPACK files list y (positive to the field side once ``mirror.y`` is applied) and z (positive down). MiniProf and
+Vampire: `wrcore.geometry.profile_meters`.
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from wrcore.errors import InputError, one_of
 from wrcore.errors.input_files import check_regular
-from wrcore.geometry.profile import SPACING, WINDOW, ProfileCurve
+from wrcore.geometry import profile_meters
+from wrcore.geometry.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
+from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated, split
+from wrcore.kernels.cache import warn
 
-_UNITS = {"m": 1.0, "mm": 1e-3}
-_KEYS = {"points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift"}
+_UNITS = {"m": 1.0, "mm": 1e-3, "inch": 0.0254}
+_SIMPACK = (".prw", ".prr")
+POINT_FILES = (".csv", ".dat", ".txt", *_SIMPACK, *METER_FILES, *VAMPIRE_FILES)
+"""Endings of files of points."""
+_KIND_OF = dict.fromkeys((".prw", ".whl", ".whe"), "wheel") | dict.fromkeys((".prr", ".ban", ".rai"), "rail")
+_KEYS = {
+    "points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift", "tape_circle", "flange_back", "within",
+    "part", "side",
+}  # fmt: skip
 _SEPARATED = "; decimal commas are read beside semicolons and tabs only"
+_INSTEAD = {"tape_circle": ("shift", "flange_back")}
+_REASONS = "side faces, too deep, stepping back, equal, not within"
 _HEADED = "; a header above them is u_m,f_m or u_mm,f_mm: u to the field side, f up"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
 
 
 def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     """ProfileCurve of a ``kind`` from the path of a point file, or from a dict of ``points`` (the path) and how to read
-    it.
+    it; its ``source`` says what was read, turned and left out.
 
-    Keys: ``unit`` (m or mm); ``inclined`` (default True): a rail's points lie in the track pose already, else
-    ``inclination`` turns them; ``smoothing`` (m). For files of columns: ``mirrored``: the first column counts towards
-    the track's centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that."""
+    Keys: ``unit`` (m, mm or inch); ``inclined`` (default True): a rail's points lie in the track pose already, else
+    ``inclination`` turns them; ``smoothing`` (m); ``within`` (m, 2): abscissae, as the file has them, between which
+    points are read. What a SIMPACK file states itself: ``mirrored``: the first column counts towards the track's
+    centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that. Where a wheel's
+    u = 0 is: ``tape_circle`` (m), its distance from the file's origin, or ``flange_back`` (m), its distance from the
+    innermost point. ``part``: of a MiniProf file of several; ``side`` (left or right) of a Vampire file."""
     spec = _checked(spec if isinstance(spec, dict) else {"points": spec}, kind)
-    path, unit = Path(spec["points"]), spec.get("unit")
-    text = _text(path)
-    simpack = path.suffix.lower() in (".prw", ".prr")
-    if simpack:
-        _check_type(path, text, kind)
-    u, f, lines = read_simpack(path, text, "smoothing" in spec) if simpack else read_columns(path, text, unit)
-    if not simpack:
-        u, f = _turned(spec, u, f)
+    path = Path(spec["points"])
+    u, f, lines, stated = _read(path, _text(path), spec, kind)
+    inside = _within(path, spec, u)
+    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside])
     turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
-    return ProfileCurve.from_points(
-        u, f, kind, str(path), lines=lines, trim=simpack, inclination=turn,
+    curve = ProfileCurve.from_points(
+        u, f, kind, str(path), lines=lines[inside], trim=stated.trimmed, inclination=turn,
         smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing,
     )  # fmt: skip
+    left_out = np.setdiff1d(lines, lines[inside][curve.outline.followed(STEEPEST)])
+    count = f"{lines.size} points{stated.odd}"
+    if left_out.size or assumed or stated.odd:
+        kept = f"{left_out.size} of " * bool(left_out.size) + count + " left out" * bool(left_out.size)
+        guess = "".join(f", {key} assumed" for key in assumed)
+        warn(f"{path}: {kept}{guess} ('wrcore profiles' shows it)")
+    told += f", {count}" + (f", left out ({_REASONS}): lines {_ranges(left_out)}" if left_out.size else "")
+    return replace(curve, source=f"{curve.source}: {told}")
 
 
-def _turned(spec, u, f):
-    """Points of columns in the package's directions, and from its origin."""
-    across, up = spec.get("shift", (0.0, 0.0))
-    u = (-u if spec.get("mirrored", False) else u) + across
-    return u, (-f if spec.get("downwards", False) else f) + up
+def kind_of(path):
+    """The kind of profile that the ending of a file's name says; None where it says none."""
+    return _KIND_OF.get(Path(path).suffix.lower())
+
+
+def _read(path, text, spec, kind):
+    """Points (n,) in m as a file has them, the lines of each, and what the file states of them."""
+    ending, unit = path.suffix.lower(), spec.get("unit")
+    if ending not in _SIMPACK and kind_of(path) not in (kind, None):
+        raise InputError(path, "", f"expected a {kind} profile, got a {kind_of(path)}")
+    if ending in _SIMPACK:
+        _check_type(path, text, kind)
+        u, f, lines = read_simpack(path, text, "smoothing" in spec)
+        beyond = _simpack_points(path, text, _header(path, text)[1])[2].size - lines.size
+        stated = Stated("SIMPACK", odd=f" and {beyond} beyond its bounds" if beyond else "")
+    elif ending in VAMPIRE_FILES:
+        u, f, lines, stated = profile_meters.read_vampire(path, text, kind, spec.get("side", "right"))
+    elif profile_meters.is_meter_file(path, text):
+        u, f, lines, stated = profile_meters.read_meter(path, text, kind, _UNITS[unit or "mm"], spec.get("part"))
+    else:
+        u, f, lines = read_columns(path, text, unit)
+        stated = Stated("columns", trimmed=False)
+    for key, form in (("part", "MiniProf"), ("side", "Vampire")):
+        if key in spec and not stated.about.startswith(form):
+            raise InputError(path, key, f"expected this of {form} files only")
+    return u, f, np.asarray(lines, dtype=int), stated
+
+
+def _within(path, spec, u):
+    """Which points lie between the abscissae that were asked for; all, where none were."""
+    if "within" not in spec:
+        return np.ones(u.size, dtype=bool)
+    low, high = spec["within"]
+    inside = (u >= low) & (u <= high)
+    if not inside.any() and u.size:
+        expected = f"expected a part of {u.min():.4g} to {u.max():.4g} m"
+        raise InputError(path, "within", f"{expected}, got {low:g} to {high:g}")
+    return inside
+
+
+def _placed(spec, kind, stated, u, f):
+    """Points in the package's directions, and from its origin; what was done to them, and which keys were assumed."""
+    seen = stated.mirrored is None
+    mirrored, downwards = profile_meters.seen(kind, u, f) if seen else (stated.mirrored, stated.downwards)
+    given = {"mirrored": mirrored, "downwards": downwards, "tape_circle": stated.tape_circle, **spec}
+    assumed = [key for key in stated.assumed if not {key, *_INSTEAD.get(key, ())} & set(spec)]
+    told, (across, up) = [stated.about], stated.offset
+    told += [f"moved by {1e3 * across:g} and {1e3 * up:g} mm"] if across or up else []
+    u, f = u + across, f + up
+    u = -u if given["mirrored"] else u
+    f = -f if given["downwards"] else f
+    told += [key + " (assumed)" * (key in assumed) for key in ("mirrored", "downwards") if given[key]]
+    if "flange_back" in spec:
+        u = u - u.min(initial=np.inf) - spec["flange_back"]
+        told += [f"flange back (innermost point) at {-1e3 * spec['flange_back']:g} mm"]
+    elif "shift" in spec:
+        u, f = u + spec["shift"][0], f + spec["shift"][1]
+        told += ["shifted by {:g} and {:g} mm".format(*(1e3 * d for d in spec["shift"]))]
+    elif given["tape_circle"]:
+        u = u - given["tape_circle"]
+        told += [f"tape circle {1e3 * given['tape_circle']:g} mm from the file's origin" + " (assumed)" * bool(assumed)]
+    return u, f, ", ".join(told), assumed
+
+
+def _ranges(lines):
+    """Line numbers as text, runs of them as ranges."""
+    runs = np.split(lines, np.flatnonzero(np.diff(lines) != 1) + 1)
+    return ", ".join(f"{run[0]}" if run.size == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
 def _checked(spec, kind):
@@ -64,20 +148,39 @@ def _checked(spec, kind):
     if not isinstance(spec.get("points"), (str, Path)):
         raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
     if spec.get("unit") not in (None, *_UNITS):
-        raise InputError(kind, "unit", f"expected m or mm, got {spec['unit']!r}")
+        raise InputError(kind, "unit", f"expected m, mm or inch, got {spec['unit']!r}")
     for key in ("inclined", "mirrored", "downwards"):
         if not isinstance(spec.get(key, True), bool):
             raise InputError(kind, key, f"expected true or false, got {spec[key]!r}")
-    shift = spec.get("shift", [0.0, 0.0])
-    if not isinstance(shift, (list, tuple)) or len(shift) != 2 or not all(map(_is_distance, shift)):
-        raise InputError(kind, "shift", f"expected two distances in m, within 1, got {shift!r}")
-    if Path(spec["points"]).suffix.lower() in (".prw", ".prr") and {"mirrored", "downwards", "shift"} & set(spec):
+    for key in ("shift", "within"):
+        pair = spec.get(key, [0.0, 0.0])
+        if not isinstance(pair, (list, tuple)) or len(pair) != 2 or not all(map(_is_distance, pair)):
+            raise InputError(kind, key, f"expected two distances in m, within 1, got {pair!r}")
+    _check_origin(spec, kind)
+    if not isinstance(spec.get("part", 1), int) or isinstance(spec.get("part"), bool):
+        raise InputError(kind, "part", f"expected a whole number, got {spec['part']!r}")
+    if spec.get("side", "left") not in ("left", "right"):
+        raise InputError(kind, "side", f"expected left or right, got {spec['side']!r}")
+    if Path(spec["points"]).suffix.lower() in _SIMPACK and {"mirrored", "downwards", "shift"} & set(spec):
         expected = "expected none of these: a SIMPACK file states them itself"
         raise InputError(kind, "mirrored, downwards, shift", expected)
     smoothing = spec.get("smoothing", 0.0)
     if isinstance(smoothing, bool) or not isinstance(smoothing, (int, float)):
         raise InputError(kind, "smoothing", f"expected a distance in m, got {smoothing!r}")
     return spec
+
+
+def _check_origin(spec, kind):
+    """A wheel's origin is said once, a rail's not at all."""
+    given = [key for key in ("shift", "tape_circle", "flange_back") if key in spec]
+    if len(given) > 1:
+        raise InputError(kind, given[1], f"expected this or {given[0]}, not both")
+    for key in set(given) - {"shift"}:
+        if kind == "rail":
+            expected = "expected this of wheels only: the gauge point (track.gauge_depth) places a rail"
+            raise InputError(kind, key, expected)
+        if not _is_distance(spec[key]):
+            raise InputError(kind, key, f"expected a distance in m, within 1, got {spec[key]!r}")
 
 
 def _is_distance(value):
@@ -98,10 +201,8 @@ def _text(path):
 def _numbers(path, line, text):
     """Two numbers or more of one line; a comma within is a decimal one beside semicolons and tabs, elsewhere it
     separates."""
-    text = text.strip(" \t,;")
-    apart = re.split(r"[\s,]*[;\t]\s*", text)
-    words = [word.replace(",", ".") for word in apart] if len(apart) > 1 else re.split(r"\s*,\s*|\s+", text)
-    mixed = len(apart) == 1 and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
+    text, words = text.strip(" \t,;"), split(text)
+    mixed = not re.search(r"[;\t]", text) and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
     try:
         numbers = [float(word) for word in words]
     except ValueError:
@@ -206,7 +307,7 @@ def read_simpack(path, text, smoothed=False):
 def _simpack_points(path, text, begin):
     points, lines = [], []
     for number, line in enumerate(text.splitlines(), 1):
-        line = line.partition("!")[0].strip()
+        line = re.split("[!%]", line)[0].strip()
         if number <= begin or not line:
             continue
         if line == "point.end":

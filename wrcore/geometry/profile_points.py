@@ -1,7 +1,7 @@
 """Measured points to a smooth outline: checks, parametric spline, origin."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,9 @@ _LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than t
 _WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
 _STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
+_SMOOTHER = " (dents and noise: smoothing, such as 5.0e-5, evens them out)"
+_OUTSIDE = "expected u = 0 (tape circle) inside a wheel profile, got it outside: tape_circle or flange_back says where"
+_BACK = 1e-3  # m; where two passes of a meter are joined, points go back by less than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,10 @@ class Outline:
 
     curve: "BSpline"
     name: str
+    points: np.ndarray
+    """All points that were given, m, (n, 2), in its pose."""
+    s: np.ndarray
+    """Their parameters, (n,), NaN for those that it does not follow."""
 
     def _component(self, column):
         from scipy.interpolate import PPoly
@@ -45,6 +52,15 @@ class Outline:
 
     def span(self, steepest):
         """Connected range of u (m) around 0 that is single-valued and no steeper than ``steepest``."""
+        return tuple(map(float, self.curve(np.array(self._ends(steepest)))[:, 0]))
+
+    def followed(self, steepest):
+        """Which of the points lie on `span`, (n,)."""
+        first, last = self._ends(steepest)
+        return (self.s >= first) & (self.s <= last)
+
+    def _ends(self, steepest):
+        """Parameters of the ends of `span`."""
         s = self._dense()
         u = self.curve(s)[:, 0]
         du, df = self.curve(s, nu=1).T
@@ -54,7 +70,7 @@ class Outline:
             raise InputError(self.name, "points", "expected a smooth profile around u = 0, got one too steep there")
         bad = np.flatnonzero(~good)
         first, last = bad[bad < home].max(initial=-1) + 1, bad[bad > home].min(initial=u.size) - 1
-        return float(u[first]), float(u[last])
+        return s[first], s[last]
 
     def working_span(self, steepest, trim):
         """`span`, refused where it is too narrow or, unless ``trim``, ends long before the points do."""
@@ -67,7 +83,7 @@ class Outline:
             u = u[f > f[(u >= low) & (u <= high)].max() - _DEEPEST]
         for end, rest in ((low, low - u.min()), (high, u.max() - high)):
             if rest > _LEFT_OUT:
-                got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond"
+                got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond" + _SMOOTHER
                 raise InputError(self.name, "points", f"expected slopes below {steepest:g}, {got}")
         return low, high
 
@@ -100,7 +116,8 @@ class Outline:
 
     def shifted(self, du, df):
         """The outline moved by (``du``, ``df``), m."""
-        return Outline(type(self.curve)(self.curve.t, self.curve.c + (du, df), self.curve.k), self.name)
+        moved = type(self.curve)(self.curve.t, self.curve.c + (du, df), self.curve.k)
+        return replace(self, curve=moved, points=self.points + (du, df))
 
     def innermost(self, depth):
         """Abscissa (m) of the leftmost point at most ``depth`` (m) below the ordinate 0, NaN if not reached."""
@@ -121,20 +138,21 @@ def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0
     _check_numbers(u, f, name, lines)
     if not 0.0 <= smoothing < 1e-3:
         raise InputError(name, "smoothing", f"expected a distance in m, 0 to 0.001, got {smoothing:g}")
-    new = np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0))  # the same point twice says nothing more
-    u, f, lines = u[new], f[new], lines[new]
+    kept = np.flatnonzero(np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0)))  # a point twice says nothing more
     if u[-1] < u[0]:
-        u, f, lines = u[::-1], f[::-1], lines[::-1]
+        kept = kept[::-1]
     if not trim:
-        _check_monotone(u, name, lines)
+        _check_monotone(u[kept], name, lines[kept])
     if inclination:
         c, s = np.cos(np.arctan(inclination)), np.sin(np.arctan(inclination))
         u, f = u * c - f * s, u * s + f * c
     if kind == "rail":
-        _check_rail(f, name)
-        u, f, lines = _head(u, f, lines, name)
-    outline = _spline(u, f, name, lines, smoothing)
-    return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline, u, f)
+        _check_rail(f[kept], name)
+        kept = kept[_head(u[kept], f[kept], lines[kept], name)]
+    if trim:
+        kept = kept[_forward(u[kept], f[kept])]
+    outline = _spline(u, f, kept, name, lines, smoothing)
+    return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline, u[kept], f[kept])
 
 
 def _check_numbers(u, f, name, lines):
@@ -170,7 +188,7 @@ def _check_rail(f, name):
 
 
 def _head(u, f, lines, name):
-    """The connected run of rail points around the highest one, down to where nothing is touched."""
+    """The connected run of rail points around the highest one, down to where nothing is touched, as a slice."""
     top = int(np.argmax(f))
     low = f < f[top] - _DEEPEST
     deep = np.flatnonzero(low)
@@ -180,7 +198,19 @@ def _head(u, f, lines, name):
         i = int(np.argmin(low))
         got = f"got another one, {f[top] - f[i]:.3g} m below the highest, at u = {u[i]:.4g} m"
         raise InputError(name, f"line {lines[i]}", f"expected one rail head, {got}: leave it out")
-    return u[keep], f[keep], lines[keep]
+    return keep
+
+
+def _forward(u, f):
+    """Which points remain without those that step back by less than `_BACK`, where a meter's passes are joined: not on
+    side faces, which may really go back."""
+    remain, du, df = np.ones(u.size, dtype=bool), np.diff(u), np.diff(f)
+    level = np.abs(df) < du
+    for i in np.flatnonzero((du[1:] < 0.0) & (np.abs(df[1:]) < -_STEEP * du[1:]) & level[:-1]) + 2:
+        ahead = np.flatnonzero(u[i:] > u[i - 1])[:1] + i
+        if ahead.size and u[i - 1] - u[i : ahead[0]].min() < _BACK and np.hypot(du, df)[i : ahead[0]].sum() < 2 * _BACK:
+            remain[i : ahead[0]] = False
+    return remain
 
 
 def _check_gaps(u, f, name, lines):
@@ -198,25 +228,28 @@ def _check_gaps(u, f, name, lines):
         warn(f"{name}: line {lines[i + 1]}: {gap}, is bridged by a spline")
 
 
-def _spline(u, f, name, lines, smoothing):
-    """Parametric cubic spline over chord length; points that nearly coincide with the one before are left out."""
+def _spline(u, f, kept, name, lines, smoothing):
+    """Parametric cubic spline over chord length through the points ``kept``; those that nearly coincide with the one
+    before are left out."""
     from scipy.interpolate import BSpline, splprep
 
-    kept = [0]
-    for i in range(1, u.size):
-        if np.hypot(u[i] - u[kept[-1]], f[i] - f[kept[-1]]) > _CLOSE:
-            kept.append(i)
-    if len(kept) < FEWEST:
-        raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(kept)}")
-    _check_gaps(u[kept], f[kept], name, lines[kept])
+    used = list(kept[:1])
+    for i in kept[1:]:
+        if np.hypot(u[i] - u[used[-1]], f[i] - f[used[-1]]) > _CLOSE:
+            used.append(i)
+    if len(used) < FEWEST:
+        raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(used)}")
+    _check_gaps(u[used], f[used], name, lines[used])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # FITPACK warns where it misses the asked distance
-            (knots, coefficients, degree), _ = splprep([u[kept], f[kept]], s=len(kept) * smoothing**2, k=3)
+            (knots, coefficients, degree), at = splprep([u[used], f[used]], s=len(used) * smoothing**2, k=3)
     except (ValueError, RuntimeWarning) as error:
         expected = f"expected points that a spline can follow to {smoothing:g} m (more smoothing, or 0)"
         raise InputError(name, "smoothing", f"{expected}: {error}") from None
-    return Outline(BSpline(knots, np.column_stack(coefficients), degree), name)
+    s = np.full(u.size, np.nan)
+    s[used] = at
+    return Outline(BSpline(knots, np.column_stack(coefficients), degree), name, np.column_stack((u, f)), s)
 
 
 def _rail_pose(outline):
@@ -231,7 +264,7 @@ def _rail_pose(outline):
 
 def _wheel_pose(outline, u, f):
     if not u.min() < 0.0 < u.max():
-        raise InputError(outline.name, "points", "expected u = 0 (tape circle) inside a wheel profile, got it outside")
+        raise InputError(outline.name, "points", _OUTSIDE)
     if u[np.argmin(f)] > 0.0:
         expected = "expected the flange at negative u and f positive up, got the largest radius on the field side"
         raise InputError(outline.name, "points", expected)

@@ -144,8 +144,8 @@ def named_profile(
     ----------
     spec : str or dict
         "S1002" (wheel); "UIC60-MBench", "60E1", ... (rails, `RAIL_HEADS`); "cone:1/20" (wheel); "circle:0.3" (rail,
-        radius in m); the path of a point file; or ``{"points": path, "unit": "mm", "inclined": False,
-        "smoothing": 1e-6}`` of which only ``points`` is required. Files: `wrcore.geometry.profile_files`.
+        radius in m); the path of a point file (CSV, SIMPACK, MiniProf, Vampire); or ``{"points": path, "unit": "mm",
+        "tape_circle": 0.07, ...}`` of which only ``points`` is required: `wrcore.geometry.profile_files.read_profile`.
     kind : {"wheel", "rail"}
         What the profile is used for.
     inclination : float, optional
@@ -159,6 +159,7 @@ def named_profile(
     Returns
     -------
     ProfileCurve
+        Its ``source`` says where it is from and, of a file, what was read, turned and left out.
 
     Raises
     ------

@@ -9,11 +9,9 @@ from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.input_files import digest_of_file
+from wrcore.geometry.profile_files import POINT_FILES
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import SIDES
-
-POINT_FILES = (".csv", ".prw", ".prr", ".dat", ".txt")
-"""Endings by which a profile given as plain text is taken for a point file."""
 
 LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
 NAMED_BY = ("parameters", "profile", "points", "table")  # keys of a scene whose values name files

@@ -202,6 +202,23 @@ def test_profiles_over_distance(tmp_path):
     assert main(["draw", str(tmp_path), "--out", str(tmp_path / "worn.svg")]) == 0
 
 
+def test_a_profile_with_the_points_of_its_file(tmp_path):
+    u = np.linspace(-30.0, 30.0, 121)
+    x, y = np.append(u, [30.01, 30.02, 30.01]), np.append(-(u**2) / 50, [-19.0, -21.0, -23.0])
+    (tmp_path / "rail.ban").write_text("ColumnDef=X,Y\n\n" + "".join(f"{a} {b}\n" for a, b in zip(x, y, strict=True)))
+    figure = wr.draw(wr.named_profile(tmp_path / "rail.ban", "rail"))
+    curve, followed, left_out, gauge = figure.axes[0].lines
+    assert len(followed.get_xdata()) + len(left_out.get_xdata()) == 124
+    assert left_out.get_ydata().min() == pytest.approx(-23.0) and 3 <= len(left_out.get_xdata()) < 10
+    on_curve = np.interp(followed.get_xdata(), *curve.get_data())
+    assert np.max(np.abs(on_curve - followed.get_ydata())) < 1e-3
+    assert gauge.get_xdata()[0] == pytest.approx(-np.sqrt(14.0 * 50.0), abs=0.01)
+    assert findings(figure) == []
+    named = wr.draw(wr.named_profile("S1002", "wheel"))
+    assert [text.get_text() for text in named.axes[0].get_legend().get_texts()] == ["curve", "tape circle"]
+    assert findings(named) == []
+
+
 def pose_only():
     run = hunting_run()
     del run.groups["wheelset"]["yaw_rad"]

@@ -12,12 +12,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wrcore.analysis.pictures.animation import Animation, animate
+from wrcore.analysis.pictures.plot_profile import plot_profile
 from wrcore.analysis.pictures.plot_vehicle import plot_vehicle
 from wrcore.analysis.pictures.plot_wear import plot_evolution
 from wrcore.analysis.wear.evolve import profiles_over_distance
 from wrcore.analysis.wear.wear_folder import TABLE, rows_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.run.results import load_run
 from wrcore.run.run import Run
 from wrcore.scene.description import Scene, Source, as_scene, load_scene
@@ -25,19 +27,20 @@ from wrcore.scene.description import Scene, Source, as_scene, load_scene
 
 @checked
 def draw(
-    source: Source | Run,
+    source: Source | Run | ProfileCurve,
     scene: Source | None = None,
     factor: Annotated[float | None, Within(1.0, 1e6)] = None,
     begin: float = 0.0,
     end: Annotated[float, Within(high=math.inf)] = math.inf,
 ) -> Figure | Animation:
-    """Draw a scene's vehicle, put a run in motion, or show how a profile wears.
+    """Draw a scene's vehicle, a profile, put a run in motion, or show how a profile wears.
 
     Parameters
     ----------
-    source : Scene, Run, str, Path or dict
+    source : Scene, Run, ProfileCurve, str, Path or dict
         A scene (or its file, or content): side and plan view of its vehicle with all bodies, force elements and joints.
         A run (or its HDF5 file): an animation. A folder of :func:`wrcore.evolve`: the profile over the distance.
+        A profile (:func:`wrcore.named_profile`): its curve and, of a file, the points it follows and those left out.
     scene : Scene, str, Path or dict, optional
         That of a run; left out: the one that the run names, with its files looked for from the working directory.
     factor : float, optional
@@ -70,6 +73,8 @@ def draw(
     for name, value in options.items():
         if value is not None:
             raise InputError("draw", name, "expected this with a run only")
+    if isinstance(source, ProfileCurve):
+        return plot_profile(source)
     if not isinstance(source, Scene | Mapping) and os.path.isdir(source):
         if not (Path(source) / TABLE).is_file():
             raise InputError("draw", source, f"expected a folder of evolve, with {TABLE}")

@@ -1,0 +1,217 @@
+"""Files of profile meters (MiniProf) and of Vampire: points as they stand there, with the directions and origin that
+the file states or its kind implies.
+
+MiniProf, ``.whl`` (wheels), ``.ban`` (rails), ``.mpt`` (parts): mm; a header of lines ``Key=value``, or one that says
+MINIPROF and ends at a blank line; ``"``, ``%``, ``!`` and ``#`` begin comments. Wheels count from the flange back, up
+is where the flange points; the tape circle is at ``WheelDiameterTaperline``, else at `TAPE_CIRCLE`. Rails have the
+gauge side at positive abscissae. Up or down is seen from the points. Parts are sections ``[Profile1Info]``,
+``[Profile1Points]``. Source: files in CONTACT's test bank, its user guide (mirroring) and ``read_miniprof.m``.
+
+Vampire, ``.whe`` (wheels), ``.rai`` (rails): four lines of header, then y and z of the left and of the right side in
+mm, z up for rails, flange up for wheels. Source: ``read_vampire.m`` of CONTACT.
+"""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.errors import InputError
+
+METER_FILES = (".whl", ".ban", ".mpt")
+VAMPIRE_FILES = (".whe", ".rai")
+
+TAPE_CIRCLE = 0.070
+"""Distance of the tape circle from the flange back where nobody states one, m (EN 15302)."""
+
+_INCH = 0.0254
+_DATUMS = {"EUROPEAN": 0.070, "US1": (2 + 27 / 32) * _INCH, "US2": (3 + 1 / 16) * _INCH}
+_GAUGE_POINTS = {"EUROPEAN": 0.014, "US": 5 / 8 * _INCH}
+_END = 0.05  # of the points: extremes that close to an end are side faces
+
+
+class Stated(NamedTuple):
+    """What a file says of its points, or its kind implies."""
+
+    about: str
+    mirrored: bool | None = False
+    downwards: bool | None = False
+    """None of both: as `seen` from the points."""
+    tape_circle: float = 0.0
+    """Abscissa (m, to the field side) of a wheel's tape circle from the file's origin."""
+    assumed: tuple[str, ...] = ()
+    """Which of these nobody has stated."""
+    offset: tuple[float, float] = (0.0, 0.0)
+    """Added to the file's two coordinates, m."""
+    odd: str = ""
+    """What a reader should look at."""
+    trimmed: bool = True
+    """Whether side faces are left out instead of refused."""
+
+
+def is_meter_file(path, text):
+    """Whether a file is read with a profile meter's conventions."""
+    return path.suffix.lower() in METER_FILES or bool(re.match(r"\ufeff?\s*(#\s*MINI|MINIPROF\b|\[FileInfo\])", text))
+
+
+def read_meter(path, text, kind, unit, part=None):
+    """Points x, y (n,) in m as a MiniProf file has them, the line number of each, and `Stated`.
+
+    ``unit``: m per unit of the file; ``part``: number of a section, for files with several."""
+    rows = _rows(text)
+    rows, about = _part(path, rows, part)
+    keys, rows = _meter_header(path, rows)
+    column = _columns(path, keys)
+    points, lines = [], []
+    for number, line in rows:
+        words = split(line)
+        try:
+            points.append([float(words[k]) for k in column])
+        except (ValueError, IndexError):
+            raise InputError(path, f"line {number}", f"expected two numbers, got {line[:40]!r}") from None
+        lines.append(number)
+    x, y = np.array(points, dtype=float).reshape(-1, 2).T * unit
+    count = keys.get("xypoints", "")
+    odd = f", {count} by its header" if count.isdecimal() and int(count) != len(lines) else ""
+    offset = tuple(_key(path, keys, name) * unit for name in ("xoffset", "yoffset"))
+    if kind == "rail":
+        return x, y, lines, Stated(about, None, None, 0.0, ("mirrored",), offset, odd)
+    tape = _key(path, keys, "wheeldiametertaperline") * unit
+    assumed = () if tape else ("tape_circle",)
+    return x, y, lines, Stated(about, None, None, tape or TAPE_CIRCLE, assumed, offset, odd)
+
+
+def _rows(text):
+    """Lines without comments, with their numbers."""
+    lines = ((number, re.split('["%!#]', line)[0].strip(), line) for number, line in enumerate(text.splitlines(), 1))
+    return [(number, line) for number, line, whole in lines if line or not whole.strip()]
+
+
+def _part(path, rows, part):
+    """The rows of one part of a file that has several, header first."""
+    heads = [(k, re.fullmatch(r"\[Profile(\d+)(Info|Points)\]", line)) for k, (_, line) in enumerate(rows)]
+    starts = {(int(m[1]), m[2]): k for k, m in heads if m}
+    parts = sorted({number for number, what in starts if what == "Points"})
+    if part is None and len(parts) < 2:
+        part = parts[0] if parts else None
+    if part not in (parts or [None]):
+        got = "none" if part is None else part
+        one = " or ".join(map(str, parts)) if parts else "none, as the file has no sections [Profile1Points]"
+        raise InputError(path, "part", f"expected {one}, got {got}")
+    if not parts:
+        return rows, "MiniProf"
+    ends = sorted(k for k, (_, line) in enumerate(rows) if line.startswith("["))
+    picked = []
+    for what in ("Info", "Points"):
+        if (begin := starts.get((part, what))) is not None:
+            picked += rows[begin + 1 : min((k for k in ends if k > begin), default=len(rows))]
+    return picked, f"MiniProf, part {part} of {', '.join(map(str, parts))}"
+
+
+def _meter_header(path, rows):
+    """Keys before the points, lower case, and the rows with points."""
+    old = next((k for k, (_, line) in enumerate(rows) if line.upper().startswith("MINIPROF")), None)
+    if old is not None:
+        blank = next((k for k in range(old, len(rows)) if not rows[k][1]), None)
+        if blank is None:
+            raise InputError(path, f"line {rows[old][0]}", "expected a blank line between the header and the points")
+        return {}, [row for row in rows[blank:] if row[1]]
+    keys, rows = {}, [row for row in rows if row[1]]
+    for k, (_, line) in enumerate(rows):
+        key, equals, value = line.partition("=")
+        if not equals:
+            return keys, rows[k:]
+        keys[key.strip().lower()] = value.strip()
+    return keys, []
+
+
+def _columns(path, keys):
+    """Places of X and Y among the columns."""
+    names = [name.strip().upper() for name in keys.get("columndef", "X,Y").split(",")]
+    if "X" not in names or "Y" not in names:
+        raise InputError(path, "ColumnDef", f"expected columns X and Y, got {keys['columndef'][:40]!r}")
+    return names.index("X"), names.index("Y")
+
+
+def _key(path, keys, name):
+    """The number under a key; 0 where there is none."""
+    text = keys.get(name) or "0"
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(path, name, f"expected a number, got {text[:40]!r}")
+    return value
+
+
+def split(line):
+    """Words of a line of numbers; a comma is a decimal one beside semicolons and tabs, elsewhere it separates."""
+    line = line.strip(" \t,;")
+    apart = re.split(r"[\s,]*[;\t]\s*", line)
+    return [word.replace(",", ".") for word in apart] if len(apart) > 1 else re.split(r"\s*,\s*|\s+", line)
+
+
+def seen(kind, x, y):
+    """Whether the abscissa counts to the track's centre, and the ordinate down, as the points show: side faces of
+    wheels and rails point away from where they touch. A wheel's flange is beside its flange back; a rail's gauge side
+    cannot be seen and is taken to be at positive abscissae, as meters have it."""
+    if y.size < 2:
+        return False, False
+    lowest, highest = (np.argmin(y) / (y.size - 1), np.argmax(y) / (y.size - 1))
+    inside = [_END < place < 1.0 - _END for place in (lowest, highest)]
+    if kind == "rail":
+        return True, inside == [True, False]
+    up = inside != [True, False]  # the flange
+    tip = x[np.argmax(y) if up else np.argmin(y)]
+    return bool(tip > 0.5 * (x.min() + x.max())), up
+
+
+def read_vampire(path, text, kind, side="right"):
+    """Points y, z (n,) in m of one ``side`` of a Vampire file, the line number of each, and `Stated`."""
+    rows = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
+    first = rows[0][1].upper() if rows else ""
+    found = {"WHEELPROFILE": "wheel", "RAILPROFILE": "rail"}.get(first)
+    if found is None:
+        raise InputError(path, "line 1", f"expected WHEELPROFILE or RAILPROFILE, got {first[:40]!r}")
+    if found != kind:
+        raise InputError(path, "line 1", f"expected a {kind} profile, got a {found}")
+    wheel = kind == "wheel"
+    named = ("TREADDATUM", _DATUMS) if wheel else ("GAUGEPOINT", _GAUGE_POINTS)
+    datum, point = _vampire_key(path, rows, 3, *named)
+    width, _ = _vampire_key(path, rows, 4, "FLANGEBACK" if wheel else "GAUGE", {})
+    points, lines = [], []
+    for number, line in rows[4:]:
+        words = split(re.split('["%!]', line)[0])
+        if words == [""]:
+            continue
+        try:
+            points.append([float(word) for word in words[:4]])
+        except ValueError:
+            points.append([])
+        if len(points[-1]) < 4:
+            expected = "expected y and z of the left and of the right side, four numbers"
+            raise InputError(path, f"line {number}", f"{expected}, got {line[:40]!r}")
+        lines.append(number)
+    table = 1e-3 * np.array(points, dtype=float).reshape(-1, 4).T
+    y, z = table[:2] if side == "left" else table[2:]
+    if wheel:
+        about = f"Vampire, {side} side, tread datum {point}, {1e3 * datum:.2f} mm from the flange back"
+        return y, z, lines, Stated(about, side == "left", True, 0.5 * width + datum)
+    about = f"Vampire, {side} side, gauge point {point}, {1e3 * datum:.2f} mm below the top (track.gauge_depth)"
+    return y, z, lines, Stated(about, side == "left")
+
+
+def _vampire_key(path, rows, number, key, named):
+    """Value in m of a header line ``key value`` or ``key NAME``, and its name."""
+    line = rows[number - 1][1] if len(rows) >= number else ""
+    words = line.upper().split()
+    if words[:1] == [key] and len(words) > 1:
+        if words[1] in named:
+            return named[words[1]], words[1]
+        try:
+            return 1e-3 * float(words[-1]), words[1]
+        except ValueError:
+            pass
+    names = f"one of {', '.join(named)} or CUSTOM and " if named else ""
+    raise InputError(path, f"line {number}", f"expected {key} and {names}a number of mm, got {line[:40]!r}")
