@@ -24,6 +24,9 @@ GROUPS = {
         "wheel_forces", "wheel_table", "wheelset_channels", "creep_power", "wear_number", "modes", "critical_speeds",
         "limit_cycles", "Settling",
     ),
+    "Response, curving, roll": (
+        "frequency_response", "plot_frequency_response",
+    ),
     "Pictures": ("draw", "plot_wheel_on_rail"),
     "Assessment, damage and wear": (
         "assess", "Assessment", "damage_table", "plot_shakedown", "local_wear", "WheelWear", "evolve",
