@@ -25,7 +25,7 @@ GROUPS = {
         "limit_cycles", "Settling",
     ),
     "Response, curving, roll": (
-        "frequency_response", "plot_frequency_response",
+        "frequency_response", "plot_frequency_response", "quasi_static_curving", "roll_coefficient",
     ),
     "Pictures": ("draw", "plot_wheel_on_rail"),
     "Assessment, damage and wear": (

@@ -88,6 +88,8 @@ def calls():
         "plot_frequency_response": {"table": the["response"]},
         "plot_pair": {"pair": pair, "shifts": [0.0]}, "plot_run": {"run": run, "channels": ["wheelset.y_m"]},
         "plot_wheel_on_rail": {"source": pair, "side": "left", "load": 5e4, "y": 0.0},
+        "quasi_static_curving": {"scene": scene, "radii": [2000.0], "cant": 0.05, "speed": 20.0, "widening": 0.0,
+                                 "cant_deficiency": None}, "roll_coefficient": {"scene": scene, "cant": 0.05},
         "run_sweep": {"source": sweep, "threads": 1, "progress": None},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},

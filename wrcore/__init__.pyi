@@ -14,6 +14,8 @@ from wrcore.analysis.pictures.plot_creep import plot_creep_force as plot_creep_f
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
 from wrcore.analysis.pictures.plot_response import plot_frequency_response as plot_frequency_response
 from wrcore.analysis.pictures.plot_run import plot_run as plot_run
+from wrcore.analysis.response.curving import quasi_static_curving as quasi_static_curving
+from wrcore.analysis.response.curving import roll_coefficient as roll_coefficient
 from wrcore.analysis.response.frequency_response import frequency_response as frequency_response
 from wrcore.analysis.stability.limit_cycles import Settling as Settling
 from wrcore.analysis.stability.limit_cycles import limit_cycles as limit_cycles

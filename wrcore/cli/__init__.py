@@ -14,6 +14,7 @@ from wrcore.cli import (
     conicity,
     contact,
     creep,
+    curving,
     draw,
     evolve,
     init,
@@ -28,7 +29,22 @@ from wrcore.cli.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
-COMMANDS = (init, simulate, sweep, assess, response, draw, evolve, contact, conicity, creep, table, profiles, keys)
+COMMANDS = (
+    init,
+    simulate,
+    sweep,
+    assess,
+    response,
+    curving,
+    draw,
+    evolve,
+    contact,
+    conicity,
+    creep,
+    table,
+    profiles,
+    keys,
+)
 """Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
 what the options say."""
 
