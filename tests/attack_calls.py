@@ -40,7 +40,7 @@ def things():
     return {
         "wheel": wheel, "rail": rail, "pair": pair, "scene": scene, "run": run, "table": wr.ensure_table(),
         "rolling": wr.RollingContact(1.0, level=6), "patch": wr.patch(pair, load=5e4)[0],
-        "response": wr.frequency_response(scene, ["level"], ["wheelset.z_m"], [1.0, 2.0]),
+        "assessed": wr.assess(run), "response": wr.frequency_response(scene, ["level"], ["wheelset.z_m"], [1.0, 2.0]),
     }  # fmt: skip
 
 
@@ -91,6 +91,9 @@ def calls():
         "quasi_static_curving": {"scene": scene, "radii": [2000.0], "cant": 0.05, "speed": 20.0, "widening": 0.0,
                                  "cant_deficiency": None}, "roll_coefficient": {"scene": scene, "cant": 0.05},
         "run_sweep": {"source": sweep, "threads": 1, "progress": None},
+        "section_statistics": {"assessments": [the["assessed"]], "k": 1.0},
+        "speed_ramp": {"scene": scene, "start": 60.0, "end": 59.9, "rate": 1.0, "disturbances": [0.001],
+                       "settling": wr.Settling(window=0.05, longest=0.1)},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},
         "simulate_to_accuracy": {"scene": scene, "accuracy": 1e-3, "of": "y", "progress": None},

@@ -1,6 +1,7 @@
 # Public names, each once: types for checkers and editors, and where `wrcore.__getattr__` loads it from.
 from wrcore.analysis.assessment.assess import Assessment as Assessment
 from wrcore.analysis.assessment.assess import assess as assess
+from wrcore.analysis.assessment.assess import section_statistics as section_statistics
 from wrcore.analysis.assessment.wheels import creep_power as creep_power
 from wrcore.analysis.assessment.wheels import wear_number as wear_number
 from wrcore.analysis.assessment.wheels import wheel_forces as wheel_forces
@@ -19,6 +20,7 @@ from wrcore.analysis.response.curving import roll_coefficient as roll_coefficien
 from wrcore.analysis.response.frequency_response import frequency_response as frequency_response
 from wrcore.analysis.stability.limit_cycles import Settling as Settling
 from wrcore.analysis.stability.limit_cycles import limit_cycles as limit_cycles
+from wrcore.analysis.stability.limit_cycles import speed_ramp as speed_ramp
 from wrcore.analysis.stability.stability import critical_speeds as critical_speeds
 from wrcore.analysis.stability.stability import modes as modes
 from wrcore.analysis.to_accuracy import simulate_to_accuracy as simulate_to_accuracy
