@@ -198,7 +198,7 @@ def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m"
     >>> import wrcore as wr
     >>> table = wr.roll_coefficient(wr.example("trailer_vehicle")).set_index("body")
     >>> table.loc["car_body", "roll_coefficient"].round(2).item()
-    0.2
+    0.16
     """
     curving = Curving(as_scene(scene))
     curve = Curve(0.0, cant, 0.0, curving.straight.curve.speed)
