@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import dataclasses
 import math
 from typing import Annotated
 
@@ -11,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from wrcore.analysis.response.frequency_response import observable
 from wrcore.analysis.stability.stability import rising
 from wrcore.balance.curve import Curve, CurveBalance, curve_model, on_circle, solve_curve
 from wrcore.balance.initial import LARGEST_REST_ON_STRIPS
@@ -110,18 +109,15 @@ class Curving:
     """A scene's vehicle on curves without end."""
 
     def __init__(self, scene: Scene) -> None:
-        data = copy.deepcopy(scene.data)
-        data.pop("drive", None)
-        data["output"]["channels"] = ["pose", "velocity", "contact"]
         for item in scene.vehicle.data.get("elements", ()):
             if "approach" in item:
                 expected = "expected friction with series_stiffness: where approach leads depends on how it came there"
                 raise InputError(scene.source, f"elements.{item['name']}", expected)
         if np.any(scene.vehicle.joints.bodies == FRAME):
             raise InputError(scene.source, "vehicle", "expected one without joints to the moving frame")
-        self.simulation = Simulation(dataclasses.replace(scene, data=data))
+        self.simulation = Simulation(observable(scene))
         self.model = undriven(self.simulation.model)
-        self.aside = WIDENED[data["track"]["widened"]]
+        self.aside = WIDENED[scene.data["track"]["widened"]]
         self.limit = LARGEST_REST_ON_STRIPS if self.model.contact.strips.strips else LARGEST_REST
         state = static_equilibrium(self.simulation.scene, self.model).state
         self.straight = CurveBalance(Curve(0.0, 0.0, 0.0, float(self.model.speed)), state, 0.0, 0.0)

@@ -94,7 +94,7 @@ def frequency_response(
     >>> table["alignment", "wheelset.y_m"].abs().round(2).tolist()
     [0.97, 0.02]
     """
-    scene = _plain(as_scene(scene))
+    scene = observable(as_scene(scene))
     (speed,) = rising([scene.data["speed"] if speed is None else speed])
     simulation = Simulation(scene)
     model = undriven(simulation.model)
@@ -116,7 +116,7 @@ def frequency_response(
     return table
 
 
-def _plain(scene: Scene) -> Scene:
+def observable(scene: Scene) -> Scene:
     """The scene without its drive, with all channels that outputs may follow from."""
     data = copy.deepcopy(scene.data)
     data.pop("drive", None)
