@@ -22,11 +22,15 @@ GROUPS = {
     "Creep forces": ("creep_force", "CreepTable", "ensure_table", "RollingContact", "plot_creep_force"),
     "Forces, modes, critical speeds": (
         "wheel_forces", "wheel_table", "wheelset_channels", "creep_power", "wear_number", "modes", "critical_speeds",
-        "limit_cycles", "Settling",
+        "limit_cycles", "speed_ramp", "Settling",
+    ),
+    "Response, curving, roll": (
+        "frequency_response", "plot_frequency_response", "quasi_static_curving", "roll_coefficient",
     ),
     "Pictures": ("draw", "plot_wheel_on_rail"),
     "Assessment, damage and wear": (
-        "assess", "Assessment", "damage_table", "plot_shakedown", "local_wear", "WheelWear", "evolve",
+        "assess", "Assessment", "section_statistics", "damage_table", "plot_shakedown", "local_wear",
+        "WheelWear", "evolve",
     ),
     "Many runs": ("load_sweep", "run_sweep"),
     "Errors": ("InputError",),

@@ -40,6 +40,7 @@ def things():
     return {
         "wheel": wheel, "rail": rail, "pair": pair, "scene": scene, "run": run, "table": wr.ensure_table(),
         "rolling": wr.RollingContact(1.0, level=6), "patch": wr.patch(pair, load=5e4)[0],
+        "assessed": wr.assess(run), "response": wr.frequency_response(scene, ["level"], ["wheelset.z_m"], [1.0, 2.0]),
     }  # fmt: skip
 
 
@@ -70,6 +71,8 @@ def calls():
         "evolve": {"plan": plan, "folder": "worn", "say": None, "changes": {}, "threads": 1, "spent": {}},
         "example": {"name": "wheelset"}, "list_profiles": {},
         "first_touch": {"pair": pair, "shifts": [0.0], "roll": True},
+        "frequency_response": {"scene": scene, "inputs": ["level"], "outputs": ["wheelset.z_m"], "frequencies": [1.0],
+                               "speed": 20.0},
         "hunting_frequency": {"t": [0.0, 1.0, 2.0, 3.0], "y": [1.0, -1.0, 1.0, -1.0]},
         "limit_cycles": {"scene": scene, "speeds": [40.0], "settling": wr.Settling(window=0.05, longest=0.1),
                          "disturbances": [0.001], "resolution": 1.0},
@@ -82,9 +85,15 @@ def calls():
                   "resolution": "coarse", "slip": "surfaces", "load_by": "vertical"},
         "plot_creep_force": {"models": ["linear"], "a": 5e-3, "b": 5e-3, "normal_force": 5e4, "mu": 0.3, "spin": 0.5,
                              "largest": 8e-3},
+        "plot_frequency_response": {"table": the["response"]},
         "plot_pair": {"pair": pair, "shifts": [0.0]}, "plot_run": {"run": run, "channels": ["wheelset.y_m"]},
         "plot_wheel_on_rail": {"source": pair, "side": "left", "load": 5e4, "y": 0.0},
+        "quasi_static_curving": {"scene": scene, "radii": [2000.0], "cant": 0.05, "speed": 20.0, "widening": 0.0,
+                                 "cant_deficiency": None}, "roll_coefficient": {"scene": scene, "cant": 0.05},
         "run_sweep": {"source": sweep, "threads": 1, "progress": None},
+        "section_statistics": {"assessments": [the["assessed"]], "k": 1.0},
+        "speed_ramp": {"scene": scene, "start": 60.0, "end": 59.9, "rate": 1.0, "disturbances": [0.001],
+                       "settling": wr.Settling(window=0.05, longest=0.1)},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},
         "simulate_to_accuracy": {"scene": scene, "accuracy": 1e-3, "of": "y", "progress": None},

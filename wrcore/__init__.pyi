@@ -1,6 +1,7 @@
 # Public names, each once: types for checkers and editors, and where `wrcore.__getattr__` loads it from.
 from wrcore.analysis.assessment.assess import Assessment as Assessment
 from wrcore.analysis.assessment.assess import assess as assess
+from wrcore.analysis.assessment.assess import section_statistics as section_statistics
 from wrcore.analysis.assessment.wheels import creep_power as creep_power
 from wrcore.analysis.assessment.wheels import wear_number as wear_number
 from wrcore.analysis.assessment.wheels import wheel_forces as wheel_forces
@@ -12,9 +13,14 @@ from wrcore.analysis.pictures.draw import draw as draw
 from wrcore.analysis.pictures.plot_contact import plot_pair as plot_pair
 from wrcore.analysis.pictures.plot_creep import plot_creep_force as plot_creep_force
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
+from wrcore.analysis.pictures.plot_response import plot_frequency_response as plot_frequency_response
 from wrcore.analysis.pictures.plot_run import plot_run as plot_run
+from wrcore.analysis.response.curving import quasi_static_curving as quasi_static_curving
+from wrcore.analysis.response.curving import roll_coefficient as roll_coefficient
+from wrcore.analysis.response.frequency_response import frequency_response as frequency_response
 from wrcore.analysis.stability.limit_cycles import Settling as Settling
 from wrcore.analysis.stability.limit_cycles import limit_cycles as limit_cycles
+from wrcore.analysis.stability.limit_cycles import speed_ramp as speed_ramp
 from wrcore.analysis.stability.stability import critical_speeds as critical_speeds
 from wrcore.analysis.stability.stability import modes as modes
 from wrcore.analysis.to_accuracy import simulate_to_accuracy as simulate_to_accuracy

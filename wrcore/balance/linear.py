@@ -47,6 +47,8 @@ class Linearisation:
     """Number of independent displacements."""
     residual: np.ndarray
     """(m,): what should be zero at a steady state: x' there, without the velocities (m/s^2, rad/s^2, m/s)."""
+    steps: np.ndarray
+    """(m,): of difference quotients in the independent coordinates."""
 
 
 def linearise(model, state):
@@ -64,13 +66,13 @@ def linearise(model, state):
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
     states = moved_states(model, state, np.vstack([moves, -moves, np.zeros((1, len(basis)))]))
-    changes = _accelerations(model, states, equations.at(0.0, states))
+    changes = accelerations(model, states, equations.at(0.0, states))
     slopes = (changes[: len(moves)] - changes[len(moves) : -1]).T / (2.0 * steps)
     kinematic = np.zeros((places.shape[1], len(moves)))
     kinematic[:, places.shape[1] : places.shape[1] + speeds.shape[1]] = places.T @ speeds
     matrix = np.vstack([kinematic, speeds.T @ slopes[:size], slopes[size:]])
     rest = np.concatenate([np.zeros(places.shape[1]), changes[-1, :size] @ speeds, changes[-1, size:]])
-    return Linearisation(matrix, basis, state, float(model.speed), places.shape[1], rest)
+    return Linearisation(matrix, basis, state, float(model.speed), places.shape[1], rest, steps)
 
 
 def steady_running(model, state, iterations=10):
@@ -145,7 +147,7 @@ def _into_body(p, vector):
     return _out_of_body(p * np.array([1.0, -1.0, -1.0, -1.0]), vector)
 
 
-def _accelerations(model, states, rates):
+def accelerations(model, states, rates):
     """Rates (k, 6 n + states) of velocities, of angular velocities in body axes, and of internal states."""
     n = len(model.bodies.mass)
     parts, slopes = (rows[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE) for rows in (states, rates))

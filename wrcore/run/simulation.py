@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -138,6 +139,13 @@ class Simulation:
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,
             end, trajectory.end_t, self._end_state(trajectory),
         )  # fmt: skip
+
+    def observe(self, model: Model, times: np.ndarray, states: np.ndarray) -> Run:
+        """Channels of states (n, size) at times (n,), s, of a variant of the scene's model, as a run has them."""
+        seen = copy.copy(self)
+        seen.model = model
+        groups, _ = seen._channels(Trajectory("", times, states, "completed", ""))
+        return Run(self.scene.data, "completed", "", times, groups)
 
     def _end_state(self, trajectory: Trajectory) -> State | None:
         """Where the stretch ended, with what belongs to it."""

@@ -1,12 +1,21 @@
 """Filters against their own definitions, sections against the path, percentiles and limits of synthetic signals."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import signal
 
 import wrcore as wr
 from tests.synthetic import CONTACT
-from wrcore.analysis.assessment.assess import assess, low_pass, section_table, sliding_mean, track_sections
+from wrcore.analysis.assessment.assess import (
+    assess,
+    low_pass,
+    section_statistics,
+    section_table,
+    sliding_mean,
+    track_sections,
+)
 from wrcore.analysis.assessment.wheels import late_in
 from wrcore.cli import main
 from wrcore.errors import InputError
@@ -214,3 +223,25 @@ def test_command_line(tmp_path, capsys):
     assert "sum_Y" in capsys.readouterr().out and (tmp_path / "sections.csv").read_text().startswith("section,")
     assert main(["assess", str(tmp_path / "run.h5"), "--standard", "EN 1"]) == 2
     assert "standard" in capsys.readouterr().err
+
+
+def test_statistics_over_the_sections_of_many_runs():
+    """Constant forces: the sections' values are the runs' forces, their mean and deviation those of four numbers."""
+    path = [{"tangent": 500.0}, {"transition": 50.0}, {"curve": 500.0, "radius": -500.0, "cant": 0.1}]
+    sizes = np.array([5e3, 7e3, 8e3, 12e3])
+    runs = [synthetic(lambda t, sign, y=y: (LOAD + 0.0 * t, sign * y + 0.0 * t), path, 50.0) for y in sizes]
+    assessments = [assess(run) for run in runs]
+    table = section_statistics(assessments, 2.0).set_index(["quantity", "track", "side"])
+    straight, curved = table.loc[("sum_Y", "straight", "")], table.loc[("Y_qst", "wide curves", "left")]
+    count = np.count_nonzero(assessments[0].sections.query("quantity == 'sum_Y'")["radius_m"] == np.inf)
+    assert straight["sections"] == 4 * count and count > 1 and curved["sections"] % 4 == 0
+    for row, values in ((straight, 2.0 * np.repeat(sizes, count)), (curved, np.repeat(sizes, curved["sections"] // 4))):
+        assert row["mean"] == pytest.approx(values.mean(), rel=1e-6)
+        assert row["standard_deviation"] == pytest.approx(np.std(values, ddof=1), rel=1e-6)
+        assert row["largest"] == pytest.approx(values.max(), rel=1e-6)
+        assert row["estimated_maximum"] == pytest.approx(values.mean() + 2.0 * np.std(values, ddof=1), rel=1e-6)
+        assert row["share"] == pytest.approx(row["estimated_maximum"] / row["limit"])
+    assert straight["limit"] == pytest.approx(10e3 + 2.0 * LOAD / 3.0)
+    assert ("Y_qst", "straight", "left") not in table.index
+    with pytest.raises(InputError, match="expected assessments by EN 14363"):
+        section_statistics([*assessments, dataclasses.replace(assessments[0], standard="EN 12299")], 2.0)

@@ -17,6 +17,7 @@ from wrcore.analysis.stability.limit_cycles import (
     rising_branch,
     settle_motion,
     shifted,
+    speed_ramp,
 )
 from wrcore.analysis.stability.stability import at_speed
 from wrcore.errors import InputError
@@ -188,3 +189,24 @@ def test_a_settling_is_made_of_positive_numbers(name):
     for value in (math.nan, 0.0, -1.0):
         with pytest.raises(InputError, match=f"Settling: {name}"):
             Settling(**{name: value})
+
+
+def test_a_ramp_dies_below_the_fold_and_comes_nearer_when_it_is_slower(oscillator, suspended, monkeypatch):
+    """The oscillator's fold is at 40 m/s; its cycle at 54 m/s is reached from 5 mm."""
+    monkeypatch.setattr(analysis_limit_cycles, "straight_ahead", lambda scene: suspended)
+    ends = []
+    for rate in (0.5, 0.1):
+        table = speed_ramp(SCENES / "suspended_wheelset.yaml", 54.0, 20.0, rate, Settling(1.0, 100.0), [0.002, 0.005])
+        m = (table["speed_m_per_s"] - HOPF) / 40.0
+        cycle = 0.01 * np.sqrt(0.5 * (1.0 + np.sqrt(1.0 + 4.0 * m[m > -0.2])))
+        np.testing.assert_allclose(table["amplitude_m"][m > -0.2], cycle, rtol=0.03)
+        np.testing.assert_allclose(np.diff(table["speed_m_per_s"]), -rate)
+        np.testing.assert_allclose(table["t_s"], np.arange(1, len(table) + 1))
+        assert table["amplitude_m"].iloc[-1] < Settling().rest <= table["amplitude_m"].iloc[-2]
+        ends.append(table.loc[table["amplitude_m"] > 1e-3, "speed_m_per_s"].min())
+    assert HOPF - 20.0 < ends[0] < ends[1] < HOPF - 10.0
+
+
+def test_a_ramp_falls():
+    with pytest.raises(InputError, match="speed_ramp: end: expected less than the start of 40 m/s"):
+        speed_ramp(SCENES / "suspended_wheelset.yaml", 40.0, 50.0)

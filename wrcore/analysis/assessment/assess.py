@@ -10,9 +10,11 @@ What is evaluated, and where from: all recalled from EN 14363:2005 and its succe
 The low-pass is a Butterworth filter of fourth order. A sliding mean over 2 m is one over the way the wheelset has gone,
 forwards or backwards, and is known where a whole window is. Q0 is the mean of Q over a wheelset's wheels and the whole
 run. Percentiles are 0.15 %, 50 % and 99.85 % within a section; the largest absolute value of the outer two counts. What
-the standard adds, statistics over many sections, is not done: the worst section of the run is compared with the limit.
+the standard adds, statistics over the sections of many runs, is :func:`section_statistics`; an assessment compares the
+worst section of its run with the limit.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -22,7 +24,7 @@ import pandas as pd
 from wrcore.analysis.assessment.ride import rate_of, ride_table, whole_body_table
 from wrcore.analysis.assessment.wheels import late_in, wheel_forces, wheelsets_of
 from wrcore.errors import InputError
-from wrcore.errors.checked_calls import OneOf, checked
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import quotient
 from wrcore.run.run import Run
@@ -106,6 +108,63 @@ def assess(
         return Assessment(standard, table, pd.DataFrame())
     sections, wheel_loads = section_table(run, begin)
     return Assessment(standard, _summary(sections, wheel_loads, 0.85 if freight else 1.0), sections)
+
+
+@checked
+def section_statistics(
+    assessments: Annotated[Sequence[Assessment], Within()], k: Annotated[float, Within(0.0, 100.0)]
+) -> pd.DataFrame:
+    """Statistics over the sections of many runs, as EN 14363 estimates greatest values: mean + k times the standard
+    deviation.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+        By EN 14363, of runs of one vehicle.
+    k : float
+        The standard's factor for the quantity that is looked at. It has no default: its values were not read.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per quantity, kind of track (straight; wide curves, of at least 400 m; tight curves), wheelset and side:
+        sections, their number; mean, standard_deviation (NaN of one section), largest and estimated_maximum of their
+        values, in N, Y/Q a number; limit, the smallest of all runs, and share, estimated_maximum over it. The value of
+        a section is the larger size of its 0.15 % and 99.85 % percentiles, quasi-static that of its median.
+
+    Raises
+    ------
+    InputError
+        For assessments by another standard.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), integration__duration=0.5, output__rate=1000)
+    >>> runs = wr.simulate_many([wr.load_scene(scene, initial__y=y) for y in (0.001, 0.002, 0.003)])
+    >>> table = wr.section_statistics([wr.assess(run) for run in runs], k=0.0)
+    >>> table.loc[table["quantity"] == "sum_Y", "sections"].item()
+    3
+    """
+    if any(one.standard != "EN 14363" for one in assessments):
+        raise InputError("section_statistics", "assessments", "expected assessments by EN 14363")
+    sections = pd.concat([one.sections for one in assessments], ignore_index=True)
+    size = sections["radius_m"].abs()
+    kinds = np.select([np.isinf(size), size >= TIGHT], ["straight", "wide curves"], "tight curves")
+    groups = sections.assign(track=kinds, value=_sizes(sections)).groupby(
+        ["quantity", "track", "wheelset", "side"], sort=False
+    )["value"]
+    table = groups.agg(sections="size", mean="mean", standard_deviation="std", largest="max").reset_index()
+    table["estimated_maximum"] = table["mean"] + k * table["standard_deviation"]
+    limits = pd.concat([one.summary for one in assessments]).groupby("quantity")["limit"].min()
+    table["limit"] = table["quantity"].map(limits)
+    return table.assign(share=table["estimated_maximum"] / table["limit"])
+
+
+def _sizes(sections):
+    """The value of each section of one or of several quantities that is held against a limit."""
+    outer = sections[["p0_15", "p99_85"]].abs().max(axis=1)
+    return outer.where(~sections["quantity"].str.endswith("_qst"), sections["p50"].abs())
 
 
 def low_pass(values, rate, cut=CUT):
@@ -217,7 +276,7 @@ def _summary(sections, wheel_loads, freight):
         part = sections[sections["quantity"] == quantity]
         if part.empty:
             continue
-        size = part["p50"].abs() if quantity.endswith("_qst") else part[["p0_15", "p99_85"]].abs().max(axis=1)
+        size = _sizes(part)
         limit = part["wheelset"].map(lambda name, quantity=quantity: limits[name][quantity])
         share = size / limit
         at = (share if share.notna().any() else size).idxmax()

@@ -17,6 +17,7 @@ import pandas as pd
 
 from wrcore.analysis.stability.stability import at_speed, rising, straight_ahead
 from wrcore.dynamics.body import STATE_SIZE
+from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.run.motion import hunting_frequency
@@ -87,20 +88,26 @@ def settle_motion(model, state, settling):
     """
     amplitudes, elapsed, status = [], 0.0, ""
     while not status:
-        t, lateral, state, on_rails = _run(model, state, settling)
-        _, state = at_speed(model, state, model.speed, t[-1])
-        elapsed += t[-1]
-        spans = 0.5 * np.ptp(lateral, axis=0)
-        y = lateral[:, np.argmax(spans)]
-        amplitudes.append(float(np.max(spans)) if on_rails else np.nan)
-        status = "derailed" if not on_rails else _status(amplitudes, elapsed, settling)
-    amplitude = amplitudes[-1]
+        row, state, lasted = _window(model, state, settling)
+        elapsed += lasted
+        amplitudes.append(row["amplitude_m"])
+        status = "derailed" if np.isnan(amplitudes[-1]) else _status(amplitudes, elapsed, settling)
+    return row | {"simulated_s": elapsed, "status": status}, state
+
+
+def _window(model, state, settling):
+    """What a window shows (the first entries of the row of `settle_motion`), the state at its end, and its length."""
+    t, lateral, state, on_rails = _run(model, state, settling)
+    _, state = at_speed(model, state, model.speed, t[-1])
+    spans = 0.5 * np.ptp(lateral, axis=0)
+    y = lateral[:, np.argmax(spans)]
+    amplitude = float(np.max(spans)) if on_rails else np.nan
     row = {
         "speed_m_per_s": model.speed, "amplitude_m": amplitude,
         "frequency_Hz": hunting_frequency(t, y - np.mean(y)) if amplitude >= settling.rest else np.nan,
-        "offset_m": float(np.mean(y)), "simulated_s": elapsed, "status": status,
+        "offset_m": float(np.mean(y)),
     }  # fmt: skip
-    return row, state
+    return row, state, t[-1]
 
 
 def _status(amplitudes, elapsed, settling):
@@ -220,6 +227,73 @@ def limit_cycles(
         "rising": rising_branch(model, state, speeds, settling),
     }
     return pd.concat(tables, names=["branch"]).reset_index("branch").reset_index(drop=True)
+
+
+@checked
+def speed_ramp(
+    scene: Source,
+    start: Annotated[float, Within(1.0, 150.0, "m/s")],
+    end: Annotated[float, Within(1.0, 150.0, "m/s")],
+    rate: Annotated[float, Within(1e-4, 100.0, "m/s^2")] = 0.5,
+    settling: Settling | None = None,
+    disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = DISTURBANCES,
+) -> pd.DataFrame:
+    """Nonlinear critical speed by a ramp: a vehicle that hunts above it slows down until the motion dies.
+
+    Parameters
+    ----------
+    scene : Scene, path or dict
+        On a tangent, perfect track; where the vehicle starts is of no influence.
+    start, end : float
+        Speeds between which the vehicle slows down, m/s.
+    rate : float
+        m/s^2: the speed falls by rate times ``settling.window`` from window to window, and is constant in each.
+    settling : Settling, optional
+        How a motion at the start is followed until it has settled, window and method; the ramp ends at an amplitude
+        below its ``rest``. Left out: its defaults, but for windows of 1 s.
+    disturbances : sequence of float
+        Sideways shifts of the vehicle at the start, m: the largest motion that settles from one goes on.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per window: t_s at its end; speed_m_per_s, amplitude_m (NaN: derailed), frequency_Hz, offset_m as in
+        :func:`limit_cycles`.
+
+    Raises
+    ------
+    InputError
+        Where the speeds do not fall.
+
+    Notes
+    -----
+    Read off: the lowest speed whose amplitude is above some limit. It is below the limit cycle's fold by what the
+    vehicle slows down while the motion decays: half the rate should give next to the same. It is one motion in one run;
+    :func:`limit_cycles` tries fresh disturbances where an amplitude drops.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.speed_ramp(wr.example("suspended_wheelset"), 60.0, 50.0, rate=2.0, disturbances=[0.0025])
+    >>> bool(table["amplitude_m"].iloc[-1] < 0.3 * table["amplitude_m"].iloc[0])
+    True
+    """
+    if not start > end:
+        raise InputError("speed_ramp", "end", f"expected less than the start of {start:g} m/s, got {end:g}")
+    settling = settling or Settling(window=1.0)
+    model, state = straight_ahead(as_scene(scene))
+    model, straight = at_speed(model, state, start)
+    tried = [settle_motion(model, shifted(model, straight, shift), settling) for shift in disturbances]
+    _, state = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
+    rows, elapsed = [], 0.0
+    for speed in np.arange(start, end, -rate * settling.window):
+        model, state = at_speed(model, state, float(speed))
+        row, state, lasted = _window(model, state, settling)
+        elapsed += lasted
+        rows.append({"t_s": elapsed, **row})
+        if not row["amplitude_m"] >= settling.rest:
+            break
+    return pd.DataFrame(rows)
 
 
 def nonlinear_critical_speed(table):

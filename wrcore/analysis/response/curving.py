@@ -1,0 +1,210 @@
+"""Quasi-static curving: wheel forces and places in the balance of constant curves, and roll on canted track."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from wrcore.analysis.response.frequency_response import observable
+from wrcore.analysis.stability.stability import rising
+from wrcore.balance.curve import Curve, CurveBalance, curve_model, on_circle, solve_curve
+from wrcore.balance.initial import LARGEST_REST_ON_STRIPS
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.marker import FRAME
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import Within, checked
+from wrcore.geometry.path_pieces import CANT_BASE
+from wrcore.geometry.track import LEAST_RADIUS, SIDES, WIDENED
+from wrcore.run.run import Run
+from wrcore.run.simulation import ArcLengths, Simulation
+from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
+from wrcore.vehicle.description import GRAVITY
+
+LARGEST_REST = 1e-4
+"""A curve in which accelerations above this are left has no balance, m/s^2 or rad/s^2 (chosen: 1e-5 of gravity)."""
+
+CANT = Annotated[float, Within(0.0, 0.5, "m")]
+
+
+@checked
+def quasi_static_curving(
+    scene: Source,
+    radii: Annotated[ArrayLike, Within(-1e9, 1e9, "m", 1)],
+    cant: CANT = 0.0,
+    speed: float | None = None,
+    cant_deficiency: Annotated[float | None, Within(-0.5, 0.5, "m")] = None,
+    widening: Annotated[float, Within(-0.05, 0.05, "m")] = 0.0,
+) -> pd.DataFrame:
+    """Balance of a scene's vehicle in constant curves, without integration over time.
+
+    Parameters
+    ----------
+    scene : Scene, path or dict
+        Its path, gradients, irregularity and drive do not count. Friction is the scene's.
+    radii : array_like, shape (n,)
+        m, positive to the left, 20 m or more.
+    cant : float
+        Outer rail above the inner one, over 1.5 m, m.
+    speed : float, optional
+        m/s; left out: the scene's, or that of the cant deficiency.
+    cant_deficiency : float, optional
+        I = 1.5 m v^2/(g R) - cant, m: the speed in each curve follows.
+    widening : float
+        Of the gauge, m.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per curve and wheel: radius_m, speed_m_per_s, cant_m, cant_deficiency_m; wheelset, side; y_m and yaw_rad
+        of the wheelset in the axes of the track (yaw is its angle of attack); Q_N, Y_N, Y_over_Q, T_gamma_N of the
+        wheel, sum_Y_N of the wheelset; acceleration_m_per_s2 with which creep slows down what nothing pulls;
+        residual_m_per_s2, what of accelerations is left. Where no balance is found, all but the latter is NaN.
+
+    Raises
+    ------
+    InputError
+        For a radius or a speed out of bounds, speed and cant deficiency together, or a vehicle whose friction depends
+        on how it came there (elements with ``approach``).
+
+    Notes
+    -----
+    One continuation from straight track through growing curvature, for curves to the left and to the right each.
+    Accelerations vanish in axes that go round with the vehicle; whether the balance is stable is not asked.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.quasi_static_curving(wr.example("suspended_wheelset"), [1000.0, 500.0], speed=15.0)
+    >>> table.loc[table["side"] == "right", ["radius_m", "y_m"]].round(4).to_numpy().tolist()
+    [[1000.0, -0.0018], [500.0, -0.0041]]
+    """
+    scene = as_scene(scene)
+    radii = np.atleast_1d(np.asarray(radii, float))
+    if np.any(np.abs(radii) < LEAST_RADIUS):
+        raise InputError("quasi_static_curving", "radii", f"expected {LEAST_RADIUS:g} m or more")
+    if speed is not None and cant_deficiency is not None:
+        raise InputError("quasi_static_curving", "speed", "expected either a speed or a cant deficiency")
+    if cant_deficiency is not None and cant + cant_deficiency <= 0.0:
+        raise InputError("quasi_static_curving", "cant_deficiency", f"expected more than {-cant:g} m: a speed above 0")
+    speeds = [scene.data["speed"] if speed is None else speed] * len(radii)
+    if cant_deficiency is not None:
+        speeds = [math.sqrt(GRAVITY * abs(radius) * (cant + cant_deficiency) / CANT_BASE) for radius in radii]
+    for one in speeds:
+        rising([one])
+    curves = [
+        Curve(1.0 / radius, math.copysign(cant, radius), widening, one)
+        for radius, one in zip(radii, speeds, strict=True)
+    ]
+    curving = Curving(scene)
+    found = dict(curving.follow(curves))
+    return pd.concat([curving.table(curve, found[k]) for k, curve in enumerate(curves)], ignore_index=True)
+
+
+class Curving:
+    """A scene's vehicle on curves without end."""
+
+    def __init__(self, scene: Scene) -> None:
+        for item in scene.vehicle.data.get("elements", ()):
+            if "approach" in item:
+                expected = "expected friction with series_stiffness: where approach leads depends on how it came there"
+                raise InputError(scene.source, f"elements.{item['name']}", expected)
+        if np.any(scene.vehicle.joints.bodies == FRAME):
+            raise InputError(scene.source, "vehicle", "expected one without joints to the moving frame")
+        self.simulation = Simulation(observable(scene))
+        self.model = undriven(self.simulation.model)
+        self.aside = WIDENED[scene.data["track"]["widened"]]
+        self.limit = LARGEST_REST_ON_STRIPS if self.model.contact.strips.strips else LARGEST_REST
+        state = static_equilibrium(self.simulation.scene, self.model).state
+        self.straight = CurveBalance(Curve(0.0, 0.0, 0.0, float(self.model.speed)), state, 0.0, 0.0)
+
+    def follow(self, curves):
+        """Pairs of a curve's number and its `CurveBalance`, from the widest curve on, to the left and to the right."""
+        for side in (1.0, -1.0):
+            known = self.straight
+            numbers = [k for k, curve in enumerate(curves) if math.copysign(1.0, curve.curvature) == side]
+            for k in sorted(numbers, key=lambda k: abs(curves[k].curvature)):
+                found = solve_curve(self.model, known, curves[k], self.limit, self.aside)
+                known = found if found.residual < self.limit else known
+                yield k, found
+
+    def observe(self, found: CurveBalance) -> Run:
+        """The channels of a balance."""
+        at, n = STATE_SIZE * self.model.bodies.wheelsets, len(self.model.bodies.mass)
+        self.simulation.arc_lengths = ArcLengths(found.state[at], found.state[: STATE_SIZE * n : STATE_SIZE])
+        model = curve_model(self.model, found.curve, self.aside)
+        return self.simulation.observe(model, np.zeros(1), on_circle(model, found.curve, found.state[None]))
+
+    def table(self, curve: Curve, found: CurveBalance) -> pd.DataFrame:
+        """Rows of :func:`quasi_static_curving` of a curve."""
+        run, rows = self.observe(found), []
+        good = 1.0 if found.residual < self.limit else np.nan
+        side, bend = math.copysign(1.0, curve.curvature), abs(curve.curvature)
+        for name in self.simulation.scene.vehicle.wheelset_names:
+            for wheel in SIDES:
+                values = {key: run[name][key][0] for key in ("y_m", "yaw_rad")}
+                contact = run[f"{name}/{wheel}"]
+                values |= {key: contact[key][0] for key in ("Q_N", "Y_N", "Y_over_Q", "T_gamma_N")}
+                values |= {"sum_Y_N": run[name].sum_Y_N[0], "acceleration_m_per_s2": found.acceleration}
+                rows.append({
+                    "radius_m": side / bend if bend else math.inf, "speed_m_per_s": curve.speed,
+                    "cant_m": side * curve.cant,
+                    "cant_deficiency_m": CANT_BASE * curve.speed**2 * bend / GRAVITY - side * curve.cant,
+                    "wheelset": name, "side": wheel, **{key: good * value for key, value in values.items()},
+                    "residual_m_per_s2": found.residual,
+                })  # fmt: skip
+        return pd.DataFrame(rows)
+
+
+@checked
+def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m")] = 0.1) -> pd.DataFrame:
+    """Roll coefficient (flexibility coefficient) s of a scene's vehicle: how far bodies roll on canted track, relative
+    to its plane, per cant angle.
+
+    Parameters
+    ----------
+    scene : Scene, path or dict
+        Its path, irregularity and drive do not count.
+    cant : float
+        Over 1.5 m, m; of influence where suspensions are not linear (bump stops).
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per body: body, cant_m, roll_rad (relative to the track's plane, towards the lower rail positive), and
+        roll_coefficient, roll_rad over the cant angle asin(cant/1.5 m).
+
+    Raises
+    ------
+    InputError
+        As :func:`quasi_static_curving`, and where there is no balance on this cant.
+
+    Notes
+    -----
+    EN 15686 and EN 14363 (recalled) measure it on a vehicle that stands. Here its wheels roll on along straight canted
+    track, so that creep holds the wheelsets; forces on bodies are those at rest. A wheelset's own row is what its shift
+    to the lower rail makes of its roll; it is part of what the bodies above it roll.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> table = wr.roll_coefficient(wr.example("trailer_vehicle")).set_index("body")
+    >>> table.loc["car_body", "roll_coefficient"].round(2).item()
+    0.16
+    """
+    curving = Curving(as_scene(scene))
+    curve = Curve(0.0, cant, 0.0, curving.straight.curve.speed)
+    ((_, found),) = curving.follow([curve])
+    if not found.residual < curving.limit:
+        expected = f"expected one on which the vehicle has a balance, got {cant:g}"
+        raise InputError("roll_coefficient", "cant", f"{expected}: {found.residual:.2g} m/s^2 are left")
+    run = curving.observe(found)
+    names = curving.simulation.scene.vehicle.body_names
+    roll = -np.array([run[name].roll_rad[0] for name in names])
+    return pd.DataFrame({
+        "body": names, "cant_m": cant, "roll_rad": roll, "roll_coefficient": roll / math.asin(cant / CANT_BASE)
+    })  # fmt: skip
