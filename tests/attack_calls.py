@@ -57,6 +57,7 @@ def calls():
     since = {"run": run, "begin": 0.0}
     found = {
         "assess": {**since, "standard": "EN 14363", "freight": False},
+        "compare": {"a": run, "b": run},
         "conicity_curve": {"pair": pair, "amplitudes": [0.003], "roll": False, "step": 1e-4},
         "contact_table": {"pair": pair, "shifts": [0.0], "yaws": [0.0], "wheel_load": 5e4, "detection": "spatial",
                           "patch": "moment"},

@@ -49,7 +49,7 @@ class Channels(Mapping[str, np.ndarray]):
             return self._channels[name]
         if name in self._derived:
             return self._derived[name]()
-        has, known = ", ".join(self._channels), [*self._channels, *self._derived]
+        has, known = ", ".join(self._channels), self.names()
         follow = f", and what follows from these, {', '.join(self._derived)}" if self._derived else ""
         text = f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}"
         raise UnknownNameError("run", "", text)
@@ -75,11 +75,14 @@ class Channels(Mapping[str, np.ndarray]):
     def __len__(self) -> int:
         return len(self._channels)
 
-    def __dir__(self) -> list[str]:
-        return sorted([*super().__dir__(), *self._channels, *self._derived])
-
-    def _ipython_key_completions_(self) -> list[str]:
+    def names(self) -> list[str]:
+        """Channels that are held, then those that follow from them."""
         return [*self._channels, *self._derived]
+
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self.names()])
+
+    _ipython_key_completions_ = names
 
     def __repr__(self) -> str:
         width = max(map(len, self._channels), default=0)
