@@ -9,6 +9,7 @@ from wrcore.analysis.assessment.wheels import wheelset_channels as wheelset_chan
 from wrcore.analysis.compare import Comparison as Comparison
 from wrcore.analysis.compare import compare as compare
 from wrcore.analysis.contact.contact import contact_table as contact_table
+from wrcore.analysis.contact.contacts import contacts as contacts
 from wrcore.analysis.contact.patch import patch as patch
 from wrcore.analysis.pictures.draw import draw as draw
 from wrcore.analysis.pictures.plot_contact import plot_pair as plot_pair
