@@ -133,7 +133,7 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
 
     Parameters
     ----------
-    a, b : Run, str or Path
+    a, b : str, Path or Run
         Runs, or their files.
 
     Returns
