@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 GUIDES = (
     "first_result", "bring_your_own", "scenes", "tracks", "vehicle_files", "freight_wagon", "sweeps", "clusters",
-    "assessment", "wear", "how_runs_end", "accuracy", "limits", "patch", "stability", "response", "cost",
+    "arrays", "assessment", "wear", "how_runs_end", "accuracy", "limits", "patch", "stability", "response", "cost",
     "comparison", "gallery", "evidence", "versions",
 )  # fmt: skip
 """Pages of `reports/` in reading order; others follow."""

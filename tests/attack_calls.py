@@ -58,9 +58,12 @@ def calls():
     since = {"run": run, "begin": 0.0}
     found = {
         "assess": {**since, "standard": "EN 14363", "freight": False},
+        "compare": {"a": run, "b": run},
         "conicity_curve": {"pair": pair, "amplitudes": [0.003], "roll": False, "step": 1e-4},
         "contact_table": {"pair": pair, "shifts": [0.0], "yaws": [0.0], "wheel_load": 5e4, "detection": "spatial",
                           "patch": "moment"},
+        "contacts": {"pair": pair, "y": [0.0], "z": None, "roll": None, "yaw": 0.0, "load": 5e4, "speed": 20.0,
+                     "omega": None, "vy": 0.0, "yaw_rate": 0.0, "mu": 0.3, "detection": "spatial", "patch": "moment"},
         "creep_force": {"model": "polach", **creep, "nu": 0.28, "table": None},
         "creep_power": wheel, "wear_number": {**wheel, "spin": True}, "wheel_forces": wheel, "wheel_table": since,
         "wheelset_channels": {"run": run, "wheelset": "wheelset"},

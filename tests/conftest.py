@@ -16,7 +16,7 @@ SCENES = ROOT / "config" / "scenes"
 
 CHECKS = (
     "study/", "test_workflow", "test_slurm", "test_attack", "test_fuzz", "test_bring_your_own", "test_first_result",
-    "test_notebooks", "test_docs", "test_wheel",
+    "test_arrays", "test_notebooks", "test_docs", "test_wheel",
 )  # fmt: skip
 """How names of files begin that have the marker ``check``: no tests of the core, but of the study, pages, the package,
 and attacks."""

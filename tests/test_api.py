@@ -110,9 +110,22 @@ def test_figures_of_a_run_have_units():
     figure = hunting_run().plot("wheelset.wy_rad_per_s", "wheelset/left.phi_per_m", "wheelset/left.xi", "wheelset.x_m")
     assert [axes.get_ylabel() for axes in figure.axes] == ["wy / rad/s", "phi / 1/m", "xi", "x / m"]
     np.testing.assert_allclose(hunting_run().plot("wheelset.y_m").axes[0].lines[0].get_ydata()[0], 2.0)  # mm
-    with pytest.raises(wr.InputError, match="wheelset.y: expected a channel of the run: wheelset.x_m"):
-        hunting_run().plot("wheelset.y")
+    assert hunting_run().plot("wheelset/left.Y_over_Q").axes[0].get_ylabel() == "Y over Q"
     assert isinstance(figure, matplotlib.figure.Figure)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("wheelset.y", "wheelset.y_m"), ("wheelset/left.Q", "wheelset/left.Q_N"), ("yaw_rad", "wheelset.yaw_rad"),
+        ("wheelset1/right.Y_over_Q", "wheelset/right.Y_over_Q"), ("wheelset.sumY", "wheelset.sum_Y_N"),
+    ],
+)  # fmt: skip
+def test_a_wrong_channel_is_answered_in_one_line_with_the_nearest(wrong, right):
+    with pytest.raises(wr.InputError) as caught:
+        hunting_run().plot(wrong)
+    said = str(caught.value)
+    assert said.startswith(f"plot: {wrong}: expected ") and said.endswith(f"did you mean {right!r}?"), said
 
 
 def test_the_public_function_is_not_hidden_by_the_file_of_its_name():

@@ -62,7 +62,8 @@ def animated():
 
 
 MADE = {
-    "Assessment": assessed, "CreepTable": wr.ensure_table, "InputError": lambda: InputError("a", "b", "c"),
+    "Assessment": assessed, "Comparison": lambda: wr.compare(hunting_run(), hunting_run(flange_at=1.0)),
+    "CreepTable": wr.ensure_table, "InputError": lambda: InputError("a", "b", "c"),
     "Patch": lambda: wr.patch(pair(), load=5e4)[0], "RollingContact": lambda: wr.RollingContact(1.0, level=6),
     "Run": hunting_run, "Scene": lambda: wr.load_scene(SCENES / "trailer_vehicle.yaml"), "Settling": wr.Settling,
     "WheelWear": lambda: wr.WheelWear(*np.ones((4, 3)), 1.0, 2.0), "WheelsetOnTrack": pair,

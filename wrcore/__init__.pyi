@@ -7,7 +7,10 @@ from wrcore.analysis.assessment.wheels import wear_number as wear_number
 from wrcore.analysis.assessment.wheels import wheel_forces as wheel_forces
 from wrcore.analysis.assessment.wheels import wheel_table as wheel_table
 from wrcore.analysis.assessment.wheels import wheelset_channels as wheelset_channels
+from wrcore.analysis.compare import Comparison as Comparison
+from wrcore.analysis.compare import compare as compare
 from wrcore.analysis.contact.contact import contact_table as contact_table
+from wrcore.analysis.contact.contacts import contacts as contacts
 from wrcore.analysis.contact.patch import patch as patch
 from wrcore.analysis.pictures.draw import draw as draw
 from wrcore.analysis.pictures.plot_contact import plot_pair as plot_pair

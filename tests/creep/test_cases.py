@@ -70,11 +70,34 @@ def test_out_of_range_patches_are_counted(table):
 def test_tables_are_made_for_each_material(table, monkeypatch):
     """Without a table each nu gets its own from the cache, of ellipses where all patches are."""
     asked = []
+    monkeypatch.setattr(cases_module, "_OPEN", {})
     monkeypatch.setattr(cases_module, "ensure_table", lambda nu, planes, *rest: asked.append((nu, planes)) or table)
     both = pd.concat([frame(), frame(nu=0.3)], ignore_index=True)
     solve_cases(both, "table")
     solve_cases(frame(b_neg_m=6e-3), "table")
     assert asked == [(0.28, "sdec"), (0.3, "sdec"), (0.28, "ellipse")]
+
+
+def test_a_table_is_read_once_for_all_calls(table, monkeypatch):
+    """Reading it took five times as long as a look-up."""
+    asked = []
+    monkeypatch.setattr(cases_module, "_OPEN", {})
+    monkeypatch.setattr(cases_module, "ensure_table", lambda *what: asked.append(what) or table)
+    patch = {"a": 6e-3, "b": 4e-3, "normal_force": 5e4, "xi": 1e-3, "eta": 2e-4, "phi": 0.1}
+    forces = [creep_force("table", **patch) for _ in range(3)]
+    assert len(asked) == 1 and forces[0] == forces[1] == forces[2] == creep_force("table", **patch, table=table)
+    creep_force("table", **patch, psi=0.1)
+    assert len(asked) == 2 and cases_module._OPEN.keys() == {(0.28, "ellipse"), (0.28, "sdec")}
+
+
+def test_forces_of_arrays_are_those_of_a_list_of_cases(table):
+    many = pd.concat([frame()] * 6, ignore_index=True).assign(xi=np.linspace(-2e-3, 2e-3, 6), case_id=range(6))
+    listed = solve_cases(many, "table", table)
+    xi = many["xi"].to_numpy().reshape(2, 3)
+    found = creep_force("table", 5e-3, 5e-3, 8e4, xi, -5e-4, 0.2, 0.3, 82e9, 0.28, table, psi=0.2)
+    for name, force in zip(("Fx_N", "Fy_N", "Mz_Nm"), found, strict=True):
+        assert force.shape == (2, 3)
+        np.testing.assert_allclose(np.ravel(force), listed[name], rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", [*NUMBERS, "case_id"])

@@ -1,6 +1,7 @@
 """Sweeps: each row is the run that `simulate` gives, whatever is shared; batches and interruptions change nothing."""
 
 import os
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -262,6 +263,122 @@ def test_tables_come_back_as_they_were(tmp_path, smoke, ending):
     pd.testing.assert_frame_equal(sweep_batch.load_table(tmp_path / f"t.{ending}"), smoke, check_dtype=False)
 
 
+def test_numbers_of_the_vehicle_are_swept_by_their_key_paths():
+    """Each row is the run of a vehicle file with these numbers, one of them a factor on all elements of a pattern."""
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml")
+    vehicle = yaml.safe_load((SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
+    keys = {
+        "vehicle.bodies.wheelset.mass": {"from": 1200.0, "to": 1800.0, "steps": 2},
+        "vehicle.elements.*.stiffness.factor": {"values": [0.8, 1.25]},
+    }
+    table = wr.run_sweep(small(sampling={"kind": "grid"}, keys=keys, measures=["y_rms_m", "yaw_max_rad"]))
+    assert len(table) == 4 == table["y_rms_m"].nunique()
+    for row in table.to_dict("records"):
+        content = yaml.safe_load(yaml.safe_dump(vehicle))
+        content["bodies"]["wheelset"]["mass"] = row["vehicle.bodies.wheelset.mass"]
+        for item in content["elements"]:
+            if "stiffness" in item:
+                item["stiffness"] = [row["vehicle.elements.*.stiffness.factor"] * k for k in item["stiffness"]]
+        run = wr.simulate(scene, {"vehicle.parameters": content, "integration.duration": 0.05})
+        assert row["yaw_max_rad"] == pytest.approx(np.abs(run["wheelset"].yaw_rad).max(), rel=1e-12)
+
+
+def test_a_scene_and_vehicles_may_be_content():
+    vehicle = yaml.safe_load((SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
+    scene = yaml.safe_load((SCENES / "suspended_wheelset.yaml").read_text())
+    scene["vehicle"]["parameters"] = vehicle
+    heavy = yaml.safe_load(yaml.safe_dump(vehicle | {"name": "heavy"}))
+    heavy["bodies"]["wheelset"]["mass"] *= 1.5
+    keys = {"vehicle.parameters": {"values": [vehicle, heavy]}}
+    sweep = wr.load_sweep(small(scene=scene, sampling={"kind": "grid"}, keys=keys))
+    table = wr.run_sweep(sweep)
+    assert table["y_max_m"].tolist() == [wr.simulate(sweep.scene, {"vehicle.parameters": one})["wheelset"].y_m.max()
+                                         for one in (vehicle, heavy)]  # fmt: skip
+    assert (table["steps"].nunique(), table["y_max_m"].nunique()) != (1, 1)
+
+
+def test_seeds_of_an_irregularity_and_lists():
+    """A list is run after run, no grid; seeds are numbers of the track's own key."""
+    spectrum = {"level": "low", "seed": 1, "length": 60.0, "begin": 2.0}
+    keys = {"track.irregularity.spectrum.seed": {"values": [1, 2, 3]}, "speed": {"values": [20, 30, 25]}}
+    data = small(sampling={"kind": "list"}, keys=keys, measures=["y_rms_m"])
+    data["set"] = data["set"] | {"track.irregularity": {"spectrum": spectrum}, "integration.duration": 0.3}
+    table = wr.run_sweep(data)
+    assert table["speed"].tolist() == [20, 30, 25] and table["y_rms_m"].nunique() == 3
+    run = wr.simulate(wr.load_sweep(data).scene, {"track.irregularity.spectrum.seed": 3, "speed": 25})
+    assert table["y_rms_m"][2] == pytest.approx(np.sqrt(np.mean(run["wheelset"].y_m ** 2)), rel=1e-12)
+    keys["speed"]["values"].pop()
+    with pytest.raises(InputError, match=r"keys.speed: expected as many values as of track\S+, 3, got 2"):
+        wr.load_sweep(data)
+
+
+def test_sobol_points_fill_ranges_evenly_and_repeat():
+    keys = {"speed": {"from": 20, "to": 40}, "initial.y": {"from": 1e-4, "to": 1e-2, "scale": "log"},
+            "contact.detection": {"values": ["planar", "spatial"]}}  # fmt: skip
+    runs = wr.load_sweep(small(keys=keys, sampling={"kind": "sobol", "runs": 64, "seed": 2})).runs
+    assert sorted(((runs["speed"] - 20) / 20 * 64).astype(int)) == list(range(64))
+    quarters = pd.crosstab(((runs["speed"] - 20) / 5).astype(int), (2 * (np.log10(runs["initial.y"]) + 4)).astype(int))
+    assert quarters.shape == (4, 4) and (quarters == 4).all(axis=None)  # of two keys together
+    assert runs["contact.detection"].value_counts().to_dict() == {"planar": 32, "spatial": 32}
+    assert wr.load_sweep(small(keys=keys, sampling={"kind": "sobol", "runs": 64, "seed": 2})).runs.equals(runs)
+    assert not wr.load_sweep(small(keys=keys, sampling={"kind": "sobol", "runs": 64, "seed": 3})).runs.equals(runs)
+    with pytest.raises(InputError, match=r"sampling.runs: expected a power of 2 for Sobol points, got 60"):
+        wr.load_sweep(small(keys=keys, sampling={"kind": "sobol", "runs": 60}))
+
+
+@pytest.mark.parametrize(
+    ("key", "nearest"),
+    [
+        ("sped", "speed"), ("contact.fricton", "friction"), ("vehicle.bodies.wheelset.mas", "mass"),
+        ("vehicle.bodies.weelset.mass", "wheelset"), ("track.irregularity.spectrum.sead", "seed"),
+    ],
+)  # fmt: skip
+def test_a_wrong_key_path_is_one_line_with_the_nearest_before_any_run(key, nearest):
+    spectrum = {"level": "low", "seed": 1, "length": 60.0}
+    data = small(sampling={"kind": "grid"}, keys={key: {"values": [1, 2]}})
+    data["set"] = {"track.irregularity": {"spectrum": spectrum}}
+    with pytest.raises(InputError) as caught:
+        wr.load_sweep(data)
+    said = str(caught.value)
+    assert said.startswith(f"sweep: keys.{key}: ") and said.endswith(f"did you mean {nearest!r}?"), said
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_vehicles_are_made_when_they_are_run_and_let_go(monkeypatch, threads):
+    """A vehicle takes some megabytes: a thousand of them at once would not fit."""
+    monkeypatch.setattr(sweep_batch, "AHEAD", 2)
+    known, alive = weakref.WeakSet(), []
+
+    def watched(task, measures, original=sweep_batch._run):
+        known.add(task.scene.vehicle)
+        alive.append(len(known))
+        return original(task, measures)
+
+    monkeypatch.setattr(sweep_batch, "_run", watched)
+    keys = {"speed": {"values": [20, 30]}, "vehicle.bodies.wheelset.mass": {"from": 1200.0, "to": 1800.0, "steps": 12}}
+    table = wr.run_sweep(small(sampling={"kind": "grid"}, keys=keys), threads=threads)
+    assert len(alive) == 24 and max(alive) <= 2 + 4 * (threads - 1)
+    assert table["speed"].tolist() == 12 * [20] + 12 * [30]
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ([(0, 4), (2, 4)], "3 are in none: --batch 2/4, 4/4"), ([(1, 2)], "3 are in none: --batch 1/2"),
+        ([(0, 6), (3, 6)], "4 are in none: --batch 2/6, 3/6, 5/6, 6/6"),
+        ([(0, 3), (5, 6)], "3 are in none: runs 2 to 4"), ([], "6 are in none"),
+    ],
+)  # fmt: skip
+def test_gather_names_the_parts_that_are_missing(tmp_path, given, says):
+    sweep, paths = wr.load_sweep(small()), []
+    for part, count in given:
+        paths.append(tmp_path / f"{part}_{count}.csv")
+        sweep_batch.write_table(paths[-1], sweep_batch.run_rows(sweep, sweep.rows(part, count)), sweep)
+    with pytest.raises(InputError) as caught:
+        sweep_batch.gather(sweep, paths, tmp_path / "all.csv")
+    assert says in str(caught.value) and not (tmp_path / "all.csv").exists()
+
+
 def test_command_runs_a_whole_sweep_and_parts_of_it(tmp_path, capsys):
     (tmp_path / "small.yaml").write_text(yaml.safe_dump(small()))
     base = ["sweep", str(tmp_path / "small.yaml"), "--out"]
@@ -273,7 +390,10 @@ def test_command_runs_a_whole_sweep_and_parts_of_it(tmp_path, capsys):
     assert main([*base, str(tmp_path / "gathered.csv"), "--gather", *reversed(parts)]) == 0
     assert (tmp_path / "gathered.csv").read_text() == (tmp_path / "whole.csv").read_text()
     capsys.readouterr()
-    for wrong, says in ((parts[:1], "in none, run 3 first"), ([*parts, parts[0]], "run 0: expected each run once")):
+    for wrong, says in (
+        (parts[:1], "3 are in none: --batch 2/2"),
+        ([*parts, parts[0]], "run 0: expected each run once"),
+    ):
         assert main([*base, str(tmp_path / "x.csv"), "--gather", *wrong]) == 2
         assert says in capsys.readouterr().err
     for place, other in ((2, small(set={"speed": 21})), (1, None)):  # of another scene; damaged

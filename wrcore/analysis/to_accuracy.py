@@ -86,6 +86,7 @@ def simulate_to_accuracy(
     Returns
     -------
     run : Run
+        Its settings hold the accuracy, too: ``accuracy_of``, ``accuracy_found`` and so on.
     accuracy : Accuracy
         ``reached`` is False beyond the prediction horizon (impacts, hunting that amplifies every difference), where no
         tolerance helps, and where runs fail.
@@ -130,7 +131,9 @@ def simulate_to_accuracy(
     if not reached:
         reason = f"{accuracy:g} {QUANTITIES[of]} not reached: {reason}; {why}"
     cost = spent / max(run.counters["rhs_evaluations"], 1)
-    return run, Accuracy(of, accuracy, found, reached, rtol, cost, reason)
+    stated = Accuracy(of, accuracy, found, reached, rtol, cost, reason)
+    run.settings |= {f"accuracy_{name}": value for name, value in vars(stated).items()}
+    return run, stated
 
 
 def _at(scene, rtol, longest):

@@ -33,16 +33,23 @@ def add(commands):
     command.add_argument("--begin", type=float, default=0.0, metavar="s", help="leave out what came before, s")
     command.add_argument("--freight", action="store_true", help="limits of freight wagons")
     command.add_argument("--out", metavar="sections.csv", help="write percentiles section by section (EN 14363)")
+    command.add_argument(
+        "--plot", metavar="FILE", help="draw the filtered forces with their limits (EN 14363): .svg or .png"
+    )
     command.set_defaults(run=run)
 
 
 def run(options):
     from wrcore.analysis.assessment.assess import assess
+    from wrcore.analysis.pictures.style import save_figure
     from wrcore.run.results import load_run
 
     out = output(options.out) if options.out else None
+    picture = output(options.plot, (".svg", ".png"), "--plot") if options.plot else None
     assessment = assess(load_run(options.run_file), options.standard, options.begin, options.freight)
     print(assessment)
     if out:
         write_csv(assessment.sections, out)
+    if picture:
+        save_figure(assessment.plot(), picture)
     return 0

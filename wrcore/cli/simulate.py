@@ -71,7 +71,6 @@ def _to_accuracy(options, scene, out):
 
     say = partial(print, f"{scene.data['name']}:")
     done, accuracy = simulate_to_accuracy(scene, options.accuracy, options.accuracy_of, say)
-    done.settings |= {f"accuracy_{name}": value for name, value in vars(accuracy).items()}
     say(f"{accuracy.reason}; {accuracy.cost:.1f} times the evaluations of this run in all")
     if out:
         done.save(out)

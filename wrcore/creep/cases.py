@@ -21,6 +21,9 @@ NUMBERS = (*POSITIVE, "nu", "xi", "eta", "phi_per_m")
 OTHER_NAMES = {"ux": "xi", "uy": "eta"}
 """Columns that are read, too, where the usual ones are missing."""
 
+FORCES = ("Fx_N", "Fy_N", "Mz_Nm")
+
+_OPEN: dict[tuple[float, str], CreepTable] = {}
 _SAME_NU = 1e-9
 _LARGEST = 1e100
 """Nondimensional creepages above this are beyond what the laws' squares can hold."""
@@ -86,7 +89,14 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
     source = source or frame.attrs.get("source", "cases")
     if model not in MODELS:
         raise InputError(source, "model", one_of(MODELS, model))
-    columns = check_cases(frame, source)
+    forces, counts = _solved(check_cases(frame, source), model, table, level, progress, source)
+    out = pd.DataFrame({"case_id": frame["case_id"].to_numpy(), **dict(zip(FORCES, forces.T, strict=True))})
+    out.attrs.update(counts)
+    return out
+
+
+def _solved(columns, model, table, level, progress, source):
+    """Forces and moment (n, 3), N and N m, of checked columns, and what was counted; as for `solve_cases`."""
     with np.errstate(all="ignore"):  # what overflows is refused
         g, psi, creepages, c = nondimensional(columns)
     size = np.abs(creepages).max(axis=1, initial=0.0)
@@ -97,10 +107,7 @@ def solve_cases(frame, model, table=None, level=DEFAULT_LEVEL, progress=None, so
     else:
         forces, counts = _by_law(model, g, psi, columns["nu"], creepages, table, progress, source)
     size = columns["mu"] * columns["N_N"]
-    out = pd.DataFrame({"case_id": frame["case_id"].to_numpy()})
-    out["Fx_N"], out["Fy_N"], out["Mz_Nm"] = size * forces[:, 0], size * forces[:, 1], size * c * forces[:, 2]
-    out.attrs.update(counts)
-    return out
+    return np.stack([size * forces[:, 0], size * forces[:, 1], size * c * forces[:, 2]], axis=1), counts
 
 
 def _exact(g, psi, nu, creepages, level, progress):
@@ -126,11 +133,18 @@ def _by_law(model, g, psi, nu, creepages, table, progress, source):
         if model == "table":
             if given is not None and abs(given.nu - value) > _SAME_NU:
                 raise InputError(source, f"nu, row {rows[0] + 1}", f"expected the table's {given.nu}, got {value}")
-            kernel_table = (given or ensure_table(float(value), planes, DEFAULT_TOLERANCE, progress)).kernel_data()
+            kernel_table = (given or _open_table(float(value), planes, progress)).kernel_data()
         data, part = creep_data(value, kernel_table), np.empty((len(rows), 3))
         outside += creep_forces(LAWS[model], data, g[rows], psi[rows], creepages[rows], part)
         forces[rows] = part
     return forces, {"not_converged": 0, "out_of_range": int(outside)}
+
+
+def _open_table(nu, planes, progress):
+    """The usual table for a Poisson's ratio, read once."""
+    if (nu, planes) not in _OPEN:
+        _OPEN[nu, planes] = ensure_table(nu, planes, DEFAULT_TOLERANCE, progress)
+    return _OPEN[nu, planes]
 
 
 @checked
@@ -162,7 +176,7 @@ def creep_force(
     mu, shear_modulus, nu : float or array_like
         Friction coefficient, shear modulus (Pa), Poisson's ratio.
     table : CreepTable or path, optional
-        For the model "table"; left out: the cached table for nu, built first if need be.
+        For the model "table"; left out: the cached table for nu, built first if need be, and read once.
     psi : float or array_like
         Shape number of a double ellipse, which spans ``b (1 + psi)`` to the left and ``b (1 - psi)`` to the right; of
         an ellipse 0. Only "table", "exact" and "fastsim" know it.
@@ -183,12 +197,9 @@ def creep_force(
     >>> Fx.round(-2).tolist()
     [0.0, -8100.0]
     """
-    import pandas as pd
-
     given = {"a": a, "b": b, "normal_force": normal_force, "mu": mu, "shear_modulus": shear_modulus, "nu": nu}
     along, across, *others, shape = same_shape("creep_force", **given, xi=xi, eta=eta, phi=phi, psi=psi)
     values = along, across * (1.0 - shape), across * (1.0 + shape), *others
-    frame = pd.DataFrame({name: np.ravel(value) for name, value in zip(NUMBERS, values, strict=True)})
-    frame.insert(0, "case_id", range(len(frame)))
-    forces = solve_cases(frame, model, table, source="creep_force")
-    return tuple(forces[name].to_numpy().reshape(along.shape)[()] for name in ("Fx_N", "Fy_N", "Mz_Nm"))
+    columns = {name: np.ravel(value).astype(float) for name, value in zip(NUMBERS, values, strict=True)}
+    forces, _ = _solved(columns, model, table, DEFAULT_LEVEL, None, "creep_force")
+    return tuple(forces[:, k].reshape(along.shape)[()] for k in range(3))

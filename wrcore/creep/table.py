@@ -100,7 +100,29 @@ class CreepTable:
         )
 
     def kernel_data(self) -> CreepTableData:
-        """The `CreepTableData` to hand to kernels."""
+        """The `CreepTableData` to hand to kernels, your own with ``numba.njit``, too.
+
+        `wrcore.creep.axes.table_lookup` takes it with ln(a/b), a/b, psi and the creepages xi', eta', phi', which are
+        xi, eta and phi c times G a b/(mu N), c^2 = a b; it returns Fx and Fy over mu N, Mz over mu N c, and 1 where a/b
+        or psi lay outside the table.
+
+        Examples
+        --------
+        >>> import numba, numpy as np, wrcore as wr
+        >>> from wrcore.creep.axes import table_lookup
+        >>> @numba.njit
+        ... def work(table, a, b, load, xi, eta, phi, mu, shear_modulus):  # of a patch per metre, over n creepages
+        ...     c, limit, total = np.sqrt(a * b), mu * load, 0.0
+        ...     scale = shear_modulus * a * b / limit
+        ...     for k in range(len(xi)):
+        ...         scaled = scale * xi[k], scale * eta[k], scale * c * phi[k]
+        ...         fx, fy, mz, _ = table_lookup(table, np.log(a / b), a / b, 0.0, *scaled)
+        ...         total -= limit * (fx * xi[k] + fy * eta[k] + c * mz * phi[k])
+        ...     return total
+        >>> table, xi = wr.ensure_table(), np.linspace(-2e-3, 2e-3, 100)
+        >>> round(work(table.kernel_data(), 6e-3, 4e-3, 5e4, xi, 0.0 * xi, 0.0 * xi, 0.3, 8.2e10), -1)
+        930.0
+        """
         return self.data
 
 

@@ -169,6 +169,12 @@ def keys_of(schema_name):
 
 def unit_of_key(path):
     """Unit of a scene's key such as ``initial.bodies.car.y``, empty where it holds no number or there is none."""
+    inside, group, _, *keys = [*path.split("."), "", ""]
+    if inside == "vehicle" and keys[2:]:  # a change of its bodies, elements or joints
+        ends = ".".join(keys[:-2]), keys[0]
+        names = {f"{group}{one}.{end}" for one in (".*", "[]") for end in ends}
+        known = {unit for name, *_, unit in keys_of("vehicle") if unit and name in names}
+        return "1" if keys[-3] == "factor" else known.pop() if len(known) == 1 else ""
     name, inner = ("track", path.removeprefix("track.")) if path.startswith("track.") else ("scene", path)
     return next((unit for known, unit in _units(name) if known.fullmatch(inner)), "")
 

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
+from wrcore.geometry.path import tangent_path
+from wrcore.geometry.track import build_track
 
 Samples = Annotated[ArrayLike, Within(dimensions=1, size=0)]
 
@@ -65,3 +67,11 @@ def growth_rate(t, y):
     if len(tops) < 2:
         return np.nan
     return float(np.polyfit(t[tops], np.log(np.abs(y[tops])), 1)[0])
+
+
+def path_of(run):
+    """`PathData` of the track that a run is on, built anew of its scene; straight where that says nothing."""
+    track = run.scene.get("track", {})
+    if track.get("path", "tangent") == "tangent" and not track.get("gradients"):
+        return tangent_path()
+    return build_track({key: track[key] for key in track if key not in ("irregularity", "support")}, "run").path

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import wrcore
-from wrcore.errors import UnknownNameError, similar
+from wrcore.errors import InputError, UnknownNameError, similar
 from wrcore.errors.checked_calls import checked
 from wrcore.run.channels import DESCRIPTIONS, unit_of
 from wrcore.run.derived import derived_channels
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
     from matplotlib.figure import Figure
 
     from wrcore.integrate.trajectory import Checkpoint
@@ -49,7 +50,7 @@ class Channels(Mapping[str, np.ndarray]):
             return self._channels[name]
         if name in self._derived:
             return self._derived[name]()
-        has, known = ", ".join(self._channels), [*self._channels, *self._derived]
+        has, known = ", ".join(self._channels), self.names()
         follow = f", and what follows from these, {', '.join(self._derived)}" if self._derived else ""
         text = f"no channel {name!r} in {self._group!r}; it has {has}{follow}{similar(name, known)}"
         raise UnknownNameError("run", "", text)
@@ -75,11 +76,14 @@ class Channels(Mapping[str, np.ndarray]):
     def __len__(self) -> int:
         return len(self._channels)
 
-    def __dir__(self) -> list[str]:
-        return sorted([*super().__dir__(), *self._channels, *self._derived])
-
-    def _ipython_key_completions_(self) -> list[str]:
+    def names(self) -> list[str]:
+        """Channels that are held, then those that follow from them."""
         return [*self._channels, *self._derived]
+
+    def __dir__(self) -> list[str]:
+        return sorted([*super().__dir__(), *self.names()])
+
+    _ipython_key_completions_ = names
 
     def __repr__(self) -> str:
         width = max(map(len, self._channels), default=0)
@@ -222,6 +226,38 @@ class Run:
                     for patch, column in enumerate(values.T):
                         if patch == 0 or not np.isnan(column).all():
                             yield (group, name, patch), column
+
+    def to_xarray(self) -> xarray.DataTree:
+        """All channels as a tree of data sets, for xarray (``pip install "wrcore[xarray]"``).
+
+        Returns
+        -------
+        xarray.DataTree
+            A node per group (``tree["wheelset/left"]``) with a variable per channel over ``t_s``, of contacts over
+            ``t_s`` and ``patch``. Attributes are ``units`` and ``long_name``, those of the root the run's name, status,
+            settings and counters. Channels are SI, and views of the run's.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise InputError("to_xarray", "xarray", 'expected it installed: pip install "wrcore[xarray]"') from None
+        nodes = {}
+        for group, channels in self.groups.items():
+            variables = {}
+            for name, values in channels.items():
+                said = {"units": unit_of(name), "long_name": DESCRIPTIONS.get(name, name.replace("_", " "))}
+                variables[name] = ("t_s", "patch")[: values.ndim], values, said
+            nodes[f"/{group}"] = xarray.Dataset(variables)
+        about = {"name": self.scene.get("name", ""), "status": self.status, "reason": self.reason}
+        numbers = {name: value for part in (self.settings, self.counters) for name, value in part.items()}
+        about |= {name: value for name, value in numbers.items() if isinstance(value, str | int | float)}
+        time = {"t_s": ("t_s", self.t, {"units": "s", "long_name": DESCRIPTIONS["t"]})}
+        return xarray.DataTree.from_dict({"/": xarray.Dataset(coords=time, attrs=about), **nodes})
 
     @checked
     def wheel_forces(self, wheelset: str = "wheelset") -> pd.DataFrame:

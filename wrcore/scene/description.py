@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
@@ -38,7 +38,7 @@ from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
-from wrcore.vehicle.description import GRAVITY, Vehicle, load_vehicle
+from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
 from wrcore.vehicle.train import train_of
 
 
@@ -163,8 +163,8 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     """The scene of a file's content, with whatever other files it names."""
     data = validate(data, "scene", source)
     digests = digests_of_files(data, folder)  # before they are read: what changes meanwhile does not go unseen
-    parameters = find_file(data["vehicle"]["parameters"], folder, source, "vehicle.parameters")
-    vehicle = load_vehicle(parameters, data["vehicle"]["axle_boxes"])
+    find = partial(find_file, folder=folder, source=source, field="vehicle.parameters")
+    vehicle = vehicle_of(data["vehicle"], find, source)
     vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
     wheel, rail = wheel_and_rail(data, folder, source)
     _check_creep(data["contact"], source, folder)
@@ -197,7 +197,7 @@ def _pair(text):
     return key.strip(), parse_value(value)
 
 
-WHOLE = (".profile", ".friction", ".controller.speed")
+WHOLE = (".profile", ".friction", ".controller.speed", "vehicle.parameters")
 """Ends of the key paths at which a mapping stands for one value."""
 
 

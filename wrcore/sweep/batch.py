@@ -10,9 +10,10 @@ import dataclasses
 import glob
 import hashlib
 import io
+import itertools
 import json
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache
@@ -43,6 +44,7 @@ _SEALED = "# seal of this part: "
 _KIND = "a sweep's table (CSV or HDF5)"
 
 CHUNK = 200  # runs whose motions are held at a time
+AHEAD = 20  # runs per thread whose parts are made before they begin
 
 
 def column_unit(name: str) -> str:
@@ -118,7 +120,7 @@ def run_rows(
     tables: list[pd.DataFrame] = []
     chunk: list[_Outcome] = []
     with ThreadPoolExecutor(threads) as pool:
-        for outcome in bar(pool.map(work, tasks) if threads > 1 else map(work, tasks)):
+        for outcome in bar(_some_at_a_time(pool, work, tasks, AHEAD * threads) if threads > 1 else map(work, tasks)):
             if chunk and (len(chunk) == CHUNK or not _alike(chunk[0], outcome)):
                 tables.append(_measured(sweep, chunk))
                 chunk = []
@@ -127,20 +129,27 @@ def run_rows(
     return pd.concat([rows, table], axis=1).reset_index()
 
 
-def _tasks(sweep: Sweep, rows: pd.DataFrame) -> list[_Task]:
-    """One task per run; runs that are made of the same parts share them."""
+def _some_at_a_time(pool: ThreadPoolExecutor, work: Callable, tasks: Iterator[_Task], count: int) -> Iterator[_Outcome]:
+    """What a pool makes of tasks, so many at a time: its map takes all that it is given at once."""
+    while part := list(itertools.islice(tasks, count)):
+        yield from pool.map(work, part)
+
+
+def _tasks(sweep: Sweep, rows: pd.DataFrame) -> Iterator[_Task]:
+    """One task per run; runs that are made of the same parts share them, and come one after the other: parts are made
+    when they are needed, and kept no longer.
+    """
     parts = [key for key in rows.columns if of_parts(key)]
-    others = [key for key in rows.columns if not of_parts(key)]
-    groups: dict[str, tuple[Scene, dict[Any, Any]]] = {}
-    tasks = []
+    groups: dict[str, list[tuple[int, dict[str, Any]]]] = {}
     for run, values in zip(rows.index, rows.to_dict("records"), strict=True):
-        made_of = {key: values[key] for key in parts}
-        text = json.dumps(made_of, sort_keys=True)
-        if text not in groups:
-            groups[text] = load_scene(sweep.scene, made_of) if made_of else sweep.scene, {}
-        scene, shared = groups[text]
-        tasks.append(_Task(int(run), scene, {key: values[key] for key in others}, shared))
-    return tasks
+        text = json.dumps([values.pop(key) for key in parts])
+        groups.setdefault(text, []).append((int(run), {str(key): value for key, value in values.items()}))
+    for text, members in groups.items():
+        made_of = dict(zip(parts, json.loads(text), strict=True))
+        scene = load_scene(sweep.scene, made_of) if made_of else sweep.scene
+        shared: dict[Any, Any] = {}
+        for run, values in members:
+            yield _Task(run, scene, values, shared)
 
 
 def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
@@ -259,9 +268,21 @@ def gather(sweep: Sweep, parts: Iterable[str | PathLike[str]], path: str | PathL
             owners[run] = part
     missing = [run for run in sweep.runs.index if run not in owners]
     if missing:
-        expected = f"expected parts with all {len(sweep.runs)} runs"
-        raise InputError(sweep.source, "", f"{expected}, but {len(missing)} are in none, run {missing[0]} first")
+        expected = f"expected parts with all {len(sweep.runs)} runs, but {len(missing)} are in none"
+        raise InputError(sweep.source, "", f"{expected}: {_lacking(sweep, [set(t['run']) for t in tables])}")
     write_table(path, pd.concat(tables).sort_values("run", ignore_index=True))
+
+
+def _lacking(sweep: Sweep, parts: list[set[int]]) -> str:
+    """Which ``--batch i/n`` are missing, if the parts are some of n equal ones, else which runs."""
+    size = max(map(len, parts), default=len(sweep.runs))
+    for count in range(-(-len(sweep.runs) // size), len(sweep.runs) // max(size - 1, 1) + 1):
+        batches = [set(sweep.rows(batch, count).index) for batch in range(count)]
+        if all(part in batches for part in parts):
+            return "--batch " + ", ".join(f"{k}/{count}" for k, batch in enumerate(batches, 1) if batch not in parts)
+    missing = np.setdiff1d(sweep.runs.index, list(set().union(*parts)))
+    stretches = np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1)
+    return "runs " + ", ".join(f"{runs[0]} to {runs[-1]}" if len(runs) > 1 else f"{runs[0]}" for runs in stretches)
 
 
 def _whole(sweep: Sweep, part: Path) -> bool:

@@ -28,6 +28,8 @@ from wrcore.sweep.measures import MEASURES
 MOST_RUNS = 10_000_000  # runs of a sweep
 MOST_BATCHES = 500  # a sweep with more batches than this would be many short processes
 
+FEW = 50  # values of a key that are all tried before any run
+
 OF_PARTS = ("name", "description", "vehicle", "wheel", "rail", "track", "contact.creep.table")
 """Keys that decide what a scene is made of: a run that changes one of them needs the scene read anew."""
 
@@ -109,16 +111,11 @@ def load_sweep(
     for measure in data["measures"]:
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
-    scene = load_scene(load_scene(find_file(data["scene"], folder, name, "scene"), data["set"]), overrides)
+    read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
+    scene = load_scene(load_scene(read_from, data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     read = scene.files | _check_values(scene, data["keys"], name)
-    grid = data["sampling"]["kind"] == "grid"
-    if grid and (count := math.prod(map(len, values.values()))) > MOST_RUNS:
-        raise InputError(name, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
-    if grid:
-        runs = pd.DataFrame(list(itertools.product(*values.values())), columns=list(values))
-    else:
-        runs = _hypercube(values, data["sampling"], name)
+    runs = pd.DataFrame(RUNS[data["sampling"]["kind"]](values, data["sampling"], name), columns=list(values))
     runs.index.name = "run"
     shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
     if data["begin"] >= shortest:
@@ -141,7 +138,7 @@ def _values(entry, sampling, field, source):
     low, high, log = entry["from"], entry["to"], entry["scale"] == "log"
     if not low < high or (log and low <= 0.0):
         raise InputError(source, field, f"expected from < to{' and from > 0' if log else ''}, got {low} and {high}")
-    if sampling["kind"] == "latin_hypercube":
+    if RUNS[sampling["kind"]] is _design:
         return (low, high, log)
     if "steps" not in entry:
         raise InputError(source, f"{field}.steps", "expected a number of values, but the key is missing")
@@ -150,11 +147,10 @@ def _values(entry, sampling, field, source):
 
 
 def _check_values(scene, entries, source):
-    """Try each key by itself: at its bounds, or at each of its values. Returns the digests of the files read."""
+    """Try each key by itself, at the values that stand for all of it. Returns the digests of the files read."""
     files: dict[str, str] = {}
     for key, entry in entries.items():
-        low, high = entry.get("from", 0.0), entry.get("to", 0.0)
-        for value in entry.get("values") or (low, high, low + 0.4142 * (high - low)):
+        for value in _trials(entry):
             try:
                 changed = load_scene(scene, {key: value})
             except InputError as error:
@@ -165,20 +161,62 @@ def _check_values(scene, entries, source):
     return files
 
 
-def _hypercube(values, sampling, source):
-    """Latin hypercube: each key's range in as many equal parts as there are runs, one run in each."""
+def _trials(entry):
+    """Values of a key that stand for all: bounds and a number between them, or all of a list. Of many numbers those at
+    its ends, and one that is not whole."""
+    if "values" not in entry:
+        low, high = entry["from"], entry["to"]
+        return low, high, low + 0.4142 * (high - low)
+    values = entry["values"]
+    if len(values) <= FEW or any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
+        return values
+    return [min(values), max(values), *[value for value in values if value != int(value)][:1]]
+
+
+def _grid(values, sampling, source):
+    """Every combination."""
+    if (count := math.prod(map(len, values.values()))) > MOST_RUNS:
+        raise InputError(source, "keys", f"expected a grid of at most {MOST_RUNS} runs, got {count}")
+    return list(itertools.product(*values.values()))
+
+
+def _list(values, sampling, source):
+    """The first values of all keys, the second ones, and so on."""
+    counts = {key: len(among) for key, among in values.items()}
+    first = next(iter(counts))
+    for key, count in counts.items():
+        if count != counts[first]:
+            expected = f"expected as many values as of {first}, {counts[first]}, got {count}"
+            raise InputError(source, f"keys.{key}", expected)
+    return list(zip(*values.values(), strict=True))
+
+
+def _design(values, sampling, source):
+    """Points of a design of scipy.stats.qmc: of a range between its bounds, of a list one of its values."""
+    from scipy.stats import qmc
+
     if "runs" not in sampling:
         raise InputError(source, "sampling.runs", "expected a number of runs, but the key is missing")
     count, random = sampling["runs"], np.random.default_rng(sampling["seed"])
-    columns = {}
-    for key, among in values.items():
-        places = (random.permutation(count) + random.random(count)) / count
-        if isinstance(among, list):
-            columns[key] = [among[int(place * len(among))] for place in places]
-        else:
-            low, high, log = among
-            columns[key] = low * (high / low) ** places if log else low + (high - low) * places
-    return pd.DataFrame(columns)
+    if sampling["kind"] == "sobol":
+        if count & (count - 1):
+            raise InputError(source, "sampling.runs", f"expected a power of 2 for Sobol points, got {count}")
+        places = qmc.Sobol(len(values), seed=random).random(count)
+    else:
+        places = qmc.LatinHypercube(len(values), seed=random).random(count)
+    return {key: _at_places(among, column) for (key, among), column in zip(values.items(), places.T, strict=True)}
+
+
+def _at_places(among, places):
+    """Values at places (n,) from 0 to 1 in a list or between bounds."""
+    if isinstance(among, list):
+        return [among[min(int(place * len(among)), len(among) - 1)] for place in places]
+    low, high, log = among
+    return (low * (high / low) ** places if log else low + (high - low) * places).tolist()
+
+
+RUNS = {"grid": _grid, "list": _list, "latin_hypercube": _design, "sobol": _design}
+"""Runs by ``sampling.kind``."""
 
 
 def of_parts(key: str) -> bool:

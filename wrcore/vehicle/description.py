@@ -11,6 +11,7 @@ from wrcore.dynamics.suspension import PRELOAD, Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements
 from wrcore.vehicle.layout import Layout
@@ -68,10 +69,25 @@ class Vehicle:
         return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, PRELOAD + 2]))
 
 
-def load_vehicle(path, axle_boxes=True):
-    """Read and check a vehicle file; without ``axle_boxes`` these become part of their wheelsets. An InputError names
-    the file, the element and what was expected."""
-    return build_vehicle(read_yaml(path), str(Path(path).name), axle_boxes)
+def vehicle_of(spec, find, source):
+    """The vehicle of a scene's key ``vehicle``, with its changes (`wrcore.vehicle.changes`): of the file that ``find``
+    finds by its path, or of its content. An InputError names the file, or the scene (``source``) where that is wrong,
+    the element and what was expected."""
+    parameters = spec["parameters"]
+    data, name = parameters, f"{source}: vehicle.parameters"
+    if isinstance(parameters, str):
+        path = find(parameters)
+        data, name = read_yaml(path), str(Path(path).name)
+    changes = {group: spec[group] for group in GROUPS if spec.get(group)}
+    if not changes:
+        return build_vehicle(data, name, spec["axle_boxes"])
+    data, reached = changed(_validated(data, name), changes, source)
+    try:
+        return build_vehicle(data, name, spec["axle_boxes"])
+    except InputError as error:
+        if any(f"{error.field}.".startswith(f"{field}.") for field in reached):
+            raise InputError(source, f"vehicle.{error.field}", error.expected) from None
+        raise
 
 
 def build_vehicle(data, source, axle_boxes=True):

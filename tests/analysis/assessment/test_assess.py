@@ -7,6 +7,7 @@ import pytest
 from scipy import signal
 
 import wrcore as wr
+from study.report.legible import findings
 from tests.synthetic import CONTACT
 from wrcore.analysis.assessment.assess import (
     assess,
@@ -245,3 +246,32 @@ def test_statistics_over_the_sections_of_many_runs():
     assert ("Y_qst", "straight", "left") not in table.index
     with pytest.raises(InputError, match="expected assessments by EN 14363"):
         section_statistics([*assessments, dataclasses.replace(assessments[0], standard="EN 12299")], 2.0)
+
+
+def test_its_picture_has_the_filtered_series_and_their_limits():
+    path = [{"tangent": 300.0}, {"transition": 30.0}, {"curve": 400.0, "radius": 600}]
+
+    def forces(t, sign):
+        return LOAD + 1e3 * np.sin(2 * np.pi * 100.0 * t), np.full_like(t, 7e3) * (sign > 0)
+
+    assessment = assess(synthetic(forces, path, duration=30.0), begin=1.0)
+    figure = assessment.plot()
+    assert findings(figure) == []
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "sum Y / kN", "Y over Q", "Q / kN", "Y qst / kN", "Q qst / kN",
+    ]  # fmt: skip
+    limits = assessment.summary.set_index("quantity")["limit"]
+    drawn = [{abs(line.get_ydata()[0]) for line in axes.lines if len(line.get_xdata()) == 2} for axes in figure.axes]
+    for quantity, factor, found in zip(limits.index, (1e-3, 1.0, 1e-3, 1e-3, 1e-3), drawn, strict=True):
+        assert found == {factor * limits[quantity]}
+    load = figure.axes[2].lines[0].get_ydata()
+    assert np.ptp(load) < 0.02 and load.mean() == pytest.approx(60.0, rel=1e-3)  # 100 Hz do not pass
+    assert assessment.series.index[0] == 1.0 and list(assessment.series["sum_Y"]) == [("wheelset", "")]
+    with pytest.raises(InputError, match="plot: standard: expected an assessment by EN 14363, got EN 12299"):
+        wr.Assessment("EN 12299", assessment.summary.iloc[:0], assessment.sections).plot()
+
+
+def test_command_draws(tmp_path):
+    synthetic(lambda t, sign: (np.full_like(t, LOAD), 0.0 * t), duration=1.0).save(tmp_path / "run.h5")
+    assert main(["assess", str(tmp_path / "run.h5"), "--plot", str(tmp_path / "run.svg")]) == 0
+    assert "<svg" in (tmp_path / "run.svg").read_text("utf-8")

@@ -178,6 +178,29 @@ def test_the_factor_is_round_and_shows_the_motion(run):
     assert f"{data['factor']:g}" == "100" and np.abs(data["bodies"][0]["y"]).max() < 0.5
 
 
+def test_in_a_curve_the_factor_shows_the_wheelsets(run):
+    """A car of 19 m between its bogies lies 0.15 m inside a curve of 300 m: that is no motion to be enlarged."""
+    path = [{"tangent": 10.0}, {"transition": 30.0}, {"curve": 200.0, "radius": 300.0, "cant": 0.1}]
+    scene = wr.load_scene(SCENES / "trailer_vehicle.yaml", {"track.path": path})
+    s, x = 60.0 + 15.0 * run.t, dict(zip(scene.vehicle.body_names, scene.vehicle.positions[:, 0], strict=True))
+    wheels = [d for name, d in x.items() if name in scene.vehicle.wheelset_names]
+    inside = {"car_body": np.mean(np.square(wheels)) / 600.0, "bogie_1": 1.28**2 / 600.0, "bogie_2": 1.28**2 / 600.0}
+    groups = {}
+    for name, at in x.items():
+        y = inside.get(name, 0.0) + 0.004 * np.sin(run.t)
+        groups[name] = {**run.groups["wheelset"], "y_m": y, "s_m": s + at, "x_m": s + at}
+    groups |= {
+        f"{name}/{side}": run.groups[f"wheelset/{side}"]
+        for name in scene.vehicle.wheelset_names for side in ("left", "right")
+    }  # fmt: skip
+    curved = dataclasses.replace(run, scene=scene.data, groups=groups)
+    data = wr.draw(curved, scene).data
+    assert data["factor"] == 100.0
+    at = np.searchsorted(run.t, np.array(data["t"]) - 1e-9)
+    for body in data["bodies"]:
+        np.testing.assert_allclose(body["y"], 0.4 * np.sin(run.t[at]), atol=1e-3)
+
+
 def test_profiles_over_distance(tmp_path):
     u = 2.5e-4 * np.arange(-40, 41)
     for step in range(2):

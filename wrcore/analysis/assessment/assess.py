@@ -14,9 +14,11 @@ the standard adds, statistics over the sections of many runs, is :func:`section_
 worst section of its run with the limit.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import pandas as pd
@@ -28,6 +30,9 @@ from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import quotient
 from wrcore.run.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PERCENTILES = (0.15, 50.0, 99.85)
 WINDOW = 2.0  # of the sliding means, m
@@ -62,6 +67,28 @@ class Assessment:
     """A row per quantity (EN 14363), body (EN 12299), or body and direction (ISO 2631)."""
     sections: pd.DataFrame
     """EN 14363: a row per section, wheelset or wheel and quantity; else empty."""
+    series: pd.DataFrame = field(default_factory=pd.DataFrame)
+    """EN 14363: the filtered quantities over time (index ``t_s``), columns quantity, wheelset and side; else empty."""
+    limits: dict[str, dict[str, float]] = field(default_factory=dict)
+    """EN 14363: by wheelset, of each quantity; NaN where the standard states none."""
+
+    @checked
+    def plot(self) -> Figure:
+        """Draw the filtered series that the percentiles are of, with their limits (dashed).
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A panel per quantity, a line per wheelset or wheel.
+
+        Raises
+        ------
+        InputError
+            For another standard than EN 14363: the others have no limits.
+        """
+        from wrcore.analysis.pictures.plot_assessment import plot_assessment
+
+        return plot_assessment(self)
 
     def __repr__(self) -> str:
         table = self.summary.to_string(index=False, float_format=lambda value: f"{value:.4g}")
@@ -106,8 +133,9 @@ def assess(
     if standard != "EN 14363":
         table = (ride_table if standard == "EN 12299" else whole_body_table)(run, begin)
         return Assessment(standard, table, pd.DataFrame())
-    sections, wheel_loads = section_table(run, begin)
-    return Assessment(standard, _summary(sections, wheel_loads, 0.85 if freight else 1.0), sections)
+    sections, wheel_loads, series = section_table(run, begin)
+    limits = {name: _limits(load, 0.85 if freight else 1.0) for name, load in wheel_loads.items()}
+    return Assessment(standard, _summary(sections, limits), sections, series, limits)
 
 
 @checked
@@ -219,13 +247,14 @@ def track_sections(path, end, begin=0.0):
 
 def section_table(run, begin=0.0):
     """Percentiles of the filtered quantities (columns p0_15, p50, p99_85, in N; Y/Q a number) per section, wheelset and
-    side from ``begin`` (s) on, and Q0 (N) by wheelset: its mean Q over the whole run.
+    side from ``begin`` (s) on, Q0 (N) by wheelset, its mean Q over the whole run, and the filtered quantities (a column
+    each) over time from ``begin`` on.
     """
     rate, late = rate_of(run, LEAST_RATE, "EN 14363"), late_in(run, begin, "EN 14363")
     wheels = [run[f"{name}/{side}"] for name in wheelsets_of(run) for side in SIDES]
     if not wheels or not all(wheel.follows("Q_N") and wheel.follows("Y_N") for wheel in wheels):
         raise InputError("EN 14363", "run", "expected the channels of contacts, or Q and Y, of wheels")
-    rows, loads = [], {}
+    rows, loads, series = [], {}, {}
     places = {name: run[name]["s_m" if "s_m" in run[name] else "x_m"] for name in wheelsets_of(run)}
     reach = max(map(np.max, places.values())), min(map(np.min, places.values()))
     sections = track_sections(run.scene.get("track", {}).get("path", "tangent"), *reach)
@@ -236,6 +265,7 @@ def section_table(run, begin=0.0):
         forces = {side: wheel_forces(run, name, side) for side in SIDES}
         loads[name] = float(np.mean([forces[side][0] for side in SIDES]))
         for quantity, side, values in _filtered(forces, way, rate):
+            series[quantity, name, side] = values[late]
             for number, (low, high, radius) in enumerate(sections):
                 inside = late & (s >= low) & (s <= high) & np.isfinite(values)
                 if quantity.endswith("_qst") and np.isinf(radius) or np.count_nonzero(inside) < 2:
@@ -244,7 +274,7 @@ def section_table(run, begin=0.0):
                 place = (number, s[inside].min(), s[inside].max(), radius)
                 rows.append((*place, quantity, name, side, *found))
     columns = ["section", "begin_m", "end_m", "radius_m", "quantity", "wheelset", "side", "p0_15", "p50", "p99_85"]
-    return pd.DataFrame(rows, columns=columns), loads
+    return pd.DataFrame(rows, columns=columns), loads, pd.DataFrame(series, index=pd.Index(run.t[late], name="t_s"))
 
 
 def _filtered(forces, way, rate):
@@ -269,10 +299,10 @@ def _limits(wheel_load, freight):
     }
 
 
-def _summary(sections, wheel_loads, freight):
+def _summary(sections, limits):
     """Worst value of each quantity by its wheelset's own limit, where it was found, and the limit."""
-    limits, rows = {name: _limits(load, freight) for name, load in wheel_loads.items()}, []
-    for quantity in _limits(0.0, freight):
+    rows = []
+    for quantity in next(iter(limits.values())):
         part = sections[sections["quantity"] == quantity]
         if part.empty:
             continue

@@ -20,7 +20,7 @@ import pandas as pd
 from wrcore.analysis.assessment.wheels import late_in, wheelsets_of
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.path import track_frame
-from wrcore.geometry.track import build_track
+from wrcore.run.motion import path_of
 from wrcore.vehicle.description import GRAVITY
 
 BLOCK = 5.0  # length of the stretches that comfort is evaluated over, s
@@ -134,8 +134,7 @@ def _upright(run, channels):
     """The upright direction in the track's axes where a body is, shape (n, 3)."""
     out, frame = np.tile([0.0, 0.0, 1.0], (len(run.t), 1)), np.empty((3, 3))
     if "s_m" in channels:
-        plan = {key: value for key, value in run.scene["track"].items() if key not in ("irregularity", "support")}
-        path = build_track(plan, "run").path
+        path = path_of(run)
         for row, s in zip(out, channels.s_m, strict=True):
             track_frame(path, s, frame)
             row[:] = frame[2]

@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from wrcore.analysis.contact.poses import AT_REST, loaded_poses
+from wrcore.analysis.contact.contacts import contacts
+from wrcore.analysis.contact.poses import STILL
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import OneOf, Within, checked
+from wrcore.geometry.track import SIDES
 
 
 @checked
@@ -26,7 +28,6 @@ def contact_table(
     Parameters
     ----------
     pair : WheelsetOnTrack
-        With equal sides.
     shifts, yaws : array_like
         Lateral positions (within 0.1 m) and yaw angles (within 0.5 rad) of the wheelset; all combinations.
     wheel_load : float
@@ -52,7 +53,9 @@ def contact_table(
     [[0.0, 'left', 1], [0.0, 'right', 1], [0.002, 'left', 1], [0.002, 'right', 1]]
     """
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
-    poses = pd.DataFrame({"pose_id": range(y.size), "y_m": y, "yaw_rad": yaw, "roll_rad": np.nan, "z_m": np.nan})
-    patches = loaded_poses(poses, pair.left.geometry, wheel_load, patch, detection=detection)[list(AT_REST)]
-    placed = poses[["pose_id", "y_m", "yaw_rad"]].merge(patches, on="pose_id", suffixes=("", "_contact"))
-    return placed.rename(columns={"y_m_contact": "y_contact_m"}).drop(columns="pose_id")
+    found = contacts(pair, y, yaw=yaw, load=wheel_load, detection=detection, patch=patch)
+    there = np.isfinite(found.N_N)
+    pose, side, number = np.nonzero(there)
+    table = {"y_m": y[pose], "yaw_rad": yaw[pose], "side": np.array(list(SIDES), object)[side], "patch": number + 1}
+    table |= {"y_contact_m" if name == "y_m" else name: found[name][there] for name in (*STILL, "p_max_Pa")}
+    return pd.DataFrame(table | {"roll_rad": found.roll_rad[pose], "z_wheelset_m": found.z_wheelset_m[pose, side]})

@@ -13,8 +13,8 @@ ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
 """Columns of rolling, empty where the wheelset does not move."""
 
 STILL = tuple(name for name in columns.CHANNELS if name not in ROLLING)
-AT_REST = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m")
-FIELDS = (*AT_REST, "x_min_m", "x_max_m", "width_m", *ROLLING)
+FIELDS = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m",
+          "x_min_m", "x_max_m", "width_m", *ROLLING)  # fmt: skip
 
 
 def loaded_poses(

@@ -17,12 +17,17 @@ from wrcore.analysis.assessment.wheels import wheelsets_of
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.errors import InputError, check_number
 from wrcore.errors.new_files import appearing
+from wrcore.geometry.path import centreline
 from wrcore.geometry.track import SIDES
+from wrcore.run.motion import path_of
 
 MOST_FRAMES = 600
 FRAME_RATE = 50.0  # frames per second of simulated time, as near as the run's output times allow
 SHOWN = 0.5  # largest displacement from above, as the factor is chosen, m
 POINTS = 160  # of a profile
+OVERHANG = (
+    0.5  # a wheelset so far beyond the end of a body's box, m, still is below it: boxes are only as long as inertia
+)
 
 PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
 
@@ -30,8 +35,8 @@ PATCH = ("y_m", "z_m", "b_m", "contact_angle_rad", "N_N", "Fx_N", "Fy_N")
 @dataclass(frozen=True)
 class Animation:
     """A page (``html``) with a run in motion; a notebook shows it. ``data`` is what it draws: per body nominal place
-    and size (m), ``y`` (m) and ``yaw`` (rad) over the frames, both times ``factor``; per wheelset its pose, true to
-    scale, and per wheel profiles, patches and forces.
+    and size (m), ``y`` (m; without the offset of straight bodies in curves) and ``yaw`` (rad) over the frames, both
+    times ``factor``; per wheelset its pose, true to scale, and per wheel profiles, patches and forces.
     """
 
     html: str = field(repr=False)
@@ -58,15 +63,16 @@ def animate(run, scene, factor=None, begin=0.0, end=math.inf):
     for name in vehicle.body_names:
         if "yaw_rad" not in run.groups.get(name, {}):
             raise InputError("draw", name, "expected a run with the output channels pose and contact")
-    poses = {name: run.groups[name] for name in vehicle.body_names}
-    largest = max(float(np.abs(poses[name]["y_m"][frames]).max()) for name in vehicle.body_names)
+    poses, path = {name: run.groups[name] for name in vehicle.body_names}, path_of(run)
+    aside = {name: _aside(vehicle, path, name, poses[name], frames) for name in vehicle.body_names}
+    largest = max(float(np.abs(shifts).max()) for shifts in aside.values())
     factor = _round(SHOWN / max(largest, 1e-6)) if factor is None else factor
     check_number(factor, 1.0, 1e6, "draw", "factor")
     data = {
         "name": run.scene.get("name", "run"), "status": run.status, "factor": factor,
         "speed": float(run.scene.get("speed", 0.0)), "t": _numbers(run.t[frames], 4),
         "half_distance": vehicle.half_distance, "radius": vehicle.rolling_radius,
-        "bodies": [_body(vehicle, name, poses[name], frames, factor) for name in vehicle.body_names],
+        "bodies": [_body(vehicle, name, aside[name], poses[name]["yaw_rad"][frames], factor) for name in aside],
         "wheelsets": [_wheelset(run, scene, name, frames) for name in vehicle.wheelset_names],
     }  # fmt: skip
     page = files("wrcore.analysis.pictures").joinpath("animation.html").read_text(encoding="utf-8")
@@ -97,15 +103,29 @@ def _numbers(values, digits):
     return [None if math.isnan(value) else value for value in rounded.tolist()]
 
 
-def _body(vehicle, name, pose, frames, factor):
+def _aside(vehicle, path, name, pose, frames):
+    """Lateral displacement of a body over the frames, m, without what a straight body has in a curve: its middle lies
+    inside the arc on which the wheelsets below it stand, by half the curvature times their mean square distance.
+    """
+    at = vehicle.body_names.index(name)
+    shifts = pose["y_m"][frames] - vehicle.positions[at, 1]
+    distances = vehicle.positions[vehicle.bodies.wheelsets, 0] - vehicle.positions[at, 0]
+    below = distances[np.abs(distances) <= 0.5 * box_of(vehicle.data["bodies"][name])[0] + OVERHANG]
+    if not path.pieces.size or not below.size or name in vehicle.wheelset_names:
+        return shifts
+    curvatures = np.array([centreline(path, s).curvature for s in pose["s_m"][frames]])
+    return shifts - 0.5 * curvatures * np.mean(below**2)
+
+
+def _body(vehicle, name, aside, yaw, factor):
     at, part = vehicle.body_names.index(name), vehicle.data["bodies"][name]
     wheelset = part["kind"] == "wheelset"
     size = [0.0, 2.0 * vehicle.half_distance] if wheelset else box_of(part)[:2].tolist()
     return {
         "name": name, "kind": part["kind"], "x": float(vehicle.positions[at, 0]), "size": size,
         "y0": float(vehicle.positions[at, 1]),
-        "y": _numbers(factor * (pose["y_m"][frames] - vehicle.positions[at, 1]), 5),
-        "yaw": _numbers(factor * pose["yaw_rad"][frames], 6),
+        "y": _numbers(factor * aside, 5),
+        "yaw": _numbers(factor * yaw, 6),
     }  # fmt: skip
 
 

@@ -64,7 +64,7 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['y / mm', 'N / kN']
     """
-    panels = [(channel.rpartition(".")[2], {channel: _values(run, channel)}) for channel in channels] or _overview(run)
+    panels = [(name.rpartition(".")[2], {name: values_of(run, name)}) for name in channels] or _overview(run)
     figure = Figure(figsize=(WIDTH, 0.7 + HEIGHT * len(panels)), layout="constrained")
     rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (quantity, lines) in zip(rows, panels, strict=True):
@@ -74,14 +74,16 @@ def plot_run(run: Run, channels: Sequence[str] = ()) -> Figure:
     return figure
 
 
-def _values(run: Run, channel: str) -> np.ndarray:
+def values_of(run: Run, channel: str) -> np.ndarray:
+    """Values of a channel such as ``wheelset/left.N_N``; InputError for one that the run has not."""
     group, _, name = channel.rpartition(".")
     try:
         return run[group][name]
     except KeyError:
-        known = [f"{group}.{name}" for group, names in run.groups.items() for name in names]
-        expected = f"expected a channel of the run: {', '.join(known)}{similar(channel, known)}"
-        raise InputError("plot", channel, expected) from None
+        known = [f"{one}.{channel}" for one in run for channel in run[one].names()]
+        near = similar(channel, known) or similar(f"{next(iter(run), '')}.{name}", known)
+        has = f"{group}.{', '.join(run[group].names())}" if group in run else f"a channel of {', '.join(run)}"
+        raise InputError("plot", channel, f"expected {has}{near}") from None
 
 
 def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
@@ -99,20 +101,25 @@ def _overview(run: Run) -> list[tuple[str, dict[str, np.ndarray]]]:
     return panels
 
 
+def printed(quantity: str) -> tuple[float, str]:
+    """Factor from a channel's values to those that figures print, and the label of an axis with their unit."""
+    unit, symbol = unit_of(quantity), quantity
+    factor, name = (1.0, "m") if quantity in LARGE else PRINTED.get(unit, (1.0, unit))
+    if unit != "1":
+        symbol = quantity.removesuffix(next(end for end in UNIT_SUFFIXES if quantity.endswith(end)))
+    symbol = symbol.replace("_", " ")
+    return factor, f"{symbol} / {name}" if name else symbol
+
+
 def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> None:
-    unit = unit_of(quantity)
-    factor, printed = (1.0, "m") if quantity in LARGE else PRINTED.get(unit, (1.0, unit))
-    for style, (label, values) in zip(_styles(list(lines)), lines.items(), strict=True):
+    factor, ylabel = printed(quantity)
+    for style, (label, values) in zip(looks(list(lines)), lines.items(), strict=True):
         if values.ndim > 1:  # a patch may last for a single output
             style |= {"marker": ".", "markersize": 3}
         for patch, column in enumerate(np.reshape(values, (len(run.t), -1)).T):
             if patch == 0 or not np.isnan(column).all():
                 axes.plot(run.t, factor * column, label=label.replace("_", " ") if patch == 0 else None, **style)
-    symbol = quantity
-    if unit != "1":
-        symbol = quantity.removesuffix(next(end for end in UNIT_SUFFIXES if quantity.endswith(end)))
-    symbol = symbol.replace("_", " ")
-    axes.set(ylabel=f"{symbol} / {printed}" if printed else symbol, xmargin=0)
+    axes.set(ylabel=ylabel, xmargin=0)
     if len(lines) > 1:
         look = {"fontsize": 7 if len(lines) > MOST_ENTRIES // 2 else 9, "ncols": -(-len(lines) // MOST_ENTRIES)}
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), **look)
@@ -120,7 +127,7 @@ def _draw(axes: Axes, run: Run, quantity: str, lines: dict[str, np.ndarray]) -> 
         axes.set_title(next(iter(lines)).removesuffix(f".{quantity}").replace("_", " "), loc="left")
 
 
-def _styles(labels: Sequence[str]) -> list[dict[str, Any]]:
+def looks(labels: Sequence[str]) -> list[dict[str, Any]]:
     """A look of its own for each line: colours by wheelset, dashes by side; told apart in grey too."""
     stems = [label.removesuffix(" left").removesuffix(" right") for label in labels]
     firsts = list(dict.fromkeys(stems))

@@ -1,0 +1,237 @@
+"""Two runs beside each other: what a modelling choice changes, channel by channel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from wrcore.analysis.assessment.wheels import wheelsets_of
+from wrcore.analysis.pictures.plot_run import COLORS, HEIGHT, WIDTH, printed, values_of
+from wrcore.analysis.pictures.style import styled
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import checked
+from wrcore.run.channels import unit_of
+from wrcore.run.results import load_run
+from wrcore.run.run import Run
+from wrcore.run.simulation import flat
+
+SAME_TIME = 1e-9
+"""Output times of two runs that are closer than this are the same, s."""
+
+PLACES = ("x_m", "y_m", "z_m", "s_m", "u_wheel_m", "u_rail_m", "s_wheel_rad")
+MOTION = ("m", "rad", "m/s", "rad/s", "m/s^2")
+"""Channels of contacts, and units of those of bodies, whose zero means little: they are measured by how they vary."""
+
+ACCURACIES = {"y": "y_m", "Y": "Y_N", "Q": "Q_N", "wear": "T_gamma_N"}
+"""Channel that the error of :func:`wrcore.simulate_to_accuracy` is of, by what it was asked of."""
+
+SHOWN = {"y_m": False, "yaw_rad": False, "Q_N": True, "Y_N": True}
+"""Channels that are drawn unless others are asked for, of bodies or of contacts."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Comparison:
+    """How two runs differ; prints itself as a table with a row per channel, of the group where it differs most.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), integration__duration=0.1)
+    >>> found = wr.compare(wr.simulate(scene), wr.simulate(scene, speed=40))
+    >>> found.changes
+    {'speed': (20.0, 40)}
+    >>> found.plot().axes[0].get_ylabel()
+    'y / mm'
+    """
+
+    runs: tuple[Run, Run]
+    changes: dict[str, tuple[Any, Any]]
+    """Keys of the scenes that differ, with both values; None where a scene has none."""
+    t: np.ndarray
+    """Output times that both have, s."""
+    table: pd.DataFrame
+    """A row per group and channel; columns: :func:`compare`."""
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """Of each channel of bodies and of contacts the row with the largest relative difference, the largest first."""
+        order = self.table.sort_values("relative", ascending=False, kind="stable")
+        again = pd.DataFrame({"channel": order["channel"], "contact": order["group"].str.contains("/")}).duplicated()
+        return order[~again].reset_index(drop=True)
+
+    def __repr__(self) -> str:
+        names = " and ".join(f"{run.scene.get('name', 'run')!r} ({run.status})" for run in self.runs)
+        keys = [f"{key}: {one!r}, {other!r}" for key, (one, other) in self.changes.items()]
+        rows = self.summary.to_string(index=False, float_format=lambda value: f"{value:.3g}", na_rep="")
+        return "\n".join([f"{names}: {len(self.t)} times, {self.t[0]:g} to {self.t[-1]:g} s", *keys, rows])
+
+    @checked
+    @styled
+    def plot(self, *channels: str) -> Figure:
+        """Draw channels of both runs, and their difference with the error that the runs state.
+
+        Parameters
+        ----------
+        *channels : str
+            Such as ``"wheelset/left.Q_N"``, a row each. Without any: lateral position, yaw, vertical and lateral force,
+            each where it differs most.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            For a channel that the runs do not both have.
+        """
+        channels = channels or self._shown()
+        pairs = [tuple(values_of(run, channel) for run in self.runs) for channel in channels]
+        figure = Figure(figsize=(1.4 * WIDTH, 0.9 + HEIGHT * len(pairs)), layout="constrained")
+        rows = figure.subplots(len(pairs), 2, sharex=True, squeeze=False)
+        places = _common(*(run.t for run in self.runs))
+        stated = self.table.set_index(["group", "channel"])["error"]
+        for (left, right), channel, pair in zip(rows, channels, pairs, strict=True):
+            group, _, name = channel.rpartition(".")
+            factor, label = printed(name)
+            for run, values, look in zip(self.runs, pair, ((COLORS[0], "-"), (COLORS[2], "--")), strict=True):
+                for column in np.reshape(values, (len(run.t), -1)).T:
+                    left.plot(run.t, factor * column, color=look[0], linestyle=look[1])
+            apart = _apart(*(values[at] for values, at in zip(pair, places, strict=True)))
+            right.plot(self.t, factor * apart, color=COLORS[1])
+            if (group, name) in stated.index and np.isfinite(error := factor * stated[group, name]):
+                right.axhspan(-error, error, color="0.85", zorder=0)
+            left.set_title(group.replace("_", " "), loc="left")
+            left.set(ylabel=label, xmargin=0)
+            right.set(ylabel="difference" + "".join(label.partition(" / ")[1:]), xmargin=0)
+        for axes in rows[-1]:
+            axes.set_xlabel("time / s")
+        first, second = (run.scene.get("name", "run") for run in self.runs)
+        title = f"full: {first}, dashed: {second}; right: second less first, grey: stated error"
+        figure.suptitle(title, x=0.01, ha="left")
+        return figure
+
+    def _shown(self) -> tuple[str, ...]:
+        """The channels of `SHOWN` where they differ most, or those that differ most."""
+        order = self.summary.itertuples()
+        worst = {(row.channel, "/" in row.group): f"{row.group}.{row.channel}" for row in order}
+        return tuple(worst[key] for key in SHOWN.items() if key in worst) or tuple(worst.values())[: len(SHOWN)]
+
+
+@checked
+def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Comparison:
+    """Compare two runs: what does a modelling choice change?
+
+    Each channel that both have, or that follows from what both have, at the output times that both have; the channels
+    of contacts patch by patch where a wheel has equally many patches in both.
+
+    Parameters
+    ----------
+    a, b : str, Path or Run
+        Runs, or their files.
+
+    Returns
+    -------
+    Comparison
+        ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``: of the
+        difference b - a (the mean with its sign); ``t_max_s``: when it is largest. ``scale``: root mean square of the
+        channel, without the mean for places and motions; the largest of both runs and all groups, so that what hardly
+        moves is no scale. ``relative``: rms over scale. ``error``: what the runs state of their own errors, added as
+        squares; NaN where they state none. Runs of :func:`wrcore.simulate_to_accuracy` state that of y, Y or Q
+        (rms) or wear (of the mean), those that look contact up the largest ones of N and Q. ``compared``: share of the
+        common times at which both have a value.
+
+    Raises
+    ------
+    InputError
+        For files that are no runs, and runs with less than two output times, or no channel, in common.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), integration__duration=0.2)
+    >>> found = wr.compare(wr.simulate(scene), wr.simulate(scene, contact__detection="planar"))
+    >>> row = found.table.set_index(["group", "channel"]).loc["wheelset", "y_m"]
+    >>> bool(row["rms"] < 1e-6), bool(row["relative"] < 1e-3)
+    (True, True)
+    """
+    runs = tuple(one if isinstance(one, Run) else load_run(one) for one in (a, b))
+    places = _common(*(run.t for run in runs))
+    if len(places[0]) < 2:
+        raise InputError("compare", "t", "expected two runs with at least two output times in common")
+    found = [
+        (group, name, *(np.asarray(run[group][name])[at] for run, at in zip(runs, places, strict=True)))
+        for group in runs[0] if group in runs[1]
+        for name in runs[0][group].names() if runs[1][group].follows(name)
+    ]  # fmt: skip
+    scales: dict[tuple[bool, str], float] = {}
+    for group, name, *pair in found:
+        key = "/" in group, name
+        scales[key] = max(scales.get(key, 0.0), *(_scale(*key, values) for values in pair))
+    t = runs[0].t[places[0]]
+    rows = [row for group, name, *pair in found for row in _row(runs, t, group, name, pair, scales["/" in group, name])]
+    if not rows:
+        raise InputError("compare", "channels", "expected two runs with a channel in common")
+    scenes = [flat(run.scene) for run in runs]
+    keys = [key for key in {**scenes[0], **scenes[1]} if scenes[0].get(key) != scenes[1].get(key)]
+    changes = {key: (scenes[0].get(key), scenes[1].get(key)) for key in keys}
+    return Comparison((runs[0], runs[1]), changes, t, pd.DataFrame(rows))
+
+
+def _common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places in both of the times that two runs have in common."""
+    if not len(one) or not len(other):
+        return np.empty(0, int), np.empty(0, int)
+    near = np.minimum(np.searchsorted(other, one - SAME_TIME), len(other) - 1)
+    same = np.abs(other[near] - one) <= SAME_TIME
+    return np.flatnonzero(same), near[same]
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Difference of a channel; of patches none where one of the runs has more than the other."""
+    width = min(part.shape[1:] for part in (one, other))
+    if not width:
+        return other - one
+    alike = np.isfinite(one).sum(axis=1) == np.isfinite(other).sum(axis=1)
+    return np.where(alike[:, None], other[:, : width[0]] - one[:, : width[0]], np.nan)
+
+
+def _scale(of_contact: bool, name: str, values: np.ndarray) -> float:
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return 0.0
+    varies = name in PLACES if of_contact else unit_of(name) in MOTION
+    return float(np.std(values) if varies else np.sqrt(np.mean(values**2)))
+
+
+def _row(runs, t, group, name, pair, scale) -> Iterator[dict[str, Any]]:
+    """The row of a channel, none where the runs nowhere both have a value."""
+    apart = _apart(*pair).reshape(len(t), -1)
+    known = np.isfinite(apart)
+    if not known.any():
+        return
+    there = apart[known]
+    rms, size = float(np.sqrt(np.mean(there**2))), np.where(known, np.abs(apart), -1.0).max(axis=1)
+    errors = [error for run in runs for error in _stated(run, group, name, scale)]
+    yield {
+        "group": group, "channel": name, "unit": unit_of(name), "rms": rms, "max": float(size.max()),
+        "t_max_s": float(t[size.argmax()]), "mean": float(np.mean(there)), "scale": scale,
+        "relative": rms / scale if scale > 0.0 else 0.0 if rms == 0.0 else np.inf,
+        "error": float(np.linalg.norm(errors)) if errors else np.nan,
+        "compared": float(known.any(axis=1).mean()),
+    }  # fmt: skip
+
+
+def _stated(run: Run, group: str, name: str, scale: float) -> Iterator[float]:
+    """Errors that a run states of one of its channels."""
+    of = ACCURACIES.get(str(run.settings.get("accuracy_of")))
+    if name == of and (name != "y_m" or group in wheelsets_of(run)):
+        yield float(run.settings["accuracy_found"])
+    if name in ("N_N", "Q_N") and "look_up_normal_error" in run.counters:
+        yield float(run.counters["look_up_normal_error"]) * scale
