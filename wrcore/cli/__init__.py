@@ -31,7 +31,8 @@ from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
 COMMANDS = (
-    init, simulate, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table, profiles, keys,
+    init, simulate, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table, profiles,
+    keys,
 )  # fmt: skip
 """Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
 what the options say."""
