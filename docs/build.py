@@ -12,7 +12,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 GUIDES = (
-    "first_result", "bring_your_own", "scenes", "tracks", "vehicle_files", "freight_wagon", "sweeps", "clusters",
+    "first_result", "bring_your_own", "scenes", "tracks", "vehicle_files", "freight_wagon", "co_simulation", "fmi",
+    "sweeps", "clusters",
     "assessment", "wear", "how_runs_end", "accuracy", "limits", "patch", "stability", "cost",
     "comparison", "gallery", "evidence",
 )  # fmt: skip

@@ -39,6 +39,7 @@ def things():
     run.save("run.h5")
     return {
         "wheel": wheel, "rail": rail, "pair": pair, "scene": scene, "run": run, "table": wr.ensure_table(),
+        "session": wr.start(scene, contact__friction={"left": 0.3, "right": 0.3}),
         "rolling": wr.RollingContact(1.0, level=6), "patch": wr.patch(pair, load=5e4)[0],
     }  # fmt: skip
 
@@ -86,6 +87,7 @@ def calls():
         "plot_wheel_on_rail": {"source": pair, "side": "left", "load": 5e4, "y": 0.0},
         "run_sweep": {"source": sweep, "threads": 1, "progress": None},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
+        "start": {"scene": scene, "overrides": {}, "start": "initial", "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},
         "simulate_to_accuracy": {"scene": scene, "accuracy": 1e-3, "of": "y", "progress": None},
         "Settling": {"window": 2.0, "longest": 30.0, "rate": 500.0, "method": "auto", "rtol": 1e-5},
@@ -102,6 +104,9 @@ def calls():
         "RollingContact.solve_many": (the["rolling"].solve_many, {"creepages": [[0.1, 0.0, 0.0]], "tolerance": 1e-3}),
         "Run[]": (run.__getitem__, {"group": "wheelset"}), "Run.save": (run.save, {"path": "b.h5"}),
         "Run.to_pandas": (run.to_pandas, {"tidy": True}), "Run.plot": (run.plot, {"*": "wheelset.y_m"}),
+        "Session.step": (the["session"].step, {"dt": 0.001, "inputs": {"friction.left": 0.3}}),
+        "Session.set": (the["session"].set, {"name": "friction.left", "value": 0.2}),
+        "Session.channels": (the["session"].channels, {"*": "wheelset.y_m"}),
         "Run.wheel_forces": (run.wheel_forces, {"wheelset": "wheelset"}),
     }  # fmt: skip
 

@@ -9,12 +9,12 @@ import sys
 from contextlib import suppress
 
 from wrcore import __version__
-from wrcore.cli import assess, conicity, contact, creep, draw, evolve, init, keys, profiles, simulate, sweep, table
+from wrcore.cli import assess, conicity, contact, creep, draw, evolve, fmu, init, keys, profiles, simulate, sweep, table
 from wrcore.cli.options import Parser
 from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
-COMMANDS = (init, simulate, sweep, assess, draw, evolve, contact, conicity, creep, table, profiles, keys)
+COMMANDS = (init, simulate, fmu, sweep, assess, draw, evolve, contact, conicity, creep, table, profiles, keys)
 """Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
 what the options say."""
 
