@@ -157,7 +157,8 @@ def test_the_value_that_an_input_has_changes_not_a_bit():
 
 def test_what_is_set_stays_in_the_session(tmp_path):
     scene = scene_of(**active(tmp_path), **APART)
-    session = stepped(scene, 3, left__force=2e3, friction__right=0.1)
+    session = stepped(scene, 3)
+    session.step(0.01, {"left.force": 2e3, "friction.right": 0.1})
     session.run()
     assert session.inputs["left.force"] == 2e3 and session.inputs["friction.right"] == 0.1
     again = wr.start(scene)
@@ -195,6 +196,7 @@ def test_a_crossing_is_located_and_leaves_the_trajectory_as_it_was():
     y, v = session.channels("wheelset.y_m", "wheelset.vy_m_per_s").values()
     assert below - 2e-9 * abs(v) < y < below and abs(v) > 0.01
     found = session.time
+    np.testing.assert_array_equal(session.run().t, [*(np.arange(int(found * 100) + 1) / 100), found])
     assert session.run_until(f"wheelset.y_m < {below}") and session.time == found  # it holds already
     assert session.run_until(0.3)
     np.testing.assert_array_equal(session.state, once.end_state)
