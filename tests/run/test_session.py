@@ -158,8 +158,9 @@ def test_the_value_that_an_input_has_changes_not_a_bit():
 def test_what_is_set_stays_in_the_session(tmp_path):
     scene = scene_of(**active(tmp_path), **APART)
     session = stepped(scene, 3)
-    session.step(0.01, {"left.force": 2e3, "friction.right": 0.1})
-    session.run()
+    session.step(0.01, {"left.force": 1e3, "friction.right": 0.1})
+    session.set("left.force", 2e3)
+    session.run()  # puts what held at each time in place for a while
     assert session.inputs["left.force"] == 2e3 and session.inputs["friction.right"] == 0.1
     again = wr.start(scene)
     assert again.inputs == {"left.force": 0.0, "right.force": 0.0, "friction.left": 0.3, "friction.right": 0.3}
