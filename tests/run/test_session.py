@@ -273,7 +273,7 @@ def test_a_step_costs_next_to_nothing_beside_a_run_of_its_own():
     began = time.process_time()
     for _ in range(3000):
         session.step(1e-9)
-    assert 300 * (time.process_time() - began) / 3000 < piece  # found: 121 ms against some 8 us
+    assert 300 * (time.process_time() - began) / 3000 < piece  # found: 56 to 195 ms against 3 to 8 us
 
 
 def test_who_does_not_step_loads_nothing_of_it():
