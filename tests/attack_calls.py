@@ -87,7 +87,7 @@ def calls():
         "plot_wheel_on_rail": {"source": pair, "side": "left", "load": 5e4, "y": 0.0},
         "run_sweep": {"source": sweep, "threads": 1, "progress": None},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
-        "start": {"scene": scene, "overrides": {}, "start": "initial", "speed": 20.0},
+        "start": {"scene": scene, "overrides": {}, "start": "initial", "record": True, "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},
         "simulate_to_accuracy": {"scene": scene, "accuracy": 1e-3, "of": "y", "progress": None},
         "Settling": {"window": 2.0, "longest": 30.0, "rate": 500.0, "method": "auto", "rtol": 1e-5},

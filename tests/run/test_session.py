@@ -207,6 +207,15 @@ def test_a_crossing_is_located_and_leaves_the_trajectory_as_it_was():
     assert not other.run_until("wheelset.y_m > 1", latest=0.2) and other.time == 0.2
 
 
+def test_a_session_without_a_record_goes_the_same_way():
+    once, session = wr.simulate(scene_of(), progress=False), wr.start(scene_of(), record=False)
+    below = float(once["wheelset"].y_m.min()) / 2
+    assert session.run_until(f"wheelset.y_m < {below}") and session.run_until(0.3)
+    np.testing.assert_array_equal(session.state, once.end_state)
+    with pytest.raises(wr.InputError, match="session: run: expected a session that keeps a record"):
+        session.run()
+
+
 def test_a_session_ends_where_a_run_ends_and_says_so():
     changes = {"initial.y": 0.02, "speed": 30.0, "initial.yaw": 0.05, "integration.duration": 3.0}
     scene = scene_of("wheelset", **changes)

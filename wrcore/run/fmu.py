@@ -81,7 +81,7 @@ class SteppedScene:
     def _present(self) -> Session:
         """The session, begun when it is first needed."""
         if self._session is None:
-            self._session = start(self._folder / SCENE)
+            self._session = start(self._folder / SCENE, record=False)
         return self._session
 
     def _output(self, name):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -93,8 +93,8 @@ class Session:
     (0.0, 0.3)
     """
 
-    def __init__(self, simulation: Simulation, begin: float) -> None:
-        self.scene, self._simulation = simulation.scene, simulation
+    def __init__(self, simulation: Simulation, begin: float, record: bool = True) -> None:
+        self.scene, self._simulation, self._recorded = simulation.scene, simulation, record
         model = simulation.model = with_own_arrays(simulation.model)
         settings = self.scene.data["integration"]
         how = settings["method"], settings["rtol"], settings["atol"], settings["longest_step"]
@@ -296,7 +296,14 @@ class Session:
         Run
             Each time with the inputs that held up to it. ``status`` is ``completed`` while the session is running. The
             ``end_state`` is a start for any run, ``end`` for one whose scene says what the inputs are now.
+
+        Raises
+        ------
+        InputError
+            If the session keeps no record.
         """
+        if not self._recorded:
+            raise InputError("session", "run", "expected a session that keeps a record of its steps")
         self._settle()
         simulation, kept = self._simulation, self._simulation.arc_lengths
         simulation.arc_lengths = self._arc_lengths
@@ -373,6 +380,8 @@ class Session:
         outcome = self._advance(record, CHUNK)
         while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
             outcome = self._advance(record, min(CHUNK, self._headway.attempts_left()))
+        if not self._recorded:
+            self._history.clear()
         if outcome == engine.COMPLETED:
             self.time, self._state = t, record.states[0].copy()
             self._history.append((t, self._state, self._held))
@@ -387,10 +396,10 @@ class Session:
         low, high = before.time, self.time
         while high - low > RESOLUTION:
             self.restore(before)
-            for t in np.linspace(low, high, PARTS + 1)[1:].tolist():
+            for below, t in pairwise(np.linspace(low, high, PARTS + 1).tolist()):
                 self._reach(t)
                 if holds():
-                    low, high = max(low, self._history[-2][0]), t
+                    low, high = below, t
                     break
         self.restore(before)
         self._reach(high)
@@ -406,6 +415,7 @@ def start(
     scene: Source,
     overrides: Iterable[str] | Mapping[str, Any] = (),
     start: Annotated[Checkpoint | np.ndarray | Literal["initial"], STARTS] = "initial",
+    record: bool = True,
     **changes: Any,
 ) -> Session:
     """Begin a scene that is then stepped from outside.
@@ -414,6 +424,8 @@ def start(
     ----------
     scene, overrides, start, **changes
         As for :func:`simulate`; ``integration.duration`` does not count.
+    record : bool
+        Whether all steps are kept for :meth:`Session.run`; one of a coach takes 1 kB.
 
     Returns
     -------
@@ -436,4 +448,4 @@ def start(
     True
     """
     scene, begin_at, begin = opened("start", scene, overrides, start, changes)
-    return Session(Simulation(scene, begin_at, show_progress), begin)
+    return Session(Simulation(scene, begin_at, show_progress), begin, record)
