@@ -41,6 +41,7 @@ from wrcore.run.fmu import SteppedScene
 
 
 class {name}({bases}):
+    held = [globals()]
     number, causality, variability = {number}, {prefix}Causality, {prefix}Variability
 '''
 
@@ -51,9 +52,13 @@ class SteppedScene:
     number: Any
     causality: Any
     variability: Any
+    held: list[Any]
+    """The names of the unit's script: PythonFMU's binary for FMI 2 (0.7.0) gives back a reference to them that it has
+    only borrowed, at each instance, and would free what is in use."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given)
+        self.held.append(self.held[0])
         self._folder = Path(given["resources"])
         told = json.loads((self._folder / INTERFACE).read_text("utf-8"))
         self.description, self._session, self._read = told["description"], None, (float("nan"), {})  # type: ignore
