@@ -12,8 +12,8 @@ from wrcore.errors.checked_yaml import kinds_in
 
 GROUPS = {
     "Scenes and runs": (
-        "load_scene", "Scene", "simulate", "simulate_many", "simulate_to_accuracy", "Run", "load_run", "load_runs",
-        "example", "write_run", "plot_run", "hunting_frequency",
+        "load_scene", "Scene", "simulate", "simulate_many", "simulate_to_accuracy", "Run", "start", "Session",
+        "load_run", "load_runs", "example", "write_run", "plot_run", "hunting_frequency",
     ),
     "Profiles and contact": (
         "list_profiles", "named_profile", "WheelsetOnTrack", "first_touch", "conicity_curve", "contact_table", "patch",

@@ -39,6 +39,7 @@ def things():
     run.save("run.h5")
     return {
         "wheel": wheel, "rail": rail, "pair": pair, "scene": scene, "run": run, "table": wr.ensure_table(),
+        "session": wr.start(scene, contact__friction={"left": 0.3, "right": 0.3}),
         "rolling": wr.RollingContact(1.0, level=6), "patch": wr.patch(pair, load=5e4)[0],
         "assessed": wr.assess(run), "response": wr.frequency_response(scene, ["level"], ["wheelset.z_m"], [1.0, 2.0]),
     }  # fmt: skip
@@ -98,6 +99,7 @@ def calls():
         "speed_ramp": {"scene": scene, "start": 60.0, "end": 59.9, "rate": 1.0, "disturbances": [0.001],
                        "settling": wr.Settling(window=0.05, longest=0.1)},
         "simulate": {"scene": scene, "overrides": {}, "progress": None, "start": "initial", "speed": 20.0},
+        "start": {"scene": scene, "overrides": {}, "start": "initial", "record": True, "speed": 20.0},
         "simulate_many": {"scenes": [scene], "progress": None, "threads": 1},
         "simulate_to_accuracy": {"scene": scene, "accuracy": 1e-3, "of": "y", "progress": None},
         "Settling": {"window": 2.0, "longest": 30.0, "rate": 500.0, "method": "auto", "rtol": 1e-5},
@@ -114,6 +116,9 @@ def calls():
         "RollingContact.solve_many": (the["rolling"].solve_many, {"creepages": [[0.1, 0.0, 0.0]], "tolerance": 1e-3}),
         "Run[]": (run.__getitem__, {"group": "wheelset"}), "Run.save": (run.save, {"path": "b.h5"}),
         "Run.to_pandas": (run.to_pandas, {"tidy": True}), "Run.plot": (run.plot, {"*": "wheelset.y_m"}),
+        "Session.step": (the["session"].step, {"dt": 0.001, "inputs": {"friction.left": 0.3}}),
+        "Session.set": (the["session"].set, {"name": "friction.left", "value": 0.2}),
+        "Session.channels": (the["session"].channels, {"*": "wheelset.y_m"}),
         "Run.wheel_forces": (run.wheel_forces, {"wheelset": "wheelset"}),
     }  # fmt: skip
 

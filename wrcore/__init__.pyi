@@ -48,6 +48,8 @@ from wrcore.run.results import load_run as load_run
 from wrcore.run.results import load_runs as load_runs
 from wrcore.run.results import write_run as write_run
 from wrcore.run.run import Run as Run
+from wrcore.run.session import Session as Session
+from wrcore.run.session import start as start
 from wrcore.run.simulate import simulate as simulate
 from wrcore.run.simulate import simulate_many as simulate_many
 from wrcore.scene.description import Scene as Scene

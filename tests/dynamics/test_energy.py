@@ -140,6 +140,8 @@ EVERYTHING = [
     {"kind": "traction_rod", "at": [[0.5, 0.1, 1.9], [-0.4, 0, 1.1]], "stiffness": 60.0, "damping": 2.0,
      "preload": 4.0},
     {"kind": "anti_roll_bar", "stiffness": 9.0, "damping": 0.4},
+    {"kind": "actuator", "direction": "y", "at": [0.1, 0.2, 1.5], "force": 3.0},
+    {"kind": "actuator", "direction": "line", "at": [[0.3, 0.2, 1.8], [-0.4, 0.2, 1.2]], "force": -2.0},
 ]  # fmt: skip
 
 

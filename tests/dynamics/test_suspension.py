@@ -26,7 +26,7 @@ def model_with(contact, items, positions=((0.0, 0.0, 2.0), (0.0, 0.0, 1.0)), spi
     layout = Layout("test", ("upper", "lower"), np.array(positions, float), np.array(MASSES), np.array(spins), {})
     model = make_model(contact, MASSES, INERTIAS, gravity=0.0, speed=speed)
     bodies = model.bodies._replace(spins=np.array(spins, np.int64))
-    return model._replace(elements=compile_elements(items, layout, [], 0.0), bodies=bodies)
+    return model._replace(elements=compile_elements(items, layout, [], 0.0)[0], bodies=bodies)
 
 
 def evaluate(model, state):

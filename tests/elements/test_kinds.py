@@ -90,6 +90,18 @@ def test_a_law_that_does_not_return_four_numbers_is_refused(contact):  # noqa: F
         del FUNCTIONS["wrong"]
 
 
+def test_an_actuator_pushes_its_first_body_along_and_its_ends_apart(contact):  # noqa: F811
+    along = {"kind": "actuator", "direction": "y", "at": [0.1, 0.2, 1.5], "force": 30.0}
+    wrench = evaluate(model_with(contact, [along]), moving((0.3, 0.7, 0.0)))[0]
+    np.testing.assert_allclose(wrench[:, :3], [[0.0, 30.0, 0.0], [0.0, -30.0, 0.0]], atol=1e-12)
+    line = {"kind": "actuator", "direction": "line", "at": [[0.0, 0.3, 1.6], [0.0, 0.0, 1.2]], "force": 50.0}
+    wrench = evaluate(model_with(contact, [line]), at_rest())[0]
+    np.testing.assert_allclose(wrench[:, :3], [[0.0, 30.0, 40.0], [0.0, -30.0, -40.0]], atol=1e-12)
+    for bodies, force in (("upper", "lower"), 30.0), (("lower", "upper"), -30.0):  # the lower one is a wheelset
+        model = model_with(contact, [{**along, "at": [0.0, 0.4, 1.0], "bodies": list(bodies)}], spins=(False, True))
+        assert evaluate(model, at_rest())[0][0, 1] == pytest.approx(force)
+
+
 def test_an_unknown_function_is_an_error(contact, registered):  # noqa: F811
     with pytest.raises(InputError) as caught:
         model_with(contact, [{**OWN, "function": "ear drag"}])

@@ -18,6 +18,7 @@ from wrcore.cli import (
     curving,
     draw,
     evolve,
+    fmu,
     init,
     keys,
     profiles,
@@ -31,8 +32,8 @@ from wrcore.cli.simulate import NOT_REACHED as NOT_REACHED
 from wrcore.errors import InputError
 
 COMMANDS = (
-    init, simulate, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table, profiles,
-    keys,
+    init, simulate, fmu, sweep, assess, compare, response, curving, draw, evolve, contact, conicity, creep, table,
+    profiles, keys,
 )  # fmt: skip
 """Modules with a command each, in the order of the help: ``add(commands)`` hands its parser over, ``run(options)`` does
 what the options say."""

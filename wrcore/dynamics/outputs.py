@@ -3,7 +3,7 @@
 import numpy as np
 
 from wrcore.dynamics.drive import actuator, controlled_force
-from wrcore.dynamics.system import Equations, derivatives_at
+from wrcore.dynamics.system import derivatives_at
 from wrcore.kernels.jit import jit
 
 
@@ -31,11 +31,11 @@ def _fill_drives(times, states, equations, model, work, rate, torques, rates, co
             torques[i, k], rates[i, k] = actuator(model, k, force, times[i], states[i], work)
 
 
-def drive_history(model, work, times, states):
-    """What motors, brakes and the speed controller did at n times (s) and states: torques on the wheelsets along their
-    axles (N m) and relative rotation rates about these (rad/s), (n, m) each; the controller's force at the rims (N) and
-    the speed that it wants (m/s), (n, 2), zeros without one. ``work`` is overwritten."""
-    shape = len(times), len(model.drive.rows)
+def drive_history(equations, times, states):
+    """What motors, brakes and the speed controller did at n times (s) and states, by `Equations`, whose scratch arrays
+    are overwritten: torques on the wheelsets along their axles (N m) and relative rotation rates about these (rad/s),
+    (n, m) each; the controller's force at the rims (N) and the speed that it wants (m/s), (n, 2), zeros without one."""
+    shape = len(times), len(equations.arguments[1].value.drive.rows)
     torques, rates, control = np.zeros(shape), np.zeros(shape), np.zeros((len(times), 2))
-    _fill_drives(times, states, *Equations(model, work).arguments, np.empty(states.shape[1]), torques, rates, control)
+    _fill_drives(times, states, *equations.arguments, np.empty(states.shape[1]), torques, rates, control)
     return torques, rates, control

@@ -23,6 +23,7 @@ failed        a number is not finite, or the step size fell below the resolution
 import time
 
 import numpy as np
+from numba import typeof
 
 from wrcore.dynamics.contract import begin, places, why_outside
 from wrcore.dynamics.drive import may_drive
@@ -33,7 +34,7 @@ from wrcore.integrate import engine
 from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
-from wrcore.integrate.rosenbrock import advance_rosenbrock, new_linear
+from wrcore.integrate.rosenbrock import advance_rosenbrock, factorise_again, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
@@ -74,12 +75,7 @@ def integrate(
     of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
-    start, goes_on = _checked(start, model), isinstance(start, Checkpoint)
-    method = start.method if goes_on else method
-    if method == "auto":
-        equations = equations or Equations(model)
-        method = cheaper_method(model, equations, times[0], start, longest_step)
-    tolerances = step_tolerances(model, rtol, atol, method)
+    start, method, tolerances, equations = decided(model, start, times[0], method, rtol, atol, longest_step, equations)
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
@@ -87,58 +83,123 @@ def integrate(
         tolerances = tolerances[0] + rate * tolerances[1]  # theirs stay what they are
         return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
-    tableau = EXPLICIT.get(method) or ROSENBROCK[method]
-    equations = equations or Equations(model)
-    work = equations.work
-    state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
-    memory = new_memory(state, times[0], len(tableau.nodes), first_step)
-    linear, system = (new_linear(model), new_system(model)) if method in ROSENBROCK else (None, None)
-    begin(work)
-    if goes_on:
-        _take_over(memory, start.memory)
-        _take_over(places(work), (start.arc_lengths, start.patches))
-        _take_over(linear, start.linear, planned=True)
-        if not np.isfinite(memory.clock[: engine.ERROR]).all():
-            raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
-        if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
-            memory.clock[engine.START] = memory.clock[engine.T] - memory.counters[engine.STEPS] * step
-            memory.clock[engine.NEXT] = step
-    scratch = new_scratch(len(memory.state), len(places(work)[0]))
-    record = Record(times, np.full((len(times), len(memory.state)), np.nan), np.zeros(1, np.int64))
-    control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
-
-    def advance(attempts):
-        if linear is None:
-            return advance_explicit(tableau, control, memory, scratch, record, attempts, *equations.arguments)
-        return advance_rosenbrock(
-            tableau, control, memory, scratch, linear, system, record, attempts, *equations.arguments
-        )
-
-    outcome, given_up = advance(0), ""  # compiles, or loads the kernel from the cache
-    before, started = memory.counters.copy(), time.perf_counter()
-    headway = _Headway(memory, most_steps, 0.0 if step else min(STALL_STEP, 0.1 * longest_step))
+    run = Integration(model, start, times[0], method, tolerances, step, longest_step, derailed_y, equations)
+    record = run.record(times)
+    outcome, given_up = run.advance(record, 0), ""  # compiles, or loads the kernel from the cache
+    before, started = run.memory.counters.copy(), time.perf_counter()
+    headway = Headway(run.memory, most_steps, 0.0 if step else min(STALL_STEP, 0.1 * longest_step))
     while outcome == engine.RUNNING and not given_up:
-        outcome = advance(min(chunk, headway.attempts_left()))
+        outcome = run.advance(record, min(chunk, headway.attempts_left()))
         if progress is not None:
-            progress(min(memory.clock[engine.T], times[-1]))
+            progress(min(run.memory.clock[engine.T], times[-1]))
         given_up = headway.lost() or (stop() if stop is not None else "")
     wall = time.perf_counter() - started
-    counters, reached = memory.counters - before, int(record.reached[0])
-    status, reason = _ending(outcome, given_up, model, memory, work)
-    last = times[reached - 1] if reached else times[0]
-    completed = status == "completed"
-    return Trajectory(
-        method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
-        int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
-        int(counters[engine.FACTORISATIONS]), int(work.counters[OUT_OF_RANGE]), float(memory.clock[engine.SMALLEST]),
-        wall, Checkpoint(method, float(last), memory, linear, *(place.copy() for place in places(work))),
-        float(last if completed else memory.clock[engine.T]),
-        (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
-        int(work.counters[ON_GRID]), int(work.counters[SOLVED]), int(work.flexible_track.unbalanced[0]),
-    )  # fmt: skip
+    return run.trajectory(record, outcome, given_up, before, wall)
 
 
-class _Headway:
+def decided(model, start, t, method, rtol, atol, longest_step, equations=None):
+    """A checked start, the method and the tolerances for it, and equations if the choice needed them; arguments as for
+    `integrate`, the time (s) in place of times."""
+    start = _checked(start, model)
+    method = start.method if isinstance(start, Checkpoint) else method
+    if method == "auto":
+        equations = equations or Equations(model)
+        method = cheaper_method(model, equations, t, start, longest_step)
+    return start, method, step_tolerances(model, rtol, atol, method), equations
+
+
+class Integration:
+    """A run by a compiled method between two calls of `advance`: ``equations``, ``memory`` and the rest of what it
+    knows; arguments as for `integrate`, with the ``tolerances`` of `step_tolerances`."""
+
+    def __init__(self, model, start, t, method, tolerances, step, longest_step, derailed_y, equations=None):
+        goes_on = isinstance(start, Checkpoint)
+        tableau = EXPLICIT.get(method) or ROSENBROCK[method]
+        self.model, self.method, self.equations = model, method, equations or Equations(model)
+        state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
+        self.memory = memory = new_memory(state, t, len(tableau.nodes), first_step)
+        stiff = method in ROSENBROCK
+        self.linear, self._system = (new_linear(model), new_system(model)) if stiff else (None, None)
+        begin(self.equations.work)
+        self.places = places(self.equations.work)
+        self._tableau = tableau
+        if goes_on:
+            self.go_on_from(start)
+            if not np.isfinite(memory.clock[: engine.ERROR]).all():
+                raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
+            if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
+                memory.clock[engine.NEXT] = step
+                self._begin_grid()
+        control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
+        scratch = new_scratch(len(memory.state), len(self.places[0]))
+        self._kernel = advance_rosenbrock if stiff else advance_explicit
+        self._before = tableau, control, memory, scratch, *((self.linear, self._system) if stiff else ())
+
+    def record(self, times):
+        """A `Record` for output times (n,), s."""
+        return Record(times, np.full((len(times), len(self.memory.state)), np.nan), np.zeros(1, np.int64))
+
+    def advance(self, record, attempts):
+        """Outcome of at most so many attempts to reach the end of a record."""
+        return self._kernel(*self._before, record, attempts, *self.equations.arguments)
+
+    def without_dispatch(self, record):
+        """`advance` for records of this very layout, without numba's search for the kernel by the arguments' types,
+        which costs five times as much as a call."""
+        arguments = *self._before, record, 0, *self.equations.arguments
+        self._kernel(*arguments)  # compiles, or loads the kernel from the cache
+        kernel = self._kernel.overloads[tuple(map(typeof, arguments))].entry_point
+        before, after = self._before, self.equations.arguments
+        return lambda record, attempts: kernel(*before, record, attempts, *after)
+
+    def begin_anew(self, t, state):
+        """Begin again at a time (s) and a state (size,), which may have any rate: with the length of the next step."""
+        clock, counters = self.memory.clock, self.memory.counters
+        clock[[engine.T, engine.T_OLD]], clock[engine.ERROR], clock[engine.MATRIX_STEP] = t, 1.0, 0.0
+        counters[[engine.HAS_RATE, engine.RETRY, engine.SINCE_FULL]], counters[engine.AGE] = 0, -1
+        self.memory.state[:] = self.memory.old[:] = state
+        self._begin_grid()
+
+    def _begin_grid(self):
+        """Let steps of a fixed length count from the time reached."""
+        clock, counters = self.memory.clock, self.memory.counters
+        clock[engine.START] = clock[engine.T] - counters[engine.STEPS] * clock[engine.NEXT]
+
+    def checkpoint(self, t):
+        """Where the run is, with the last output time (s); it changes with the run but for its places."""
+        return Checkpoint(self.method, float(t), self.memory, self.linear, *(place.copy() for place in self.places))
+
+    def go_on_from(self, checkpoint):
+        """Take over all numbers of a checkpoint of this model and method."""
+        _take_over(self.memory, checkpoint.memory)
+        _take_over(self.places, (checkpoint.arc_lengths, checkpoint.patches))
+        _take_over(self.linear, checkpoint.linear, planned=True)
+        if self.linear is not None:
+            factorise_again(self._tableau, self.memory, self.linear, self._system)
+
+    def ending(self, outcome, given_up=""):
+        """Status and reason of an outcome, or why the run was given up."""
+        return _ending(outcome, given_up, self.model, self.memory, self.equations.work)
+
+    def trajectory(self, record, outcome, given_up, before, wall):
+        """`Trajectory` over a record; counters count from ``before``, ``wall`` in s."""
+        memory, times, work = self.memory, record.times, self.equations.work
+        counters, reached = memory.counters - before, int(record.reached[0])
+        status, reason = self.ending(outcome, given_up)
+        last = times[reached - 1] if reached else times[0]
+        completed = status == "completed"
+        return Trajectory(
+            self.method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
+            int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
+            int(counters[engine.FACTORISATIONS]), int(work.counters[OUT_OF_RANGE]),
+            float(memory.clock[engine.SMALLEST]), wall, self.checkpoint(last),
+            float(last if completed else memory.clock[engine.T]),
+            (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
+            int(work.counters[ON_GRID]), int(work.counters[SOLVED]), int(work.flexible_track.unbalanced[0]),
+        )  # fmt: skip
+
+
+class Headway:
     """Whether a run gets on: counts the steps that were tried, all of them and since it was last seen to get on."""
 
     def __init__(self, memory, most_steps, least_step):

@@ -92,16 +92,20 @@ def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
     return error_size(control.tolerances, pace(model, memory.state, scratch.trial), bodies, scratch.trial, defect)
 
 
+@jit(allocates=False)
+def factorise_again(tableau, memory, linear, system):
+    """Find what ``system`` holds anew, which no checkpoint keeps."""
+    if memory.clock[engine.MATRIX_STEP] > 0.0:
+        factorise(linear.jacobian, system, 1.0 / (memory.clock[engine.MATRIX_STEP] * tableau.gamma))
+
+
 @jit(allocates=False, nogil=True)
 def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record, budget, equations, model, work):
-    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome. What ``system``
-    holds is found anew: no checkpoint keeps it."""
+    """Advance a run by a Rosenbrock method, at most ``budget`` attempts; returns its outcome."""
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
     hold = HOLD if tableau.reuse > 1 else 1.0
-    if clock[engine.MATRIX_STEP] > 0.0:
-        factorise(linear.jacobian, system, 1.0 / (clock[engine.MATRIX_STEP] * tableau.gamma))
     while True:
         axes = turn_of(linear.jacobian)
         outcome = write_outputs(control, tableau.dense, 1.0, axes, drift, memory, record, model, work)

@@ -203,7 +203,7 @@ class Run:
         """
         import pandas as pd
 
-        columns = dict(self._columns())
+        columns = dict(self.columns())
         wide = {".".join(map(str, (group, name, *patch))): values for (group, name, *patch), values in columns.items()}
         if not tidy:
             return pd.DataFrame(wide, index=pd.Index(self.t, name="t_s"))
@@ -216,7 +216,7 @@ class Run:
         ]  # fmt: skip
         return pd.concat(parts, ignore_index=True).dropna(subset="value", ignore_index=True)
 
-    def _columns(self) -> Iterator[tuple[tuple[Any, ...], np.ndarray]]:
+    def columns(self) -> Iterator[tuple[tuple[Any, ...], np.ndarray]]:
         """Channels one by one, those of contacts patch by patch."""
         for group, channels in self.groups.items():
             for name, values in channels.items():

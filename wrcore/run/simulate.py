@@ -73,18 +73,25 @@ def simulate(
     >>> float(run["wheelset"].y_m[0])  # m
     0.002
     """
-    begin_at: Any = None if isinstance(start, str) and start == "initial" else start
-    overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
-    if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", key) for key in (*overrides, *changes)):
-        raise InputError("simulate", "initial", "expected either this or a start")
-    if overrides or changes or not isinstance(scene, Scene):
-        scene = load_scene(scene, overrides, **changes)
+    scene, begin_at, begin = opened("simulate", scene, overrides, start, changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
-    begin = start.t if isinstance(start, Checkpoint | State) else 0.0
     check_memory(scene)
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
         simulation = Simulation(scene, begin_at, show_progress if progress is None else None)
         return simulation.advance(output_times(begin, settings["duration"], rate), advance)
+
+
+def opened(source: str, scene: Source, overrides: Any, start: Any, changes: dict[str, Any]) -> tuple[Scene, Any, float]:
+    """What `simulate` is given as a checked scene, where a `Simulation` begins and at which time (s); ``source`` is
+    named in errors.
+    """
+    begin_at = None if isinstance(start, str) and start == "initial" else start
+    overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
+    if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", key) for key in (*overrides, *changes)):
+        raise InputError(source, "initial", "expected either this or a start")
+    if overrides or changes or not isinstance(scene, Scene):
+        scene = load_scene(scene, overrides, **changes)
+    return scene, begin_at, start.t if isinstance(start, Checkpoint | State) else 0.0
 
 
 @checked

@@ -16,7 +16,7 @@ from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.outputs import drive_history, evaluations_at
-from wrcore.dynamics.system import Equations, Model, Workspace, independent_at, workspace
+from wrcore.dynamics.system import Equations, Model, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
@@ -121,20 +121,25 @@ class Simulation:
         """Integrate one stretch over output times (n,), s; its run alone. ``progress`` is called with the time reached
         (s), ``stop`` gives a reason to stop or an empty string.
         """
-        scene, settings = self.scene, self.scene.data["integration"]
+        settings = self.scene.data["integration"]
         begin = self.start.t if isinstance(self.start, Checkpoint) else float(times[0])
         trajectory = integrate(
             self.model, self.start, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
             settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
         )  # fmt: skip
         compiled = time.perf_counter() - self._began - trajectory.wall_s
+        run = self.run_of(trajectory, begin, compiled, *self.channels(trajectory))
+        self.start = run.end or self.start
+        self._began = time.perf_counter()
+        return run
+
+    def run_of(self, trajectory: Trajectory, begin: float, compiled: float, groups: dict, limits: dict) -> Run:
+        """The run that a trajectory from a time (s) on is, with its `channels` and seconds of compilation."""
+        scene, settings = self.scene, self.scene.data["integration"]
         counters = counters_of(trajectory, begin) | {"compile_s": compiled}
-        groups, limits = self._channels(trajectory)
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
         record["method_used"] = trajectory.method
         end = trajectory.end and replace(trajectory.end, model=self.mark)
-        self.start = end or self.start
-        self._began = time.perf_counter()
         return Run(
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,
             end, trajectory.end_t, self._end_state(trajectory),
@@ -144,29 +149,70 @@ class Simulation:
         """Channels of states (n, size) at times (n,), s, of a variant of the scene's model, as a run has them."""
         seen = copy.copy(self)
         seen.model = model
-        groups, _ = seen._channels(Trajectory("", times, states, "completed", ""))
+        groups, _ = seen.channels(Trajectory("", times, states, "completed", ""))
         return Run(self.scene.data, "completed", "", times, groups)
 
     def _end_state(self, trajectory: Trajectory) -> State | None:
         """Where the stretch ended, with what belongs to it."""
-        if trajectory.end_state is None:
-            return None
-        t, vehicle = trajectory.end_t, self.scene.vehicle
-        names = vehicle.name, *vehicle.body_names
-        return State(trajectory.end_state, t, self._moved + self.model.speed * t, names)
+        return None if trajectory.end_state is None else self.state_at(trajectory.end_t, trajectory.end_state)
 
-    def _channels(self, trajectory: Trajectory):
-        """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs."""
-        scene, model, states = self.scene, self.model, trajectory.states
-        wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
-        work = self._workspace()
-        patches, bounds, rates = evaluated(model, trajectory, work)
-        poses, axes = self._poses(states)
-        energies = energy_channels(model, self._workspace(), trajectory.t, states) if "energy" in wanted else None
+    def state_at(self, t: float, state: np.ndarray) -> State:
+        """A state at a time (s), with what belongs to it."""
+        names = self.scene.vehicle.name, *self.scene.vehicle.body_names
+        return State(state, t, self._moved + self.model.speed * t, names)
+
+    def channels(
+        self, trajectory: Trajectory, equations: Equations | None = None
+    ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, Any]]:
+        """Output channels by group, and counters of exceeded limits; contacts are evaluated again at the outputs, by
+        ``equations`` of this model where they are at hand."""
+        model, states, equations = self.model, trajectory.states, self._from_here(equations)
+        evaluations = patches, _, _ = evaluated(model, trajectory, equations)
+        poses, axes = self._poses(states, range(len(model.bodies.mass)))
+        energies = energy_channels(model, self._workspace(), trajectory.t, states) if self._wants("energy") else None
         if len(states):
-            self.arc_lengths = ArcLengths(work.arc_lengths.copy(), poses[-1, :, 0].copy())
+            self.arc_lengths = ArcLengths(equations.work.arc_lengths.copy(), poses[-1, :, 0].copy())
+        groups = self._of_bodies(range(len(model.bodies.mass)), states, evaluations, poses, axes)
+        if energies is not None:
+            groups["energy"] = energies
+        groups |= self._drive_channels(trajectory, equations)
+        standing = poses[:, model.bodies.wheelsets]
+        beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
+        limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
+        limits |= {"beyond_irregularity": int(beyond)}
+        return groups, limits | self._look_up_errors(trajectory, patches, standing[..., 0])
+
+    def present(
+        self, trajectory: Trajectory, asked: set[str], places: np.ndarray, equations: Equations
+    ) -> dict[str, dict[str, np.ndarray]]:
+        """Channels of the groups that are asked for, with what belongs to them, by ``equations`` of this model;
+        ``places`` are arc lengths (k,) near which its wheelsets are, m."""
+        names, wheelsets = self.scene.vehicle.body_names, self.model.bodies.wheelsets
+        if len(places) and np.isfinite(places[0]):
+            nominal = self.scene.vehicle.positions[:, 0]
+            self.arc_lengths = ArcLengths(places.copy(), nominal + places[0] - nominal[wheelsets[0]])
+        bodies = [body for body, name in enumerate(names) if any(group.split("/")[0] == name for group in asked)]
+        groups: dict[str, dict[str, np.ndarray]] = {}
+        if bodies:
+            evaluations = evaluated(self.model, trajectory, self._from_here(equations))
+            groups = self._of_bodies(bodies, trajectory.states, evaluations, *self._poses(trajectory.states, bodies))
+        if any(group.startswith("drive/") for group in asked):
+            groups |= self._drive_channels(trajectory, equations)
+        if "energy" in asked and self._wants("energy"):
+            groups["energy"] = energy_channels(self.model, self._workspace(), trajectory.t, trajectory.states)
+        return groups
+
+    def _wants(self, *kinds: str) -> bool:
+        """Whether the scene asks for any of some kinds of channels."""
+        return not set(kinds).isdisjoint(self.scene.data["output"]["channels"])
+
+    def _of_bodies(self, bodies, states, evaluations, poses, axes):
+        """Channels of bodies, by number, and of their wheels by group; what is `evaluated`, and `_poses` with axes."""
+        scene, model, (patches, bounds, rates) = self.scene, self.model, evaluations
+        wanted, wheelsets = scene.data["output"]["channels"], model.bodies.wheelsets
         groups, numbers = {}, {int(body): k for k, body in enumerate(wheelsets)}
-        for body, name in enumerate(scene.vehicle.body_names):
+        for body in bodies:
+            name = scene.vehicle.body_names[body]
             part, k = slice(STATE_SIZE * body, STATE_SIZE * (body + 1)), numbers.get(body)
             motion = states[:, part], rates[:, part], poses[:, body], axes[:, body]
             groups[name] = _body_channels(*motion, wanted, pitches=not model.bodies.spins[body])
@@ -176,7 +222,7 @@ class Simulation:
                 groups[name] |= self._track_places(states, k)
             if "velocity" in wanted and body in wheelsets[model.bodies.independent[:, 0]]:
                 groups[name] |= self._rolling_rates(states, body)
-            if k is None or {"contact", *OF_WHEELS, *OF_WHEELSETS}.isdisjoint(wanted):
+            if k is None or not self._wants("contact", *OF_WHEELS, *OF_WHEELSETS):
                 continue
             contacts = self._contact_channels(name, patches[:, k])
             if "contact" in wanted:
@@ -188,14 +234,7 @@ class Simulation:
                 groups[name] |= {f"planar_error_{side}_m": bounds[:, k, i] for i, side in enumerate(SIDES)}
                 spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
                 groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
-        if energies is not None:
-            groups["energy"] = energies
-        groups |= self._drive_channels(trajectory)
-        standing = poses[:, wheelsets]
-        beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
-        limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
-        limits |= {"beyond_irregularity": int(beyond)}
-        return groups, limits | self._look_up_errors(trajectory, patches, standing[..., 0])
+        return groups
 
     def _look_up_errors(self, trajectory, patches, places):
         """Of some output times, if exact contact is looked up: contacts are solved there. ``places``: arc lengths of
@@ -206,7 +245,7 @@ class Simulation:
         some = np.unique(np.linspace(0, len(trajectory.t) - 1, CHECKED_TIMES).round().astype(int))
         part = replace(trajectory, t=trajectory.t[some], states=trajectory.states[some])
         solved = self.model._replace(contact=contact._replace(strips=contact.strips._replace(looked_up=0.0)))
-        exact, _, _ = evaluated(solved, part, self._workspace())
+        exact, _, _ = evaluated(solved, part, self._from_here(None, solved))
         friction, schedules = contact.friction, self.model.friction
         if len(schedules.points):
             rails = [schedules.points[schedules.starts[rail] : schedules.starts[rail + 1]].T for rail in range(2)]
@@ -239,12 +278,12 @@ class Simulation:
         places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
-    def _drive_channels(self, trajectory):
+    def _drive_channels(self, trajectory, equations):
         """Torque and power of motors and brakes, force and speed of the controller, if the scene has any."""
         spec = self.scene.data.get("drive")
         if not spec:
             return {}
-        torques, rates, control = drive_history(self.model, self._workspace(), trajectory.t, trajectory.states)
+        torques, rates, control = drive_history(self._from_here(equations), trajectory.t, trajectory.states)
         groups = {
             f"drive/{item['name']}": {"torque_Nm": torques[:, i], "power_W": torques[:, i] * rates[:, i]}
             for i, item in enumerate([*spec["motors"], *spec["brakes"]])
@@ -258,13 +297,21 @@ class Simulation:
         work.arc_lengths[:] = self.arc_lengths.wheelsets
         return work
 
-    def _poses(self, states):
-        """Arc length, y, z, roll, yaw and pitch of all bodies in the track's axes, (n, bodies, 6), and these axes."""
+    def _from_here(self, equations, model=None):
+        """Equations, new ones of a model where there are none, that seek arc lengths near those of the last output."""
+        if equations is None:
+            return Equations(model or self.model, self._workspace())
+        equations.work.arc_lengths[:] = self.arc_lengths.wheelsets
+        return equations
+
+    def _poses(self, states, bodies):
+        """Arc length, y, z, roll, yaw and pitch of bodies, by number, in the track's axes, (n, all bodies, 6), and
+        these axes."""
         count = len(self.model.bodies.mass)
         poses, axes = np.empty((len(states), count, 6)), np.broadcast_to(np.eye(3), (len(states), count, 3, 3))
         if not self.model.track.tangent:
             axes = axes.copy()
-        for body in range(count):
+        for body in bodies:
             at = STATE_SIZE * body
             if self.model.track.tangent:
                 roll, pitch, yaw = angles(states[:, at + 3 : at + 7])
@@ -275,16 +322,18 @@ class Simulation:
 
 
 def evaluated(
-    model: Model, trajectory: Trajectory, work: Workspace | None = None
+    model: Model, trajectory: Trajectory, equations: Equations | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the equations of motion again at a run's output times, arc lengths sought near those of ``work``:
-    patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left first, NaN where absent; bounds (n, wheelsets, 2) of
-    planar detection's error (``auto`` only), m; rates (n, size), derivatives of the states.
+    """Evaluate the equations of motion again at a run's output times, by ``equations`` of this model where they are at
+    hand, arc lengths sought near those of their work: patches (n, wheelsets, 2, MAX_PATCHES, PATCH_COLUMNS), left
+    first, NaN where absent; bounds (n, wheelsets, 2) of planar detection's error (``auto`` only), m; rates (n, size),
+    derivatives of the states.
     """
     shape = (len(trajectory.t), len(model.bodies.wheelsets), 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS)
     patches, bounds = np.full(shape, np.nan), np.full(shape[:3], np.nan)
     rates = np.full(trajectory.states.shape, np.nan)
-    evaluations_at(trajectory.t, trajectory.states, *Equations(model, work).arguments, rates, patches, bounds)
+    arguments = (equations or Equations(model)).arguments
+    evaluations_at(trajectory.t, trajectory.states, *arguments, rates, patches, bounds)
     return patches, bounds, rates
 
 

@@ -41,6 +41,16 @@ def digests_of_files(value, folder, key=""):
     return {} if found is None else {str(found): digest_of_file(found)}
 
 
+def with_names(value, folder, names, key=""):
+    """A scene's content, or a part of it, with other names for the files of `digests_of_files`, by their paths."""
+    if isinstance(value, dict):
+        return {name: with_names(item, folder, names, name) for name, item in value.items()}
+    if isinstance(value, list):
+        return [with_names(item, folder, names, key) for item in value]
+    found = _found(value, folder) if key in NAMED_BY and isinstance(value, str) else None
+    return value if found is None else names[str(found)]
+
+
 def wheel_and_rail(data, folder, source):
     """The scene's wheel and rail profile, of all wheels that are not said to differ; files count from ``folder``."""
     return tuple(_profile(data[kind], kind, kind, folder, source) for kind in ("wheel", "rail"))

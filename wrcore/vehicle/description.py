@@ -50,6 +50,8 @@ class Vehicle:
     """The file's content with defaults, for provenance."""
     unit: "Vehicle | None" = None
     """The vehicle that a train repeats."""
+    directed: tuple = ()
+    """Names of the force elements along one direction, row by row of ``elements.directed``."""
 
     @property
     def wheelset_names(self):
@@ -119,7 +121,7 @@ def compile_vehicle(data, source):
         for name, part in zip(layout.names, parts, strict=True) if part["kind"] == "axle_box"
     ]  # fmt: skip
     compiled = _joints(joints, layout, source)
-    elements = compile_elements(data["elements"], layout, joints, GRAVITY)
+    elements, directed = compile_elements(data["elements"], layout, joints, GRAVITY)
     independent = np.stack((np.array(apart, np.int64), elements.states + np.arange(len(apart))), axis=-1)
     bodies = Bodies(
         layout.mass,
@@ -129,7 +131,7 @@ def compile_vehicle(data, source):
     return Vehicle(
         data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
         float(first.get("tape_circle_half_distance", np.nan)), bodies,
-        elements._replace(states=elements.states + len(apart)), compiled, data,
+        elements._replace(states=elements.states + len(apart)), compiled, data, directed=directed,
     )  # fmt: skip
 
 

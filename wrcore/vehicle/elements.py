@@ -16,8 +16,8 @@ the shares of the load where springs differ."""
 
 
 def compile_elements(items, layout, joints, gravity):
-    """Checked elements sorted into what kernels need; joints carry weight, too, and ``gravity`` (m/s^2) makes the
-    preloads of elements that state none."""
+    """Checked elements sorted into what kernels need, and the names of those along one direction in its order; joints
+    carry weight, too, and ``gravity`` (m/s^2) makes the preloads of elements that state none."""
     springs, directed, turning, waiting = [], [], [], []
     pressing: dict[str, tuple] = {}
     parts, found = _loaded(items, layout, joints, gravity)
@@ -51,7 +51,8 @@ def compile_elements(items, layout, joints, gravity):
     for k, (name, pair, does, row) in enumerate(waiting):
         by, numbers = _pressed(name, pair, does, pressing, layout.source)
         directed[k] = pair, row, does.law, numbers, does.points, does.inner, by
-    return pack_elements(springs, directed, turning)
+    names = [waiting[k][0] for k in sorted(range(len(waiting)), key=lambda k: waiting[k][1])]
+    return pack_elements(springs, directed, turning), tuple(names)
 
 
 def _loaded(items, layout, joints, gravity):

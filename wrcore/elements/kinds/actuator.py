@@ -1,0 +1,25 @@
+"""A given force along one direction, which whoever steps a session sets."""
+
+from wrcore.elements import law
+from wrcore.elements.kind import AT, DIRECTION, MOST, Along, Kind, axis_of, ends_of, number
+from wrcore.kernels.jit import jit
+
+
+@jit(allocates=False)
+def given(elements, k, stretch, speed, inner, press):
+    """-F, however the ends move; the power that it puts in counts as dissipated, negative."""
+    force = -law.numbers(elements, k)[0]
+    return force, 0.0, 0.0, force * speed
+
+
+def parts(item):
+    """One part."""
+    force = item.get("force", 0.0)
+    return [Along(ends_of(item), given, axis_of(item), (force,), preload=force, odd=False)]
+
+
+KIND = Kind(
+    {"at": AT, "direction": DIRECTION,
+     "force": number("the force in N on the first body along the direction (line: pushes the ends apart)", -MOST)},
+    ("at", "direction"), {"marker": "X", "color": "#D55E00"}, parts, laws=(given,),
+)  # fmt: skip

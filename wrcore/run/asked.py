@@ -1,0 +1,45 @@
+"""What a session is asked for: times, values by their names, conditions on them."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.run.run import Run
+
+COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": operator.gt}
+
+
+def on_grid(t: float, dt: float) -> float:
+    """A time, or the whole multiple of ``dt`` that it is but for rounding."""
+    rate = 1.0 / dt
+    whole = round(rate)
+    rate = whole if whole and abs(rate - whole) <= 1e-9 * whole else rate
+    near = round(t * rate) / rate
+    return near if abs(near - t) <= 1e-9 * dt else t
+
+
+def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]], bool]]:
+    """Names of channels and the test that a text such as ``wheelset.y_m > 0.004`` stands for."""
+    parts = re.fullmatch(r"\s*(\S+)\s*([<>])\s*(\S+)\s*", text)
+    try:
+        name, sign, bound = parts[1], parts[2], float(parts[3])  # type: ignore[index]
+    except (TypeError, ValueError):
+        expected = f"expected a time, a function, or a channel, < or >, and a number, got {text!r}"
+        raise InputError("session", "end", expected) from None
+    return (name,), lambda values: COMPARED[sign](values[name], bound)
+
+
+def value_of(run: Run, name: str) -> float:
+    """One value of a run of one time by its name in a table."""
+    group, _, channel = name.partition(".")
+    channel, _, patch = channel.partition(".")
+    values = run[group][channel][0]
+    if np.ndim(values) != bool(patch) or (patch and not patch.isdecimal()) or (patch and int(patch) >= len(values)):
+        number = f" with the number of a patch, {group}.{channel}.0 to .{len(values) - 1}" if np.ndim(values) else ""
+        raise InputError("session", name, f"expected the name of one number{number}")
+    return float(values[int(patch)] if patch else values)

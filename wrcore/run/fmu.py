@@ -1,0 +1,195 @@
+"""Functional mock-up units of scenes: a session behind the interface of FMI 2 or FMI 3 for co-simulation.
+
+The file holds the scene with all files that it names, a few lines of Python and the binary of PythonFMU, which runs
+them in the Python of the machine: there, ``import wrcore`` must work. The binary, not wrcore, speaks FMI.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import yaml
+
+import wrcore
+from wrcore.errors import InputError
+from wrcore.errors.new_files import appearing
+from wrcore.run.channels import DESCRIPTIONS
+from wrcore.run.session import Session, start
+from wrcore.scene.description import Scene
+from wrcore.scene.pairs import with_names
+
+LIBRARIES = {2: ("pythonfmu", "Fmi2Slave", "Real", "Fmi2"), 3: ("pythonfmu3", "Fmi3Slave", "Float64", "Fmi3")}
+"""By the version of FMI: the library, what it calls a slave and a number, and how its other names begin."""
+
+SCENE, INTERFACE = "scene.yaml", "interface.json"
+
+SCRIPT = '''"""A scene of wrcore {version} as a functional mock-up unit; it needs wrcore where it runs."""
+
+from {library} import {number}, {prefix}Causality, {prefix}Variability, {slave}
+from wrcore.run.fmu import SteppedScene
+
+
+class {name}({bases}):
+    held = [globals()]
+    number, causality, variability = {number}, {prefix}Causality, {prefix}Variability
+'''
+
+
+class SteppedScene:
+    """What a unit does, for a class that also is a slave of PythonFMU."""
+
+    number: Any
+    causality: Any
+    variability: Any
+    held: list[Any]
+    """The names of the unit's script: PythonFMU's binary for FMI 2 (0.7.0) gives back a reference to them that it has
+    only borrowed, at each instance, and would free what is in use."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self.held.append(self.held[0])
+        self._folder = Path(given["resources"])
+        told = json.loads((self._folder / INTERFACE).read_text("utf-8"))
+        self.description, self._session, self._read = told["description"], None, (float("nan"), {})  # type: ignore
+        self._inputs, self._outputs = {name: value for name, (value, _) in told["inputs"].items()}, [*told["outputs"]]
+        if told["fmi"] == 3:
+            self._register("time", "independent", "continuous", "time, s", lambda: self._present().time)
+        for name, (_, text) in told["inputs"].items():
+            value, put = (lambda name=name: self._inputs[name] or 0.0), self._setter(name)
+            self._register(name, "input", "continuous", text, value, put)
+        for name, text in told["outputs"].items():
+            self._register(name, "output", "continuous", text, lambda name=name: self._output(name))
+
+    def _register(self, name, causality, variability, text, getter, setter=None):
+        causality, variability = self.causality[causality], self.variability[variability]
+        more = {"description": text, "getter": getter, "setter": setter}
+        variable = self.number(name, causality=causality, variability=variability, **more)
+        self.register_variable(variable, nested=False)
+
+    def _setter(self, name):
+        def put(value):
+            self._inputs[name] = value
+
+        return put
+
+    def _present(self) -> Session:
+        """The session, begun when it is first needed."""
+        if self._session is None:
+            self._session = start(self._folder / SCENE, record=False)
+        return self._session
+
+    def _output(self, name):
+        """A channel; all that are outputs are found at once."""
+        session = self._present()
+        if self._read[0] != session.time:
+            self._read = session.time, session.channels(*self._outputs)
+        return self._read[1][name]
+
+    def exit_initialization_mode(self) -> None:
+        self._present()
+
+    def do_step(self, current_time: float, step_size: float) -> Any:
+        """Step with the inputs as they are; what cannot go on is an error of the master's."""
+        session = self._present()
+        session.step(step_size, {name: value for name, value in self._inputs.items() if value is not None})
+        if session.status != "running":
+            raise RuntimeError(f"{session.status}: {session.reason}")
+        return True
+
+    def to_xml(self, *options: Any) -> Any:
+        root = super().to_xml(*options)  # type: ignore[misc]
+        root.set("variableNamingConvention", "flat")
+        structure = root.find("ModelStructure")
+        if (outputs := structure.find("Outputs")) is not None:  # of FMI 2, where PythonFMU leaves the others out
+            outputs = copy.deepcopy(outputs)
+            outputs.tag = "InitialUnknowns"
+            structure.append(outputs)
+        return root
+
+    def _get_fmu_state(self) -> Any:
+        return self._present().save(), dict(self._inputs)
+
+    def _set_fmu_state(self, state: Any) -> None:
+        self._present().restore(state[0])
+        self._inputs.update(state[1])
+        self._read = float("nan"), {}
+
+
+def library_of(fmi: int) -> ModuleType:
+    """The library that makes units of a version; an InputError says how to install it."""
+    try:
+        return import_module(LIBRARIES[fmi][0])
+    except ImportError:
+        text = f"expected {LIBRARIES[fmi][0]} to be installed: pip install 'wrcore[fmi]'"
+        raise InputError("wrcore fmu", "", text) from None
+
+
+def write_fmu(scene: Scene, path: Path, fmi: int = 2, outputs: Iterable[str] = ()) -> tuple[list[str], list[str]]:
+    """Write a scene as a unit for co-simulation: names of its inputs and outputs. ``outputs`` are names of
+    :meth:`Session.channels`, by default all of bodies and the drive; InputError for one that there is not.
+    """
+    library, session = library_of(fmi), start(scene)
+    numbers = [name for name in session.channels() if "/" not in name or name.startswith("drive/")]
+    chosen = list(outputs) or numbers
+    session.channels(*chosen)
+    told = {
+        "fmi": fmi, "description": f"{scene!r}, by wrcore {wrcore.__version__}",
+        "inputs": {name: _start_of(value, session.meanings[name]) for name, value in session.inputs.items()},
+        "outputs": {name: DESCRIPTIONS.get(name.split(".")[1], "") for name in chosen},
+    }  # fmt: skip
+    with tempfile.TemporaryDirectory(prefix="wrcore_fmu_") as place, _import_state():
+        folder = Path(place, "files")
+        folder.mkdir()
+        _pack_scene(scene, folder)
+        (folder / INTERFACE).write_text(json.dumps(told), "utf-8")
+        name, (package, slave, number, prefix) = re.sub(r"\W", "_", f"wrcore_{path.stem}"), LIBRARIES[fmi]
+        words = {"version": wrcore.__version__, "library": package, "number": number, "slave": slave, "prefix": prefix}
+        script = Path(place, f"{name}.py")
+        script.write_text(SCRIPT.format(name=name, bases=f"SteppedScene, {slave}", **words), "utf-8")
+        built = library.FmuBuilder.build_FMU(script, Path(place), list(folder.iterdir()), **_options(fmi))
+        with appearing(path) as file, open(built, "rb") as unit:
+            shutil.copyfileobj(unit, file)
+    return list(told["inputs"]), chosen
+
+
+def _start_of(value, text):
+    """Start value and description of an input."""
+    return (value, text) if value == value else (None, f"{text}; until it is set the scene's table rules")
+
+
+def _options(fmi):
+    return {"canGetAndSetFMUstate" if fmi == 2 else "canGetAndSetFMUState": True}
+
+
+@contextmanager
+def _import_state():
+    """Undo what an import of a script leaves behind."""
+    path, modules = list(sys.path), set(sys.modules)
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        for name in set(sys.modules) - modules:
+            if name.startswith("wrcore_"):
+                del sys.modules[name]
+
+
+def _pack_scene(scene, folder):
+    """Write a scene and all files that it names into one folder."""
+    names = {}
+    for number, path in enumerate(scene.files):
+        names[path] = f"{number}_{Path(path).name}"
+        shutil.copy(path, folder / names[path])
+    content = with_names(scene.data, Path(scene.source).parent, names)
+    (folder / SCENE).write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")

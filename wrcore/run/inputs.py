@@ -1,0 +1,87 @@
+"""What a session may set while it runs: numbers in the arrays of a compiled model, by name.
+
+Kernels read these arrays at every evaluation, so that nothing is compiled or built anew for a new value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from wrcore.dynamics.drive import CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
+from wrcore.dynamics.schedule import Schedules
+from wrcore.dynamics.system import Model
+from wrcore.elements import law
+from wrcore.elements.kinds.actuator import given
+from wrcore.geometry.track import SIDES
+from wrcore.scene.description import Scene
+
+
+@dataclass(frozen=True)
+class Input:
+    """A number that a session may set."""
+
+    meaning: str
+    unit: str
+    places: np.ndarray
+    """View of the model's numbers (n,), all of which become the value times the factor."""
+    factor: float = 1.0
+    low: float = -1e15
+    high: float = 1e15
+
+    @property
+    def value(self) -> float:
+        """What it is now; NaN while the scene's own table holds several values."""
+        return float(self.places[0]) / self.factor if np.all(self.places == self.places[0]) else float("nan")
+
+
+def with_own_arrays(model: Model) -> Model:
+    """A model that shares no array of inputs with its scene's vehicle."""
+    return model._replace(elements=model.elements._replace(directed=model.elements.directed.copy()))
+
+
+def inputs_of(scene: Scene, model: Model) -> dict[str, Input]:
+    """Inputs of a compiled scene by name."""
+    return {**dict(_of_actuators(scene, model)), **dict(_of_drive(scene, model)), **dict(_of_friction(model))}
+
+
+def _of_actuators(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
+    number = law.LAWS.index(given)
+    for k, name in enumerate(scene.vehicle.directed):
+        if model.elements.law[k, law.LAW] == number:
+            places = model.elements.directed[k, law.NUMBERS : law.NUMBERS + 1]
+            yield f"{name}.force", Input("force on the first body along the actuator's direction", "N", places)
+
+
+def _of_drive(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
+    """Torque or force of each motor and brake, or its share of the controller's force; what the controller is told."""
+    spec, drive = scene.data.get("drive") or {"motors": [], "brakes": []}, model.drive
+    for k, item in enumerate([*spec["motors"], *spec["brakes"]]):
+        name, brake = item["name"], k >= len(spec["motors"])
+        if drive.rows[k, KIND] == CONTROLLED:
+            radius = scene.vehicle.rolling_radius
+            yield f"{name}.share", Input("share of the controller's force", "1", drive.lever[k : k + 1], radius, 0.0)
+            continue
+        key, unit, place = ("torque", "N m", "on the wheelset") if "torque" in item else ("force", "N", "at the rims")
+        values = _values(drive.tables, drive.rows[k, TABLE])
+        yield f"{name}.{key}", Input(f"{key} {place}", unit, values, low=0.0 if brake else -1e15)
+    if "controller" in spec:
+        yield "controller.speed", Input("speed to be kept", "m/s", _values(drive.tables, drive.control[0, SPEED]))
+        yield "controller.limit", Input("largest force ahead", "N", drive.gains[0, MOST : MOST + 1], low=0.0)
+        least = drive.gains[0, LEAST : LEAST + 1]
+        yield "controller.brake_limit", Input("largest force back", "N", least, -1.0, 0.0)
+
+
+def _of_friction(model: Model) -> Iterator[tuple[str, Input]]:
+    """Coefficient of each rail, where the scene tells the rails apart; tables of contact reach to its largest value."""
+    for rail, side in enumerate(SIDES if len(model.friction.points) else ()):
+        values = _values(model.friction, rail)
+        most = float(values.max()) if model.contact.strips.looked_up else 1.0
+        yield f"friction.{side}", Input(f"coefficient of friction of the {side} rail", "1", values, 1.0, 1e-9, most)
+
+
+def _values(tables: Schedules, k: int) -> np.ndarray:
+    """Values of a table."""
+    return tables.points[tables.starts[k] : tables.starts[k + 1], 1]
