@@ -12,9 +12,11 @@ def blocks(page):
     return re.findall(r"```(\w+)\n(.*?)```", (ROOT / "reports" / page).read_text(encoding="utf-8"), re.DOTALL)
 
 
-def run_blocks(page):
-    """Run a page in the working directory; blocks of text are what it prints."""
+def run_blocks(page, left_out=()):
+    """Run a page in the working directory; blocks of text are what it prints, those of some kinds are ``left_out``."""
     for kind, text in blocks(page):
+        if kind in left_out:
+            continue
         name = re.match(r"# file: (\S+)\n", text)
         if name:
             with open(name[1], "w") as file:

@@ -35,7 +35,7 @@ def test_tables_are_linear_between_their_points_and_constant_beyond():
 def turning(contact, kind, table):  # noqa: F811
     """One or two free bodies; the first turns about its y axis, and an actuator acts on it."""
     model = make_model(contact, [50.0, 80.0], [[30.0, 20.0, 30.0], [40.0, 60.0, 50.0]], gravity=0.0)
-    rows = np.array([[0, 1, 0, kind, 0, TIME]])
+    rows = np.array([[0, 1, 0, kind, 0, TIME, 0]])
     return model._replace(drive=no_drive()._replace(rows=rows, lever=np.ones(1), tables=pack_schedules([table])))
 
 

@@ -281,7 +281,7 @@ def test_methods_agree_with_independent_wheels_a_controller_and_a_curve(support,
     vehicle = tmp_path / "independent.yaml"
     vehicle.write_text(text.replace("    kind: wheelset\n", "    kind: wheelset\n    independent_wheels: true\n"))
     drive = {
-        "motors": [{"name": "motor", "bodies": ["wheelset", "frame"]}],
+        "motors": [{"name": side, "bodies": ["wheelset", "frame"], "wheel": side} for side in ("left", "right")],
         "controller": {"body": "wheelset", "speed": 20.0, "proportional": 1e4, "integral": 1e3, "limit": 1e4},
     }
     path = [{"transition": 5}, {"curve": 50, "radius": 500, "cant": 0.05}]

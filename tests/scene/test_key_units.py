@@ -25,7 +25,7 @@ COMPOUND = {
     "kg/m",
     "N, m^3/m",
 }
-KNOWN = {"1", "that of the key", "that of the function", *UNIT_SUFFIXES.values(), *COMPOUND}
+KNOWN = {"1", "that of the key", "that of the law", *UNIT_SUFFIXES.values(), *COMPOUND}
 
 
 def has_numbers(part):

@@ -6,8 +6,7 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT
-from wrcore.elements.kinds import KINDS, compiled
-from wrcore.elements.kinds.traction_rod import linear
+from wrcore.elements.kinds import KINDS
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.vehicle.description import build_vehicle
 
@@ -19,8 +18,10 @@ BOLSTER = {"kind": "body", "mass": 500.0, "inertia": {"roll": 1.0, "pitch": 1.0,
 @pytest.mark.parametrize(
     "item", [item for block in EXAMPLES if isinstance(block, list) for item in block], ids=lambda item: item["name"]
 )
-def test_each_example_is_a_part_of_a_vehicle(item, monkeypatch):
-    monkeypatch.setitem(compiled.FUNCTIONS, "air_drag", linear)
+def test_each_example_is_a_part_of_a_vehicle(item, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in re.findall(r"```python\n# file: (\S+)\n(.*?)```", TEXT, re.DOTALL):
+        (tmp_path / name).write_text(text)
     data = yaml.safe_load(yaml.safe_dump(VEHICLE))
     if item["kind"] in KINDS:
         data["elements"].append(item)

@@ -207,7 +207,9 @@ def initial_state(scene, model, at_rest=None, shared=None):
         moves = {name: (part[0], part[VELOCITY]) for name, part in parts.items()}
         for name, part in parts.items():  # an axle box is where its wheelset is
             part[:] = _on_path(model.track.path, *moves[vehicle.data["bodies"][name].get("wheelset", name)], part)
-    return np.concatenate([state, np.zeros(internal_states(driven) - internal_states(model))])
+    rest_of_states = np.zeros(internal_states(driven) - internal_states(model))
+    rest_of_states[len(rest_of_states) - len(driven.controls.start) :] = driven.controls.start
+    return np.concatenate([state, rest_of_states])
 
 
 def _move(scene, model, moved, at_rest, state):

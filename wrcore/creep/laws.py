@@ -15,10 +15,22 @@ import numpy as np
 from wrcore.creep.axes import CreepTableData, TableAxes, table_lookup
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
+from wrcore.errors import InputError, one_of
+from wrcore.kernels import own
+from wrcore.kernels.handles import FOUR, four_at
 from wrcore.kernels.jit import FUSED, jit, rarely_called
 
 LAWS = {"table": 0, "linear": 1, "she": 2, "polach": 3, "fastsim": 4}
 _TABLE, _LINEAR, _SHE, _POLACH = 0, 1, 2, 3
+OWN = 5
+"""Number of a law of the user's own, see `own_law`."""
+
+GROUP = "wrcore.creep_laws"
+"""Of entry points, by which installed packages name their laws."""
+
+TRIED = (0.0, 0.0, 0.0), (0.1, -0.2, 0.1), (5.0, 3.0, -2.0)
+"""Nondimensional creepages of the test calls of an own law."""
+
 FASTSIM_GRID = 40
 
 
@@ -38,16 +50,55 @@ class CreepData(NamedTuple):
     """Without nodes where the law is not the table; its ``kalker`` serves all laws."""
     fastsim: FastsimData
     polach: PolachFactors
+    source: np.ndarray = np.zeros(0, np.int64)  # digest of a law of the user's own, see `wrcore.kernels.own`
+    own: int = 0  # address of its kernel
 
 
-def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 1.0)):
+def own_law(name, folder):
+    """The `wrcore.kernels.own.Own` law that a scene names as ``module:function`` or ``file.py:function``, or by an
+    entry point, after test calls: ``law(ratio, psi, kalker, xi, eta, phi)`` with kalker = (C11, C22, C23, C33), to (fx,
+    fy, mz). An InputError without a source says what was expected."""
+    if ":" not in name:
+        from importlib.metadata import entry_points  # reads what is installed: some ten milliseconds
+
+        entry = next(iter(entry_points(group=GROUP, name=name)), None)
+        if entry is None:
+            raise InputError("", "", f"{one_of(LAWS, name)}; or module:function of a law of your own")
+        name = entry.value
+    found = own.find(name, folder)
+    if not hasattr(found.function, "py_func"):
+        raise InputError("", "", f"expected a function compiled by numba.njit, got {name!r}, which is plain Python")
+    for creepages in TRIED:
+        forces, _ = own.tried(found, (), 1.3, 0.0, (4.0, 3.7, 1.5, 1.2), *creepages)
+        if np.shape(forces) != (3,):
+            raise InputError("", "", f"expected three numbers fx, fy, mz from a test call, got {forces!r}")
+        own.finite(*forces)
+    return found
+
+
+def _wrapped(function):
+    """The kernel of an own law."""
+
+    def call(g, psi, kalker, xi, eta, phi):
+        fx, fy, mz = function(g, psi, kalker, xi, eta, phi)
+        return float(fx), float(fy), float(mz), 0.0
+
+    return call
+
+
+def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 1.0), law=None):
     """`CreepData` for `creep_force` at Poisson's ratio ``nu``. ``table``: ``CreepTable.kernel_data()``, for the law
     "table" only; ``grid``: FASTSIM's steps along x and strips across; ``elliptic``: its bound is Hertzian instead of
-    parabolic; ``factors``: k_A and k_S of Polach's law."""
+    parabolic; ``factors``: k_A and k_S of Polach's law; ``law``: one of the user's own."""
     if table is None:
         table = CreepTableData(TableAxes(0.0, 0.0, 0.0, 0, 0, 0, 0, 0), kalker_data(nu), np.zeros(0, np.float32))
     fastsim_data = FastsimData(int(grid), int(grid), int(elliptic))
-    return CreepData(table, fastsim_data, PolachFactors(float(factors[0]), float(factors[1])))
+    data = CreepData(table, fastsim_data, PolachFactors(float(factors[0]), float(factors[1])))
+    if law is None:
+        return data
+    example = tuple(map(own.Example, (1.0, 0.0, (1.0,) * 4, 0.0, 0.0, 0.0)))
+    address = own.addressed(_wrapped, law.digest, 0, 0, example, FOUR).address
+    return data._replace(source=np.array(law.digest, np.int64), own=address)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -108,6 +159,8 @@ def _other_law(law, data, log_g, g, psi, xi, eta, phi):
         fx, fy, mz = she(kalker, g, xi, eta, phi)
     elif law == _POLACH:
         fx, fy, mz = polach(kalker, data.polach, g, xi, eta, phi)
+    elif law == OWN:
+        fx, fy, mz, _ = four_at(data.own, g, psi, kalker_coefficients(g, kalker), xi, eta, phi)
     else:
         fx, fy, mz = fastsim(data.fastsim, kalker, g, psi, xi, eta, phi)
     return fx, fy, mz, outside

@@ -4,9 +4,12 @@ A torque M along the axle e (pointing left: M > 0 drives forward) acts on a whee
 takes the reaction, so that the pair gains no angular momentum, and the power put in is M times the relative rotation
 rate omega = e . (w_wheelset - w_body). With the moving frame as that body the reaction leaves the vehicle.
 
-*Motor*: M by a table. *Brake*: M = -M_b tanh(omega/`GRIP`), with M_b by a table: a friction brake whose sign changes
-within some `GRIP`, so that it holds at standstill and takes energy at every instant. *Controller*: proportional and
-integral, on the speed v of a body along its own x axis, with limits of the force at the wheels' rims,
+On a wheelset whose wheels turn independently of each other a torque acts on one of them, and omega is that wheel's.
+
+*Motor*: M by a table, or as a control law commands (:mod:`wrcore.dynamics.control`). *Brake*:
+M = -M_b tanh(omega/`GRIP`), with M_b by a table: a friction brake whose sign changes within some `GRIP`, so that it
+holds at standstill and takes energy at every instant. *Controller*: proportional and integral, on the speed v of a body
+along its own x axis, with limits of the force at the wheels' rims,
 
     F = clip(F*, -brake limit, limit),   F* = Kp (v* - v) + Ki z,   z' = v* - v - (F* - F)/Kp,
 
@@ -31,10 +34,10 @@ from wrcore.dynamics.track import arc_length_at
 from wrcore.dynamics.vector import load
 from wrcore.kernels.jit import jit
 
-MOTOR, BRAKE, CONTROLLED = range(3)
+MOTOR, BRAKE, CONTROLLED, COMMANDED = range(4)
 """Kinds of actuators."""
 
-WHEELSET, REACTION, NUMBER, KIND, TABLE, OVER = range(6)
+WHEELSET, REACTION, NUMBER, KIND, TABLE, OVER, WHEEL = range(7)
 """Columns of ``Drive.rows``."""
 
 BODY, FOREMOST, SPEED, SPEED_OVER = range(4)
@@ -54,8 +57,9 @@ class Drive(NamedTuple):
     """Motors, brakes and controller, for kernels."""
 
     rows: np.ndarray
-    """(m, 6) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
-    kind, table, what that is over."""
+    """(m, 7) int: wheelset (body), body that takes the reaction or FRAME, number of the wheelset among all wheelsets,
+    kind, table (or output of a control law), what that is over, and the wheel that turns by itself: 1 for the left
+    one, -1 for the right one, 0 for a solid wheelset."""
     lever: np.ndarray  # (m,): torque per unit of the table, or of the controller's force: 1 or a radius (m)
     control: np.ndarray
     """(c, 4) int, c = 0 or 1: body whose speed counts, number of the wheelset whose arc length does, table, what that
@@ -67,18 +71,20 @@ class Drive(NamedTuple):
 def no_drive():
     """A `Drive` of nothing."""
     return Drive(
-        np.zeros((0, 6), np.int64), np.zeros(0), np.zeros((0, 4), np.int64), np.zeros((0, 4)), pack_schedules([])
+        np.zeros((0, 7), np.int64), np.zeros(0), np.zeros((0, 4), np.int64), np.zeros((0, 4)), pack_schedules([])
     )
 
 
 def undriven(model):
-    """The model without motors, brakes and controller: its state ends with those of the force elements."""
-    return model._replace(drive=no_drive(), torques=0)
+    """The model without motors, brakes, controller and control laws: its state ends with that of force elements."""
+    none = model.controls._make(array[:0] for array in model.controls)
+    return model._replace(drive=no_drive(), torques=0, samples=0, controls=none)
 
 
 def may_drive(model):
     """Whether motors, brakes or a controller can ever exert a torque."""
-    return len(model.drive.control) > 0 or bool(model.drive.tables.points[:, 1].any())
+    driven = len(model.drive.control) > 0 or len(model.controls.rows) > 0
+    return driven or bool(model.drive.tables.points[:, 1].any())
 
 
 def drive_links(model):
@@ -100,6 +106,18 @@ def _controlled(model):
     """Bodies that the controller's force acts on."""
     rows = model.drive.rows
     return set(rows[rows[:, KIND] == CONTROLLED][:, [WHEELSET, REACTION]].ravel().tolist()) - {FRAME}
+
+
+@jit(allocates=False)
+def wheels_apart_at(bodies, k):
+    """Place in the state of half the difference of rolling rates of the k-th wheelset; that of the last independent one
+    if it has none."""
+    place = -1
+    for j in range(bodies.independent.shape[0]):
+        place = bodies.independent[j, 1]
+        if bodies.independent[j, 0] == k:
+            break
+    return STATE_SIZE * bodies.mass.shape[0] + place
 
 
 @jit(allocates=False)
@@ -132,8 +150,12 @@ def actuator(model, i, force, t, state, work):
         if row[REACTION] != FRAME:
             turn -= state[STATE_SIZE * row[REACTION] + OMEGA + k]
         rate += axes[k, 1] * turn
+    if row[WHEEL] != 0:
+        rate += row[WHEEL] * state[wheels_apart_at(model.bodies, row[NUMBER])]
     value = force
-    if kind != CONTROLLED:
+    if kind == COMMANDED:
+        value = work.control.outputs[row[TABLE]]
+    elif kind != CONTROLLED:
         value = _table_value(model, row[TABLE], row[OVER], row[NUMBER], t, state, work)
     torque = model.drive.lever[i] * value
     return (-torque * math.tanh(rate / GRIP) if kind == BRAKE else torque), rate
@@ -154,3 +176,6 @@ def add_drive(model, t, state, work, rate):
             work.wrenches[wheelset, 3 + k] += moment
             if body != FRAME:
                 work.wrenches[body, 3 + k] -= moment
+        if model.drive.rows[i, WHEEL] != 0:
+            at = wheels_apart_at(model.bodies, model.drive.rows[i, NUMBER])
+            rate[at] += model.drive.rows[i, WHEEL] * torque / model.bodies.inertia[wheelset, 1]

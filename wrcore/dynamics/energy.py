@@ -185,7 +185,7 @@ def _track_energies(model, states, work):
 
 def _drive_powers(model, work, times, states):
     """Channels `DRIVE_CHANNELS`."""
-    torques, rates, _ = drive_history(Equations(model, work), times, states)
+    torques, rates, *_ = drive_history(Equations(model, work), times, states)
     powers, brakes = torques * rates, model.drive.rows[:, KIND] == BRAKE
     return dict(zip(DRIVE_CHANNELS, (powers[:, ~brakes].sum(axis=1), -powers[:, brakes].sum(axis=1)), strict=True))
 

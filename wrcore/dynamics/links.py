@@ -3,10 +3,11 @@
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.drive import drive_links, drive_state_bodies
+from wrcore.dynamics.control import control_links
+from wrcore.dynamics.drive import BRAKE, CONTROLLED, KIND, NUMBER, REACTION, WHEEL, drive_links, drive_state_bodies
 from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.marker import FRAME
-from wrcore.elements.law import INNER
+from wrcore.elements.law import INNER, LAW, NUMBERS
 
 
 def packed(lists):
@@ -33,6 +34,9 @@ def reached_bodies(model):
         if i != FRAME and j != FRAME:
             linked[i].add(int(j))
             linked[j].add(int(i))
+    for bodies, _ in control_links(model):
+        for body in bodies:
+            linked[body] |= bodies
     return [set().union(*(joined[other] for other in others)) for others in linked]
 
 
@@ -42,21 +46,60 @@ def internal_state_bodies(model):
     bodies = [set() for _ in range(elements.states)]
     for p, ends in enumerate(elements.pairs):
         for k in range(elements.first_directed[p], elements.first_directed[p + 1]):
-            if elements.law[k, INNER] >= 0:
-                bodies[elements.law[k, INNER]] = set().union(*(joined[b] for b in ends if b != FRAME))
+            for state in _states_of(elements, k):
+                bodies[state] = set().union(*(joined[b] for b in ends if b != FRAME))
     for wheelset, state in model.bodies.independent:
         bodies[state] = joined[model.bodies.wheelsets[wheelset]]
-    for wheelset, states in enumerate(internal_state_groups(model)):
+    for wheelset, states in enumerate(_track_groups(model)):
         for state in states:
             bodies[state] = joined[model.bodies.wheelsets[wheelset]]
-    return bodies + [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
+    bodies += [set().union(*(joined[b] for b in ends)) for ends in drive_state_bodies(model)]
+    bodies += [set() for _ in model.controls.start]
+    for ends, states in [*control_links(model), *_wheels_driven_apart(model)]:
+        for state in states:
+            bodies[state] = bodies[state].union(*(joined[b] for b in ends))
+    for states in internal_state_groups(model):
+        together = set().union(*(bodies[state] for state in states))
+        for state in states:
+            bodies[state] = together
+    return bodies
 
 
-def internal_state_groups(model):
+def _states_of(elements, k):
+    """Internal states of the k-th element along one direction."""
+    first, own = int(elements.law[k, INNER]), elements.law[k, LAW] < 0
+    return range(first, first + (int(elements.directed[k, NUMBERS]) if own else 1)) if first >= 0 else ()
+
+
+def _wheels_driven_apart(model):
+    """For each motor or brake of a single wheel whose torque depends on the motion: bodies whose motion it is, and the
+    internal state of the wheels, with the speed controller's if that is what drives."""
+    independent = {int(wheelset): int(state) for wheelset, state in model.bodies.independent}
+    for row in model.drive.rows:
+        if row[WHEEL] and row[KIND] in (BRAKE, CONTROLLED):
+            followed = {int(body) for body in model.drive.control[:, 0]} if row[KIND] == CONTROLLED else set()
+            states = {independent[int(row[NUMBER])]} | ({model.elements.states} if row[KIND] == CONTROLLED else set())
+            yield followed | {int(row[REACTION])} - {FRAME}, states
+
+
+def _track_groups(model):
     """For each wheelset the list of internal states that act on one another, those of a flexible track; else none."""
     if not len(model.flexible_track.mass):
         return []
     groups = [[int(state) for state in row] for row in track_places(model) - STATE_SIZE * len(model.bodies.mass)]
     for wheelset, state in model.bodies.independent:
         groups[wheelset].append(int(state))
+    return groups
+
+
+def internal_state_groups(model):
+    """Lists of internal states that act on one another: those of a flexible track, of own laws, of control."""
+    groups = _track_groups(model)
+    elements = [list(_states_of(model.elements, k)) for k in range(len(model.elements.law))]
+    more = [*elements, *(sorted(states) for _, states in [*control_links(model), *_wheels_driven_apart(model)])]
+    for states in more:
+        if len(states) > 1:
+            shared = [group for group in groups if set(group) & set(states)]
+            groups = [group for group in groups if group not in shared]
+            groups.append(sorted(set(states).union(*shared)))
     return groups

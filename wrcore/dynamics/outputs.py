@@ -22,11 +22,13 @@ def evaluations_at(times, states, equations, model, work, rates, patches, bounds
 
 
 @jit(allocates=False)
-def _fill_drives(times, states, equations, model, work, rate, torques, rates, control):
+def _fill_drives(times, states, equations, model, work, rate, torques, rates, control, outputs):
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work, rate)
         force, wanted, _ = controlled_force(model, times[i], states[i], work)
         control[i, 0], control[i, 1] = force, wanted
+        for k in range(outputs.shape[1]):
+            outputs[i, k] = work.control.outputs[k]
         for k in range(torques.shape[1]):
             torques[i, k], rates[i, k] = actuator(model, k, force, times[i], states[i], work)
 
@@ -34,8 +36,11 @@ def _fill_drives(times, states, equations, model, work, rate, torques, rates, co
 def drive_history(equations, times, states):
     """What motors, brakes and the speed controller did at n times (s) and states, by `Equations`, whose scratch arrays
     are overwritten: torques on the wheelsets along their axles (N m) and relative rotation rates about these (rad/s),
-    (n, m) each; the controller's force at the rims (N) and the speed that it wants (m/s), (n, 2), zeros without one."""
-    shape = len(times), len(equations.arguments[1].value.drive.rows)
+    (n, m) each; the controller's force at the rims (N) and the speed that it wants (m/s), (n, 2), zeros without one;
+    and the outputs of control laws, (n, o)."""
+    model, rate = equations.arguments[1].value, np.empty(states.shape[1])
+    shape = len(times), len(model.drive.rows)
     torques, rates, control = np.zeros(shape), np.zeros(shape), np.zeros((len(times), 2))
-    _fill_drives(times, states, *equations.arguments, np.empty(states.shape[1]), torques, rates, control)
-    return torques, rates, control
+    outputs = np.zeros((len(times), len(model.controls.places)))
+    _fill_drives(times, states, *equations.arguments, rate, torques, rates, control, outputs)
+    return torques, rates, control, outputs

@@ -4,6 +4,7 @@ import threading
 
 import numpy as np
 
+from wrcore.dynamics.control import with_control_laws
 from wrcore.dynamics.suspension import with_laws
 from wrcore.dynamics.system import Equations, internal_states, looked_up, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
@@ -35,7 +36,7 @@ def structure(model):
     return (
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
-        strips[:3], sizes, len(set(looked_up(model))),
+        strips[:3], sizes, len(set(looked_up(model))), *model.controls.period, *map(np.shape, model.controls),
     )  # fmt: skip
 
 
@@ -44,9 +45,11 @@ def with_kernels_of(model, other):
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
-    kept = {name: getattr(other, name) for name in ("reactions", "torques", "rail_friction", "rails", "wheels")}
+    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples"
+    kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
-    return model._replace(contact=contact, elements=with_laws(model.elements), **kept)
+    kept |= {"elements": with_laws(model.elements), "controls": with_control_laws(model.controls)}
+    return model._replace(contact=contact, **kept)
 
 
 def _addresses(contact):

@@ -34,6 +34,7 @@ from wrcore.dynamics.vector import cross, dot, load, minus
 from wrcore.elements import law
 from wrcore.kernels.handles import FOUR, Kernel, Kind, four_at
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.own import Own, text_digest
 
 STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
 """Columns of a row of ``Elements.springs``, which begins as one of ``Elements.directed``."""
@@ -64,14 +65,18 @@ class Elements(NamedTuple):
     """Number of internal states: displacements (m) of dampers that act in series with a spring; and what else is
     counted with them, see `wrcore.dynamics.system.fill_derivatives`."""
     laws: np.ndarray = np.zeros(0, np.int64)  # addresses of the laws by their number, see `with_laws`
+    own: np.ndarray = np.zeros((0, 4), np.int64)
+    """(o, 4): digests of the laws of the user's own (`wrcore.kernels.own`), and of those of other packages."""
+    own_laws: np.ndarray = np.zeros(0, np.int64)  # (o,): their addresses, see `with_laws`
+    parameters: np.ndarray = np.zeros(0)  # of own laws, whose places stand where others have points
 
 
 def pack_elements(springs=(), directed=(), turning=()):
     """Sort elements by pair (first body, second body, offset).
 
     ``springs``: (pair, the 15 numbers of a row of ``Elements.springs``). ``directed``: (pair, the first 10 of
-    ``Elements.directed``, law, at most six numbers for it, points (q, 2) of the characteristic or None, whether it has
-    an internal state, the element that presses: None, or (0, k) and (1, k) for the k-th of ``springs`` and of
+    ``Elements.directed``, law, at most six numbers for it, points (q, 2) of the characteristic or None, the number of
+    internal states, the element that presses: None, or (0, k) and (1, k) for the k-th of ``springs`` and of
     ``directed``). ``turning``: (pair, stiffness, damping, cubic stiffness) against relative rotation about the second
     body's axes, three numbers each; summed pair by pair.
     """
@@ -82,14 +87,24 @@ def pack_elements(springs=(), directed=(), turning=()):
     for pair, stiffness, damping, cubic in turning:
         rotational[pairs.index(pair)] += (0.5 * np.sum(stiffness) - np.asarray(stiffness, float), damping, cubic)
     tables, rows, laws, length, states = [np.zeros((0, 3))], [], [], 0, 0
+    own: dict[tuple, int] = {}
+    parameters: list[float] = []
     for _, row, kernel, numbers, points, inner, presses in directed:
         tables.append(_with_integral(points))
         pressing = [-1, -1]
         if presses is not None:
             pressing[presses[0]] = orders[presses[0]].index(presses[1])
         end = length + len(tables[-1])
-        on_line, number = not np.any(row[law.AXIS :]), law.LAWS.index(kernel)
-        laws.append((on_line, number, length, end, states if inner else -1, *pressing))
+        on_line, first, last = not np.any(row[law.AXIS :]), length, end
+        if isinstance(kernel, Own):
+            number, first, last = -1 - own.setdefault(kernel.digest, len(own)), len(parameters), -1
+            parameters += numbers
+            last, numbers = len(parameters), (inner,)
+        else:
+            number = law.LAWS.index(kernel)
+            if not kernel.__module__.startswith("wrcore."):
+                own.setdefault(text_digest(kernel), len(own))
+        laws.append((on_line, number, first, last, states if inner else -1, *pressing))
         length, states = end, states + inner
         rows.append([*row, *numbers, *[0.0] * (law.MOST_NUMBERS - len(numbers))])
     first_spring, first_directed = (
@@ -102,6 +117,7 @@ def pack_elements(springs=(), directed=(), turning=()):
         first_spring, np.array([row for _, row in springs], float).reshape(-1, 15),
         first_directed, np.array(rows, float).reshape(-1, law.NUMBERS + law.MOST_NUMBERS),
         np.array(laws, np.int64).reshape(-1, 7), np.vstack(tables), states,
+        own=np.array(list(own), np.int64).reshape(-1, 4), parameters=np.array(parameters, float),
     )  # fmt: skip
 
 
@@ -119,9 +135,15 @@ def _with_integral(points):
 def with_laws(elements):
     """The elements with the addresses of the laws that they follow: these alone are compiled."""
     addresses, example = np.zeros(len(law.LAWS), np.int64), Kind(elements)
+    own = np.zeros(len(elements.own), np.int64)
     for number in np.unique(elements.law[:, law.LAW]):
-        addresses[number] = Kernel(law.LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
-    return elements._replace(laws=addresses)
+        if number >= 0:
+            addresses[number] = Kernel(law.LAWS[number], example, 0, 0.0, 0.0, 0.0, 0.0, returns=FOUR).address
+        else:
+            from wrcore.elements.kinds.own_law import address
+
+            own[-1 - number] = address(tuple(map(int, elements.own[-1 - number])), example)
+    return elements._replace(laws=addresses, own_laws=own)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -233,11 +255,15 @@ def pair_forces(elements, p, motion, state, inner_at, rate):
         inner, press, place = 0.0, 0.0, elements.law[k, law.INNER]
         if elements.law[k, law.PRESSING_SPRING] >= 0 or elements.law[k, law.PRESSING] >= 0:
             press = _pressing_force(elements, k, motion)
-        if place >= 0:
-            inner = state[inner_at + place]
-        force, inner_rate, energy, loss = _by_law(elements, k, stretch, along, inner, press)
-        if place >= 0:
-            rate[inner_at + place] = inner_rate
+        if elements.law[k, law.LAW] < 0:
+            at, address = inner_at + max(place, 0), elements.own_laws[-1 - elements.law[k, law.LAW]]
+            force, _, energy, loss = four_at(address, elements, k, stretch, along, state, rate, at)
+        else:
+            if place >= 0:
+                inner = state[inner_at + place]
+            force, inner_rate, energy, loss = _by_law(elements, k, stretch, along, inner, press)
+            if place >= 0:
+                rate[inner_at + place] = inner_rate
         gx, gy, gz = -force * nx, -force * ny, -force * nz
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         mx, my, mz = mx + by * gz - bz * gy, my + bz * gx - bx * gz, mz + bx * gy - by * gx

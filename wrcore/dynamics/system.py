@@ -19,6 +19,7 @@ from wrcore.contact.strip import Pose
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
+from wrcore.dynamics.control import Controls, ControlWork, control_work, no_controls, with_controls
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
 from wrcore.dynamics.joint import Joints
@@ -70,6 +71,8 @@ class Model(NamedTuple):
     torques: int = 0  # address of the kernel that adds their torques
     flexible_track: FlexibleTrack = rigid_track()  # the track under each wheelset, if it is flexible
     rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
+    controls: Controls = no_controls()  # control laws of the user's own
+    samples: int = 0  # address of the kernel that takes their samples
 
 
 class Workspace(NamedTuple):
@@ -92,6 +95,7 @@ class Workspace(NamedTuple):
     irregularity: np.ndarray
     strips: StripWork
     flexible_track: FlexibleTrackWork
+    control: ControlWork
 
 
 def state_size(model):
@@ -100,8 +104,9 @@ def state_size(model):
 
 
 def internal_states(model):
-    """Number of states that belong to no body: of force elements and the track, then that of the speed controller."""
-    return model.elements.states + len(model.drive.control)
+    """Number of states that belong to no body: of force elements and the track, then that of the speed controller, then
+    those of control laws."""
+    return model.elements.states + len(model.drive.control) + len(model.controls.start)
 
 
 def workspace(model):
@@ -112,7 +117,7 @@ def workspace(model):
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
-        strip_work(model.contact.strips, k), track_work(model.flexible_track, k),
+        strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
     )  # fmt: skip
 
 
@@ -208,7 +213,8 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
 
     The state: per body position (m), Euler parameters, velocity (m/s), angular velocity (rad/s), track axes; then the
     internal states of force elements (m), of wheels that turn independently (rad/s) and of a flexible track (m, m/s,
-    :mod:`wrcore.dynamics.flexible_track`), and the speed controller's integral (m).
+    :mod:`wrcore.dynamics.flexible_track`), the speed controller's integral (m), and what control laws hold
+    (:mod:`wrcore.dynamics.control`).
     """
     bodies = model.bodies
     n = bodies.mass.shape[0]
@@ -333,7 +339,10 @@ def with_kernels(model, work):
     kind, scratch, state, kernels = Kind(model), Kind(work), np.empty(0), {}
     if model.joints.equations:
         kernels["reactions"] = Kernel(add_reactions, kind, 0.0, state, scratch)
-    if len(model.drive.rows):
+    if len(model.controls.rows):
+        model, own = with_controls(model, kind, scratch, state)
+        kernels |= own
+    elif len(model.drive.rows):
         kernels["torques"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
     if len(model.friction.points):
         kernels["rail_friction"] = Kernel(fill_rail_friction, kind, state, scratch)
@@ -344,7 +353,7 @@ def with_kernels(model, work):
             wrenches, Kind(model.contact), work.motions, work.patches, work.counts, work.bounds, work.rail_wrenches,
             work.counters, Kind(work.strips), FRESH,
         )  # fmt: skip
-    return model._replace(**{name: kernel.address for name, kernel in kernels.items()})
+    return model._replace(**{name: getattr(kernel, "address", kernel) for name, kernel in kernels.items()})
 
 
 class Equations:

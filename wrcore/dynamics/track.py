@@ -92,6 +92,8 @@ def rail_motions(track, distances, state, at, axle, guess, frame, values, rails,
         place = side * distances[wheel]
         slope_y = share * station.widening_rate + values[1, 2 * wheel]
         lateral, vertical, _ = rail_direction(station, place + shift, lift, slope_y, values[1, 2 * wheel + 1])
+        if not track.path.climbs:
+            lateral, vertical = slope_y, values[1, 2 * wheel + 1]
         _rail_frame(frame, lateral, vertical, rail)
         # the wheelset's centre from the rail's origin, turned into the rail's frame
         gx, gy, gz = turned_back(frame, 0.0, y - place - shift, z - lift)
@@ -145,6 +147,15 @@ def fill_rail_friction(model, state, work):
             work.motions[k, wheel, MOTION.friction] = scheduled(model.friction, wheel, s)
 
 
+@jit(allocates=False)
+def angles_in(frame, body):
+    """Roll, yaw and pitch (rad) of a body's rotation matrix in a frame of the track."""
+    ax, ay, az = turned_into(frame, body[0, 1], body[1, 1], body[2, 1])
+    _, _, forward = turned_into(frame, body[0, 0], body[1, 0], body[2, 0])
+    _, _, upward = turned_into(frame, body[0, 2], body[1, 2], body[2, 2])
+    return math.asin(min(max(az, -1.0), 1.0)), math.atan2(-ax, ay), math.atan2(-forward, upward)
+
+
 @jit
 def track_poses(track, states, at, guess):
     """Poses (n, 6) of the body whose state starts ``at`` in the track's frame, arc length s, y, z (m), roll, yaw and
@@ -157,10 +168,6 @@ def track_poses(track, states, at, guess):
         station = track_frame(track.path, s, frame)
         _, y, z = turned_into(frame, state[0] - station.x, state[1] - station.y, state[2] - station.z)
         rotation_matrix(state, 0, body)
-        ax, ay, az = turned_into(frame, body[0, 1], body[1, 1], body[2, 1])
-        _, _, forward = turned_into(frame, body[0, 0], body[1, 0], body[2, 0])
-        _, _, upward = turned_into(frame, body[0, 2], body[1, 2], body[2, 2])
-        angles = math.asin(min(max(az, -1.0), 1.0)), math.atan2(-ax, ay), math.atan2(-forward, upward)
         store((s, y, z), poses[i])
-        store(angles, poses[i, 3:])
+        store(angles_in(frame, body), poses[i, 3:])
     return poses, axes

@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_bound
@@ -43,6 +45,7 @@ class ContactModel(NamedTuple):
     geometries: tuple = ()
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
     wheels: tuple = ()  # the same as contact models, see `wrcore.dynamics.system.with_kernels`
+    friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
 
 
 @jit(allocates=False, inline="always")
@@ -97,11 +100,17 @@ def detect_patches(model, m, rows):
 @jit(allocates=False, forceinline=True)
 def falling(model, friction, xi, eta, speed):
     """Coefficient of friction mu0 ((1 - A) exp(-B w) + A) at the slip velocity w of a patch (Polach, Wear 258 (2005)
-    992): that of its reference point, without spin."""
+    992): that of its reference point, without spin; or mu0 times a factor of a user's own, samples of which lie 1/B
+    apart."""
     ratio = model.friction_ratio
     if ratio == 1.0:
         return friction
     slip = speed * math.sqrt(xi * xi + eta * eta)
+    factors = model.friction_factors
+    if factors.shape[0] > 0:
+        place = min(slip * model.friction_decay, factors.shape[0] - 1.001)
+        k = int(place)
+        return friction * (factors[k] + (place - k) * (factors[k + 1] - factors[k]))
     return friction * ((1.0 - ratio) * math.exp(-model.friction_decay * slip) + ratio)
 
 

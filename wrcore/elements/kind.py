@@ -58,13 +58,15 @@ class Along(NamedTuple):
 
     ends: np.ndarray
     law: Any
+    """A kernel, or an `wrcore.kernels.own.Own` function."""
     axis: np.ndarray | None
     numbers: Any = ()
-    """At most six for the law, or a function that returns them, of the force that presses in nominal position (N)."""
+    """At most six for the law (any number for one of the user's own), or a function that returns them, of the force
+    that presses in nominal position (N)."""
     points: np.ndarray | None = None
     """(q, 2): polygon of force over displacement or speed, or the inverse of it."""
-    inner: bool = False
-    """Whether it has an internal state."""
+    inner: int = 0
+    """Number of internal states: at most one, but for a law of the user's own."""
     slope: float = 0.0
     """Stiffness with which it may carry weight, N/m."""
     preload: float = 0.0
@@ -128,6 +130,12 @@ DIRECTION = {
     "enum": ["x", "y", "z", "line"],
     "description": "'x', 'y' or 'z' of the second body, or 'line' between the two ends",
 }
+
+
+PARAMETERS = {
+    "type": "array", "maxItems": 1000, "items": {"type": "number", "minimum": -MOST, "maximum": MOST},
+    "description": "a list of numbers that the law gets", "x-unit": "that of the law",
+}  # fmt: skip
 
 
 def curve(abscissa, unit):

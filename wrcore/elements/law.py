@@ -19,7 +19,8 @@ ON_LINE, LAW, FIRST, LAST, INNER, PRESSING_SPRING, PRESSING = range(7)
 """Columns of ``Elements.law``."""
 
 LAWS: list = []
-"""All laws of `wrcore.elements.kinds`; a law's number in kernels is its place here."""
+"""All laws of `wrcore.elements.kinds`; a law's number in kernels is its place here. Those of the user's own have
+numbers below 0: -1 for the first row of ``Elements.own``, and so on."""
 
 
 @jit(allocates=False, inline="always")

@@ -241,9 +241,9 @@ def check(data, schema, source, above=""):
 
 
 def plain_tree(data, source):
-    """A copy of nested data that holds nothing but what JSON knows, paths as text; InputError for keys that are no
-    text, dates, bytes, sets, numbers not finite or too large, text that is no Unicode, data that contain themselves or
-    that aliases blow up beyond `MOST_VALUES`.
+    """A copy of nested data that holds nothing but what JSON knows, paths and functions as text; InputError for keys
+    that are no text, dates, bytes, sets, numbers not finite or too large, text that is no Unicode, data that contain
+    themselves or that aliases blow up beyond `MOST_VALUES`.
     """
     left = MOST_VALUES
 
@@ -264,12 +264,20 @@ def plain_tree(data, source):
             return {key: copied(item, (*path, key), above) for key, item in value.items()}
         if isinstance(value, os.PathLike):
             value = os.fspath(value)
+        value = name_of_function(value) or value
         fault = _fault(value)
         if fault:
             raise InputError(source, ".".join(path), fault)
         return value
 
     return copied(data, (), frozenset())
+
+
+def name_of_function(value):
+    """``module:function`` of a function, compiled ones too, that a module knows by its name; else empty."""
+    plain = getattr(value, "py_func", value)
+    name = getattr(plain, "__qualname__", "") if callable(plain) and not isinstance(plain, type) else ""
+    return f"{plain.__module__}:{name}" if name.isidentifier() else ""
 
 
 def _fault(value):

@@ -43,6 +43,8 @@ class PathData(NamedTuple):
     aside: float
     """Part of the widening by which the middle of both rails moves to the left: 0, or 1/2 where the left rail has all
     of it, -1/2 where the right one has."""
+    climbs: bool = True
+    """Whether the direction of the rails' lines has the twist of cant ramps."""
 
 
 class Station(NamedTuple):
@@ -83,22 +85,23 @@ def tangent_path():
 
 
 def path_data(
-    knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None, aside=0.0
-):
+    knots, curvature, cant, widening, rounding, shapes=None, cant_about="lower_rail", incline=None, aside=0.0,
+    climbs=True,
+):  # fmt: skip
     """PathData from curvature (1/m, 0 at the first knot), cant (m, right rail higher) and widening (m) at increasing
     arc lengths ``knots`` (m), all (k,): straight before the first, constant after the last.
 
     The k - 1 ``shapes`` are those of `wrcore.geometry.ramps`, linear if left out; corners of cant and widening are
     rounded over the length ``rounding`` (m). ``cant_about`` is "lower_rail", "inner_rail" (of the curve) or
     "centreline": what keeps its height. ``incline`` (`wrcore.geometry.ramps.Incline`) is the height before cant,
-    ``aside`` that of `PathData`."""
+    ``aside`` and ``climbs`` those of `PathData`."""
     knots = np.asarray(knots, float)
     pieces, borders = cut(knots, curvature, cant, widening, rounding, shapes, cant_about, incline)
     starts = np.concatenate(([-math.inf], borders))
     cells = min(16 * len(pieces), 100_000)
     grid, step = np.linspace(borders[0], borders[-1], cells, endpoint=False, retstep=True)
     lookup = np.searchsorted(starts, grid, side="right") - 1
-    return PathData(pieces, starts, lookup, float(borders[0]), float(step), float(aside))
+    return PathData(pieces, starts, lookup, float(borders[0]), float(step), float(aside), bool(climbs))
 
 
 @jit(inline="always")

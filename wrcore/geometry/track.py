@@ -9,10 +9,20 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import validate
-from wrcore.geometry.irregularity import IrregularityData, faded, generate, no_irregularity, read_irregularity, sum_of
+from wrcore.geometry.irregularity import (
+    CHANNELS,
+    LARGEST,
+    IrregularityData,
+    faded,
+    generate,
+    no_irregularity,
+    read_irregularity,
+    sum_of,
+)  # fmt: skip
 from wrcore.geometry.path import PathData, path_data, tangent_path
 from wrcore.geometry.profile import GAUGE_DEPTH
 from wrcore.geometry.ramps import STEEPEST, incline
+from wrcore.kernels import own
 
 SIDES = {"left": 1.0, "right": -1.0}
 """Sign of a rail's place beside the centre line, along y."""
@@ -83,7 +93,8 @@ def build_track(data, source, folder="."):
         climb = _incline(data["gradients"], data["rounding"], source) if data["gradients"] else None
         knots, values, shapes = _knots(segments or [{"tangent": 1.0}], data["rounding"], source)
         aside = WIDENED[data["widened"]]
-        path = path_data(knots, *values, data["rounding"], shapes, data["cant_about"], climb, aside)
+        about, climbs = data["cant_about"], data["rail_climb"]
+        path = path_data(knots, *values, data["rounding"], shapes, about, climb, aside, climbs)
     irregularity = no_irregularity()
     if "irregularity" in data:
         irregularity = _irregularity(data["irregularity"], source, Path(folder))
@@ -172,8 +183,8 @@ def _incline(gradients, rounding, source):
 def _irregularity(data, source, folder):
     """IrregularityData of the key ``track.irregularity``."""
     key = "track.irregularity"
-    if "points" not in data and "spectrum" not in data:
-        raise InputError(source, key, "expected points or spectrum")
+    if not data.keys() & {"points", "spectrum", "own"}:
+        raise InputError(source, key, "expected points, spectrum or own")
     points = data.get("points", [])
     sampled = []
     for name in [points] if isinstance(points, str) else points:
@@ -183,6 +194,12 @@ def _irregularity(data, source, folder):
         sampled.append(read_irregularity(found[0]))
     if "spectrum" in data:
         sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))
+    if "own" in data:
+        s, values = own.on_grid(data["own"], len(CHANNELS), folder, source, f"{key}.own")
+        if np.abs(values).max() > LARGEST:
+            expected = f"expected deviations in m, within {LARGEST:g}, got {np.abs(values).max():g}"
+            raise InputError(source, f"{key}.own.law", expected)
+        sampled.append((s, values.T))
     return sum_of([faded(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled])
 
 

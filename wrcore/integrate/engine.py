@@ -14,11 +14,13 @@ import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.contract import after_rejection, before_attempt, outside
+from wrcore.dynamics.control import DUE, NEXT_SAMPLE
 from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry
 from wrcore.integrate.tolerances import pace
+from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import jit
 
 RUNNING, COMPLETED, DERAILED, TOO_SMALL, NOT_FINITE = range(5)
@@ -176,6 +178,24 @@ def accept(control, memory, trial, step):
 
 
 @jit(allocates=False)
+def take_samples(control, memory, scratch, equations, model, work):
+    """Let sampled control laws take what is due at the time reached, and have the next step, or the next but one, end
+    where the next sample is; steps of a stated length stay."""
+    if model.samples == 0:
+        return
+    clock, sampling = memory.clock, work.control.sampling
+    call_address(model.samples, model, clock[T], memory.state, work, False)
+    if sampling[DUE] > 0.0:
+        derivatives_at(equations, clock[T], memory.state, model, work, scratch.slope, WARM)
+        memory.counters[EVALUATIONS] += 1
+        call_address(model.samples, model, clock[T], memory.state, work, True)
+        memory.counters[HAS_RATE] = 0
+    left = sampling[NEXT_SAMPLE] - clock[T]
+    if control.fixed_step == 0.0 and clock[NEXT] > 0.5 * left:
+        clock[NEXT] = left if clock[NEXT] >= left else 0.5 * left
+
+
+@jit(allocates=False)
 def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
@@ -217,6 +237,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
     clock, counters, state, stages, trial = memory.clock, memory.counters, memory.state, memory.stages, scratch.trial
     n, last = state.shape[0], stages.shape[0] - 1
     while True:
+        take_samples(control, memory, scratch, equations, model, work)
         last_step = clock[T] - clock[T_OLD]
         outcome = write_outputs(control, tableau.dense, last_step, STILL, scratch.still, memory, record, model, work)
         if outcome != RUNNING or budget == 0:

@@ -186,7 +186,7 @@ class Kernel:
 
     def __init__(self, function, *examples, returns=types.none):
         signature = tuple(typeof(example) for example in examples)
-        function = function.in_form("addressed")
+        function = function.in_form("addressed") if hasattr(function, "in_form") else function
         if signature not in function.overloads:
             function.compile(signature)
         compiled = function.overloads[signature]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wrcore.dynamics.drive import CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
+from wrcore.dynamics.drive import COMMANDED, CONTROLLED, KIND, LEAST, MOST, SPEED, TABLE
 from wrcore.dynamics.schedule import Schedules
 from wrcore.dynamics.system import Model
 from wrcore.elements import law
@@ -60,6 +60,8 @@ def _of_drive(scene: Scene, model: Model) -> Iterator[tuple[str, Input]]:
     spec, drive = scene.data.get("drive") or {"motors": [], "brakes": []}, model.drive
     for k, item in enumerate([*spec["motors"], *spec["brakes"]]):
         name, brake = item["name"], k >= len(spec["motors"])
+        if drive.rows[k, KIND] == COMMANDED:  # by a control law
+            continue
         if drive.rows[k, KIND] == CONTROLLED:
             radius = scene.vehicle.rolling_radius
             yield f"{name}.share", Input("share of the controller's force", "1", drive.lever[k : k + 1], radius, 0.0)

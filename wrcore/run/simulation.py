@@ -13,6 +13,7 @@ import numpy as np
 import wrcore
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
+from wrcore.dynamics.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.outputs import drive_history, evaluations_at
@@ -196,7 +197,7 @@ class Simulation:
         if bodies:
             evaluations = evaluated(self.model, trajectory, self._from_here(equations))
             groups = self._of_bodies(bodies, trajectory.states, evaluations, *self._poses(trajectory.states, bodies))
-        if any(group.startswith("drive/") for group in asked):
+        if any(group.startswith(("drive/", "control/")) for group in asked):
             groups |= self._drive_channels(trajectory, equations)
         if "energy" in asked and self._wants("energy"):
             groups["energy"] = energy_channels(self.model, self._workspace(), trajectory.t, trajectory.states)
@@ -279,17 +280,26 @@ class Simulation:
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
 
     def _drive_channels(self, trajectory, equations):
-        """Torque and power of motors and brakes, force and speed of the controller, if the scene has any."""
-        spec = self.scene.data.get("drive")
-        if not spec:
+        """Torque and power of motors and brakes, force and speed of the controller, outputs and states of control laws,
+        if the scene has any."""
+        spec, laws = self.scene.data.get("drive") or {"motors": [], "brakes": []}, self.scene.data.get("control", {})
+        if not any(spec.values()) and not laws:
             return {}
-        torques, rates, control = drive_history(self._from_here(equations), trajectory.t, trajectory.states)
+        found = drive_history(self._from_here(equations), trajectory.t, trajectory.states)
+        torques, rates, control, outputs = found
         groups = {
             f"drive/{item['name']}": {"torque_Nm": torques[:, i], "power_W": torques[:, i] * rates[:, i]}
             for i, item in enumerate([*spec["motors"], *spec["brakes"]])
         }
         if "controller" in spec:
             groups["drive/controller"] = {"force_N": control[:, 0], "wanted_m_per_s": control[:, 1]}
+        motors = [item["name"] for item in spec["motors"]]
+        for (name, item), row in zip(sorted(laws.items()), self.model.controls.rows, strict=True):
+            given = outputs[:, row[OUTPUTS] : row[OUTPUTS_END]].T
+            names = [f"{output}_{'Nm' if output in motors else 'N'}" for output in item["outputs"]]
+            states = trajectory.states[:, row[STATES] : row[STATES_END]].T
+            numbered = {f"state_{k}": values for k, values in enumerate(states)}
+            groups[f"control/{name}"] = dict(zip(names, given, strict=True)) | numbered
         return groups
 
     def _workspace(self):

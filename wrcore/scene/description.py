@@ -23,17 +23,18 @@ from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.creep.laws import LAWS, creep_data
+from wrcore.creep.laws import LAWS, OWN, creep_data, own_law
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
-from wrcore.errors import InputError, one_of, short
+from wrcore.errors import InputError, short
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.errors.checked_yaml import parse_value, read_source, validate
+from wrcore.errors.checked_yaml import name_of_function, parse_value, read_source, validate
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
+from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
@@ -175,8 +176,10 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
     check_bodies(data["initial"]["bodies"], vehicle, source)
-    read_friction(data["contact"]["friction"], source)
-    read_drive(data.get("drive"), vehicle, source)
+    read_friction(data["contact"]["friction"], source, folder)
+    read_controls(data, vehicle, folder, source)
+    read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
+    digests |= digests_of_files(vehicle.data["elements"], folder)
     return Scene(data, source, vehicle, wheel, rail, track, pairs, digests)
 
 
@@ -215,7 +218,9 @@ def _flat(changes, prefix=""):
 
 
 def _plain(value):
-    """Numbers and arrays of numpy and paths as YAML holds them."""
+    """Numbers and arrays of numpy, paths and functions as YAML holds them."""
+    if callable(value):
+        return name_of_function(value) or repr(value)
     return value.tolist() if isinstance(value, np.generic | np.ndarray) else str(value)
 
 
@@ -234,7 +239,13 @@ def _check_creep(contact, source, folder):
     creep = contact["creep"]
     creep.setdefault("tolerance", DEFAULT_TOLERANCE)
     if creep["model"] not in LAWS:
-        raise InputError(source, "contact.creep.model", one_of(LAWS, creep["model"]))
+        try:
+            own_law(creep["model"], folder)
+        except InputError as error:
+            raise InputError(source, "contact.creep.model", error.expected) from None
+        if contact["patch"] not in REDUCTIONS:
+            expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}"
+            raise InputError(source, "contact.patch", expected)
     if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     for key in ("k_A", "k_S"):
@@ -270,7 +281,8 @@ def _creep(scene, progress):
     creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
     factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
     if creep["model"] != "table" and contact["patch"] != "tabulated":
-        return creep_data(nu, factors=factors)
+        law = None if creep["model"] in LAWS else own_law(creep["model"], Path(scene.source).parent)
+        return creep_data(nu, factors=factors, law=law)
     if "table" in creep:
         table = load_table(creep["table"])
     else:
@@ -298,7 +310,8 @@ def compile_scene(
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
     parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs  # known by their identity
-    friction = read_friction(contact["friction"], scene.source)
+    folder = Path(scene.source).parent
+    friction = read_friction(contact["friction"], scene.source, folder)
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     support, elements = track_support(
         data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
@@ -306,7 +319,7 @@ def compile_scene(
     model = Model(
         vehicle.bodies,
         ContactModel(
-            geometry, hertz_table(), LAWS[contact["creep"]["model"]],
+            geometry, hertz_table(), LAWS.get(contact["creep"]["model"], OWN),
             _kept(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
                   lambda: _creep(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
@@ -316,13 +329,15 @@ def compile_scene(
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"],
                         friction.largest),
             friction.ratio, friction.decay,
-            tuple(pair.geometry for pair in scene.pairs),
+            tuple(pair.geometry for pair in scene.pairs), friction_factors=friction.factors,
         ),
         elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
-        friction=friction.rails, drive=read_drive(data.get("drive"), vehicle, scene.source), flexible_track=support,
+        friction=friction.rails, flexible_track=support,
+        drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
+        controls=read_controls(data, vehicle, folder, scene.source),
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

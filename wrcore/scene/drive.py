@@ -2,19 +2,20 @@
 
 import numpy as np
 
-from wrcore.dynamics.drive import BRAKE, CONTROLLED, KIND, MOTOR, NUMBER, Drive, no_drive
+from wrcore.dynamics.drive import BRAKE, COMMANDED, CONTROLLED, KIND, MOTOR, NUMBER, Drive, no_drive
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.schedule import pack_schedules
 from wrcore.errors import InputError, one_of
+from wrcore.geometry.track import SIDES
 from wrcore.scene.schedule import read_schedule
 from wrcore.vehicle.layout import FRAME_NAME
 
 OVER = ("time", "arc_length")  # what tables are over, in the order of the constants in `wrcore.dynamics.drive`
 
 
-def read_drive(spec, vehicle, source):
-    """Drive (motors, brakes, controller) from a scene's checked ``drive``, or from None; an InputError names the motor
-    or brake and the key."""
+def read_drive(spec, vehicle, source, commanded=()):
+    """Drive (motors, brakes, controller) from a scene's checked ``drive``, or from None; ``commanded`` are the outputs
+    of control laws by their names. An InputError names the motor or brake and the key."""
     if spec is None:
         return no_drive()
     items = [("motors", item) for item in spec["motors"]] + [("brakes", item) for item in spec["brakes"]]
@@ -24,22 +25,22 @@ def read_drive(spec, vehicle, source):
     rows, levers = [], []
     tables: list[np.ndarray] = []
     for group, item in items:
-        row, lever = _actuator(group, item, vehicle, source, tables)
+        row, lever = _actuator(group, item, vehicle, source, tables, commanded)
         rows.append(row)
         levers.append(lever)
     controlled = [row[KIND] == CONTROLLED for row in rows]
     if any(controlled) != ("controller" in spec):
-        expected = "expected a controller exactly where motors state neither torque nor force"
+        expected = "expected a controller exactly where motors state neither torque nor force and no control has them"
         raise InputError(source, "drive.controller", expected)
     levers = [lever / sum(controlled) if shares else lever for lever, shares in zip(levers, controlled, strict=True)]
     control, gains = _controller(spec["controller"], rows, vehicle, source, tables) if any(controlled) else ([], [])
     return Drive(
-        np.array(rows, np.int64).reshape(-1, 6), np.array(levers, float), np.array(control, np.int64).reshape(-1, 4),
+        np.array(rows, np.int64).reshape(-1, 7), np.array(levers, float), np.array(control, np.int64).reshape(-1, 4),
         np.array(gains, float).reshape(-1, 4), pack_schedules(tables),
     )  # fmt: skip
 
 
-def _actuator(group, item, vehicle, source, tables):
+def _actuator(group, item, vehicle, source, tables, commanded):
     """Row and lever of a motor or brake; its table is added to the others."""
     field, (wheelset, body) = f"drive.{group}.{item['name']}", item["bodies"]
     if wheelset not in vehicle.wheelset_names:
@@ -48,18 +49,34 @@ def _actuator(group, item, vehicle, source, tables):
     carrier = FRAME if body == FRAME_NAME else _body(body, vehicle, source, f"{field}.bodies")
     if body in vehicle.wheelset_names:
         raise InputError(source, f"{field}.bodies", f"expected a body or {FRAME_NAME} as the second one")
-    given = [key for key in ("torque", "force") if key in item]
+    given, wheel = [key for key in ("torque", "force") if key in item], _wheel(item, vehicle, source, f"{field}.wheel")
     if len(given) > 1 or (group == "brakes" and not given):
         raise InputError(source, field, "expected either torque or force")
     number, k = vehicle.body_names.index(wheelset), vehicle.wheelset_names.index(wheelset)
     lever = 1.0 if given == ["torque"] else vehicle.rolling_radius
+    if item["name"] in commanded and group == "motors":
+        if given:
+            raise InputError(source, f"{field}.{given[0]}", "expected none, as a control law commands this motor")
+        return [number, carrier, k, COMMANDED, commanded.index(item["name"]), 0, wheel], 1.0
     if not given:
-        return [number, carrier, k, CONTROLLED, 0, 0], lever
+        return [number, carrier, k, CONTROLLED, 0, 0, wheel], lever
     over, points = read_schedule(item[given[0]], given[0], OVER, source, f"{field}.{given[0]}")
     if group == "brakes" and np.any(points[:, 1] < 0.0):
         raise InputError(source, f"{field}.{given[0]}", "expected no negative value: a brake acts against the rotation")
     tables.append(points)
-    return [number, carrier, k, BRAKE if group == "brakes" else MOTOR, len(tables) - 1, over], lever
+    return [number, carrier, k, BRAKE if group == "brakes" else MOTOR, len(tables) - 1, over, wheel], lever
+
+
+def _wheel(item, vehicle, source, field):
+    """Which wheel of a wheelset a motor or brake acts on: 1 left, -1 right, 0 both, as one."""
+    independent = vehicle.data["bodies"][item["bodies"][0]].get("independent_wheels", False)
+    if independent and "wheel" not in item:
+        expected = f"expected left or right, as the wheels of {item['bodies'][0]} turn independently of each other"
+        raise InputError(source, field, expected)
+    if not independent and "wheel" in item:
+        expected = f"expected no such key, as the wheels of {item['bodies'][0]} turn together"
+        raise InputError(source, field, expected)
+    return SIDES[item["wheel"]] if independent else 0
 
 
 def _controller(spec, rows, vehicle, source, tables):

@@ -1,5 +1,6 @@
 """Friction of a scene's rails: one coefficient, one per rail, tables along the track, and how it falls with slip."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,14 @@ import numpy as np
 from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
+from wrcore.kernels import own
 from wrcore.scene.schedule import read_schedule
+
+LEAST, MOST = 1e-9, 1.0
+"""Bounds of a coefficient."""
+
+LEAST_FACTOR = 0.01
+"""Of friction that falls."""
 
 
 class Friction(NamedTuple):
@@ -17,35 +25,76 @@ class Friction(NamedTuple):
     """Largest coefficient anywhere; the only one where the rails do not differ."""
     rails: Schedules
     """Over arc length, left and right; empty for one coefficient."""
-    ratio: float
+    ratio: float = 1.0
     """A of mu = mu0 ((1 - A) exp(-B w) + A)."""
-    decay: float
-    """B, s/m."""
+    decay: float = 0.0
+    """B, s/m; of a law of the user's own, samples per m/s."""
+    factors: np.ndarray = np.zeros(0)
+    """(n,): samples of such a law, from slip velocity 0 on."""
 
 
-def read_friction(spec, source):
+def read_friction(spec, source, folder="."):
     """Friction from a scene's ``contact.friction``, checked against the schema; an InputError where keys do not go
-    together or arc lengths do not rise."""
+    together or arc lengths do not rise. Files with laws of the user's own count from ``folder``."""
     field = "contact.friction"
     if not isinstance(spec, dict):
-        return Friction(float(spec), pack_schedules([]), 1.0, 0.0)
-    falling = spec.get("falling", {"ratio": 1.0, "decay": 0.0})
+        return Friction(float(spec), pack_schedules([]))
+    falling = _falling(spec.get("falling"), source, f"{field}.falling", Path(folder))
     given = spec.keys() - {"falling"}
-    if given not in ({"mu"}, {"mu", "arc_length"}, {"left", "right"}):
-        expected = "expected mu, arc_length and mu, or left and right"
+    if "law" in given and given <= {"law", "begin", "length", "spacing"}:
+        tables = _by_law(spec, source, field, Path(folder))
+    elif given not in ({"mu"}, {"mu", "arc_length"}, {"left", "right"}):
+        expected = "expected mu, arc_length and mu, left and right, or law, length and spacing"
         raise InputError(source, field, f"{expected}, got {' and '.join(sorted(given)) or 'none of them'}")
-    if "mu" in given:
+    elif "mu" in given:
         table = spec if "arc_length" in spec else spec["mu"]
         if isinstance(spec["mu"], list) != ("arc_length" in spec):
             raise InputError(source, f"{field}.mu", "expected one number, or a list of them with arc_length")
         if not isinstance(table, dict):
-            return Friction(float(table), pack_schedules([]), float(falling["ratio"]), float(falling["decay"]))
+            return Friction(float(table), pack_schedules([]), *falling)
         tables = [_table(table, source, field)] * 2
     else:
         tables = [_table(spec[side], source, f"{field}.{side}") for side in SIDES]
     largest = float(max(np.max(table[:, 1]) for table in tables))
-    return Friction(largest, pack_schedules(tables), float(falling["ratio"]), float(falling["decay"]))
+    return Friction(largest, pack_schedules(tables), *falling)
 
 
 def _table(spec, source, field):
     return read_schedule(spec, "mu", ("arc_length",), source, field)[1]
+
+
+def _by_law(spec, source, field, folder):
+    """Tables of the left and the right rail from a function of arc length."""
+    _needs(spec, ("length", "spacing"), source, field)
+    s, values = own.on_grid(spec, 2, folder, source, field)
+    _within(values, LEAST, MOST, "coefficients", source, f"{field}.law")
+    return [np.column_stack([s, row]) for row in values]
+
+
+def _falling(spec, source, field, folder):
+    """Ratio, decay and factors."""
+    if spec is None:
+        return ()
+    if "law" not in spec:
+        _needs(spec, ("ratio", "decay"), source, field)
+        if spec.keys() - {"ratio", "decay"}:
+            raise InputError(source, field, "expected ratio and decay, or law, length and spacing")
+        return float(spec["ratio"]), float(spec["decay"])
+    _needs(spec, ("length", "spacing"), source, field)
+    if spec.keys() & {"ratio", "decay"}:
+        raise InputError(source, field, "expected ratio and decay, or law, length and spacing")
+    w, values = own.on_grid(spec, 1, folder, source, field)
+    _within(values, LEAST_FACTOR, 1.0, "factors", source, f"{field}.law")
+    return 0.0, (len(w) - 1) / (w[-1] - w[0]), np.ascontiguousarray(values[0])
+
+
+def _needs(spec, keys, source, field):
+    for key in keys:
+        if key not in spec:
+            raise InputError(source, f"{field}.{key}", "expected a value, but the key is missing")
+
+
+def _within(values, least, most, what, source, field):
+    if values.min() < least or values.max() > most:
+        got = f"got {values.min():g} to {values.max():g}"
+        raise InputError(source, field, f"expected {what} from {least:g} to {most:g}, {got}")

@@ -14,7 +14,7 @@ from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import SIDES
 
 LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
-NAMED_BY = ("parameters", "profile", "points", "table")  # keys of a scene whose values name files
+NAMED_BY = ("parameters", "profile", "points", "table", "law", "model")  # keys of a scene whose values name files
 
 
 def find_file(path, folder, source, field):
@@ -37,6 +37,8 @@ def digests_of_files(value, folder, key=""):
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else ((key, item) for item in value)
         return {path: digest for name, item in items for path, digest in digests_of_files(item, folder, name).items()}
+    if key in ("law", "model") and isinstance(value, str) and ":" in value:  # file.py:function
+        value = value.rpartition(":")[0]
     found = _found(value, folder) if key in NAMED_BY and isinstance(value, str) else None
     return {} if found is None else {str(found): digest_of_file(found)}
 

@@ -11,6 +11,7 @@ from wrcore.dynamics.suspension import PRELOAD, Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
+from wrcore.kernels import own
 from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements
@@ -79,7 +80,7 @@ def vehicle_of(spec, find, source):
     data, name = parameters, f"{source}: vehicle.parameters"
     if isinstance(parameters, str):
         path = find(parameters)
-        data, name = read_yaml(path), str(Path(path).name)
+        data, name = _with_laws(read_yaml(path), Path(path).parent), str(Path(path).name)
     changes = {group: spec[group] for group in GROUPS if spec.get(group)}
     if not changes:
         return build_vehicle(data, name, spec["axle_boxes"])
@@ -90,6 +91,17 @@ def vehicle_of(spec, find, source):
         if any(f"{error.field}.".startswith(f"{field}.") for field in reached):
             raise InputError(source, f"vehicle.{error.field}", error.expected) from None
         raise
+
+
+def _with_laws(data, folder):
+    """The content of a vehicle file with the places of the files that hold laws of the user's own."""
+    elements = data.get("elements")
+    for item in elements if isinstance(elements, list) else ():
+        if isinstance(item, dict) and isinstance(item.get("law"), str):
+            place, _, name = item["law"].rpartition(":")
+            if path := own.file_of(item["law"], folder):
+                item["law"] = f"{path.resolve()}:{name}"
+    return data
 
 
 def build_vehicle(data, source, axle_boxes=True):

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from wrcore.dynamics.marker import FRAME
 from wrcore.elements.kind import Along, Turning
-from wrcore.elements.kinds import KINDS
+from wrcore.elements.kinds import KINDS, kind_named
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import check
 
@@ -12,7 +12,7 @@ from wrcore.errors.checked_yaml import check
 def check_element(item, source):
     """Raise an InputError that names the element if its kind, its keys or their values are not what they should be."""
     field = f"elements.{item['name']}"
-    if item["kind"] not in KINDS:
+    if kind_named(item["kind"]) is None:
         raise InputError(source, f"{field}.kind", one_of(KINDS, item["kind"]))
     kind, given = KINDS[item["kind"]], {key: item[key] for key in item if key not in ("name", "kind", "bodies")}
     for key in kind.needed:

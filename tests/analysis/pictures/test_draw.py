@@ -19,8 +19,6 @@ from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
 from wrcore.cli import main
 from wrcore.elements import kinds as elements
-from wrcore.elements.kinds import compiled
-from wrcore.elements.kinds.traction_rod import linear
 from wrcore.errors.checked_yaml import _schema
 
 VEHICLES = sorted(path.stem for path in SCENES.glob("*.yaml"))
@@ -51,7 +49,8 @@ ELEMENTS = {
     "damper": {"damping": [1e3, 1e3, 1e3]}, "friction": {"direction": "x", "force": 1e3, "series_stiffness": 1e6},
     "bump_stop": {"direction": "y", "gap": 0.02, "stiffness": 1e6}, "anti_roll_bar": {"stiffness": 1e6},
     "traction_rod": {"stiffness": 1e6, "at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
-    "compiled": {"direction": "x", "function": "linear"},
+    "own_law": {"direction": "x", "law": "tests.elements.own_laws:dashpot", "parameters": [1.0]},
+    "actuator": {"direction": "y"},
 }  # fmt: skip
 JOINTS = {
     "coordinate": {"axis": "x"}, "spherical": {"at": [0.0, 0.0, 0.5]}, "rigid": {"at": [0.0, 0.0, 0.5]},
@@ -60,8 +59,7 @@ JOINTS = {
 
 
 @pytest.mark.parametrize("kind", elements.KINDS)
-def test_every_kind_of_element_is_drawn(tmp_path, kind, monkeypatch):
-    monkeypatch.setitem(compiled.FUNCTIONS, "linear", linear)
+def test_every_kind_of_element_is_drawn(tmp_path, kind):
     item = {"name": "new", "kind": kind, "bodies": ["wheelset", "frame"]}
     at = {} if kind == "anti_roll_bar" else {"at": [0.0, 0.3, 0.5]}
     assert "element:new:side" in drawn_of(tmp_path, "elements", item | at | ELEMENTS[kind])

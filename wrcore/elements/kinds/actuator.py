@@ -1,4 +1,4 @@
-"""A given force along one direction, which whoever steps a session sets."""
+"""A given force along one direction, which whoever steps a session sets, or a sampled control law of the scene."""
 
 from wrcore.elements import law
 from wrcore.elements.kind import AT, DIRECTION, MOST, Along, Kind, axis_of, ends_of, number
@@ -7,15 +7,16 @@ from wrcore.kernels.jit import jit
 
 @jit(allocates=False)
 def given(elements, k, stretch, speed, inner, press):
-    """-F, however the ends move; the power that it puts in counts as dissipated, negative."""
-    force = -law.numbers(elements, k)[0]
+    """-F, however the ends move, with what control holds as internal state; the power that it puts in counts as
+    dissipated, negative."""
+    force = -(law.numbers(elements, k)[0] + inner)
     return force, 0.0, 0.0, force * speed
 
 
 def parts(item):
     """One part."""
     force = item.get("force", 0.0)
-    return [Along(ends_of(item), given, axis_of(item), (force,), preload=force, odd=False)]
+    return [Along(ends_of(item), given, axis_of(item), (force,), inner=True, preload=force, odd=False)]
 
 
 KIND = Kind(

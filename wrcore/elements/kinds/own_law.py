@@ -1,0 +1,81 @@
+"""A law of the user's own along one direction: a function that numba compiled, or plain Python, which is slow.
+
+``law(stretch, speed, states, parameters, rates)`` gets the stretch (m) and its rate (m/s), the element's own states and
+the parameters, writes the rates of the states, and returns the force against stretch (N), or force, stored energy (J)
+and dissipated power (W). A force alone stores nothing: its power counts as dissipated.
+"""
+
+import numpy as np
+from numba.core.types import BaseTuple
+
+from wrcore.elements import law
+from wrcore.elements.kind import AT, DIRECTION, PARAMETERS, Along, Kind, axis_of, ends_of
+from wrcore.errors import InputError
+from wrcore.kernels import own
+from wrcore.kernels.handles import FOUR
+
+TRIED = (0.0, 0.0), (1e-4, 1e-3), (-1e-4, -1e-3)
+"""Stretches (m) and speeds (m/s) of the test calls."""
+
+
+def wrapped(function):
+    """The kernel of a function, called as `wrcore.dynamics.suspension` calls it."""
+    returned = function.overloads[own.signature_of(2, 3)].signature.return_type
+    alone = not isinstance(returned, BaseTuple)
+
+    def call(elements, k, stretch, speed, state, rate, at):
+        row, end = elements.law[k], at + int(elements.directed[k, law.NUMBERS])
+        parameters = elements.parameters[row[law.FIRST] : row[law.LAST]]
+        return function(stretch, speed, state[at:end], parameters, rate[at:end])
+
+    def of_force(elements, k, stretch, speed, state, rate, at):
+        force = float(call(elements, k, stretch, speed, state, rate, at))
+        return force, 0.0, 0.0, force * speed
+
+    def of_three(elements, k, stretch, speed, state, rate, at):
+        force, stored, lost = call(elements, k, stretch, speed, state, rate, at)
+        return float(force), 0.0, float(stored), float(lost)
+
+    call = own.uncached(call)
+    return of_force if alone else of_three
+
+
+def address(digest, elements):
+    """Address of the kernel of an own law; ``elements`` an example of the model's."""
+    state = np.empty(0)
+    examples = (elements, 0, 0.0, 0.0, state, state, 0)
+    return own.addressed(wrapped, digest, 2, 3, tuple(map(own.Example, examples)), FOUR).address
+
+
+def parts(item):
+    """One part with its own states and parameters."""
+    numbers, states = item.get("parameters", ()), item.get("states", 0)
+    return [Along(ends_of(item), own.find(item["law"]), axis_of(item), numbers, inner=states, odd=False)]
+
+
+def check(item):
+    """The function is there, and works on a test call."""
+    try:
+        function = own.find(item["law"])
+        states = item.get("states", 0)
+        for pair in TRIED:
+            answer, arrays = own.tried(function, [states, item.get("parameters", []), states], *pair)
+            if np.shape(answer) not in ((), (3,)) or answer is None:
+                expected = "expected a force in N, or force, stored energy and dissipated power from a test call"
+                raise InputError("", "", f"{expected}, got {answer!r}")
+            own.finite(answer, *arrays)
+    except InputError as error:
+        yield "law", error.expected
+
+
+KIND = Kind(
+    {
+        "at": AT,
+        "direction": DIRECTION,
+        "law": {"type": "string", "description": "a function as module:function or file.py:function"},
+        "parameters": PARAMETERS,
+        "states": {"type": "integer", "minimum": 0, "maximum": 20, "x-unit": "1",
+                   "description": "the number of the law's own states, 0 to 20, all 0 at the start"},
+    },
+    ("at", "direction", "law"), {"marker": "*", "color": "#009E73"}, parts, check,
+)  # fmt: skip
