@@ -16,7 +16,7 @@ html_copy_source = html_show_sphinx = False
 html_show_search_summary = False  # summaries are fetched, which pages opened as files may not do
 exclude_patterns = ["_static"]
 
-myst_enable_extensions = ["dollarmath", "deflist"]
+myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
 math_eqref_format, numfig, numfig_secnum_depth = "({number})", True, 1  # equations of a page: (4.1), (4.2), ...

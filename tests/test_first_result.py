@@ -1,4 +1,4 @@
-"""reports/first_result.md works as written, from an empty folder, and prints what it shows."""
+"""reports/first_result.md and the site's first page work as written, from an empty folder, and print what they show."""
 
 import pytest
 
@@ -23,3 +23,16 @@ def test_it_prints_what_it_shows(tmp_path, monkeypatch, capsys):
         assert mine[:2] == theirs[:2]
         assert [float(x) for x in mine[2:]] == pytest.approx([float(x) for x in theirs[2:]], rel=0.01, abs=0.02)
     assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_first_page_of_the_site_prints_what_it_shows(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    found = dict(blocks("../docs/index.md"))
+    assert len(found["python"].splitlines()) == 5
+    exec(compile(found["python"], "docs/index.md", "exec"), {})
+    printed, shown = (text.strip().splitlines() for text in (capsys.readouterr().out, found["text"]))
+    assert printed[0].split(" in ")[0] == shown[0].split(" in ")[0] and printed[1].split() == shown[1].split()
+    for mine, theirs in zip(printed[2:], shown[2:], strict=True):
+        assert mine.split()[0] == theirs.split()[0]
+        assert [float(x) for x in mine.split()[1:]] == pytest.approx([float(x) for x in theirs.split()[1:]], rel=0.01)
+    assert (tmp_path / "hunting.png").read_bytes().startswith(b"\x89PNG")

@@ -67,16 +67,9 @@ class Session:
     ----------
     time : float
         Time reached, s.
-    state : ndarray, shape (size,)
-        State there, as the ``end_state`` of a :class:`Run`.
     status, reason : str
         ``running`` until the vehicle has derailed (``derailed``), the step size collapses (``stalled``) or a number is
         not finite (``failed``), and why.
-    inputs : dict of str to float
-        What :meth:`set` sets, by name: ``NAME.force`` of actuators (N), ``NAME.torque`` (N m) or ``NAME.force`` (N) of
-        motors and brakes, ``NAME.share`` of motors under the speed controller, ``controller.speed`` (m/s), ``.limit``
-        and ``.brake_limit`` (N), ``friction.left`` and ``friction.right`` where the scene tells the rails apart. NaN
-        while a table of the scene rules.
 
     Examples
     --------
@@ -124,12 +117,16 @@ class Session:
 
     @property
     def state(self) -> State:
-        """State at the present time, a start for :func:`simulate`."""
+        """State at the present time, ndarray of shape (size,) as the ``end_state`` of a :class:`Run`, a start for
+        :func:`simulate`."""
         return self._simulation.state_at(self.time, self._state)
 
     @property
     def inputs(self) -> dict[str, float]:
-        """Present values of all inputs by name."""
+        """Present values of what :meth:`set` sets, by name: ``NAME.force`` of actuators (N), ``NAME.torque`` (N m) or
+        ``NAME.force`` (N) of motors and brakes, ``NAME.share`` of motors under the speed controller,
+        ``controller.speed`` (m/s), ``.limit`` and ``.brake_limit`` (N), ``friction.left`` and ``friction.right`` where
+        the scene tells the rails apart. NaN while a table of the scene rules."""
         return {name: item.value for name, item in self._inputs.items()}
 
     @property
