@@ -90,7 +90,15 @@ def parts(thing):
 
 
 def test_there_is_one_of_each_public_class():
-    assert {name for name in wr.__all__ if isinstance(getattr(wr, name), type)} <= MADE.keys()
+    assert {name for name in wr.__all__ if isinstance(getattr(wr, name), type)} - {"Session"} <= MADE.keys()
+
+
+def test_a_session_is_not_copied():
+    """It goes on in arrays whose addresses its kernels hold."""
+    session = wr.start(SCENES / "suspended_wheelset.yaml")
+    for way in WAYS.values():
+        with pytest.raises(InputError, match="session: copy: expected save and restore"):
+            way(session)
 
 
 @pytest.mark.parametrize("name", MADE)

@@ -119,7 +119,7 @@ def test_files_to_start_from_are_copied_and_never_written_over(tmp_path, capsys)
     for part in ("scenes", "vehicles", "sweeps", "wear"):
         copied = {path.name: path.read_text() for path in (tmp_path / "mine" / part).iterdir()}
         assert copied == {path.name: path.read_text() for path in (ROOT / "config" / part).iterdir()} != {}
-    for path in (tmp_path / "mine" / "scenes").iterdir():
+    for path in (tmp_path / "mine" / "scenes").glob("*.yaml"):
         assert wr.load_scene(path).data == wr.load_scene(wr.example(path.stem)).data
     wr.load_sweep(tmp_path / "mine" / "sweeps" / "smoke.yaml")
     assert main(["init", str(tmp_path / "mine")]) == 2 and "not written over" in capsys.readouterr().err

@@ -76,11 +76,13 @@ def test_every_public_function_is_checked_and_every_annotation_is_understood():
     made = (
         "InputError",
         "Assessment",
+        "Comparison",
         "CreepTable",
         "Patch",
         "RollingContact",
         "Run",
         "Scene",
+        "Session",
         "WheelWear",
         "__version__",
     )

@@ -225,7 +225,7 @@ def test_unreadable_files_are_named(tmp_path):
 
 KEY = "track.irregularity"
 BAD_KEYS = [
-    ({}, KEY, "points or spectrum"),
+    ({}, KEY, "points, spectrum or own"),
     ({"points": []}, f"{KEY}.points", "a CSV file"),
     ({"points": ["a.csv", 3]}, f"{KEY}.points.1", "a CSV file"),
     ({"points": ["none.csv"]}, f"{KEY}.points", "existing file"),

@@ -115,6 +115,9 @@ class Session:
         inputs = ", ".join(self._inputs) or "none"
         return f"Session {self.scene.data['name']!r}: {self.status}, t = {self.time:g} s; inputs: {inputs}"
 
+    def __reduce__(self) -> str:
+        raise InputError("session", "copy", "expected save and restore, or run().end_state for another session")
+
     @property
     def state(self) -> State:
         """State at the present time, ndarray of shape (size,) as the ``end_state`` of a :class:`Run`, a start for
