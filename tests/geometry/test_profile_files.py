@@ -375,3 +375,11 @@ def test_commands_smooth_profiles_of_files(tmp_path):
     for command in (["contact", "--poses", "d", "--wheel-load", "1"], ["conicity"]):
         with pytest.raises(InputError, match="smoothing"):
             profile_of(parser().parse_args([*command, *pair]), str(tmp_path / "wheel.csv"), "wheel")
+
+
+@pytest.mark.parametrize(("step", "told"), [(20, False), (80, True)])
+def test_points_that_leave_the_shape_open_are_told(tmp_path, capfd, step, told):
+    """Every 2 mm of a wheel nothing is said; of points 8 mm apart the flange's shape lies between."""
+    u = U[5:-5:step]
+    read_profile({"points": write(tmp_path, "wheel.csv", "u_mm,f_mm\n" + columns(u, wheel()(u)))}, "wheel")
+    assert ("the curve may be wrong by as much" in capfd.readouterr().err) == told

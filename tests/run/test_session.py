@@ -187,6 +187,24 @@ def test_from_where_it_was_saved_it_goes_the_same_way(method, tmp_path):
     same(session.run(), run)
 
 
+def test_a_run_is_of_the_branch_that_was_restored():
+    """Also forwards, beyond what the session has done since."""
+    session = wr.start(scene_of(), contact__friction={"left": 0.3, "right": 0.3})
+    session.run_until(0.05)
+    root, found = session.save(), {}
+    for friction in (0.05, 0.5):
+        session.restore(root)
+        session.step(0.05, {"friction.left": friction})
+        found[friction] = session.save(), session.run()
+    assert found[0.05][1]["wheelset"].y_m[-1] != found[0.5][1]["wheelset"].y_m[-1]
+    session.restore(found[0.05][0])
+    same(session.run(), found[0.05][1])
+    session.restore(root)
+    session.restore(found[0.5][0])
+    assert session.run().t[-1] == session.time == 0.1
+    same(session.run(), found[0.5][1])
+
+
 def test_a_crossing_is_located_and_leaves_the_trajectory_as_it_was():
     scene = scene_of()
     once = wr.simulate(scene, progress=False)

@@ -24,8 +24,9 @@ _NARROWEST = 0.02  # m; less of a profile is left only where its points are faul
 _LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than this
 _WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
 _STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
+_COARSE = 3e-4  # m; a file whose points leave more open between two of them is told
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
-_SMOOTHER = " (dents and noise: smoothing, such as 5.0e-5, evens them out)"
+_SMOOTHER = " (dents and noise: smoothing, such as 1.0e-5, evens them out)"
 _OUTSIDE = "expected u = 0 (tape circle) inside a wheel profile, got it outside: tape_circle or flange_back says where"
 _BACK = 1e-3  # m; where two passes of a meter are joined, points go back by less than this
 
@@ -226,6 +227,13 @@ def _check_gaps(u, f, name, lines):
             expected = f"expected points at most {_USUAL * np.median(length):.2g} m apart, as elsewhere"
             raise InputError(name, f"line {lines[i + 1]}", f"{expected}, got {gap}")
         warn(f"{name}: line {lines[i + 1]}: {gap}, is bridged by a spline")
+    coarse = np.where(~wide & (np.abs(df) < _STEEP * du), bend, 0.0)
+    i = int(np.argmax(coarse))
+    if coarse[i] > _COARSE:
+        apart = (
+            f"points {length[i]:.2g} m apart at u = {u[i]:.4g} m, between which the profile bends by {coarse[i]:.2g} m"
+        )
+        warn(f"{name}: line {lines[i + 1]}: {apart}: the curve may be wrong by as much")
 
 
 def _spline(u, f, kept, name, lines, smoothing):

@@ -2,7 +2,8 @@
 
 A function that numba compiled (``@numba.njit``) becomes part of the run's machine code. A plain Python function is
 called back by every evaluation that needs it, at some microseconds each; an error in it is said once and counts as NaN.
-What decides on a run is the text of the function's module: its digest stands in the model, in place of an address.
+What decides on a run is the text of the function's module, its code, and the values that it takes from around it: their
+digest stands in the model, in place of an address.
 """
 
 import ctypes
@@ -14,7 +15,7 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numba
@@ -43,7 +44,7 @@ class Own(NamedTuple):
 
     name: str
     digest: tuple[int, ...]
-    """Of its name and of its module's text, as four numbers: what models hold in its place."""
+    """Of its name, of its module's text and of `_content`, as four numbers: what models hold in its place."""
 
     @property
     def function(self):
@@ -61,7 +62,7 @@ def find(law, folder=Path()):
     function = getattr(module, name, None)
     if not callable(function):
         raise InputError("", "", f"expected a function {name!r} in {place}, found none")
-    sha = hashlib.sha256(f"{name}\0{_text(module, function)}".encode()).digest()
+    sha = hashlib.sha256(f"{name}\0{_text(module, function)}\0{_content(function, set())}".encode()).digest()
     digest = tuple(int(part) for part in np.frombuffer(sha, np.int64))
     _KNOWN[digest] = function
     return Own(name, digest)
@@ -121,6 +122,39 @@ def _text(module, function):
                 code = getattr(plain, "__code__", None)
                 return repr((code.co_code, code.co_consts, code.co_names)) if code else repr(plain)
     return _TEXTS[module]
+
+
+def _content(thing, seen):
+    """What a value is, or a function does, as text that another process finds, too: a function that is defined anew,
+    with another text or other globals, has another one. Functions of libraries stand by their names."""
+    plain = getattr(thing, "py_func", thing)
+    if isinstance(plain, FunctionType):
+        name = f"{plain.__module__}.{plain.__qualname__}"
+        within = seen and plain.__module__ not in {one.__module__ for one in seen} and plain is thing
+        if within or plain in seen or name.startswith("wrcore."):
+            return name
+        seen.add(plain)
+        cells = [cell.cell_contents for cell in plain.__closure__ or ()]
+        around = [plain.__globals__[one] for one in _names(plain.__code__) if one in plain.__globals__]
+        return _content((plain.__code__, plain.__defaults__, plain.__kwdefaults__, cells, around), seen)
+    if isinstance(thing, CodeType):
+        return f"{thing.co_code.hex()}{thing.co_names}{_content(thing.co_consts, seen)}"
+    if isinstance(thing, np.ndarray | np.generic):
+        return f"{thing.dtype}{np.shape(thing)}{hashlib.sha256(thing.tobytes()).hexdigest()}"
+    if isinstance(thing, tuple | list):
+        return str([_content(one, seen) for one in thing])
+    if isinstance(thing, dict):
+        return str([(str(key), _content(value, seen)) for key, value in thing.items()])
+    if isinstance(thing, set | frozenset):
+        return str(sorted(_content(one, seen) for one in thing))
+    known = thing is None or isinstance(thing, bool | int | float | complex | str | bytes)
+    return repr(thing) if known else f"{type(thing).__name__} {getattr(thing, '__name__', '')}"
+
+
+def _names(code):
+    """Names that code, and the code in it, takes from its globals."""
+    inner = [one for one in code.co_consts if isinstance(one, CodeType)]
+    return sorted({*code.co_names, *(name for one in inner for name in _names(one))})
 
 
 def text_digest(function):

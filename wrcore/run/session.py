@@ -55,9 +55,11 @@ class Saved:
     checkpoint: Checkpoint
     values: Values
     held: Values
-    steps: int
+    history: Any
     counted: np.ndarray
     ending: tuple[str, str]
+    of: object
+    """What tells the session from others."""
 
 
 class Session:
@@ -107,7 +109,8 @@ class Session:
         self.status, self.reason = "running", ""
         self._record = self._run.record(np.array([begin]))
         self._advance = self._run.without_dispatch(self._record)
-        self._history: list[tuple[float, np.ndarray, Values]] = []
+        self._history: Any = None  # the last step (time, state, inputs) and, before it, what was the history then
+        self._self = object()
         self.time, self._state = begin, np.array(self._run.memory.state)
         self._reach(begin)
 
@@ -218,7 +221,7 @@ class Session:
         run, ending = self._run, (self.status, self.reason)
         return Saved(
             self.time, self._state, copy.deepcopy(run.checkpoint(self.time)), self._values, self._held,
-            len(self._history), run.equations.work.counters.copy(), ending,
+            self._history, run.equations.work.counters.copy(), ending, self._self,
         )  # fmt: skip
 
     def restore(self, saved: Saved) -> None:
@@ -234,14 +237,14 @@ class Session:
         InputError
             For anything else.
         """
-        if not isinstance(saved, Saved) or len(saved.values) != len(self._inputs):
+        if not isinstance(saved, Saved) or saved.of is not self._self:
             raise InputError("session", "saved", "expected what this session's save returned")
         self._run.go_on_from(saved.checkpoint)
         self._run.equations.work.counters[:] = saved.counted
         self._put(saved.values)
         self._values, self._held, self._state = saved.values, saved.held, saved.state
         self.time, (self.status, self.reason) = saved.time, saved.ending
-        del self._history[saved.steps :]
+        self._history = saved.history
 
     @checked
     def run_until(
@@ -305,12 +308,12 @@ class Session:
         if not self._recorded:
             raise InputError("session", "run", "expected a session that keeps a record of its steps")
         self._settle()
-        simulation, kept = self._simulation, self._simulation.arc_lengths
+        simulation, kept, history = self._simulation, self._simulation.arc_lengths, self._steps()
         simulation.arc_lengths = self._arc_lengths
         groups: dict[str, dict[str, list[np.ndarray]]] = {}
         limits: dict[str, Any] = {}
         try:
-            for _, items in groupby(self._history, key=lambda item: id(item[2])):
+            for _, items in groupby(history, key=lambda item: id(item[2])):
                 piece = list(items)
                 self._put(piece[0][2])
                 times, states = _times_and_states(piece)
@@ -326,9 +329,9 @@ class Session:
             simulation.arc_lengths = kept
         simulation.mark = model_fingerprint(simulation.model)
         joined = {group: {name: np.concatenate(v) for name, v in of.items()} for group, of in groups.items()}
-        record = self._run.record(np.empty(len(self._history)))
-        record.times[:], record.states[:] = _times_and_states(self._history)
-        record.reached[0] = len(self._history)
+        record = self._run.record(np.empty(len(history)))
+        record.times[:], record.states[:] = _times_and_states(history)
+        record.reached[0] = len(history)
         whole = self._run.trajectory(record, engine.COMPLETED, "", self._counted, 0.0)
         whole = replace(whole, end=copy.deepcopy(whole.end))
         if self.status != "running":
@@ -363,8 +366,9 @@ class Session:
             self._values = self._held
             return
         self._run.begin_anew(self.time, self._state)
-        if len(self._history) == 1:  # nothing has happened yet: they hold from the beginning
-            self._history[0] = (*self._history[0][:2], self._values)
+        first, before = self._history
+        if before is None:  # nothing has happened yet: they hold from the beginning
+            self._history = (*first[:2], self._values), None
         self._held = self._values
 
     def _reach(self, t):
@@ -380,16 +384,25 @@ class Session:
         outcome = self._advance(record, CHUNK)
         while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
             outcome = self._advance(record, min(CHUNK, self._headway.attempts_left()))
-        if not self._recorded:
-            self._history.clear()
         if outcome == engine.COMPLETED:
             self.time, self._state = t, record.states[0].copy()
-            self._history.append((t, self._state, self._held))
+            self._keep(t, self._state)
             return
         if record.reached[0]:
-            self._history.append((t, record.states[0].copy(), self._held))
+            self._keep(t, record.states[0].copy())
         self.status, self.reason = self._run.ending(outcome, given_up)
         self.time, self._state = float(self._run.memory.clock[engine.T]), self._run.memory.state.copy()
+
+    def _keep(self, t, state):
+        self._history = (t, state, self._held), self._history if self._recorded else None
+
+    def _steps(self):
+        """All steps so far, in their order."""
+        steps, rest = [], self._history
+        while rest is not None:
+            step, rest = rest
+            steps.append(step)
+        return steps[::-1]
 
     def _locate(self, before, holds):
         """Go to where something begins to hold, after where the session was ``before``, at which it does not."""

@@ -102,7 +102,8 @@ def quasi_static_curving(
     ]
     curving = Curving(scene)
     found = dict(curving.follow(curves))
-    return pd.concat([curving.table(curve, found[k]) for k, curve in enumerate(curves)], ignore_index=True)
+    tables = [curving.table(curve, found[k]).assign(radius_m=radii[k]) for k, curve in enumerate(curves)]
+    return pd.concat(tables, ignore_index=True)
 
 
 class Curving:

@@ -104,14 +104,15 @@ def frequency_response(
     if growth(motion) > 0.0:
         expected = f"expected a speed at which small motions die away, but at {speed:g} m/s they grow"
         raise InputError("frequency_response", "speed", f"{expected} by {growth(motion):.2g} 1/s")
-    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies, float))
+    asked = np.atleast_1d(np.asarray(frequencies, float))
+    omega = 2.0 * np.pi * asked
     systems = _Systems(simulation, model, motion, list(outputs))
     columns: dict[tuple[str, str], np.ndarray] = {}
     for name in inputs:
         forced, direct = systems.of_input(name, omega)
         answers = systems.answers(omega, forced, direct)
         columns |= {(name, output): values for output, values in zip(outputs, answers.T, strict=True)}
-    table = pd.DataFrame(columns, index=pd.Index(omega / (2.0 * np.pi), name="frequency_Hz"))
+    table = pd.DataFrame(columns, index=pd.Index(asked, name="frequency_Hz"))
     table.columns = pd.MultiIndex.from_tuples(columns, names=["input", "output"])
     return table
 
@@ -144,6 +145,9 @@ class _Systems:
         columns = []
         for name, _ in self.outputs:
             group, _, channel = name.rpartition(".")
+            if not group:
+                expected = f"expected BODY.CHANNEL, such as wheelset.y_m, got {name!r}"
+                raise InputError("frequency_response", "outputs", expected)
             column = run[group][channel]
             if np.ndim(column) != 1 or np.isnan(column).any():
                 expected = f"expected a channel that has one number at each time, got {name}"
