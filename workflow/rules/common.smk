@@ -55,7 +55,8 @@ def check_config():
     scenes["paper.geometry"] = (config["paper"]["geometry"]["scene"], {})
     for vehicle, entry in config["critical_speed"]["vehicles"].items():
         for name, changes in config["critical_speed"]["variants"].items():
-            scenes[f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"] = (entry["scene"], changes)
+            place = f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"
+            scenes[place] = (entry["scene"], entry["set"] | changes)
     scenes["patch.cells"] = (config["patch"]["cells"]["scene"], config["patch"]["cells"]["set"])
     for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
         for name, model in config["patch"]["runs"]["models"].items():

@@ -17,6 +17,10 @@ def critical_scene(wildcards):
     return CRITICAL["vehicles"][wildcards.vehicle]["scene"]
 
 
+def critical_set(wildcards):
+    return changes(CRITICAL["vehicles"][wildcards.vehicle]["set"])
+
+
 def cycle_speeds(wildcards):
     return CRITICAL["vehicles"][wildcards.vehicle]["cycle_speeds"]
 
@@ -39,6 +43,7 @@ rule root_locus:
     benchmark:
         "<benchmarks>/root_locus/{vehicle}.tsv"
     params:
+        overrides=critical_set,
         speeds=CRITICAL["speeds"],
         search=CRITICAL["search"],
         shown=CRITICAL["shown"],
@@ -62,6 +67,7 @@ rule limit_cycles:
     benchmark:
         "<benchmarks>/limit_cycles/{vehicle}_{detection}.tsv"
     params:
+        overrides=critical_set,
         speeds=cycle_speeds,
         settings=CRITICAL["limit_cycles"],
     script:

@@ -107,5 +107,6 @@ def _print_run(done, as_json):
     if errors:
         normal, force = (f"{100.0 * error:.2g} %" for error in errors.values())
         print(
-            f"looked-up contact, now and then beside the exact solver: N within {normal}, creep force {force} of mu N"
+            f"looked-up contact, in the middle of cells beside the exact solver: N within {normal}, creep force within "
+            f"{force} of mu N"
         )

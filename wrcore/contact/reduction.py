@@ -43,6 +43,7 @@ SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
 COSINE, SINE = 19, 20  # of the contact angle
 P_MAX = 21  # filled where patches are no ellipses
 PSI = 22  # shape number, filled where the creep table asks for it
+CELL = 22  # in its place, of patches on strips: the cell in which they were looked up, 0 where they were solved
 PATCH_COLUMNS = 23
 
 CHANNELS = {

@@ -6,6 +6,7 @@ up on its nodes and on an exact solution in its middle: a run gives the same num
 one. Nodes and cells that the examples meet come with the package, for the pair of profiles of most of them.
 """
 
+import _thread
 import atexit
 import ctypes
 import hashlib
@@ -14,7 +15,8 @@ import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from contextlib import contextmanager
+from functools import cache, cached_property
 from pathlib import Path
 from queue import LifoQueue
 from threading import Lock, Timer
@@ -23,7 +25,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from wrcore.contact.patch.model import MODES, NODES, NUMBERS, PairTable, strip_work
+from wrcore.contact.patch.model import MODES, NODES, NUMBERS, PairTable, strip_work, with_tables
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
 from wrcore.dynamics.pair_table import (
@@ -35,11 +37,14 @@ from wrcore.dynamics.pair_table import (
     LEVELS,
     NARROW,
     PART,
+    PART_CODE,
     STEPS,
     WIDE,
     YAW,
     YAWS,
     corner_of,
+    node_code,
+    node_of,
 )
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
@@ -112,13 +117,11 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
-        self._contact, self._works = Handle(contact), LifoQueue()
-        for _ in range(THREADS):
-            self._works.put([Handle(strip_work(contact.strips, 1, SLIPS)) for _ in range(2)])
+        self._works = LifoQueue()
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
-        self._cells = np.zeros((CELLS, NODES, NUMBERS), np.float32)
+        self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 2), np.float32)
         self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
-        self._told, self._new, self._spent, self._written = False, 0, 0.0, time.monotonic()
+        self._new, self._spent, self._written = 0, 0.0, time.monotonic()
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
         self._take_shipped()
@@ -132,7 +135,14 @@ class Pair:
     def table(self):
         """`PairTable` for kernels, which keeps the pair alive."""
         address = ctypes.cast(self._call, ctypes.c_void_p).value
-        return PairTable(np.asarray(self), self._states, self._cells, creep_modes().values, address)
+        return PairTable(np.asarray(self), self._states, self._cells, self._misses, creep_modes().values, address)
+
+    @cached_property
+    def _solvable(self):
+        """Handle of the contact with all that a solution takes; there are scratch arrays then, too."""
+        for _ in range(THREADS):
+            self._works.put([Handle(strip_work(self.contact.strips, 1, SLIPS)) for _ in range(2)])
+        return Handle(self.contact._replace(strips=with_tables(self.contact.strips)))
 
     def _fill(self, key):
         """Solve what a cell needs; kernels call this."""
@@ -142,15 +152,10 @@ class Pair:
             if self._full():
                 _warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
-            begin = time.monotonic()
-            try:
-                self._keep(key, *self._solved(key))
-            except BaseException as error:  # a kernel cannot hand it on; the cell stays as if never met
-                _hand_on(error)
+            begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path})"
+            with handed_on("patches are solved without a table"), told_if_long(text, self._spent):
+                self._keep(key, *self._solved(key))  # or the cell stays as if never met
             self._spent += time.monotonic() - begin
-            if self._spent > _PATIENCE and not self._told:
-                self._told = True
-                warn(f"exact contact is solved for its table, once ({self.path})")
             if time.monotonic() - self._written > _PATIENCE:
                 self.write()
 
@@ -176,7 +181,7 @@ class Pair:
             return
         if state > 0:
             self._ready += 1
-            self._cells[self._ready], state = rows, self._ready
+            self._cells[self._ready], self._misses[self._ready], state = rows, self.misses[key], self._ready
         slot = key % SLOTS
         while self._keys[slot]:
             slot = (slot + 1) % SLOTS
@@ -188,60 +193,54 @@ class Pair:
         return 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS
 
     def _numbers(self, nodes):
-        """Numbers (nodes, NUMBERS) of nodes (level, part, yaw, t, slope, ln D), solved side by side where they are new;
-        NaN where there is no solution.
+        """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_table.node_code`, solved side by
+        side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
-        new = [node for node in dict.fromkeys(nodes) if node not in self._parts]
+        codes = node_code(*nodes.T).tolist()
+        new = [code for code in dict.fromkeys(codes) if code not in self._parts]
         self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
-        keys = [(node[0], self._parts[node], *node[2:]) for node in nodes]
+        first = nodes[0, 1].item()
+        keys = [code + (self._parts[code] - first) * PART_CODE for code in codes]
         new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
         self._solved_at |= zip(new, _side_by_side(self._at, new), strict=True)
         self._new += len(new)
         return np.array([self._solved_at[key] for key in keys])
 
-    def _part(self, node):
+    def _part(self, code):
         """Part of the wheel's profile in which a node's lobe lies, and `BESIDE`."""
-        works, part = self._works.get(), node[1]
+        _, works, place = self._solvable, self._works.get(), node_of(code)
         try:
-            found = lobe_of(self.contact.geometry, _place(*node), works[0].value.rows)
+            found = lobe_of(self.contact.geometry, _place(*place), works[0].value.rows)
         finally:
             self._works.put(works)
         if found is None:
-            return part
-        return int((found[1] - FIELD) / PART + 0.5) + (BESIDE if found[2] and part >= BESIDE else 0)
+            return place[1]
+        return int((found[1] - FIELD) / PART + 0.5) + (BESIDE if found[2] and place[1] >= BESIDE else 0)
 
     def _rows_of(self, key):
         """Rows (NODES, NUMBERS) that a cell is looked up from, those of yaw still empty; None where one of its corners
         has no solution. In the finest lattice up to four corners without take the mean of the others. Where a node
         beyond has none, a straight line goes on."""
         level, part, turn, *first = corner_of(key)
-
-        def numbers(corners):
-            return self._numbers([(level, part, 2 * turn + 1, *np.add(first, corner).tolist()) for corner in corners])
-
-        rows, own = np.zeros((NODES, NUMBERS), np.float32), numbers(_CORNERS)
+        where = level, part, 2 * turn + 1
+        rows, own = np.zeros((NODES, NUMBERS), np.float32), self._numbers(_nodes(*where, _CORNERS + first))
         lost = np.isnan(own[:, 0])
         if lost.sum() > (4 if level + 1 == LEVELS else 0):
             return None
         own[lost] = own[~lost].mean(axis=0)
-        own, ends = own.reshape(2, 2, 2, NUMBERS), []
-        for n, (a, b) in zip(range(0, 16, 4), itertools.product((0, 1), repeat=2), strict=True):
-            rows[n : n + 2] = own[a, b]
-            for row, axis, near in ((n + 2, 2, (a, b, 0)), (n + 16, 0, (0, a, b)), (n + 18, 1, (a, 0, b))):
-                ends += [(row, axis, near), (row + 1, axis, _moved(near, axis, 1))]
-        beyond = numbers([_moved(near, axis, 3 * near[axis] - 1) for _, axis, near in ends])
-        for found, (row, axis, near) in zip(beyond, ends, strict=True):
-            line = 2.0 * own[near] - own[_moved(near, axis, 1 - near[axis])]
-            rows[row] = line if np.isnan(found[0]) else found
+        beyond = self._numbers(_nodes(*where, _BEYOND + first))
+        alone = np.isnan(beyond[:, 0])
+        beyond[alone] = 2.0 * own[_NEAR[alone]] - own[_ACROSS[alone]]
+        rows[_OWN_ROWS], rows[_BEYOND_ROWS] = own, beyond
         return rows
 
     def _add_yaw(self, key, rows):
         """Fill a cell's rows of yaw; those of up to four corners that are not known are the mean of the others. False
         where more are not."""
         level, part, turn, *first = corner_of(key)
-        corners = (2 * (np.array(_CORNERS) + np.array(first) // 2)).tolist()
-        found = self._numbers([(level, part, 2 * turn + at, *corner) for corner in corners for at in range(3)])
+        corners = np.repeat(2 * (_CORNERS + np.array(first) // 2), 3, axis=0)
+        found = self._numbers(_nodes(level, part, 2 * turn + np.tile(np.arange(3), 8), corners))
         left, middle, right = found.reshape(8, 3, NUMBERS).swapaxes(0, 1)
         yawed = rows[32:].reshape(8, 2, NUMBERS)
         yawed[:, 0], yawed[:, 1] = right - left, left + right - 2.0 * middle
@@ -250,10 +249,13 @@ class Pair:
             yawed[lost] = yawed[~lost].mean(axis=0)
         return not np.isnan(rows[:, 0]).any()
 
-    def _at(self, node):
-        """Numbers of a place in steps of a lattice; NaN where there is no solution."""
+    def _at(self, code):
+        """Numbers of a node; NaN where there is no solution."""
+        return self._at_place(_place(*node_of(code)))
+
+    def _at_place(self, place):
         modes = creep_modes()
-        found = self.solve(_place(*node), modes.points)
+        found = self.solve(place, modes.points)
         if found is None:
             return np.full(NUMBERS, np.nan, np.float32)
         numbers, remainder = found
@@ -262,9 +264,9 @@ class Pair:
 
     def solve(self, place, points):
         """`solve_place` with the pair's own scratch arrays."""
-        works = self._works.get()
+        handle, works = self._solvable, self._works.get()
         try:
-            return solve_place(self.contact, self._contact, works, place, points)
+            return solve_place(self.contact, handle, works, place, points)
         finally:
             self._works.put(works)
 
@@ -274,7 +276,7 @@ class Pair:
         level, part, at, *first = corner_of(key)
         node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
         place, found, weights, sums = _place(*node), np.zeros(NUMBERS, np.float32), np.empty(NODES), np.empty(3 * MODES)
-        exact = self._at(node)
+        exact = self._at_place(place)
         if np.isnan(exact[0]):
             if level + 1 < LEVELS:
                 return math.nan, math.nan
@@ -286,7 +288,7 @@ class Pair:
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
         spin = -math.sin(exact[columns.ANGLE] - place[1]) / self.contact.geometry.rolling_radius
         points = np.vstack([modes.points, AT_REST])
-        creep = unlike(self._contact, modes.values, exact, found, place[2], spin, points, sums)
+        creep = unlike(self._solvable, modes.values, exact, found, place[2], spin, points, sums)
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
         return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 
@@ -299,10 +301,10 @@ class Pair:
                 self._take(*nodes)
                 self._known = {key: (miss, state) for (key, state), miss in zip(cells.tolist(), misses, strict=True)}
 
-    def _take(self, places, numbers, parts):
+    def _take(self, codes, numbers, parts):
         """Take nodes."""
-        self._solved_at = dict(zip(map(tuple, places.tolist()), numbers, strict=True)) | self._solved_at
-        self._parts = {tuple(node): part for *node, part in parts.tolist()} | self._parts
+        self._solved_at = dict(zip(codes.tolist(), numbers, strict=True)) | self._solved_at
+        self._parts = dict(parts.tolist()) | self._parts
 
     def _read(self):
         """Take what the file knows."""
@@ -314,8 +316,8 @@ class Pair:
                 self._take(*nodes)
                 for (key, state), miss in zip(cells.tolist(), misses.tolist(), strict=True):
                     if key not in self.cells:
-                        self._keep(key, state, rows[state - 1] if state > 0 else None)
                         self.misses[key] = miss
+                        self._keep(key, state, rows[state - 1] if state > 0 else None)
             except (InputError, KeyError, ValueError, IndexError, OSError) as error:
                 warn(f"{error}; it is solved anew")
 
@@ -329,7 +331,7 @@ class Pair:
                 self._read()
                 data = (
                     list(self._solved_at), list(self._solved_at.values()),
-                    [(*node, part) for node, part in self._parts.items()], list(self.cells.items()),
+                    list(self._parts.items()), list(self.cells.items()),
                     [self.misses[key] for key in self.cells], self._cells[1 : self._ready + 1],
                 )  # fmt: skip
                 with new_hdf5(self.path) as file:
@@ -341,10 +343,31 @@ class Pair:
                 self._new = 0
 
 
-_PARTS = "places", "numbers", "parts", "cells", "misses", "rows"
+_PARTS = "nodes", "numbers", "parts", "cells", "misses", "rows"
 
 
-_CORNERS = list(itertools.product((0, 1), repeat=3))
+def _ends():
+    """Of the 12 edges of a cell both ends: a row, a place beyond, the near corner and the one across."""
+    for n, (a, b) in zip(range(0, 16, 4), itertools.product((0, 1), repeat=2), strict=True):
+        for row, axis in ((n + 2, 2), (n + 16, 0), (n + 18, 1)):
+            for end in range(2):
+                corner = [a, b]
+                corner.insert(axis, end)
+                beyond = [*corner[:axis], 3 * end - 1, *corner[axis + 1 :]]
+                near = 4 * corner[0] + 2 * corner[1] + corner[2]
+                yield row + end, beyond, near, near + (1 - 2 * end) * (4, 2, 1)[axis]
+
+
+_CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+_OWN_ROWS = np.array([4 * (corner // 2) + corner % 2 for corner in range(8)])
+_BEYOND_ROWS, _BEYOND, _NEAR, _ACROSS = map(np.array, zip(*_ends(), strict=True))
+
+
+def _nodes(level, part, turn, corners):
+    """Nodes (n, 6) of corners (n, 3)."""
+    nodes = np.empty((len(corners), 6), np.int64)
+    nodes[:, 0], nodes[:, 1], nodes[:, 2], nodes[:, 3:] = level, part, turn, corners
+    return nodes
 
 
 def _place(level, part, turn, i, j, k):
@@ -352,11 +375,6 @@ def _place(level, part, turn, i, j, k):
     t, slope, log_depth = np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
     yaw, (beside, part) = YAW * (turn / 3.0**level - YAWS), divmod(part, BESIDE)
     return t, slope, math.exp(log_depth), yaw, FIELD + part * PART, NARROW if beside else WIDE
-
-
-def _moved(corner, axis, to):
-    """A corner with another place along an axis."""
-    return (*corner[:axis], to, *corner[axis + 1 :])
 
 
 def _side_by_side(solve, places):
@@ -367,15 +385,29 @@ def _side_by_side(solve, places):
         return list(pool.map(solve, places))
 
 
-def _hand_on(error):
-    """Say later what went wrong in a call from a kernel: Ctrl-C once more, after the call, all else in a line."""
-    if isinstance(error, KeyboardInterrupt):
-        import _thread
-
+@contextmanager
+def handed_on(outcome):
+    """Around what a kernel calls, which can raise nothing: say later what went wrong, Ctrl-C once more, after the call,
+    all else in a line, with its ``outcome``."""
+    try:
+        yield
+    except KeyboardInterrupt:
         Timer(_AFTER, _thread.interrupt_main).start()
-    else:
+    except BaseException as error:
         first = str(error).strip().partition("\n")[0]
-        _warn_once(f"exact contact: {type(error).__name__}: {first}; patches are solved without a table")
+        _warn_once(f"exact contact: {type(error).__name__}: {first}; {outcome}")
+
+
+@contextmanager
+def told_if_long(text, spent=0.0):
+    """Say a line once what is done takes long, with the time ``spent`` before (s)."""
+    timer = Timer(max(_PATIENCE - spent, 0.0), _warn_once, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @cache
@@ -400,7 +432,7 @@ def _write_all():
 def pair_of(contact):
     """The `Pair` of a `ContactModel` without geometries of its wheels' own."""
     digest = hashlib.sha256(source_digest().encode())
-    parts = contact.geometry, contact.creep.table, creep_modes(), contact.strips.values
+    parts = contact.geometry, contact.creep.table, creep_modes()
     for array in _flat(parts):
         digest.update(np.ascontiguousarray(array).tobytes())
     settings = contact.strips
@@ -418,7 +450,7 @@ def fingerprint(contact):
     """Numbers that two contact models share, but for rounding, if their nodes are the same."""
     settings = contact.strips
     numbers = [contact.friction, contact.shear_modulus, contact.poisson_ratio, settings.strips, settings.surfaces]
-    for part in _flat((contact.geometry, contact.creep.table, creep_modes(), settings.values)):
+    for part in _flat((contact.geometry, contact.creep.table, creep_modes())):
         size = np.abs(np.asarray(part, float)).ravel()
         numbers += [len(size), size.sum(), size @ (2.0 + np.cos(np.arange(len(size))))]
     return np.array(numbers)

@@ -143,6 +143,24 @@ def corner_of(key):
     return key - 1, *reversed(found)
 
 
+PART_CODE = 512 * 4096 * 4096 * 256
+"""What one part of the profile more adds to a `node_code`."""
+
+
+def node_code(level, part, turn, i, j, k):
+    """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
+    return (level * 128 + part) * PART_CODE + ((turn * 4096 + i) * 4096 + j) * 256 + k
+
+
+def node_of(code):
+    """Level, part of the profile, place in yaw and in the lattice of a node."""
+    found = []
+    for count in (256, 4096, 4096, 512, 128):
+        code, rest = divmod(code, count)
+        found.append(rest)
+    return code, *reversed(found)
+
+
 @jit(allocates=False)
 def state_of(keys, states, key):
     """State of a cell, or number of its corners."""

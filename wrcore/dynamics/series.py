@@ -55,7 +55,7 @@ def with_kernels_of(model, other):
 def _addresses(contact):
     """Of the kernels of patches on strips, from a contact model that may have one for each wheel."""
     strips = (contact.wheels[0] if contact.wheels else contact).strips
-    return {"fallback": strips.fallback, "solver": strips.solver, "group": strips.group}
+    return {"fallback": strips.fallback, "group": strips.group}
 
 
 def _arrays(part):

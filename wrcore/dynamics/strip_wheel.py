@@ -25,6 +25,8 @@ from wrcore.contact.patch import rolling, solve
 from wrcore.contact.patch.gap import frame_of_overlaps, group_end, rigid_slip
 from wrcore.contact.patch.gap import strip_wrenches as wrenches_of_strips
 from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
+from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
+from wrcore.contact.patch.model import LOAD
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
@@ -32,8 +34,8 @@ from wrcore.contact.strip import make_pose
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, wheel_wrenches
-from wrcore.kernels.handles import call_address
+from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling
+from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
 
 SLENDER = 3.0
@@ -344,7 +346,7 @@ def fill_row(frame, y, z, found, wrenches, out):
     mn = turn_z * cosine - turn_y * sine
     out[reduction.ANGLE], out[reduction.COSINE], out[reduction.SINE] = math.atan2(sine, cosine), cosine, sine
     out[reduction.X], out[reduction.Y], out[reduction.Z] = px, py, pz
-    out[reduction.SEMI_A], out[reduction.SEMI_B], out[reduction.P_MAX] = a, b, found.p_max
+    out[reduction.SEMI_A], out[reduction.SEMI_B], out[reduction.P_MAX], out[reduction.CELL] = a, b, found.p_max, 0.0
     out[reduction.NORMAL] = normal + fz * cosine - fy * sine
     out[reduction.FX], out[reduction.FY], out[reduction.MZ] = fx, fs, mn
     size = fx * fx + fs * fs + mn * mn / (a * b)
@@ -366,13 +368,25 @@ def mirror(rows, count, wrench):
             rows[i, column] = -rows[i, column]
 
 
+@jit(allocates=False)
+def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode):
+    """`wheel_wrenches`, called by its address: few runs need it."""
+    late = model.strips.late
+    if late[WITH_ELLIPSES] == 0:
+        call_c(late[LOAD], WITH_ELLIPSES)
+    if late[WITH_ELLIPSES] == 0:  # interrupted
+        wrenches[:] = math.nan
+        return
+    call_address(late[WITH_ELLIPSES], model, motions, patches, counts, bounds, wrenches, counters, work, mode)
+
+
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """As `wheel_wrenches`, with patches on strips; arguments as there. Ellipses stand in for what is solved, not for
     what a table has."""
     rough = mode & ELLIPSES > 0
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
-        wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
+        _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
     for i in range(motions.shape[0]):
         for wheel in range(2):
@@ -392,7 +406,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                     work,
                 )  # fmt: skip
                 if rough and work.out[reduction.NORMAL] < 0.0:
-                    wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, ELLIPSES)
+                    _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, ELLIPSES)
                     return
                 group += 1
                 if work.out[reduction.NORMAL] > 0.0:

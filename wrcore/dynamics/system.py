@@ -12,10 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
-from wrcore.contact.strip import Pose
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
@@ -24,7 +22,7 @@ from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.modes import FRESH, WRENCHES_HELD
-from wrcore.dynamics.motion import MOTION, WheelMotion
+from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.suspension import Elements, element_forces, with_laws
 from wrcore.dynamics.track import TrackModel, fill_rail_friction, rail_motions, turn_back_wrenches
@@ -278,48 +276,19 @@ def looked_up(model):
 
 
 def with_wheels(model):
-    """Contact of a model with what each wheel runs on where they differ."""
-    contact, of_rails, with_pair = model.contact, looked_up(model), (lambda each: each)
-    alone, wheels = contact._replace(geometries=()), []
-    if contact.strips.looked_up:
-        from wrcore.dynamics.pair_store import with_pair
-    if not contact.geometries and of_rails[0] == of_rails[1]:
-        return with_pair(alone)
-    for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
-        strips = contact.strips._replace(looked_up=of_rails[k % 2])
-        wheels.append(with_pair(alone._replace(geometry=geometry, strips=strips)))
-    return alone._replace(wheels=tuple(wheels))
+    """Contact of a model with what each wheel runs on where they differ, and with what its patches need."""
+    contact, of_rails = model.contact, looked_up(model)
+    if contact.geometries or of_rails[0] != of_rails[1]:
+        wheels, alone = [], contact._replace(geometries=())
+        for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
+            strips = contact.strips._replace(looked_up=of_rails[k % 2])
+            wheels.append(alone._replace(geometry=geometry, strips=strips))
+        contact = alone._replace(wheels=tuple(wheels))
+    if contact.strips.strips:
+        from wrcore.dynamics.patch_kernels import with_late
 
-
-def with_fallback(contact):
-    """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
-    from wrcore.dynamics.strip_wheel import solve_on_grid
-
-    m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
-    fallback = Kernel(
-        solve_on_grid, Kind(contact._replace(geometries=())), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
-        np.zeros(PATCH_COLUMNS),
-    )  # fmt: skip
-    return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
-
-
-def with_groups(contact, work):
-    """Contact on strips with the addresses of the kernels of its patches."""
-    from wrcore.dynamics.strip_wheel import add_group
-
-    m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
-
-    def address(kernel):
-        kind, counters = Kind(contact._replace(geometries=())), np.zeros(4, np.int64)
-        return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
-
-    contact = with_fallback(contact)
-    solver = group = address(add_group)
-    if contact.strips.looked_up:
-        from wrcore.dynamics.tabulated_wheel import add_tabulated
-
-        group = address(add_tabulated)
-    return contact._replace(strips=contact.strips._replace(solver=solver, group=group))
+        contact = with_late(contact)
+    return contact
 
 
 def with_kernels(model, work):
@@ -327,6 +296,7 @@ def with_kernels(model, work):
     compiled."""
     wrenches, contact = wheel_wrenches, model.contact
     if contact.strips.strips and len(work.motions):
+        from wrcore.dynamics.patch_kernels import with_groups
         from wrcore.dynamics.strip_wheel import strip_wrenches
 
         wrenches, contact = strip_wrenches, with_groups(contact, work.strips)

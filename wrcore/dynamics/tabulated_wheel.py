@@ -17,6 +17,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import add_force, frame_of_rows
+from wrcore.contact.patch.model import KERNEL, LOAD, LOBE_COLUMNS, MODEL
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import (
@@ -33,13 +34,14 @@ from wrcore.dynamics.pair_table import (
 )
 from wrcore.dynamics.strip_wheel import NOTHING, UNSOLVED, Solution, fill_row, lifted_overlaps
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
-from wrcore.kernels.handles import call_address
+from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
 
 UNKNOWN = NOTHING._replace(load=-1.0)
 
-NORMAL, LIFT, FORCE_X, FORCE_S, END = range(5)
-"""Columns of a lobe: its load (N), what others lift it by (m), friction on it (N), and the end of its overlaps."""
+NORMAL, LIFT, FORCE_X, FORCE_S, END, CELL = range(LOBE_COLUMNS)
+"""Columns of a lobe: its load (N), what others lift it by (m), friction on it (N), the end of its overlaps, and the
+number of its cell."""
 
 TURNS, STEPS, ROLLS = 3, 6, 3
 """Lobes are looked up so many times, with so many steps towards balance between, and rolled so many times."""
@@ -64,6 +66,10 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
     fill_row(frame, y, z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
+    heaviest = 0
+    for q in range(1, lobes):
+        heaviest = q if work.lobes[q, NORMAL] > work.lobes[heaviest, NORMAL] else heaviest
+    out[reduction.CELL] = work.lobes[heaviest, CELL]
     for k in range(6):
         wrench[k] += work.wrench[0, k] + work.wrench[1, k]
     return found
@@ -77,7 +83,13 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
     if found.load < 0.0 and work.spare[UNSOLVED] > 0.0:
         out[reduction.NORMAL] = -1.0
     elif found.load < 0.0:
-        call_address(model.strips.solver, model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
+        late = model.strips.late
+        if late[KERNEL] == 0:
+            call_c(late[LOAD], KERNEL)
+        if late[KERNEL] == 0:  # interrupted
+            out[reduction.NORMAL] = wrench[:] = math.nan
+            return
+        call_address(late[KERNEL], late[MODEL], m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -110,7 +122,7 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
                 look_up(rows_of_cell, work.weights, work.numbers[q])
                 if left == 0:
                     look_modes_up(rows_of_cell, work.weights, work.numbers[q])
-                lobes[q, NORMAL] = _load(modulus, work.numbers[q], depth)
+                lobes[q, NORMAL], lobes[q, CELL] = _load(modulus, work.numbers[q], depth), cell
             first = last
         if count > 1:
             for _ in range(STEPS):

@@ -115,12 +115,10 @@ def _text(module, function):
         try:
             _TEXTS[module] = Path(module.__file__).read_text("utf-8")
         except (AttributeError, TypeError, OSError, UnicodeDecodeError):
-            plain = getattr(function, "py_func", function)
             try:
-                return inspect.getsource(plain)
+                return inspect.getsource(getattr(function, "py_func", function))
             except (OSError, TypeError):
-                code = getattr(plain, "__code__", None)
-                return repr((code.co_code, code.co_consts, code.co_names)) if code else repr(plain)
+                return ""  # its code still counts
     return _TEXTS[module]
 
 
@@ -130,8 +128,8 @@ def _content(thing, seen):
     plain = getattr(thing, "py_func", thing)
     if isinstance(plain, FunctionType):
         name = f"{plain.__module__}.{plain.__qualname__}"
-        within = seen and plain.__module__ not in {one.__module__ for one in seen} and plain is thing
-        if within or plain in seen or name.startswith("wrcore."):
+        foreign = seen and plain.__module__ not in {one.__module__ for one in seen} and plain is thing
+        if foreign or plain in seen or name.startswith("wrcore."):
             return name
         seen.add(plain)
         cells = [cell.cell_contents for cell in plain.__closure__ or ()]
@@ -213,11 +211,14 @@ def on_grid(spec, rows, folder, source, field, begin=0.0):
         raise InputError(source, f"{field}.law", error.expected) from None
 
 
-@cache
 def addressed(wrap, digest, scalars, arrays, examples, returns):
-    """The `Kernel` that ``wrap`` makes of the function with a digest, for ``examples`` (`hashable`); plain Python is
+    """The `Kernel` that ``wrap`` makes of the function with a digest, for ``examples`` (`Example`); plain Python is
     called back with so many ``scalars``, then ``arrays``."""
-    function = _KNOWN[digest]
+    return _kernel(wrap, _KNOWN[digest], scalars, arrays, examples, returns)
+
+
+@cache
+def _kernel(wrap, function, scalars, arrays, examples, returns):
     if not hasattr(function, "py_func"):
         function = _called_back(function, scalars, arrays)
     if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller

@@ -35,9 +35,6 @@ from wrcore.scene.description import Scene, compile_scene
 DERAILED_Y = 0.05
 """A wheelset further than this from the track's centre has left the rails, m (flange tip on the rail: about 0.04 m)."""
 
-CHECKED_TIMES = 5
-"""Output times at which looked-up contact is held against the exact solver."""
-
 COUNTERS = {
     "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
     "factorisations": "factorisations", "smallest_step_s": "smallest_step", "step_collapses": "collapses",
@@ -181,7 +178,7 @@ class Simulation:
         beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
         limits |= {"beyond_irregularity": int(beyond)}
-        return groups, limits | self._look_up_errors(trajectory, patches, standing[..., 0])
+        return groups, limits | look_up_errors(equations.arguments[1].value.contact, patches)
 
     def present(
         self, trajectory: Trajectory, asked: set[str], places: np.ndarray, equations: Equations
@@ -236,22 +233,6 @@ class Simulation:
                 spatial = bounds[:, k] > scene.data["contact"]["detection_tolerance"]
                 groups[name] |= {f"spatial_{side}": spatial[:, i].astype(float) for i, side in enumerate(SIDES)}
         return groups
-
-    def _look_up_errors(self, trajectory, patches, places):
-        """Of some output times, if exact contact is looked up: contacts are solved there. ``places``: arc lengths of
-        the wheelsets, m."""
-        contact = self.model.contact
-        if not contact.strips.looked_up or not len(trajectory.t):
-            return {}
-        some = np.unique(np.linspace(0, len(trajectory.t) - 1, CHECKED_TIMES).round().astype(int))
-        part = replace(trajectory, t=trajectory.t[some], states=trajectory.states[some])
-        solved = self.model._replace(contact=contact._replace(strips=contact.strips._replace(looked_up=0.0)))
-        exact, _, _ = evaluated(solved, part, self._from_here(None, solved))
-        friction, schedules = contact.friction, self.model.friction
-        if len(schedules.points):
-            rails = [schedules.points[schedules.starts[rail] : schedules.starts[rail + 1]].T for rail in range(2)]
-            friction = np.stack([np.interp(places[some], *each) for each in rails], axis=-1)
-        return look_up_errors(patches[some], exact, friction)
 
     def _contact_channels(self, name, patches):
         """Channels of the contacts of a wheelset's wheels by group."""

@@ -49,7 +49,8 @@ LIMITS = {
 """Counters of a run, as a person reads them."""
 
 LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error"
-"""Counters of a run that looks exact contact up: how far it is from the exact solver, see :func:`look_up_errors`."""
+"""Counters of a run that looks exact contact up: how far its cells are from the exact solver, see
+:func:`look_up_errors`."""
 
 _OF_PROFILES = ("half_space", "conformal", "profile_edge", "hollow_ahead")  # those that look at the profiles
 
@@ -85,18 +86,16 @@ def exceeded(contact, patches, roll, yaw):
     }
 
 
-def look_up_errors(found, exact, friction):
-    """`LOOK_UP_ERRORS` of patches (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up, beside exact ones in the
-    same states: the largest errors of a wheel's normal force, over it, and of its creep force, over the normal force
-    times ``friction``, one number or of each wheel (n, k, 2).
-    """
-    friction = np.broadcast_to(friction, found.shape[:3]).reshape(-1)
-    forces = [reduction.NORMAL, reduction.FX, reduction.FY]
-    found, exact = (np.nansum(rows[..., forces], axis=-2).reshape(-1, 3) for rows in (found, exact))
-    wheels = exact[:, 0] > 0.0
-    difference, normal = (found - exact)[wheels], exact[wheels, 0]
-    errors = abs(difference[:, 0]) / normal, np.hypot(difference[:, 1], difference[:, 2]) / (friction[wheels] * normal)
-    return dict(zip(LOOK_UP_ERRORS, (float(np.max(each, initial=0.0)) for each in errors), strict=True))
+def look_up_errors(contact, patches):
+    """`LOOK_UP_ERRORS` of ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up in the tables of a
+    contact model: the largest errors in the middles of their cells, of a wheel's normal force, over it, and of its
+    creep force, over what friction bears; nothing where patches are not looked up."""
+    if not contact.strips.looked_up:
+        return {}
+    wheels = contact.wheels or (contact,) * (2 * patches.shape[1])
+    cells = np.nan_to_num(patches[..., reduction.CELL]).astype(int).reshape(len(patches), -1, reduction.MAX_PATCHES)
+    misses = [one.strips.table.misses[np.unique(cells[:, i])] for i, one in enumerate(wheels)]
+    return dict(zip(LOOK_UP_ERRORS, map(float, np.vstack([np.zeros((1, 2)), *misses]).max(axis=0)), strict=True))
 
 
 def _exceeded_by_each(contact, patches, roll, yaw):

@@ -16,7 +16,7 @@ scenes = {}
 for name, changes in params.variants.items():
     own = any(change.startswith(("contact.creep.tolerance=", "contact.creep.planes=")) for change in changes)
     shared = [] if own else [f"contact.creep.table={table}"]
-    scenes[name] = load_scene(source, [*shared, "initial.y=0.0", *changes])
+    scenes[name] = load_scene(source, [*shared, "initial.y=0.0", *params.overrides, *changes])
 speeds = np.linspace(**params.speeds)
 locus = loci({name: scenes[name] for name in ("planar", "spatial")}, speeds)
 linear = critical_speeds(scenes, np.linspace(**params.search))

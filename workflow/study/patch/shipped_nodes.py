@@ -1,7 +1,8 @@
 """Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--out FILE]``.
 
-The scenes of `study.patch.look_up` run on an empty table. What they meet of the pair of profiles that they share is
-kept: nodes, and which cells may be looked up (``wrcore/dynamics/tables/nodes.h5``).
+Scenes run on an empty table: those of `study.patch.look_up`, and examples at speeds, on tracks and from starts that a
+user may well try. What they meet of the pair of profiles that they share is kept: nodes, and which cells may be looked
+up (``wrcore/dynamics/tables/nodes.h5``).
 """
 
 import argparse
@@ -11,9 +12,21 @@ from pathlib import Path
 import numpy as np
 
 import wrcore as wr
-from study.patch.look_up import SCENES
+from study.patch.look_up import CURVE, ROUGH, SCENES
 from wrcore.dynamics import pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
+
+WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
+MET = [
+    *SCENES.values(),
+    *(("suspended_wheelset", {"speed": v, "initial.y": 0.003}) for v in (20.0, 30.0, 40.0, 50.0, 60.0)),
+    *(("trailer_vehicle", {"speed": v, "initial.y": 0.003}) for v in (20.0, 30.0, 40.0, 50.0, 60.0, 70.0)),
+    *((f"freight_wagon_{load}", {}) for load in ("empty", "laden")),
+    *(("trailer_vehicle", {"speed": v, "integration.duration": 4.0, **ROUGH}) for v in (20.0, 40.0)),
+    ("trailer_vehicle", {"speed": 25.0, "integration.duration": 6.0, **WIDER}),
+    ("guided_car", {}),
+]
+"""Examples and what is set in them."""
 
 
 def met(scenes):
@@ -33,13 +46,11 @@ def met(scenes):
 
 
 def write(pair, path):
-    """Keep a pair's nodes at whole steps, which cells are looked up from, and its cells."""
-    whole = [place for place in pair._solved_at if all(float(n).is_integer() for n in place)]
-    parts = [(*node, part) for node, part in pair._parts.items() if all(float(n).is_integer() for n in node)]
+    """Keep a pair's nodes, and which of its cells may be looked up."""
     data = {
-        "places": np.array(whole, np.int32),
-        "numbers": np.array([pair._solved_at[place] for place in whole]),
-        "parts": np.array(parts, np.int32),
+        "nodes": np.array(sorted(pair._solved_at)),
+        "numbers": np.array([pair._solved_at[node] for node in sorted(pair._solved_at)]),
+        "parts": np.array(sorted(pair._parts.items())),
         "cells": np.array([(key, np.sign(state) if state > 0 else state) for key, state in pair.cells.items()]),
         "misses": np.array([pair.misses[key] for key in pair.cells], np.float32),
         "fingerprint": pair_store.fingerprint(pair.contact),
@@ -53,7 +64,7 @@ def main():
     """Run the scenes, write what they met, and say how much it is."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", default=str(pair_store.SHIPPED / "nodes.h5"))
-    path, pair = parser.parse_args().out, met(list(SCENES.values()))
+    path, pair = parser.parse_args().out, met(MET)
     write(pair, path)
     print(f"{len(pair.cells)} cells, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
 

@@ -30,8 +30,8 @@ from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
 from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
 from wrcore.dynamics.pair_store import with_pair
+from wrcore.dynamics.patch_kernels import with_fallback
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
-from wrcore.dynamics.system import with_fallback
 from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
 from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.patch.library import Library, make_library
+from wrcore.contact.patch.library import LOG_MIN, LOG_STEP, Library, make_library
 from wrcore.contact.patch.normal_influence import influence_table
 from wrcore.contact.patch.panels import make_panels
 from wrcore.contact.patch.rolling import LEVELS, Level, RollingWork, rolling_work
@@ -30,6 +30,8 @@ class PairTable(NamedTuple):
     """(n,) int64 and int32: cells by their keys, each with its number or its state."""
     cells: np.ndarray
     """(n, NODES, NUMBERS) float32: what a cell is looked up from."""
+    misses: np.ndarray
+    """(n, 2) float32: errors in its middle, of N and of the creep force over mu N."""
     modes: np.ndarray
     """(2, n + 2, n + 2, 3 MODES) float32: coefficients of quadratic B-splines over the disk of the creepages, of both
     families."""
@@ -38,17 +40,23 @@ class PairTable(NamedTuple):
 
 
 NO_TABLE = PairTable(
-    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0,) * 4, np.float32), 0,
+    np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0, 2), np.float32),
+    np.zeros((0,) * 4, np.float32), 0,
 )  # fmt: skip
 NODES, NUMBERS, MODES = 48, 64, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
-LOBE_COLUMNS = 5
+LOBE_COLUMNS = 6
 """Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
 
 
+KERNEL, MODEL, ELLIPSES, LOAD = range(4)
+"""Addresses in `StripModel.solver`."""
+
+
 class StripModel(NamedTuple):
-    """Settings and tables of patches on strips, for kernels; without strips its arrays are empty."""
+    """Settings and tables of patches on strips, for kernels; its arrays are empty without strips, and where patches are
+    looked up until one is to be solved (`with_tables`)."""
 
     strips: int
     """Strips of a window; 0: patches are ellipses."""
@@ -67,9 +75,11 @@ class StripModel(NamedTuple):
     fallback: int = 0
     """Address of the kernel that solves a patch on a grid."""
     table: PairTable = NO_TABLE
-    solver: int = 0
     group: int = 0
-    """Addresses of the kernels that solve a patch, and that add what acts on one: looked up in the table or solved."""
+    """Address of the kernel that adds what acts on a patch: looked up in the table or solved."""
+    late: np.ndarray = np.zeros(4, np.int64)
+    """Addresses of the kernel that solves a patch where it is looked up, of the model that it takes, and of the kernel
+    with ellipses in its place, all 0 until they are needed, and of what then finds them."""
 
 
 class StripWork(NamedTuple):
@@ -101,8 +111,8 @@ class StripWork(NamedTuple):
     slender: RollingWork
 
 
-def _no_library(nu):
-    return Library(Level(0, 0, 0, 0), make_panels(4), nu, 0.0, 1.0, np.zeros((0, 0), np.float32))
+def _no_library(nu, level=Level(0, 0, 0, 0)):  # noqa: B008  a tuple
+    return Library(level, make_panels(max(level.panels, 4)), nu, LOG_MIN, LOG_STEP, np.zeros((0, 0), np.float32))
 
 
 def strip_model(patch, resolution="middle", slip="surfaces", nu=0.28, friction=0.3):
@@ -123,8 +133,17 @@ def _strip_model(patch, resolution, slip, nu, friction):
         return StripModel(0, 0, 0.0, np.zeros((0, 0)), *(_no_library(nu) for _ in range(4)))
     level = LEVELS[resolution]
     levels = [level._replace(strips=level.strips * halves // 2) for halves in (2, 3, 4)]
-    libraries = (make_library(each, nu) for each in (*levels, LEVELS["slender"]))
-    return StripModel(level.strips, int(slip == "surfaces"), friction, influence_table(), *libraries)
+    libraries = (_no_library(nu, each) for each in (*levels, LEVELS["slender"]))
+    model = StripModel(level.strips, int(slip == "surfaces"), friction, np.zeros((0, 0)), *libraries)
+    return model if friction else with_tables(model)
+
+
+def with_tables(model):
+    """A `StripModel` with all that a solution takes."""
+    bare = model._asdict()
+    names = "library", "wider", "widest", "slender"
+    libraries = {name: make_library(bare[name].level, bare[name].nu) for name in names}
+    return model._replace(values=influence_table(), **libraries)
 
 
 def strip_work(model, wheelsets, slips=1):

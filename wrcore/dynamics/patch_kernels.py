@@ -1,0 +1,90 @@
+"""Addresses of the kernels of patches on strips; those that solve one are compiled with a run, or, where patches are
+looked up, when the first one is to be solved."""
+
+import ctypes
+
+import numpy as np
+
+from wrcore.contact.patch.gap import Frame
+from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, MODEL, strip_work, with_tables
+from wrcore.contact.reduction import PATCH_COLUMNS
+from wrcore.contact.strip import Pose
+from wrcore.dynamics.modes import FRESH
+from wrcore.dynamics.motion import MOTION, WheelMotion
+from wrcore.dynamics.pair_store import handed_on, told_if_long, with_pair
+from wrcore.dynamics.strip_wheel import add_group, solve_on_grid
+from wrcore.dynamics.tabulated_wheel import add_tabulated
+from wrcore.dynamics.wheel import wheel_wrenches
+from wrcore.kernels.handles import Handle, Kernel, Kind
+
+
+def with_fallback(contact):
+    """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
+    m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
+    fallback = Kernel(
+        solve_on_grid, Kind(contact._replace(geometries=())), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
+        np.zeros(PATCH_COLUMNS),
+    )  # fmt: skip
+    return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
+
+
+def with_groups(contact, work):
+    """Contact on strips with the address of the kernel of its patches."""
+    looked_up = contact.strips.looked_up > 0.0
+    contact = contact if looked_up else with_fallback(contact)
+    group = _of_patches(add_tabulated if looked_up else add_group, contact, work)
+    return contact._replace(strips=contact.strips._replace(group=group))
+
+
+def with_late(contact):
+    """Contact on strips with tables, and with what is compiled late, its own and that of its wheels."""
+    contact = contact._replace(wheels=tuple(_with_own(each) for each in contact.wheels))
+    return _with_own(contact)
+
+
+def _with_own(contact):
+    if contact.strips.looked_up and not contact.wheels:
+        contact = with_pair(contact)
+    late = LateKernels(contact)
+    return contact._replace(strips=contact.strips._replace(late=np.asarray(late)))
+
+
+def _of_patches(kernel, contact, work):
+    """Address of a kernel of patches."""
+    m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
+    kind, counters = Kind(contact._replace(geometries=(), wheels=())), np.zeros(4, np.int64)
+    return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
+
+
+class LateKernels:
+    """What is compiled, and loaded, when kernels first ask for it: see `StripModel.late`."""
+
+    def __init__(self, contact):
+        self._contact, self._call = contact, ctypes.CFUNCTYPE(None, ctypes.c_int64)(self.find)
+        self._places = np.zeros(4, np.int64)
+        self._places[LOAD] = ctypes.cast(self._call, ctypes.c_void_p).value
+
+    @property
+    def __array_interface__(self):
+        """`StripModel.late`: who holds it holds this."""
+        return self._places.__array_interface__
+
+    def find(self, which):
+        """Find the kernel with ellipses, or the solver and its model."""
+        text = "the solver of exact contact is compiled, once: some minutes of one core"
+        with handed_on("it has no solver"), told_if_long(text):
+            if which == ELLIPSES:
+                self._places[ELLIPSES] = self._with_ellipses()
+            else:
+                strips = with_tables(self._contact.strips)
+                contact = with_fallback(self._contact._replace(strips=strips))
+                self._model = Handle(contact)
+                kernel = _of_patches(add_group, contact, strip_work(strips, 1))
+                self._places[[MODEL, KERNEL]] = self._model.address, kernel
+
+    def _with_ellipses(self):
+        work, counts = Kind(strip_work(self._contact.strips, 1)), np.zeros((1, 2), np.int64)
+        motions, patches, bounds = np.zeros((1, 2, len(MOTION))), np.zeros((1, 2, 1, PATCH_COLUMNS)), np.zeros((1, 2))
+        return Kernel(
+            wheel_wrenches, Kind(self._contact), motions, patches, counts, bounds, motions, counts[0], work, FRESH
+        ).address
