@@ -69,6 +69,8 @@ THREADS = min(len(os.sched_getaffinity(0)), 8)
 CELLS, SLOTS = 50_000, 200_003
 """Room for cells that can be looked up, and for all."""
 
+WITHOUT = "contact.patch: moment does without"
+
 _AFTER = 0.02
 """Ctrl-C in a call from a kernel is said again so much later, s."""
 
@@ -152,7 +154,7 @@ class Pair:
             if self._full():
                 _warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
-            begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path})"
+            begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path}); {WITHOUT}"
             with handed_on("patches are solved without a table"), told_if_long(text, self._spent):
                 self._keep(key, *self._solved(key))  # or the cell stays as if never met
             self._spent += time.monotonic() - begin

@@ -11,7 +11,7 @@ from wrcore.contact.reduction import PATCH_COLUMNS
 from wrcore.contact.strip import Pose
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
-from wrcore.dynamics.pair_store import handed_on, told_if_long, with_pair
+from wrcore.dynamics.pair_store import WITHOUT, handed_on, told_if_long, with_pair
 from wrcore.dynamics.strip_wheel import add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import wheel_wrenches
@@ -71,7 +71,7 @@ class LateKernels:
 
     def find(self, which):
         """Find the kernel with ellipses, or the solver and its model."""
-        text = "the solver of exact contact is compiled, once: some minutes of one core"
+        text = f"the solver of exact contact is compiled, once: some minutes of one core; {WITHOUT}"
         with handed_on("it has no solver"), told_if_long(text):
             if which == ELLIPSES:
                 self._places[ELLIPSES] = self._with_ellipses()
