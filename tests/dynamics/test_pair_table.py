@@ -85,6 +85,23 @@ def test_modes_leave_the_slopes_at_rest():
     assert max(map(abs, np.subtract(far, near))) > 1e-3
 
 
+def test_each_family_of_modes_has_its_contact_angles():
+    """Of little spin up to 0.2 rad, of much from 0.4 rad on, half of both in between, on either side."""
+    little, much = np.zeros(NUMBERS), np.zeros(NUMBERS)
+    little[pair_table.MODE :][:MODES], much[pair_table.MODE :][MODES : 2 * MODES] = 0.1, 0.1
+    table, sums = creep_modes().values, np.zeros(3 * MODES)
+
+    def at(numbers, angle):
+        numbers[pair_table.ANGLE] = angle
+        return np.array(pair_table.remainder(table, numbers, 0.7, -0.4, sums))
+
+    for numbers, whole, none in ((little, 0.1, 0.5), (much, 0.5, 0.1)):
+        assert abs(at(numbers, whole)).max() > 1e-3
+        np.testing.assert_allclose(at(numbers, 0.3), 0.5 * at(numbers, whole), rtol=1e-6)
+        np.testing.assert_array_equal(at(numbers, -whole), at(numbers, whole))
+        np.testing.assert_array_equal(at(numbers, none), 0.0)
+
+
 def test_a_remainder_has_no_poles():
     """Between nodes the number that tells how exact slopes are falls below 0."""
     numbers, sums = np.zeros(NUMBERS), np.zeros(3 * MODES)
@@ -212,6 +229,21 @@ def test_in_the_root_of_the_flange(benchmark_pair, y, load, yaw, spin, drift, mo
     assert models["tabulated"]._counters[3] == 0
     assert table[reduction.NORMAL] == pytest.approx(exact[reduction.NORMAL], rel=3e-3)
     assert math.hypot(*(table - exact)[[reduction.FX, reduction.FY]]) < most * 0.3 * exact[reduction.NORMAL]
+
+
+def test_a_slender_contact_on_the_flange_about_its_spin_pole(benchmark_pair):
+    """Where it slips about a place within, its creep force turns round within a few parts in a thousand of the rate."""
+    models = {name: LoadedWheels(benchmark_pair, name) for name in ("exact", "tabulated")}
+    roll, _ = models["exact"].settled(6.5e-3, 1e4)
+    z, forces = models["exact"].height("left", 6.5e-3, 1e4, roll, 0.0), {name: [] for name in models}
+    for rate in np.linspace(0.98, 1.035, 12):
+        rolling = Rolling(SPEED, SPEED / 0.46 * rate)
+        for name, model in models.items():
+            row = model.at_height("left", 6.5e-3, z, roll, rolling=rolling)[0].row
+            forces[name].append(row[[reduction.FX, reduction.FY]] / (0.3 * row[reduction.NORMAL]))
+    exact, table = map(np.array, forces.values())
+    assert np.ptp(exact[:, 0]) > 1.0
+    assert np.hypot(*(table - exact).T).max() < 0.005
 
 
 def test_a_lobe_that_barely_touches_is_left_out(own_cache):
@@ -452,15 +484,19 @@ def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
     assert not shipped_pair(**{"contact.friction": 0.29})._known
 
 
-def test_an_example_solves_nothing(own_cache, monkeypatch):
+@pytest.mark.parametrize("name, speed", [
+    ("suspended_wheelset", 60.0), ("trailer_vehicle", 50.0), ("freight_wagon_empty", 20.0),
+    ("freight_wagon_laden", 20.0),
+])  # fmt: skip
+def test_an_example_solves_nothing(own_cache, monkeypatch, name, speed):
+    """They look contact up, and what they meet comes with the package: not even the solver is compiled."""
     monkeypatch.undo()
     monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
     monkeypatch.setattr(pair_store, "_PAIRS", {})
     monkeypatch.setattr(pair_store.Pair, "solve", None)
-    run = wr.simulate(
-        wr.example("suspended_wheelset"), **{"contact.patch": "tabulated", "speed": 60.0, "integration.duration": 0.5}
-    )
-    assert run.counters["patches_not_tabulated"] == 0
+    monkeypatch.setattr(patch_kernels.LateKernels, "find", None)
+    run = wr.simulate(wr.example(name), **{"speed": speed, "integration.duration": 0.5})
+    assert run.scene["contact"]["patch"] == "tabulated" and run.counters["patches_not_tabulated"] == 0
     assert not list(own_cache.iterdir())
 
 

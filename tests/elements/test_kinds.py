@@ -3,14 +3,17 @@
 import math
 import time
 from importlib.metadata import EntryPoint
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import njit
 
 import wrcore as wr
 from tests.conftest import SCENES
 from tests.dynamics.test_suspension import at_rest, evaluate, model_with, moving
 from tests.dynamics.test_system import body_state, contact, run  # noqa: F401 (contact is a fixture)
+from tests.elements import own_laws
 from wrcore.dynamics.energy import energy_balance, energy_channels
 from wrcore.dynamics.system import workspace
 from wrcore.elements import kinds, law
@@ -44,6 +47,25 @@ def test_a_law_of_ones_own_acts_as_it_says(contact, name):  # noqa: F811
     for z in (-0.2, 0.3):
         wrench, rates = evaluate(model, at_rest(upper=(0, 0, 2.0 + z), own=[0.0]))
         assert wrench[0, 2] == pytest.approx(-CATCH * min(z, 0.0)) and rates == pytest.approx([z])
+
+
+def boxed(stiffness):
+    box = SimpleNamespace(stiffness=stiffness)  # objects of one kind look alike
+    return lambda stretch, speed, states, parameters, rates: box.stiffness * stretch
+
+
+def compiled(stiffness):
+    return njit(lambda stretch, speed, states, parameters, rates: stiffness * stretch)
+
+
+@pytest.mark.parametrize("defined", [boxed, compiled])
+def test_a_function_that_is_defined_anew_is_the_one_that_runs(contact, monkeypatch, defined):  # noqa: F811
+    forces = []
+    for stiffness in (3.0, 5.0):
+        monkeypatch.setattr(own_laws, "pull", defined(stiffness), raising=False)
+        model = model_with(contact, [{**OWN, "law": f"{LAWS}pull", "parameters": [], "states": 0}])
+        forces.append(evaluate(model, at_rest(upper=(0, 0, 2.5)))[0][0, 2])
+    assert forces == pytest.approx([-1.5, -2.5])
 
 
 def test_a_law_of_ones_own_seen_from_a_wheelset_is_the_same(contact):  # noqa: F811

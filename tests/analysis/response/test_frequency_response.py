@@ -93,10 +93,17 @@ def test_one_rail_is_half_of_both():
         assert 0.5 * (left - right) == pytest.approx(cross, abs=1e-4 * abs(left))
 
 
+def test_frequencies_come_back_as_they_were_asked_for():
+    asked = [0.1, 1.0 / 3.0, 7.3]
+    table = wr.frequency_response(SCENES / "suspended_wheelset.yaml", ["level"], ["wheelset.y_m"], asked)
+    assert table.index.tolist() == asked
+
+
 @pytest.mark.parametrize("arguments, says", [
     ((["lvel"], ["wheelset.y_m"], [1.0]), "inputs: .*did you mean 'level'"),
     ((["wheelset.Fq_N"], ["wheelset.y_m"], [1.0]), "inputs: .*did you mean"),
     ((["level"], ["wheelset.yy_m"], [1.0]), "no channel 'yy_m'"),
+    ((["level"], ["y_m"], [1.0]), "outputs: expected"),
     ((["level"], ["wheelset/left.N_N"], [1.0]), "outputs: expected a channel that has one number"),
     ((["level"], ["wheelset.y_m"], [0.0]), "frequencies: expected"),
     ((["level"], ["wheelset.y_m"], [1.0], 80.0), "speed: expected a speed at which small motions die away"),
