@@ -1,9 +1,7 @@
 """Fixtures that several test modules share: the benchmark pair and where data that is never committed may lie."""
 
-import atexit
 import os
 import shutil
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -14,20 +12,7 @@ from wrcore.scene import description
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
-
-
-def _on_ellipses():
-    """A copy of the examples' scenes with ellipses: what most tests are about does not depend on patches, and friction,
-    wheels and rails of all kinds would each have a table of exact contact to be filled first."""
-    folder = Path(tempfile.mkdtemp(prefix="wrcore_scenes_"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    shutil.copytree(ROOT / "config", folder / "config")
-    for path in (folder / "config" / "scenes").glob("*.yaml"):
-        path.write_text(path.read_text().replace("patch: tabulated", "patch: moment"))
-    return folder / "config" / "scenes"
-
-
-SCENES = _on_ellipses()
+SCENES = ROOT / "config" / "scenes"
 
 CHECKS = (
     "study/", "test_workflow", "test_slurm", "test_attack", "test_fuzz", "test_bring_your_own", "test_first_result",

@@ -489,14 +489,14 @@ def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
     ("freight_wagon_laden", 20.0),
 ])  # fmt: skip
 def test_an_example_solves_nothing(own_cache, monkeypatch, name, speed):
-    """They look contact up, and what they meet comes with the package: not even the solver is compiled."""
+    """What they meet comes with the package: not even the solver is compiled."""
     monkeypatch.undo()
     monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
     monkeypatch.setattr(pair_store, "_PAIRS", {})
     monkeypatch.setattr(pair_store.Pair, "solve", None)
     monkeypatch.setattr(patch_kernels.LateKernels, "find", None)
-    run = wr.simulate(wr.example(name), **{"speed": speed, "integration.duration": 0.5})
-    assert run.scene["contact"]["patch"] == "tabulated" and run.counters["patches_not_tabulated"] == 0
+    run = wr.simulate(wr.example(name), **{"contact.patch": "tabulated", "speed": speed, "integration.duration": 0.5})
+    assert run.counters["patches_not_tabulated"] == 0
     assert not list(own_cache.iterdir())
 
 
