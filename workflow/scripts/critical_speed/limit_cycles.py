@@ -7,10 +7,11 @@ from wrcore.analysis.stability.limit_cycles import Settling, limit_cycles
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
-source, settings = snakemake.input.scene, dict(snakemake.params.settings)
+params, source = snakemake.params, snakemake.input.scene
+settings = dict(params.settings)
 table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
 changes = [f"contact.creep.table={table}", "initial.y=0.0", f"contact.detection={snakemake.wildcards.detection}"]
 settling = Settling(**settings.pop("settling"))
-cycles = limit_cycles(load_scene(source, [*snakemake.params.overrides, *changes]), snakemake.params.speeds, settling, **settings)
+cycles = limit_cycles(load_scene(source, [*params.overrides, *changes]), params.speeds, settling, **settings)
 cycles.insert(0, "detection", snakemake.wildcards.detection)
 cycles.to_csv(snakemake.output[0], index=False)

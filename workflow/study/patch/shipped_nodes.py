@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import wrcore as wr
-from study.patch.look_up import CURVE, ROUGH, SCENES
+from study.patch.look_up import ROUGH, SCENES
 from wrcore.dynamics import pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
 
