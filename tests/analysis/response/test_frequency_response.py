@@ -106,6 +106,16 @@ def test_bad_input_is_named(arguments, says):
         wr.frequency_response(SCENES / "suspended_wheelset.yaml", *arguments)
 
 
+def test_a_vehicle_that_nothing_holds_along_the_track_is_told_so():
+    with pytest.raises(InputError, match="along the track, where nothing holds the vehicle against its rolling resist"):
+        wr.frequency_response(SCENES / "locomotive.yaml", ["level"], ["body.z_m"], [1.0], speed=20.0)
+
+
+def test_control_laws_do_not_count():
+    with pytest.raises(InputError, match="steady motion: speed 15 m/s"):  # not of outputs that go to motors left out
+        wr.frequency_response(SCENES / "guided_car.yaml", ["level"], ["car_body.z_m"], [1.0], speed=15.0)
+
+
 def test_the_command_writes_table_and_plot(tmp_path):
     out, plot = tmp_path / "bode.csv", tmp_path / "bode.svg"
     words = ["--input", "level", "car_body.Fz_N", "--output", "car_body.az_m_per_s2", "--count", "5"]

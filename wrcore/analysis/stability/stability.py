@@ -57,10 +57,19 @@ def steady_motion(model, state, speed):
     the model's speed; InputError if there is none.
     """
     motion = steady_running(*at_speed(model, state, speed))
-    if not np.max(np.abs(motion.residual)) < LARGEST_REST:
+    left = np.abs(motion.residual)
+    if not np.max(left) < LARGEST_REST:
+        bodies = len(model.bodies.mass)
+        whole, inner = np.split(np.abs(motion.basis @ motion.residual)[6 * bodies :], [6 * bodies])
+        whole = whole.reshape(bodies, 6)
+        whole[:, 0], whole[model.bodies.spins == 1, 4] = 0.0, 0.0  # along the track, and the spin that belongs to it
+        held = "" if max(np.max(whole), np.max(inner, initial=0.0)) >= LARGEST_REST else (
+            ", along the track, where nothing holds the vehicle against its rolling resistance: an element or joint"
+            " between a body and the frame would"
+        )  # fmt: skip
         raise InputError(
             "steady motion", f"speed {speed:g} m/s", "expected a vehicle that can run straight ahead near the given"
-            f" state, but accelerations of {np.max(np.abs(motion.residual)):.2g} m/s^2 are left",
+            f" state, but accelerations of {np.max(left):.2g} m/s^2 are left{held}",
         )  # fmt: skip
     return motion
 
