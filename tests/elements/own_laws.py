@@ -84,6 +84,12 @@ def late_fault(stretch, speed, states, parameters, rates):
 number = 3.0
 
 
+@njit
+def lost_far(stretch, speed, states, parameters, rates):
+    """Works on a test call."""
+    return 1e3 * stretch if abs(stretch) < 2e-4 else math.nan
+
+
 def aside(s):
     """Both rails go 2 mm aside from 5 m on."""
     deviation = 2e-3 * np.clip((s - 5.0) / 10.0, 0.0, 1.0)

@@ -45,10 +45,10 @@ def with_element(law, states=0):
 
 def test_an_element_and_a_creep_law_that_are_lost():
     irregular = {"track": {"irregularity": {"own": {"law": "tests.elements.own_laws:aside", "length": 40.0}}}}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", with_element("tests.elements.own_laws:late_fault"))
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", with_element("tests.elements.own_laws:lost_far"))
     run = wr.simulate({**scene.data, **irregular}, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
-    assert run.reason.endswith(", where own_laws.py:late_fault gave a number that is not finite")
+    assert run.reason.endswith(", where own_laws.py:lost_far gave a number that is not finite")
     law = {"contact": {"creep": {"model": "tests.elements.own_laws:lost_in_slip"}, "patch": "moment"}}
     run = wr.simulate(SCENES / "suspended_wheelset.yaml", **law, initial={"y": 0.0}, **irregular, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
@@ -57,9 +57,9 @@ def test_an_element_and_a_creep_law_that_are_lost():
 
 def test_laws_that_are_given_what_is_not_finite_are_not_to_blame():
     model, state = compile_scene(car({"front": STEERING}))
-    equations, rate = Equations(model), np.full(len(state), np.nan)
-    assert own.not_finite_in(lambda: equations(0.0, rate)) == []
-    assert blame(equations, model, 0.0, state, rate) == ""
+    nothing = np.full(len(state), np.nan)
+    assert own.not_finite_in(lambda: Equations(model)(0.0, nothing)) == []
+    assert blame(model, 0.0, state, nothing) == ""
     model, state = compile_scene(car({"front": STEERING, "rear": LOST}))
-    assert "lost_later" in blame(Equations(model), model, 0.3, state, np.full(len(state), np.nan))
-    assert blame(Equations(model), model, 0.2, state, 0.0 * state) == ""
+    assert "lost_later" in blame(model, 0.3, state, nothing)
+    assert blame(model, 0.2, state, 0.0 * state) == ""

@@ -182,11 +182,8 @@ class Integration:
         """Status and reason of an outcome, or why the run was given up."""
         status, reason = _ending(outcome, given_up, self.model, self.memory, self.equations.work)
         if status == "failed":
-            clock, kept = self.memory.clock, [place.copy() for place in self.places]
-            at = clock[engine.T], self.memory.state, self.memory.rate, clock[engine.NEXT]
-            reason += blame(self.equations, self.model, *at)
-            for place, before in zip(self.places, kept, strict=True):
-                place[...] = before
+            clock = self.memory.clock
+            reason += blame(self.model, clock[engine.T], self.memory.state, self.memory.rate, clock[engine.NEXT])
         return status, reason
 
     def trajectory(self, record, outcome, given_up, before, wall):

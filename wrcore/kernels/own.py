@@ -14,6 +14,7 @@ import inspect
 import math
 import sys
 from collections.abc import Callable
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -38,6 +39,7 @@ MOST_SAMPLES = 400_000
 
 _KNOWN: dict[tuple[int, ...], Callable] = {}
 _TEXTS: dict[ModuleType, str] = {}
+_WATCHED = ContextVar("watched", default=False)
 _NOT_FINITE: dict[tuple[int, ...], None] = {}
 _NOTES: list[Any] = []  # what compiled code calls, kept alive
 
@@ -224,14 +226,22 @@ def name_of(digest):
 
 
 def not_finite_in(evaluate):
-    """Names of the functions that give numbers that are not finite for finite ones while ``evaluate`` is called."""
+    """Names of the functions that give numbers that are not finite for finite ones while ``evaluate`` is called, which
+    asks for their addresses (`addressed`) anew."""
     _NOT_FINITE.clear()
-    evaluate()
+    token = _WATCHED.set(True)
+    try:
+        evaluate()
+    finally:
+        _WATCHED.reset(token)
     return [name_of(digest) for digest in _NOT_FINITE]
 
 
-def _note_of(digest):
-    """Kernel that takes note where a function makes of ``given`` that is finite what is not."""
+def _note_of(digest, watched):
+    """Kernel that takes note where a function makes of ``given`` that is finite what is not; where nobody watches, one
+    that does nothing."""
+    if not watched:
+        return uncached(lambda given, found: None)
     back = ctypes.CFUNCTYPE(None, ctypes.c_int64)(lambda _: _NOT_FINITE.update({digest: None}))
     address = ctypes.cast(back, ctypes.c_void_p).value
     _NOTES.append(back)
@@ -243,16 +253,22 @@ def _note_of(digest):
     return uncached(note)
 
 
-@cache
 def addressed(wrap, digest, scalars, arrays, examples, returns):
     """The `Kernel` that ``wrap`` makes of the function with a digest and of what takes note of its results, for
     ``examples`` (`hashable`); plain Python is called back with so many ``scalars``, then ``arrays``."""
+    return _addressed(wrap, digest, scalars, arrays, examples, returns, _WATCHED.get())
+
+
+@cache
+def _addressed(wrap, digest, scalars, arrays, examples, returns, watched):
     function = _KNOWN[digest]
     if not hasattr(function, "py_func"):
         function = _called_back(function, scalars, arrays)
     if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller
         function.compile(signature_of(scalars, arrays))
-    return Kernel(uncached(wrap(function, _note_of(digest))), *(example.value for example in examples), returns=returns)
+    return Kernel(
+        uncached(wrap(function, _note_of(digest, watched))), *(example.value for example in examples), returns=returns
+    )
 
 
 def signature_of(scalars, arrays):
