@@ -13,8 +13,11 @@ from wrcore.analysis.stability.modes import NEUTRAL, energy_table, linear_modes,
 from wrcore.balance.linear import steady_running
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import checked
+from wrcore.geometry.irregularity import no_irregularity
+from wrcore.geometry.path import tangent_path
 from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
@@ -31,11 +34,12 @@ def rising(speeds):
 
 
 def straight_ahead(scene):
-    """Model of a scene, without motors, brakes and controller (they have no steady state), and the state in which its
-    vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
+    """Model of a scene on a tangent, perfect track, without motors, brakes and controller (they have no steady state),
+    and the state in which its vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
     """
     model, _ = compile_scene(scene)
-    return undriven(model), static_equilibrium(scene, model).state
+    model = undriven(model)._replace(track=TrackModel(True, tangent_path(), no_irregularity()))
+    return model, static_equilibrium(scene, model).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):
@@ -81,6 +85,7 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     scene : Scene, path or dict
+        Its path, gradients, irregularity, drive and control do not count.
     speed : float
         m/s.
 
@@ -170,7 +175,7 @@ def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], spee
     Parameters
     ----------
     scenes : Scene or path, or dict of str to Scene
-        Several by what they differ in.
+        Several by what they differ in. Paths, gradients, irregularity, drive and control do not count.
     speeds : sequence of float
         Rising, m/s: the critical speed is looked for between them.
 
