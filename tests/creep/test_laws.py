@@ -90,6 +90,20 @@ def test_fastsim_example(data, elliptic, published):
     assert lateral("fastsim", ours, -6.25e-4, 0.625) == pytest.approx(2 * fine - coarse, abs=0.005)
 
 
+@pytest.mark.parametrize("grid", [1, 3, 10, 40])
+@pytest.mark.parametrize("elliptic", [False, True])
+def test_fastsim_bears_no_more_than_friction(grid, elliptic):
+    """Its cells' bounds carry mu N: all of it in full slip, to rounding, and never more."""
+    data, rng = creep_data(0.28, grid=grid, elliptic=elliptic), np.random.default_rng(3)
+    for g in (0.1, 1.0, 3.7, 10.0):
+        for psi in (0.0, -0.6):
+            full = fastsim(data.fastsim, data.table.kalker, g, psi, 3e6, -4e6, 0.0)
+            assert np.hypot(*full[:2]) == pytest.approx(1.0, abs=1e-12)
+            for xi, eta, phi in rng.normal(size=(100, 3)) * 10.0 ** rng.uniform(-1, 3, (100, 3)):
+                forces = fastsim(data.fastsim, data.table.kalker, g, psi, xi, eta, phi)
+                assert np.hypot(*forces[:2]) <= 1.0 + 1e-14
+
+
 def test_fastsim_on_a_skewed_patch():
     """Full slip carries mu N whatever the shape, and mirroring the shape mirrors the force."""
     data = creep_data(0.28, grid=60)

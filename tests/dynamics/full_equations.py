@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
+from wrcore.dynamics.inertia import inertia_tensors
 from wrcore.dynamics.joint import build_joints, joint_jacobian
 from wrcore.dynamics.system import Equations
 
@@ -54,7 +55,7 @@ def full_equations(model, state, t=0.0):
     for b in range(n):
         A, at = rotations[b], 6 * b
         mass[at : at + 3, at : at + 3] = model.bodies.mass[b] * np.eye(3)
-        mass[at + 3 : at + 6, at + 3 : at + 6] = A @ np.diag(model.bodies.inertia[b]) @ A.T
+        mass[at + 3 : at + 6, at + 3 : at + 6] = A @ inertia_tensors(model.bodies)[b] @ A.T
     D = joint_jacobian(model.joints, values, n).reshape(m, 6 * n)
     unjointed = model._replace(joints=build_joints([], model.bodies.spins))
     forces = mass @ _accelerations(Equations(unjointed)(t, state), n)

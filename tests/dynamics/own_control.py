@@ -65,3 +65,9 @@ def not_finite(t, inputs, states, parameters, outputs, following):
 @njit
 def answers(t, inputs, states, parameters, outputs, following):
     return 1.0
+
+
+@njit
+def lost_later(t, inputs, states, parameters, outputs, following):
+    """Not a number from a time on."""
+    outputs[:] = 0.0 if t < parameters[0] else math.nan

@@ -200,3 +200,22 @@ def test_vertical_curves_add_v_squared_over_r_to_the_load(gradient):
     extra = np.mean(load[inside] - 1813.0 * 9.81 * level)
     assert extra == pytest.approx(np.mean(expected - 1813.0 * 9.81 * level), rel=2e-3)
     assert np.max(np.abs(load[inside] - expected)) < 0.02 * abs(extra)
+
+
+@pytest.mark.parametrize("gradient", [0.05, -0.05])
+def test_circular_sags_and_crests_change_the_wheel_load_by_m_v_squared_over_r(gradient):
+    radius = 1200.0
+    curve = {"gradient": gradient, "radius": radius, "vertical_curve": "circle"}
+    run = freely_rolling([{"gradient": 0.0, "length": 60.0}, curve], 4.0)
+    w, half = run["wheelset"], 0.5 * radius * math.atan(0.05)
+    inside = (w.s_m > 60.0 - half + 8.0) & (w.s_m < 60.0 + half - 4.0)
+    wheels = [run[f"wheelset/{side}"] for side in ("left", "right")]
+    load = 0.5 * sum(np.nansum(wheel.N_N * np.cos(wheel.contact_angle_rad), axis=1) for wheel in wheels)
+    load += 0.5 * sum(np.nansum(wheel.Fy_N * np.sin(wheel.contact_angle_rad), axis=1) for wheel in wheels)
+    bend = math.copysign(1.0, gradient) / radius
+    incline = bend * (w.s_m[inside] - 60.0 + half)
+    speed = np.hypot(w.vx_m_per_s, w.vz_m_per_s)[inside]
+    change = 0.5 * 1813.0 * speed**2 * bend / (1.0 - 0.46 * bend)  # the radius is that of the wheelset's centre
+    found = load[inside] - 0.5 * 1813.0 * 9.81 * np.cos(incline)
+    assert np.mean(found) == pytest.approx(np.mean(change), rel=1e-3)
+    assert np.max(np.abs(found - change)) < 0.02 * np.abs(change).max()

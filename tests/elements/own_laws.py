@@ -1,5 +1,8 @@
 """Laws of elements as a user writes them."""
 
+import math
+
+import numpy as np
 from numba import njit
 
 
@@ -79,3 +82,23 @@ def late_fault(stretch, speed, states, parameters, rates):
 
 
 number = 3.0
+
+
+@njit
+def lost_far(stretch, speed, states, parameters, rates):
+    """Works on a test call."""
+    return 1e3 * stretch if abs(stretch) < 2e-4 else math.nan
+
+
+def aside(s):
+    """Both rails go 2 mm aside from 5 m on."""
+    deviation = 2e-3 * np.clip((s - 5.0) / 10.0, 0.0, 1.0)
+    return np.array([deviation, 0.0 * s, deviation, 0.0 * s])
+
+
+@njit
+def lost_in_slip(ratio, psi, kalker, xi, eta, phi):
+    """Linear, and not a number where the lateral creepage is large and rises; finite in test calls."""
+    if 0.02 < abs(eta) < 0.05:
+        return math.nan, 0.0, 0.0
+    return -kalker[0] * xi, -kalker[1] * eta - kalker[2] * phi, 0.0

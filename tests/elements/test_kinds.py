@@ -240,9 +240,9 @@ def test_the_text_of_a_file_decides_on_the_model(tmp_path):
 
 
 def test_scenes_without_one_compile_none():
-    before = own._kernel.cache_info().misses
+    before = own._addressed.cache_info().misses
     wr.simulate(wr.load_scene(SCENES / "suspended_wheelset.yaml", {"integration.duration": 0.1}), progress=False)
-    assert own._kernel.cache_info().misses == before
+    assert own._addressed.cache_info().misses == before
 
 
 def test_a_kind_of_another_package_is_as_a_file_beside_the_others(tmp_path, monkeypatch):

@@ -144,6 +144,18 @@ def test_directions_units_and_origins_of_wheels(tmp_path, change, spec):
     assert off(curve) < 1e-6
 
 
+def test_a_wheel_without_its_flange_back(tmp_path, capsys):
+    x, y = wheel_points()
+    seen = x > x[np.argmax(y)] - 0.5  # from the flange's tip on
+    path = file_of(tmp_path, "w.whl", OLD + rows(x[seen], y[seen]))
+    with pytest.raises(InputError, match="flange_back: expected points up to the flange back, got none that lie 5 mm"):
+        read_profile({"points": path, "flange_back": 0.07}, "wheel")
+    assert off(read_profile(path, "wheel")) < 1e-6
+    assert "tape_circle assumed, no flange back among the points" in capsys.readouterr().err
+    read_profile(file_of(tmp_path, "whole.whl", OLD + rows(x, y)), "wheel")
+    assert "no flange back" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("up", [1.0, -1.0], ids=["up", "down"])
 def test_rails_of_meters(tmp_path, up):
     x, y = rail_points()

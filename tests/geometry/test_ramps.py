@@ -185,6 +185,33 @@ def test_gradients_rise_along_vertical_curves():
     assert centreline(path, 600.0).x == pytest.approx(run, abs=1e-11)
 
 
+@pytest.mark.parametrize("after", [0.09, -0.06])
+def test_a_circular_vertical_curve_keeps_its_radius_over_its_arc(after):
+    # arc length R (difference of angles), half to either side of s = 100 m; height by R (cos - cos)
+    radius, before = 400.0, 0.02
+    gradients = [
+        {"gradient": before, "length": 100.0}, {"gradient": after, "radius": radius, "vertical_curve": "circle"},
+    ]  # fmt: skip
+    path = built("tangent", gradients=gradients)
+    first, last = math.atan(before), math.atan(after)
+    sign, half = math.copysign(1.0, last - first), 0.5 * radius * abs(last - first)
+    begin = centreline(path, 100.0 - half)
+    for s in np.linspace(100.0 - half + 2.5, 100.0 + half - 2.5, 9):
+        angle, station = first + sign * (s - 100.0 + half) / radius, centreline(path, s)
+        smeared = 1.0 - (4.0 / radius) ** 2 / 24.0  # its mean over the rounding length
+        assert station.slope == pytest.approx(math.sin(angle) * smeared, abs=1e-8)
+        assert station.slope_rate / station.level == pytest.approx(sign / radius, rel=1e-4)
+        risen = sign * radius * (math.cos(first) - math.cos(angle))
+        rounding = sign * 4.0**2 / 24.0 / radius  # height that rounding adds behind the corner, and at it a half
+        assert station.z - begin.z == pytest.approx(risen * smeared + 0.5 * rounding, abs=3e-7)
+    end = centreline(path, 100.0 + half + 2.5)
+    assert end.slope == pytest.approx(math.sin(last), abs=1e-15)
+    parabola = built("tangent", gradients=[gradients[0], {"gradient": after, "radius": radius}])
+    steep = 100.0 + half - 2.5
+    station = centreline(parabola, steep)  # its curvature grows by one over the incline's cosine
+    assert station.slope_rate / station.level == pytest.approx(sign / radius / station.level, rel=1e-9)
+
+
 def test_a_line_may_be_on_a_gradient_all_along_and_turn_there():
     path = built(MIXED, gradients=[{"gradient": -0.025}], cant_about="centreline")
     for s in (-200.0, 0.0, 130.0, 2000.0):
@@ -212,6 +239,9 @@ BAD = [
     ({"gradients": [{"gradient": 0.0, "length": 9.0}]}, "track.gradients.0.length", "all but the last"),
     ({"gradients": [{"gradient": 0.0, "radius": 2e3}]}, "track.gradients.0.radius", "all but the first"),
     ({"gradients": [{"gradient": 0.0, "length": 9.0}, {"gradient": 0.01}]}, "track.gradients.1.radius", "the first"),
+    ({"gradients": [{"gradient": 0.01, "vertical_curve": "circle"}]}, "track.gradients.0.vertical_curve", "the first"),
+    ({"gradients": [{"gradient": 0.0, "length": 9.0}, {"gradient": 0.01, "radius": 5e2, "vertical_curve": "arc"}]},
+     "track.gradients.1.vertical_curve", "'circle'"),
     ({"gradients": [{"gradient": 0.0, "length": 50.0}, {"gradient": 0.02, "radius": 5e3, "length": 80.0},
                     {"gradient": 0.0, "radius": 5e3}]}, "track.gradients", "overlapping vertical curves"),
 ]  # fmt: skip

@@ -282,6 +282,8 @@ def test_what_cannot_be_is_one_line(tmp_path):
     for end in ("wheelset.y_m", "wheelset.y_m > high", "wheelset.y_m = 1"):
         with pytest.raises(wr.InputError, match="end: expected a time, a function, or a channel"):
             session.run_until(end)
+    with pytest.raises(wr.InputError, match="session: end: expected one of .*; did you mean 'wheelset.y_m'"):
+        session.run_until(lambda channels: channels["wheelset.ym"] > 0.0)
     with pytest.raises(wr.InputError, match="integration.method: expected a compiled method"):
         wr.start(scene_of(**{"integration.method": "scipy_rk45"}))
     with pytest.raises(wr.InputError, match="expected what this session's save returned"):

@@ -84,7 +84,7 @@ def test_bad_scenes_get_one_line_with_file_and_field(scene_file, capsys, key, va
 
 BAD_VEHICLES = [
     ("bodies.wheelset.mass", -1.0, "bodies.wheelset.mass", "kg, above 0"),
-    ("bodies.wheelset.inertia", {"roll": 1.0, "pitch": 1.0, "yaw": 2.0}, "bodies.wheelset.inertia", "equal"),
+    ("bodies.wheelset.inertia.yz", 2.0, "bodies.wheelset.inertia.yz", "xz alone"),
     ("bodies.wheelset.rolling_radius", 460, "bodies.wheelset.rolling_radius", "in m"),
     ("elements.0.bodies", ["wheelset", "bogie"], "elements.axle_box_left.bodies", "one of frame, wheelset"),
     ("elements.0.at", [0.1, 1.0, 0.46], "elements.axle_box_left.at", "axle"),

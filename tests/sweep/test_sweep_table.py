@@ -283,6 +283,23 @@ def test_numbers_of_the_vehicle_are_swept_by_their_key_paths():
         assert row["yaw_max_rad"] == pytest.approx(np.abs(run["wheelset"].yaw_rad).max(), rel=1e-12)
 
 
+def test_numbers_in_lists_are_swept_by_their_place():
+    path = [{"transition": 5.0}, {"curve": 50.0, "radius": 500.0}]
+    sweep = {
+        "name": "radii", "scene": str(SCENES / "suspended_wheelset.yaml"), "sampling": {"kind": "grid"},
+        "set": {"integration.duration": 1.0, "track.path": path}, "measures": ["y_rms_m"],
+        "keys": {"track.path.1.radius": {"values": [400.0, 300.0]}},
+    }  # fmt: skip
+    table = wr.run_sweep(sweep)
+    for row, radius in enumerate((400.0, 300.0)):
+        alone = {**sweep, "keys": {"track.path": {"values": [[path[0], {"curve": 50.0, "radius": radius}]]}}}
+        assert table["y_rms_m"][row] == pytest.approx(wr.run_sweep(alone)["y_rms_m"][0], rel=1e-12)
+    assert abs(table["y_rms_m"][0] - table["y_rms_m"][1]) > 1e-6
+    for place in ("2", "-1", "curve"):
+        with pytest.raises(wr.InputError, match="expected the number of one of 2 in the list, from 0, got"):
+            wr.load_sweep({**sweep, "keys": {f"track.path.{place}.radius": {"values": [400.0]}}})
+
+
 def test_a_scene_and_vehicles_may_be_content():
     vehicle = yaml.safe_load((SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
     scene = yaml.safe_load((SCENES / "suspended_wheelset.yaml").read_text())

@@ -76,11 +76,12 @@ def own_law(name, folder):
     return found
 
 
-def _wrapped(function):
-    """The kernel of an own law."""
+def _wrapped(function, note):
+    """The kernel of an own law, whose results ``note`` looks at."""
 
     def call(g, psi, kalker, xi, eta, phi):
         fx, fy, mz = function(g, psi, kalker, xi, eta, phi)
+        note(g + xi + eta + phi, float(fx + fy + mz))
         return float(fx), float(fy), float(mz), 0.0
 
     return call
@@ -96,9 +97,14 @@ def creep_data(nu, table=None, grid=FASTSIM_GRID, elliptic=False, factors=(1.0, 
     data = CreepData(table, fastsim_data, PolachFactors(float(factors[0]), float(factors[1])))
     if law is None:
         return data
+    return with_own_law(data._replace(source=np.array(law.digest, np.int64)))
+
+
+def with_own_law(data):
+    """`CreepData` with the address of the law of the user's own that it names."""
     example = tuple(map(own.Example, (1.0, 0.0, (1.0,) * 4, 0.0, 0.0, 0.0)))
-    address = own.addressed(_wrapped, law.digest, 0, 0, example, FOUR).address
-    return data._replace(source=np.array(law.digest, np.int64), own=address)
+    kernel = own.addressed(_wrapped, tuple(map(int, data.source)), 0, 0, example, FOUR)
+    return data._replace(own=kernel.address)
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.dynamics.inertia import inertia_axes
 from wrcore.dynamics.joint import MOST_EQUATIONS, NO_TURN, JointState, evaluate_joints, joint_state
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.vector import cross, dot, load, minus, store
@@ -54,18 +55,6 @@ def constraint_workspace(joints):
     )  # fmt: skip
 
 
-@jit(allocates=False, fastmath=FUSED)
-def apply_inverse_inertia(inertia, matrix, wrench, out):
-    """out = J^-1 n for the moment part of a wrench (6,), J = A diag(inertia) A^T."""
-    for i in range(3):
-        out[i] = 0.0
-    for k in range(3):
-        local = matrix[0, k] * wrench[3] + matrix[1, k] * wrench[4] + matrix[2, k] * wrench[5]
-        local /= inertia[k]
-        for i in range(3):
-            out[i] += matrix[i, k] * local
-
-
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def add_reactions(model, t, state, work):
     """Solve Eq. (8) for the multipliers and add the joint reactions -D^T lambda to the wrenches, which hold all other
@@ -73,7 +62,7 @@ def add_reactions(model, t, state, work):
     joints, scratch = model.joints, work.constraints
     values, accelerations, right = scratch.joints, scratch.accelerations, scratch.multipliers
     evaluate_joints(joints, t, model.speed, state, work.rotations, values)
-    invert_masses(model.bodies, joints, work.rotations, scratch)
+    invert_masses(model.bodies, joints, inertia_axes(model.bodies, work), scratch)
     apply_inverse_masses(joints, scratch, work.wrenches)
     damping, stiffness = 2.0 * model.alpha, model.beta * model.beta
     for p in range(joints.kind.shape[0]):
@@ -89,11 +78,11 @@ def add_reactions(model, t, state, work):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def invert_masses(bodies, joints, rotations, scratch):
-    """M^-1 of the bodies that joints hold."""
+def invert_masses(bodies, joints, axes, scratch):
+    """M^-1 of the bodies that joints hold, from the principal axes of all (n, 3, 3)."""
     for b in joints.order.moving:
         scratch.inverse_mass[b] = 1.0 / bodies.mass[b]
-        a, out = rotations[b], scratch.inverse_inertia[b]
+        a, out = axes[b], scratch.inverse_inertia[b]
         x, y, z = 1.0 / bodies.inertia[b, 0], 1.0 / bodies.inertia[b, 1], 1.0 / bodies.inertia[b, 2]
         for i in range(3):
             for j in range(i + 1):

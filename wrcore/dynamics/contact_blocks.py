@@ -10,7 +10,7 @@ the rail and a turn about the axle change nothing, and differences of velocities
 import math
 
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
-from wrcore.dynamics.constraints import apply_inverse_inertia
+from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
 from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
 from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
@@ -64,7 +64,7 @@ def take_mobility(jacobian, t, state, model, work):
 @jit(allocates=False)
 def _accelerations(t, state, model, work, body, direction, out):
     """Accelerations (6 n,) by one wrench on one body, along its axes, and no other force; ``body`` < 0: none."""
-    bodies, wrenches = model.bodies, work.wrenches
+    bodies, wrenches, axes = model.bodies, work.wrenches, inertia_axes(model.bodies, work)
     wrenches[:] = 0.0
     if body >= 0:
         for i in range(3):
@@ -74,7 +74,7 @@ def _accelerations(t, state, model, work, body, direction, out):
     for b in range(bodies.mass.shape[0]):
         for i in range(3):
             out[6 * b + i] = wrenches[b, i] / bodies.mass[b]
-        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], wrenches[b], out[6 * b + 3 : 6 * b + 6])
+        apply_inverse_inertia(bodies.inertia[b], axes[b], wrenches[b], out[6 * b + 3 : 6 * b + 6])
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -26,6 +26,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.drive import BRAKE, KIND, undriven
 from wrcore.dynamics.flexible_track import track_places
+from wrcore.dynamics.inertia import add_carried_gyroscopic, carrying, inertia_axes
 from wrcore.dynamics.outputs import drive_history
 from wrcore.dynamics.suspension import element_energies, pack_elements
 from wrcore.dynamics.system import Equations, derivatives_at, frictionless, independent_at
@@ -66,6 +67,9 @@ def _fill_powers(times, states, equations, model, work, rate, powers):
         derivatives_at(equations, times[i], states[i], model, work, rate)
         powers[i] = work.flexible_track.power[0]
         for b in range(work.wrenches.shape[0]):
+            if carrying(model.bodies, b):  # what these moments do, kinetic energy has by the turn of the inertia's axes
+                axes, at = inertia_axes(model.bodies, work)[b], STATE_SIZE * b
+                add_carried_gyroscopic(model.bodies.inertia[b], axes, states[i], at, 1.0, work.wrenches[b])
             for k in range(6):
                 powers[i] += work.wrenches[b, k] * states[i, STATE_SIZE * b + VELOCITY + k]
         for j in range(model.bodies.independent.shape[0]):
@@ -81,12 +85,12 @@ def _powers(times, states, model, work):
 
 
 @jit
-def _kinetic_and_gravitational(model, rotations, state):
-    """Kinetic and gravitational energy of all bodies, J, and the rate of the latter, W."""
+def _kinetic_and_gravitational(model, axes, state):
+    """Kinetic and gravitational energy of all bodies, J, and the rate of the latter, W; ``axes``: principal ones."""
     kinetic = height = rise = 0.0
     for b in range(model.bodies.mass.shape[0]):
         at, mass = STATE_SIZE * b, model.bodies.mass[b]
-        local, velocity = rotations[b].T.copy() @ state[at + OMEGA : at + STATE_SIZE], state[at + VELOCITY : at + OMEGA]
+        local, velocity = axes[b].T.copy() @ state[at + OMEGA : at + STATE_SIZE], state[at + VELOCITY : at + OMEGA]
         kinetic += 0.5 * mass * np.sum(velocity**2) + 0.5 * np.sum(model.bodies.inertia[b] * local**2)
         height, rise = height + mass * state[at + 2], rise + mass * state[at + VELOCITY + 2]
     for j in range(model.bodies.independent.shape[0]):
@@ -120,7 +124,7 @@ def _energies(times, states, evaluation, work):
     equations, model, work_handle = evaluation
     for i in range(times.shape[0]):
         derivatives_at(equations, times[i], states[i], model, work_handle, rate)
-        kinetic, height, rise = _kinetic_and_gravitational(model, work.rotations, states[i])
+        kinetic, height, rise = _kinetic_and_gravitational(model, inertia_axes(model.bodies, work), states[i])
         stored, stretching, damped, driven = element_energies(
             model.elements, model.track, times[i], model.speed, states[i], work.rotations, work.turns, rate
         )

@@ -16,10 +16,18 @@ from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
-from wrcore.dynamics.constraints import ConstraintWork, add_reactions, apply_inverse_inertia, constraint_workspace
+from wrcore.dynamics.constraints import ConstraintWork, add_reactions, constraint_workspace
 from wrcore.dynamics.control import Controls, ControlWork, control_work, no_controls, with_controls
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
+from wrcore.dynamics.inertia import (
+    add_carried_gyroscopic,
+    apply_inverse_inertia,
+    carrying,
+    inertia_axes,
+    subtract_gyroscopic,
+    turn_to_principal,
+)
 from wrcore.dynamics.joint import Joints
 from wrcore.dynamics.modes import FRESH, WRENCHES_HELD
 from wrcore.dynamics.motion import MOTION
@@ -39,12 +47,15 @@ class Bodies(NamedTuple):
     """Rigid bodies, for kernels."""
 
     mass: np.ndarray  # (n,), kg
-    inertia: np.ndarray  # (n, 3): principal moments about the body's x, y, z axes, kg m^2
+    inertia: np.ndarray  # (n, 3): principal moments, kg m^2, about the body's x, y, z axes unless ``axes`` are given
     spins: np.ndarray  # (n,) int: 1 for a body of revolution about its y axis whose frame does not spin along
     wheelsets: np.ndarray  # (k,) int: bodies with wheels
     independent: np.ndarray = np.zeros((0, 2), np.int64)
     """(j, 2) int: wheelsets (by their number) whose wheels turn independently of each other, and the place of half the
     difference of their rolling rates, left less right (rad/s), among the internal states."""
+    axes: np.ndarray = np.zeros((0, 3, 3))
+    """(n, 3, 3): principal axes in the body's own as columns; of wheelsets in level axes, see
+    `wrcore.dynamics.inertia`. Empty where all bodies' own axes are principal and all wheelsets bodies of revolution."""
 
 
 class Model(NamedTuple):
@@ -94,6 +105,7 @@ class Workspace(NamedTuple):
     strips: StripWork
     flexible_track: FlexibleTrackWork
     control: ControlWork
+    principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
 
 
 def state_size(model):
@@ -116,22 +128,8 @@ def workspace(model):
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
+        np.zeros(model.bodies.axes.shape),
     )  # fmt: skip
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _subtract_gyroscopic(inertia, matrix, state, at, wrench):
-    """Subtract w x J w from the moment part of a wrench (6,)."""
-    wx, wy, wz = load(state, at + OMEGA)
-    hx = hy = hz = 0.0
-    for k in range(3):
-        h = inertia[k] * (matrix[0, k] * wx + matrix[1, k] * wy + matrix[2, k] * wz)
-        hx += matrix[0, k] * h
-        hy += matrix[1, k] * h
-        hz += matrix[2, k] * h
-    wrench[3] -= wy * hz - wz * hy
-    wrench[4] -= wz * hx - wx * hz
-    wrench[5] -= wx * hy - wy * hx
 
 
 @jit(inline="always")
@@ -234,8 +232,14 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
     element_forces(model.elements, model.track, t, model.speed, state, work.rotations, work.turns, work.wrenches, rate)
     if model.torques != 0:
         call_address(model.torques, model, t, state, work, rate)
+    if bodies.axes.shape[0] > 0:
+        turn_to_principal(bodies, work.rotations, work.principal)
+    axes = inertia_axes(bodies, work)
     for b in range(n):
-        _subtract_gyroscopic(bodies.inertia[b], work.rotations[b], state, STATE_SIZE * b, work.wrenches[b])
+        if carrying(bodies, b):
+            add_carried_gyroscopic(bodies.inertia[b], axes[b], state, STATE_SIZE * b, -1.0, work.wrenches[b])
+        else:
+            subtract_gyroscopic(bodies.inertia[b], axes[b], state, STATE_SIZE * b, work.wrenches[b])
     if model.joints.equations > 0:
         call_address(model.reactions, model, t, state, work)
     for b in range(n):
@@ -244,7 +248,7 @@ def fill_derivatives(t, state, model, work, rate, mode=FRESH):
         for i in range(3):
             rate[at + i] = state[at + VELOCITY + i]
             rate[at + VELOCITY + i] = work.wrenches[b, i] / bodies.mass[b]
-        apply_inverse_inertia(bodies.inertia[b], work.rotations[b], work.wrenches[b], rate[at + OMEGA :])
+        apply_inverse_inertia(bodies.inertia[b], axes[b], work.wrenches[b], rate[at + OMEGA :])
 
 
 @jit(allocates=False, forceinline=True)

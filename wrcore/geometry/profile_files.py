@@ -36,6 +36,8 @@ _KEYS = {
 }  # fmt: skip
 _SEPARATED = "; decimal commas are read beside semicolons and tabs only"
 _INSTEAD = {"tape_circle": ("shift", "flange_back")}
+_FACE, _BACK = 2e-3, 5e-3
+"""Points this near to a wheel's innermost one are its flange back, m, if they rise so far above the flange's tip, m."""
 _REASONS = "side faces, too deep, stepping back, equal, not within"
 _HEADED = "; a header above them is u_m,f_m or u_mm,f_mm: u to the field side, f up"
 _UNSUPPORTED = ("rotate", "point.dist.min", "approx.smooth")
@@ -55,7 +57,7 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     path = Path(spec["points"])
     u, f, lines, stated = _read(path, _text(path), spec, kind)
     inside = _within(path, spec, u)
-    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside])
+    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside], path)
     turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
     curve = ProfileCurve.from_points(
         u, f, kind, str(path), lines=lines[inside], trim=stated.trimmed, inclination=turn,
@@ -66,6 +68,7 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     if left_out.size or assumed or stated.odd:
         kept = f"{left_out.size} of " * bool(left_out.size) + count + " left out" * bool(left_out.size)
         guess = "".join(f", {key} assumed" for key in assumed)
+        guess += ", no flange back among the points" * ("tape_circle" in assumed and not _shows_back(u, f))
         warn(f"{path}: {kept}{guess} ('wrcore profiles' shows it)")
     told += f", {count}" + (f", left out ({_REASONS}): lines {_ranges(left_out)}" if left_out.size else "")
     return replace(curve, source=f"{curve.source}: {told}")
@@ -111,7 +114,12 @@ def _within(path, spec, u):
     return inside
 
 
-def _placed(spec, kind, stated, u, f):
+def _shows_back(u, f):
+    """Whether a wheel's innermost points, in the package's directions, go up again behind the flange's tip."""
+    return bool(u.size) and bool(f[u < u.min() + _FACE].max() > f.min() + _BACK)
+
+
+def _placed(spec, kind, stated, u, f, path):
     """Points in the package's directions, and from its origin; what was done to them, and which keys were assumed."""
     seen = stated.mirrored is None
     mirrored, downwards = profile_meters.seen(kind, u, f) if seen else (stated.mirrored, stated.downwards)
@@ -124,6 +132,11 @@ def _placed(spec, kind, stated, u, f):
     f = -f if given["downwards"] else f
     told += [key + " (assumed)" * (key in assumed) for key in ("mirrored", "downwards") if given[key]]
     if "flange_back" in spec:
+        if not _shows_back(u, f):
+            expected = (
+                f"expected points up to the flange back, got none that lie {1e3 * _BACK:g} mm above the flange's tip"
+            )
+            raise InputError(path, "flange_back", f"{expected} behind it: tape_circle or shift says where u = 0 is")
         u = u - u.min(initial=np.inf) - spec["flange_back"]
         told += [f"flange back (innermost point) at {-1e3 * spec['flange_back']:g} mm"]
     elif "shift" in spec:

@@ -206,8 +206,8 @@ def _others(values, shapes):
 
 
 class Incline(NamedTuple):
-    """Height along gradients that vertical curves join: dz/ds is a broken line (a vertical curve is a parabola) whose
-    corners are rounded over +-half."""
+    """Height along gradients that vertical curves join: dz/ds is a broken line (a vertical curve is a parabola, or a
+    circle in short chords) whose corners are rounded over +-half."""
 
     slope: Broken
     half: float
@@ -231,16 +231,28 @@ class Incline(NamedTuple):
         return found
 
 
-def incline(lengths, gradients, radii, half):
+LARGEST_CHORD = 1e-3
+"""Change of incline, rad, over which dz/ds of a circular vertical curve is straight: its curvature is off by half of
+this times the slope."""
+
+
+def incline(lengths, gradients, radii, half, circles=()):
     """Incline along n gradients (rise over horizontal distance), each over its arc length in ``lengths`` (m; the first
-    begins at 0, the last has no end), with vertical curves of ``radii`` (m) half to either side of a change; ``half``:
-    half the rounding length, m."""
-    slopes = np.sin(np.arctan(np.asarray(gradients, float)))
-    reach = 0.5 * np.asarray(radii, float)[1:] * np.abs(np.diff(slopes))
-    changes = np.cumsum(np.asarray(lengths, float)[:-1])
-    real = reach > 0.0
-    knots = np.stack((changes - reach, changes + reach), axis=-1)[real].ravel()
-    values = np.stack((slopes[:-1], slopes[1:]), axis=-1)[real].ravel()
-    if not knots.size:
-        knots, values = np.array([0.0, 1.0]), np.full(2, slopes[0])
-    return Incline(Broken(knots, values), half)
+    begins at 0, the last has no end), with vertical curves of ``radii`` (m) half to either side of a change;
+    ``half``: half the rounding length, m; ``circles`` (n,): where they are circles, not parabolas. Beside it the ends
+    of the vertical curves, (k, 2)."""
+    angles = np.arctan(np.asarray(gradients, float))
+    slopes, changes = np.sin(angles), np.cumsum(np.asarray(lengths, float)[:-1])
+    knots, values, ends = [], [], []
+    for i, (at, radius) in enumerate(zip(changes, radii[1:], strict=True)):
+        circular = bool(len(circles)) and circles[i + 1]
+        turn = angles[i + 1] - angles[i] if circular else slopes[i + 1] - slopes[i]
+        if turn == 0.0:
+            continue
+        count = math.ceil(abs(turn) / LARGEST_CHORD) if circular else 1
+        u = np.linspace(0.0, 1.0, count + 1)[1:-1]
+        ends.append((at - 0.5 * radius * abs(turn), at + 0.5 * radius * abs(turn)))
+        knots += [ends[-1][0], *(at + (u - 0.5) * radius * abs(turn)), ends[-1][1]]
+        values += [slopes[i], *np.sin(angles[i] + u * turn), slopes[i + 1]]
+    line = Broken(np.array(knots), np.array(values)) if knots else Broken(np.array([0.0, 1.0]), np.full(2, slopes[0]))
+    return Incline(line, half), np.array(ends).reshape(-1, 2)

@@ -172,9 +172,12 @@ def _incline(gradients, rounding, source):
                 expected = f"expected a {key} in m in all but the {place} gradient, and none there"
                 raise InputError(source, f"track.gradients.{i}.{key}", expected)
     lengths, radii = ([item.get(key, 0.0) for item in gradients] for key in ("length", "radius"))
-    climb = incline(lengths, [item["gradient"] for item in gradients], radii, 0.5 * rounding)
-    overlap = np.flatnonzero(np.diff(climb.slope.knots)[1::2] < 0.0)
-    if overlap.size:
+    if "vertical_curve" in gradients[0]:
+        expected = "expected no such key in the first gradient, at whose beginning there is no vertical curve"
+        raise InputError(source, "track.gradients.0.vertical_curve", expected)
+    circles = [item.get("vertical_curve") == "circle" for item in gradients]
+    climb, ends = incline(lengths, [item["gradient"] for item in gradients], radii, 0.5 * rounding, circles)
+    if np.any(ends[1:, 0] < ends[:-1, 1]):
         expected = "expected a length that holds half of the vertical curve at either end"
         raise InputError(source, "track.gradients", f"{expected}, got overlapping vertical curves")
     return climb

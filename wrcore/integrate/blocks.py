@@ -343,8 +343,8 @@ def solve_stage(jacobian, system, sigma, increment):
                 to[i] += inverse[0, i, k] * increment[at + k]
                 to[3 + i] += inverse[1, i, k] * turn
     for node in range(n, right.shape[0]):
-        for k in range(pattern.width[node]):
-            right[node, k] = unknowns[pattern.first[node] + k]
+        for k in range(6):  # beyond its width, too, where a stage that was not finite may have left its marks
+            right[node, k] = unknowns[pattern.first[node] + k] if k < pattern.width[node] else 0.0
     for q in range(pattern.pairs.shape[0]):
         i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
         if j < n and i < n:

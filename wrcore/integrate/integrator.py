@@ -31,6 +31,7 @@ from wrcore.dynamics.system import Equations, state_size
 from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, SOLVED
 from wrcore.errors import InputError
 from wrcore.integrate import engine
+from wrcore.integrate.blame import blame
 from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
@@ -179,7 +180,11 @@ class Integration:
 
     def ending(self, outcome, given_up=""):
         """Status and reason of an outcome, or why the run was given up."""
-        return _ending(outcome, given_up, self.model, self.memory, self.equations.work)
+        status, reason = _ending(outcome, given_up, self.model, self.memory, self.equations.work)
+        if status == "failed":
+            clock = self.memory.clock
+            reason += blame(self.model, clock[engine.T], self.memory.state, self.memory.rate, clock[engine.NEXT])
+        return status, reason
 
     def trajectory(self, record, outcome, given_up, before, wall):
         """`Trajectory` over a record; counters count from ``before``, ``wall`` in s."""

@@ -11,8 +11,10 @@ import hashlib
 import importlib
 import importlib.util
 import inspect
+import math
 import sys
 from collections.abc import Callable
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -23,7 +25,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.kernels.cache import warn
-from wrcore.kernels.handles import Kernel
+from wrcore.kernels.handles import Kernel, call_c
 from wrcore.kernels.jit import FUSED
 
 NOTHING = numba.types.none
@@ -37,6 +39,9 @@ MOST_SAMPLES = 400_000
 
 _KNOWN: dict[tuple[int, ...], Callable] = {}
 _TEXTS: dict[ModuleType, str] = {}
+_WATCHED = ContextVar("watched", default=False)
+_NOT_FINITE: dict[tuple[int, ...], None] = {}
+_NOTES: list[Any] = []  # what compiled code calls, kept alive
 
 
 class Own(NamedTuple):
@@ -211,19 +216,56 @@ def on_grid(spec, rows, folder, source, field, begin=0.0):
         raise InputError(source, f"{field}.law", error.expected) from None
 
 
+def name_of(digest):
+    """File and name of the function with a digest."""
+    plain = getattr(_KNOWN[tuple(map(int, digest))], "py_func", _KNOWN[tuple(map(int, digest))])
+    code = getattr(plain, "__code__", None)
+    return f"{Path(code.co_filename).name}:{plain.__name__}" if code else str(plain)
+
+
+def not_finite_in(evaluate):
+    """Names of the functions that give numbers that are not finite for finite ones while ``evaluate`` is called, which
+    asks for their addresses (`addressed`) anew."""
+    _NOT_FINITE.clear()
+    token = _WATCHED.set(True)
+    try:
+        evaluate()
+    finally:
+        _WATCHED.reset(token)
+    return [name_of(digest) for digest in _NOT_FINITE]
+
+
+def _note_of(digest, watched):
+    """Kernel that takes note where a function makes of ``given`` that is finite what is not; where nobody watches, one
+    that does nothing."""
+    if not watched:
+        return uncached(lambda given, found: None)
+    back = ctypes.CFUNCTYPE(None, ctypes.c_int64)(lambda _: _NOT_FINITE.update({digest: None}))
+    address = ctypes.cast(back, ctypes.c_void_p).value
+    _NOTES.append(back)
+
+    def note(given, found):
+        if math.isfinite(given) and not math.isfinite(found):
+            call_c(address, 0)
+
+    return uncached(note)
+
+
 def addressed(wrap, digest, scalars, arrays, examples, returns):
-    """The `Kernel` that ``wrap`` makes of the function with a digest, for ``examples`` (`Example`); plain Python is
-    called back with so many ``scalars``, then ``arrays``."""
-    return _kernel(wrap, _KNOWN[digest], scalars, arrays, examples, returns)
+    """The `Kernel` that ``wrap`` makes of the function with a digest and of what takes note of its results, for
+    ``examples`` (`Example`); plain Python is called back with so many ``scalars``, then ``arrays``."""
+    return _addressed(wrap, digest, _KNOWN[digest], scalars, arrays, examples, returns, _WATCHED.get())
 
 
 @cache
-def _kernel(wrap, function, scalars, arrays, examples, returns):
+def _addressed(wrap, digest, function, scalars, arrays, examples, returns, watched):
     if not hasattr(function, "py_func"):
         function = _called_back(function, scalars, arrays)
     if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller
         function.compile(signature_of(scalars, arrays))
-    return Kernel(uncached(wrap(function)), *(example.value for example in examples), returns=returns)
+    return Kernel(
+        uncached(wrap(function, _note_of(digest, watched))), *(example.value for example in examples), returns=returns
+    )
 
 
 def signature_of(scalars, arrays):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, one_of
 from wrcore.run.run import Run
 
 COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": operator.gt}
@@ -21,6 +21,13 @@ def on_grid(t: float, dt: float) -> float:
     rate = whole if whole and abs(rate - whole) <= 1e-9 * whole else rate
     near = round(t * rate) / rate
     return near if abs(near - t) <= 1e-9 * dt else t
+
+
+class Named(dict[str, float]):
+    """Channels by name, for functions of a user's own."""
+
+    def __missing__(self, name: str) -> float:
+        raise InputError("session", "end", one_of(self, name))
 
 
 def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]], bool]]:

@@ -23,7 +23,7 @@ from wrcore.errors.checked_calls import Within, checked
 from wrcore.integrate import engine
 from wrcore.integrate.integrator import CHUNK, REFERENCES, STALL_STEP, Headway, Integration, decided
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
-from wrcore.run.asked import condition_of, on_grid, value_of
+from wrcore.run.asked import Named, condition_of, on_grid, value_of
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.inputs import Input, inputs_of, with_own_arrays
 from wrcore.run.run import Run
@@ -275,12 +275,16 @@ class Session:
         ------
         InputError
             For a text that is no condition, a channel that there is not, or if the session has ended before.
+
+        Notes
+        -----
+        A function is called several times where its condition begins to hold: it should depend on nothing else.
         """
         if not isinstance(end, str) and not callable(end):
             while self.time < end and self.status == "running":
                 self._reach(min(on_grid(self.time + dt, dt), float(end)))
             return self.time >= end
-        names, holds = condition_of(end) if isinstance(end, str) else ((), end)
+        names, holds = condition_of(end) if isinstance(end, str) else ((), lambda values: end(Named(values)))
         while not holds(self.channels(*names)):
             if self.time >= latest or self.status != "running":
                 return False

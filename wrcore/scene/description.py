@@ -174,7 +174,8 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
-        raise InputError(source, "track.path", "expected 'tangent': this vehicle has joints to the moving frame")
+        expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
+        raise InputError(source, "track.path", expected)
     check_bodies(data["initial"]["bodies"], vehicle, source)
     read_friction(data["contact"]["friction"], source, folder)
     read_controls(data, vehicle, folder, source)
@@ -225,13 +226,20 @@ def _plain(value):
 
 
 def _set(data, key, value, source):
-    """Set the value at a path of keys."""
+    """Set the value at a path of keys; a number means one of a list."""
     *path, last = key.split(".")
     for part in path:
-        data = data.setdefault(part, {})
-        if not isinstance(data, dict):
+        data = data[_place(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
+        if not isinstance(data, dict | list):
             raise InputError(source, key, f"expected a key below a mapping, but {part!r} holds a value")
-    data[last] = value
+    data[_place(data, last, key, source) if isinstance(data, list) else last] = value
+
+
+def _place(items, part, key, source):
+    """The place in a list that a part of a key path says."""
+    if not part.isdecimal() or int(part) >= len(items):
+        raise InputError(source, key, f"expected the number of one of {len(items)} in the list, from 0, got {part!r}")
+    return int(part)
 
 
 def _check_creep(contact, source, folder):

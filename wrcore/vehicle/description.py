@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrcore.dynamics.inertia import principal, tensor_of
 from wrcore.dynamics.joint import Joint, Joints, build_joints
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.suspension import PRELOAD, Elements
@@ -135,11 +136,8 @@ def compile_vehicle(data, source):
     compiled = _joints(joints, layout, source)
     elements, directed = compile_elements(data["elements"], layout, joints, GRAVITY)
     independent = np.stack((np.array(apart, np.int64), elements.states + np.arange(len(apart))), axis=-1)
-    bodies = Bodies(
-        layout.mass,
-        np.array([[part["inertia"][k] for k in ("roll", "pitch", "yaw")] for part in parts], float),
-        layout.spins.astype(np.int64), wheelsets, independent,
-    )  # fmt: skip
+    moments, axes = principal([tensor_of(part["inertia"]) for part in parts], layout.spins)
+    bodies = Bodies(layout.mass, moments, layout.spins.astype(np.int64), wheelsets, independent, axes)
     return Vehicle(
         data["name"], source, layout.names, layout.positions, float(first.get("rolling_radius", np.nan)),
         float(first.get("tape_circle_half_distance", np.nan)), bodies,
@@ -170,7 +168,8 @@ def _check_names(data, source):
 
 
 def _check_bodies(bodies, source):
-    """Keys of each kind of body, equal wheelsets, and what a frame that does not spin asks of a wheelset."""
+    """Keys of each kind of body, possible moments of inertia, equal wheelsets, and what a frame that does not spin asks
+    of a wheelset."""
     wheelsets = {name: part for name, part in bodies.items() if part["kind"] == "wheelset"}
     for name, part in bodies.items():
         needed, optional = BODY_KEYS[part["kind"]]
@@ -180,6 +179,10 @@ def _check_bodies(bodies, source):
         for key in part:
             if key not in ("kind", "mass", "inertia", "position", *needed, *optional):
                 raise InputError(source, f"bodies.{name}.{key}", f"unknown for kind {part['kind']}")
+        least = np.linalg.eigvalsh(tensor_of(part["inertia"]))[0]
+        if least <= 0.0:
+            expected = f"expected products that leave all principal moments above 0, got one of {least:.4g} kg m^2"
+            raise InputError(source, f"bodies.{name}.inertia", expected)
         if part["kind"] == "axle_box" and part["wheelset"] not in wheelsets:
             raise InputError(source, f"bodies.{name}.wheelset", f"expected a wheelset, got {part['wheelset']!r}")
     for name, part in wheelsets.items():
@@ -191,10 +194,10 @@ def _check_bodies(bodies, source):
         if y != 0.0 or abs(z - part["rolling_radius"]) > LARGEST_LIFT:
             expected = f"expected y = 0 and z within {LARGEST_LIFT:g} m of the rolling radius, got {[x, y, z]}"
             raise InputError(source, f"bodies.{name}.position", expected)
-        if part["inertia"]["roll"] != part["inertia"]["yaw"]:
-            raise InputError(
-                source, f"bodies.{name}.inertia", "expected equal roll and yaw moments (body of revolution)"
-            )
+        for key in ("xy", "yz"):
+            if part["inertia"].get(key):
+                expected = "expected no such key in a wheelset: what does not turn with its axle may have xz alone"
+                raise InputError(source, f"bodies.{name}.inertia.{key}", expected)
 
 
 def _lumped(bodies):
@@ -205,9 +208,9 @@ def _lumped(bodies):
             wheelset = bodies[part["wheelset"]]
             wheelset["mass"] += part["mass"]
             across = part["mass"] * (part["position"][1] - wheelset["position"][1]) ** 2
-            along = 0.5 * (part["inertia"]["roll"] + part["inertia"]["yaw"])  # a body of revolution again
             for key in ("roll", "yaw"):
-                wheelset["inertia"][key] += across + along
+                wheelset["inertia"][key] += across + part["inertia"][key]
+            wheelset["inertia"]["xz"] = wheelset["inertia"].get("xz", 0.0) + part["inertia"].get("xz", 0.0)
             part["kind"] = "lumped"
     return bodies
 

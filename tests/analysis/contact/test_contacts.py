@@ -117,6 +117,9 @@ def test_a_batch_is_one_call_and_a_second_call_makes_nothing_anew(pair, monkeypa
     ("arguments", "message"),
     [
         ({"y": 0.0}, "contacts: z load: expected either heights or a load"),
+        ({"y": 0.0, "z": 0.46, "load": 5e4}, "contacts: z load: expected either heights or a load, got both"),
+        ({"y": 0.0, "load": 5e4, "omega": 40.0}, "contacts: speed: expected a speed beside omega, vy or yaw_rate"),
+        ({"y": 0.0, "load": 5e4, "vy": [0.0, 0.1]}, "contacts: speed: expected a speed beside omega, vy or yaw_rate"),
         ({"y": [0.0, 1.0], "load": 5e4}, "contacts: y: expected"),
         ({"y": [0.0, np.nan], "load": 5e4}, "contacts: y: expected"),
         ({"y": [0.0, 0.0], "yaw": [0.0, 0.0, 0.0], "load": 5e4}, "expected arrays of one shape"),

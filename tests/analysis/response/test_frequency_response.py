@@ -72,6 +72,17 @@ def test_a_slow_force_finds_the_springs_and_a_fast_one_the_mass():
     assert table.loc[1e-3, ("level", "car_body.z_m")] == pytest.approx(1.0, rel=1e-3)
 
 
+def test_a_fast_moment_finds_the_inverse_of_the_tensor():
+    inertia = {"roll": 56800.0, "pitch": 1970000.0, "yaw": 1970000.0, "xz": 40000.0, "xy": 9000.0}
+    scene = wr.load_scene(TRAILER, {"vehicle.bodies.car_body.inertia": inertia})
+    outputs, frequency = [f"car_body.w{axis}_rad_per_s" for axis in "xyz"], 1000.0
+    table = wr.frequency_response(scene, ["car_body.Mx_Nm", "car_body.Mz_Nm"], outputs, [frequency], speed=20.0)
+    found = 2j * np.pi * frequency * table.to_numpy().reshape(2, 3)
+    tensor = np.array([[56800.0, -9000.0, -40000.0], [-9000.0, 1970000.0, 0.0], [-40000.0, 0.0, 1970000.0]])
+    inverse = np.linalg.inv(tensor)[[0, 2]]
+    np.testing.assert_allclose(found, inverse, atol=1e-3 * np.abs(inverse[:, 2:]).max())
+
+
 def test_axle_distances_filter():
     """Bounce ends where half a wave lies between the bogies' pivots, pitch where a whole one does, but for what bogies
     that pitch hand on along the track."""
@@ -111,6 +122,16 @@ def test_frequencies_come_back_as_they_were_asked_for():
 def test_bad_input_is_named(arguments, says):
     with pytest.raises(InputError, match=says):
         wr.frequency_response(SCENES / "suspended_wheelset.yaml", *arguments)
+
+
+def test_a_vehicle_that_nothing_holds_along_the_track_is_told_so():
+    with pytest.raises(InputError, match="along the track, where nothing holds the vehicle against its rolling resist"):
+        wr.frequency_response(SCENES / "locomotive.yaml", ["level"], ["body.z_m"], [1.0], speed=20.0)
+
+
+def test_control_laws_do_not_count():
+    with pytest.raises(InputError, match="steady motion: speed 15 m/s"):  # not of outputs that go to motors left out
+        wr.frequency_response(SCENES / "guided_car.yaml", ["level"], ["car_body.z_m"], [1.0], speed=15.0)
 
 
 def test_the_command_writes_table_and_plot(tmp_path):

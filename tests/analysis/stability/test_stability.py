@@ -148,6 +148,17 @@ def test_where_a_scene_starts_is_of_no_influence(suspended):
     )
 
 
+def test_small_motions_are_those_on_a_tangent_perfect_track():
+    plain, there = straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml"))
+    elsewhere = [
+        "track.path=[{transition: 20}, {curve: 50, radius: 500, cant: 0.1}]", "track.gradients=[{gradient: 0.02}]",
+        "track.irregularity={spectrum: {level: high, seed: 1, length: 100, begin: -50}}",
+    ]  # fmt: skip
+    model, state = straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml", elsewhere))
+    np.testing.assert_array_equal(state, there)
+    np.testing.assert_array_equal(steady_motion(model, state, 60.0).matrix, steady_motion(plain, there, 60.0).matrix)
+
+
 def test_root_locus_is_a_table_of_modes_over_speed(suspended):
     vehicle, model, state = suspended
     locus = root_locus(vehicle, model, state, [20.0, 60.0])

@@ -97,6 +97,10 @@ def contacts(
     """
     if z is None and load is None:
         raise InputError("contacts", "z load", "expected either heights or a load")
+    if z is not None and load is not None:
+        raise InputError("contacts", "z load", "expected either heights or a load, got both")
+    if speed is None and (omega is not None or np.any(vy) or np.any(yaw_rate)):
+        raise InputError("contacts", "speed", "expected a speed beside omega, vy or yaw_rate")
     given = {"y": y, "z": z, "roll": roll, "yaw": yaw, "load": load, "speed": speed, "omega": omega, "vy": vy}
     given |= {"yaw_rate": yaw_rate, "mu": mu}
     whole = same_shape("contacts", **{key: np.nan if value is None else value for key, value in given.items()})

@@ -45,7 +45,7 @@ def quasi_static_curving(
     Parameters
     ----------
     scene : Scene, path or dict
-        Its path, gradients, irregularity and drive do not count. Friction is the scene's.
+        Its path, gradients, irregularity, drive and control do not count. Friction is the scene's.
     radii : array_like, shape (n,)
         m, positive to the left, 20 m or more.
     cant : float
@@ -169,7 +169,7 @@ def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m"
     Parameters
     ----------
     scene : Scene, path or dict
-        Its path, irregularity and drive do not count.
+        Its path, irregularity, drive and control do not count.
     cant : float
         Over 1.5 m, m; of influence where suspensions are not linear (bump stops).
 

@@ -21,6 +21,7 @@ from wrcore.analysis.stability.stability import growth, rising, steady_motion
 from wrcore.balance.linear import Linearisation, accelerations, moved_states
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.inertia import inertia_tensors
 from wrcore.dynamics.system import Model, internal_states
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError, one_of
@@ -57,7 +58,7 @@ def frequency_response(
     Parameters
     ----------
     scene : Scene, path or dict
-        Path, irregularity and drive of it do not count; flexible track does.
+        Path, irregularity, drive and control of it do not count; flexible track does.
     inputs : sequence of str
         Irregularity: ``alignment`` or ``level`` (lateral or vertical, both rails alike), ``cross_level`` (left less
         right height), ``gauge`` (its change), or one rail's ``left_lateral``, ``left_vertical``, ``right_lateral``,
@@ -118,9 +119,10 @@ def frequency_response(
 
 
 def observable(scene: Scene) -> Scene:
-    """The scene without its drive, with all channels that outputs may follow from."""
+    """The scene without its drive and control, with all channels that outputs may follow from."""
     data = copy.deepcopy(scene.data)
     data.pop("drive", None)
+    data.pop("control", None)
     data["output"]["channels"] = ["pose", "velocity", "contact"]
     return dataclasses.replace(scene, data=data)
 
@@ -178,9 +180,11 @@ class _Systems:
     def _of_force(self, place):
         """B (m,) of a unit force on a coordinate: what the joints leave of it, (N^T M N)^-1 N^T."""
         bodies, free, at = self.model.bodies, self.free, self.motion.places
-        mass = np.concatenate([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia], axis=1).ravel()
+        mass = np.diag(np.repeat(bodies.mass, 6))
+        for b, tensor in enumerate(inertia_tensors(bodies)):
+            mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = tensor
         out = np.zeros(len(self.motion.matrix))
-        out[at : at + free.shape[1]] = np.linalg.solve(free.T @ (mass[:, None] * free), free[place])
+        out[at : at + free.shape[1]] = np.linalg.solve(free.T @ mass @ free, free[place])
         return out
 
     def _of_irregularity(self, weights, omega):

@@ -188,7 +188,8 @@ def limit_cycles(
     Parameters
     ----------
     scene : Scene, path or dict
-        On a tangent, perfect track; where the vehicle starts is of no influence.
+        Runs are on a tangent, perfect track, whatever it says of path, gradients and irregularity; neither its drive
+        and control nor where the vehicle starts count.
     speeds : sequence of float
         Rising, m/s.
     settling : Settling, optional
@@ -243,7 +244,8 @@ def speed_ramp(
     Parameters
     ----------
     scene : Scene, path or dict
-        On a tangent, perfect track; where the vehicle starts is of no influence.
+        Runs are on a tangent, perfect track, whatever it says of path, gradients and irregularity; neither its drive
+        and control nor where the vehicle starts count.
     start, end : float
         Speeds between which the vehicle slows down, m/s.
     rate : float

@@ -30,6 +30,7 @@ import pandas as pd
 from wrcore.balance.linear import DIRECTIONS
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.flexible_track import RAILS, rigid_track, track_size
+from wrcore.dynamics.inertia import inertia_tensors
 
 NEUTRAL = 1e-3  # eigenvalues of smaller modulus are neutral, 1/s: such a motion takes a quarter of an hour to change
 OVERDAMPED = 0.95  # damping ratio above which a mode hardly oscillates
@@ -70,7 +71,8 @@ class _Namer:
         bodies = vehicle.bodies
         n = len(bodies.mass)
         self.speed, self.along = linearisation.speed, linearisation.state[: STATE_SIZE * n : STATE_SIZE]
-        self.mass = np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), bodies.inertia])
+        moments = np.diagonal(inertia_tensors(bodies), axis1=1, axis2=2)
+        self.mass = np.hstack([np.repeat(bodies.mass[:, None], 3, axis=1), moments])
         self.wheelsets = bodies.wheelsets
         groups = families(vehicle)
         weight = {name: np.max(bodies.mass[members]) for name, members in groups.items()}

@@ -13,8 +13,11 @@ from wrcore.analysis.stability.modes import NEUTRAL, energy_table, linear_modes,
 from wrcore.balance.linear import steady_running
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.drive import undriven
+from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import checked
+from wrcore.geometry.irregularity import no_irregularity
+from wrcore.geometry.path import tangent_path
 from wrcore.scene.description import Scene, Source, as_scene, compile_scene, static_equilibrium
 
 LARGEST_REST = 1e-3
@@ -31,11 +34,12 @@ def rising(speeds):
 
 
 def straight_ahead(scene):
-    """Model of a scene, without motors, brakes and controller (they have no steady state), and the state in which its
-    vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
+    """Model of a scene on a tangent, perfect track, without motors, brakes and controller (they have no steady state),
+    and the state in which its vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
     """
     model, _ = compile_scene(scene)
-    return undriven(model), static_equilibrium(scene, model).state
+    model = undriven(model)._replace(track=TrackModel(True, tangent_path(), no_irregularity()))
+    return model, static_equilibrium(scene, model).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):
@@ -57,10 +61,19 @@ def steady_motion(model, state, speed):
     the model's speed; InputError if there is none.
     """
     motion = steady_running(*at_speed(model, state, speed))
-    if not np.max(np.abs(motion.residual)) < LARGEST_REST:
+    left = np.abs(motion.residual)
+    if not np.max(left) < LARGEST_REST:
+        bodies = len(model.bodies.mass)
+        whole, inner = np.split(np.abs(motion.basis @ motion.residual)[6 * bodies :], [6 * bodies])
+        whole = whole.reshape(bodies, 6)
+        whole[:, 0], whole[model.bodies.spins == 1, 4] = 0.0, 0.0  # along the track, and the spin that belongs to it
+        held = "" if max(np.max(whole), np.max(inner, initial=0.0)) >= LARGEST_REST else (
+            ", along the track, where nothing holds the vehicle against its rolling resistance: an element or joint"
+            " between a body and the frame would"
+        )  # fmt: skip
         raise InputError(
             "steady motion", f"speed {speed:g} m/s", "expected a vehicle that can run straight ahead near the given"
-            f" state, but accelerations of {np.max(np.abs(motion.residual)):.2g} m/s^2 are left",
+            f" state, but accelerations of {np.max(left):.2g} m/s^2 are left{held}",
         )  # fmt: skip
     return motion
 
@@ -72,6 +85,7 @@ def modes(scene: Source, speed: float) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     scene : Scene, path or dict
+        Its path, gradients, irregularity, drive and control do not count.
     speed : float
         m/s.
 
@@ -161,7 +175,7 @@ def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], spee
     Parameters
     ----------
     scenes : Scene or path, or dict of str to Scene
-        Several by what they differ in.
+        Several by what they differ in. Paths, gradients, irregularity, drive and control do not count.
     speeds : sequence of float
         Rising, m/s: the critical speed is looked for between them.
 

@@ -18,8 +18,8 @@ TRIED = (0.0, 0.0), (1e-4, 1e-3), (-1e-4, -1e-3)
 """Stretches (m) and speeds (m/s) of the test calls."""
 
 
-def wrapped(function):
-    """The kernel of a function, called as `wrcore.dynamics.suspension` calls it."""
+def wrapped(function, note):
+    """The kernel of a function, whose results ``note`` looks at, called as `wrcore.dynamics.suspension` calls it."""
     returned = function.overloads[own.signature_of(2, 3)].signature.return_type
     alone = not isinstance(returned, BaseTuple)
 
@@ -28,15 +28,23 @@ def wrapped(function):
         parameters = elements.parameters[row[law.FIRST] : row[law.LAST]]
         return function(stretch, speed, state[at:end], parameters, rate[at:end])
 
+    def look(elements, k, stretch, speed, state, rate, at, force):
+        given, found = stretch + speed, force
+        for i in range(at, at + int(elements.directed[k, law.NUMBERS])):
+            given, found = given + state[i], found + rate[i]
+        note(given, found)
+
     def of_force(elements, k, stretch, speed, state, rate, at):
         force = float(call(elements, k, stretch, speed, state, rate, at))
+        look(elements, k, stretch, speed, state, rate, at, force)
         return force, 0.0, 0.0, force * speed
 
     def of_three(elements, k, stretch, speed, state, rate, at):
         force, stored, lost = call(elements, k, stretch, speed, state, rate, at)
+        look(elements, k, stretch, speed, state, rate, at, float(force))
         return float(force), 0.0, float(stored), float(lost)
 
-    call = own.uncached(call)
+    call, look = own.uncached(call), own.uncached(look)
     return of_force if alone else of_three
 
 
