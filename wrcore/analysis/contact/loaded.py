@@ -314,6 +314,10 @@ class LoadedWheels:
                          self._still.reduction, load, self.geometry.rolling_radius)  # fmt: skip
         if math.isnan(z) or (not self._still.strips.strips and rolling is None and vertical):
             return roll if not math.isnan(z) else math.nan, z
+        return self._levelled(roll, z, y, load, yaw, rolling, friction, vertical)
+
+    def _levelled(self, roll, z, y, load, yaw, rolling, friction, vertical):
+        """Roll (rad) and height (m) at which each wheel carries a load, from guesses."""
         before = difference = math.nan
         slope, left, right = ROLL_SLOPE, z, z
         for _ in range(_MOST_ROLLS):

@@ -1,0 +1,66 @@
+"""A loaded wheel on a rail of slices: crossings, switches, joints."""
+
+import math
+
+from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.errors import InputError, one_of
+from wrcore.geometry.track import SIDES
+
+MODELS = ("maximum", "moment", "exact")
+"""Patch models that serve rails which change along the track."""
+
+_SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
+
+
+class LoadedOnSlices(LoadedWheels):
+    """`LoadedWheels` on rails of slices, both alike: of a `WheelOnSlices`; arguments as there.
+
+    ``s`` (m) is the arc length of the wheelset's cross-section. The rail is what a wheel sees of it in its pose
+    (`wrcore.contact.seen_rail`)."""
+
+    def __init__(self, pair, model="exact", **how):
+        if model not in MODELS:
+            raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
+        self.pair, self.s, self._seen = pair, 0.0, {}
+        super().__init__(self._blank(), model, **how)
+
+    def _blank(self):
+        """Geometry of the type that all have, of the first place of the rail with one."""
+        for s in self.pair.rail.s:
+            for side in SIDES:
+                geometry, _ = self.pair.under(side, float(s), 0.0)
+                if geometry is not None:
+                    return geometry
+        raise InputError(self.pair.rail.name, "", "expected a rail below the wheels, got none at y = 0")
+
+    def _lie(self, side, y, roll, yaw):
+        """Lay a wheel on what it sees; returns the height of its first touch, NaN where there is nothing."""
+        pose = (self.s, y, roll, yaw)
+        if self._seen.get(side, (None,))[0] != pose:
+            self._seen[side] = pose, *self.pair.under(side, *pose)
+        _, geometry, touch = self._seen[side]
+        if geometry is not None and geometry is not self.geometry:
+            self.geometry = geometry
+            self._still = self._still._replace(geometry=geometry)
+            self._still_handle.renew(self._still)
+            for handle in self._rolling.values():
+                handle.renew(handle.value._replace(geometry=geometry))
+        return touch
+
+    def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
+        """As for `LoadedWheels`, at ``s``."""
+        if math.isnan(self._lie(side, y, roll, yaw)):
+            return []
+        return super().at_height(side, y, z, roll, yaw, rolling, friction, fields)
+
+    def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
+        """As for `LoadedWheels`, at ``s``."""
+        touch = self._lie(side, y, roll, yaw)
+        if math.isnan(touch):
+            return math.nan
+        return super().height(side, y, load, roll, yaw, rolling, friction, vertical,
+                              touch - _SUNK if math.isnan(guess) else guess)  # fmt: skip
+
+    def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
+        """As for `LoadedWheels`, at ``s``."""
+        return self._levelled(0.0, math.nan, y, load, yaw, rolling, friction, vertical)
