@@ -24,7 +24,6 @@ from wrcore.contact.detection import axle_direction
 from wrcore.contact.geometry import contact_geometry
 from wrcore.contact.patch.surfaces import ContactPlane, wheel_height
 from wrcore.contact.strip import make_pose, strip_point
-from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import SPACING, ProfileCurve, averaged_second_derivative
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
@@ -88,14 +87,6 @@ class WheelOnSlices:
                              averaged_second_derivative(u, f, slope))  # fmt: skip
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
         return geometry._replace(along=np.ascontiguousarray(seen[AHEAD:].T)), touch
-
-    def plain(self):
-        """The `WheelOnRail` that this is where all slices are alike, else None."""
-        if not self.rail.alike:
-            return None
-        heads = self.rail.heads(float(self.rail.s[0]))
-        head = max(heads, key=lambda one: one.f.max())
-        return WheelOnRail(self.wheel, head, self.rolling_radius, self.half_distance, self.rail_distance)
 
     def _stations(self, s):
         """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""

@@ -74,11 +74,14 @@ def cubic_at(nodes, start, step, u):
     return value, slope, (2.0 * c2 + 6.0 * t * c3) * (inverse * inverse)
 
 
+_AS_KERNELS = {"_nrt": False, "error_model": "numpy"}
+
+
 def _with_rail_along(along, start, step, column, ur, factor, value):
     raise NotImplementedError
 
 
-@overload(_with_rail_along, inline="always", jit_options={"_nrt": False, "error_model": "numpy"})
+@overload(_with_rail_along, inline="always", jit_options=_AS_KERNELS)
 def _of_its_type(along, start, step, column, ur, factor, value):
     """Nothing at all for rails that are the same everywhere."""
     if isinstance(along, types.BaseTuple):
@@ -100,21 +103,21 @@ def with_rail_along(geometry, column, ur, factor, value):
     return _with_rail_along(geometry.along, geometry.rail_start, geometry.rail_step, column, ur, factor, value)
 
 
-def _kinds(along, pose):
+def _changes(along):
     raise NotImplementedError
 
 
-@overload(_kinds, inline="always", jit_options={"_nrt": False, "error_model": "numpy"})
-def _kinds_of_its_type(along, pose):
+@overload(_changes, inline="always", jit_options=_AS_KERNELS)
+def _changes_by_type(along):
     if isinstance(along, types.BaseTuple):
-        return lambda along, pose: 2 if pose.ex == 0.0 else 3
-    return lambda along, pose: 3
+        return lambda along: False
+    return lambda along: True
 
 
 @jit(allocates=False, forceinline=True)
-def kinds_of_unknowns(geometry, pose):
-    """Unknowns of a strip: 3 where its middle is one of them."""
-    return _kinds(geometry.along, pose)
+def changes_along(geometry):
+    """Whether the rail changes along the track: known when a kernel is compiled."""
+    return _changes(geometry.along)
 
 
 @jit(allocates=False, forceinline=True)

@@ -200,7 +200,9 @@ def _assembled(path, heads, told=""):
     profiles = len({row[2] for _, rows in heads for row in rows})
     source = f"{stations.size} slices from s = {stations[0]:g} to {stations[-1]:g} m, {profiles} profiles, "
     source += f"{len(sheets)} parts" + f", {told}" * bool(told)
-    rail = RailSlices(str(path), stations, tuple(sheets), source, alike)
+    _, _, name, how, _ = heads[0][1][0]
+    first = {"points": str(path.parent / name), **how}
+    rail = RailSlices(str(path), stations, tuple(sheets), source, alike, first)
     ends = ", ".join(f"{end:g}" for end in rail.begins())
     return replace(rail, source=f"{source}, parts begin or end at s = {ends} m") if ends else rail
 

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.geometry.profile import SPACING, STEEPEST, ProfileCurve, averaged_second_derivative
+from wrcore.geometry.profile import GAUGE_DEPTH, SPACING, STEEPEST, ProfileCurve, averaged_second_derivative
 from wrcore.kernels.jit import jit
 
 PATH_STEP = 5e-4
-"""Greatest distance of the paths across a part, in the slice where it is widest, m."""
+"""Greatest distance of the paths across a part, in the slice where it is widest, m: as in CONTACT. A section is the
+cubic spline through them, which evens out what is shorter."""
 
 NARROWEST = 2e-3
 """A head is at least so wide, m."""
@@ -75,11 +76,28 @@ class RailSlices:
     source: str = ""
     alike: bool = False
     """Whether all slices are the same."""
+    first: object = None
+    """How `read_profile` reads the first slice's profile (dict)."""
 
     def moved(self, du, df):
         """The rail moved by ``du`` to the field side and ``df`` up, m."""
         shift = np.array([du, df, 0.0, 0.0])[:, None]
         return replace(self, sheets=tuple(_moved(sheet, shift) for sheet in self.sheets))
+
+    def placed(self, depth=GAUGE_DEPTH):
+        """The rail moved so that the first slice's highest point is its origin, and the distance (m, positive) from
+        there to its innermost point within ``depth`` (m) of it on the same head."""
+        points = [sheet.at(self.s[0])[0] for sheet in self.sheets if sheet.first <= self.s[0]]
+        u, f = (np.concatenate([p[row] for p in points]) for row in (U, F))
+        top = int(np.argmax(f))
+        low = np.flatnonzero(f[:top] < f[top] - depth)
+        if not low.size:
+            expected = f"expected a first slice down to {depth:g} m below its top on the gauge side (or the distance)"
+            raise InputError(self.name, "gauge", expected)
+        k = low[-1]
+        crossing = u[k] + (u[k + 1] - u[k]) * (f[top] - depth - f[k]) / (f[k + 1] - f[k])
+        inner = min(u[k + 1 : top + 1].min(), crossing)
+        return self.moved(-u[top], -f[top]), float(u[top] - inner)
 
     def begins(self):
         """Arc lengths at which a part begins or ends, m, sorted."""
@@ -111,7 +129,9 @@ class RailSlices:
                 if part.size * spacing > NARROWEST:
                     name, at = f"{self.name}, head {len(heads) + 1} at s = {s:g} m", u[part]
                     second = averaged_second_derivative(at, f[part], slope[part])
-                    heads.append(ProfileCurve(name, "rail", at, f[part].copy(), slope[part].copy(), second, self.source))
+                    heads.append(
+                        ProfileCurve(name, "rail", at, f[part].copy(), slope[part].copy(), second, self.source)
+                    )
         return heads
 
 
@@ -153,7 +173,7 @@ def _sheet(s, slices, ends, run, count):
         low, high = ends[k]
         at = low + (high - low) * share
         points[k, :2] = one.curve(at).T
-        points[k, 2:] = CubicSpline(np.arange(count + 1), points[k, :2].T)(np.arange(count + 1), 1).T if count > 2 else (high - low) / count * one.curve(at, 1).T
+        points[k, 2:] = CubicSpline(share, points[k, :2].T)(share, 1).T / count
     first = -np.inf if run[0] == 0 else s[run[0]]
     last = np.inf if run[-1] == s.size - 1 else s[run[-1]]
     spline = CubicSpline(s[run], points) if run.size > 1 else None

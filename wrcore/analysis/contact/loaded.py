@@ -186,7 +186,7 @@ class LoadedWheels:
         count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
-            last, before = group_end(overlaps, count, first), self._counters[ON_GRID]
+            last, before = group_end(self.geometry, overlaps, count, first), self._counters[ON_GRID]
             work.spare[0] = 0.0
             found = UNKNOWN
             if contact.value.strips.looked_up:

@@ -9,6 +9,9 @@ from wrcore.geometry.track import SIDES
 MODELS = ("maximum", "moment", "exact")
 """Patch models that serve rails which change along the track."""
 
+FINER = 2
+"""Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them."""
+
 _SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
 
 
@@ -18,11 +21,14 @@ class LoadedOnSlices(LoadedWheels):
     ``s`` (m) is the arc length of the wheelset's cross-section. The rail is what a wheel sees of it in its pose
     (`wrcore.contact.seen_rail`)."""
 
-    def __init__(self, pair, model="exact", **how):
+    def __init__(self, pair, model="exact", *how, **more):
         if model not in MODELS:
             raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
         self.pair, self.s, self._seen = pair, 0.0, {}
-        super().__init__(self._blank(), model, **how)
+        super().__init__(self._blank(), model, *how, **more)
+        strips = self._still.strips
+        self._still = self._still._replace(strips=strips._replace(strips=FINER * strips.strips))
+        self._still_handle.renew(self._still)
 
     def _blank(self):
         """Geometry of the type that all have, of the first place of the rail with one."""

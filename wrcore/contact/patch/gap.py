@@ -14,12 +14,26 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Z
-from wrcore.contact.strip import AHEAD, BEND, cubic_at, curvature_at, gap_at, strip_point, wheel_slope, with_rail_along
+from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Y, Z
+from wrcore.contact.strip import (
+    AHEAD,
+    BEND,
+    LIFT,
+    changes_along,
+    cubic_at,
+    curvature_at,
+    gap_at,
+    strip_point,
+    wheel_slope,
+    with_rail_along,
+)
 from wrcore.kernels.jit import FUSED, jit
 
 JOINED_ANGLE = 0.5
 """Neighbouring overlaps whose planes differ by less (rad) are one patch with one contact angle."""
+
+JOINED = 8e-3
+"""Overlaps that are closer than this across share a patch, as in CONTACT, m."""
 
 NODES = 48
 """Nodes over each overlap at which the gap is looked at."""
@@ -58,10 +72,13 @@ class Frame(NamedTuple):
 
 
 @jit(allocates=False)
-def group_end(patches, count, first):
-    """End of the run of overlaps, from ``first``, that are one patch."""
+def group_end(geometry, patches, count, first):
+    """End of the run of overlaps, from ``first``, that are one patch; where a rail may have several heads they are not
+    if they lie far apart."""
     last = first + 1
     while last < count and abs(patches[last, ANGLE] - patches[last - 1, ANGLE]) < JOINED_ANGLE:
+        if changes_along(geometry) and abs(patches[last, Y] - patches[last - 1, Y]) > JOINED:
+            break
         last += 1
     return last
 
@@ -189,6 +206,7 @@ def strip_gap(geometry, pose, frame, s, u, ur):
     tilt = 0.5 * (rise + fall)
     lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
     gap, slope = (top - normal - (s - here) * fall) * lean, (rise - fall) * lean
+    top = with_rail_along(geometry, LIFT, ur, frame.cosine, top)
     return gap, slope, shape * lean, crest, shape_rate * lean, crest_rate, top, tilt, u, ur
 
 
