@@ -7,8 +7,9 @@ ahead of the axle where the rail rises. The seen section has the height that giv
 
 which does not depend on the wheelset's height. What strips want beside it is kept at the section's nodes
 (`ContactGeometry.along`): how much further ahead the gap is least than over a prismatic rail, half of what the gap's
-second derivative over x has more, and how much higher the wheel's point there lies. Over a rail that is the same
-everywhere the section is the rail's own and all three vanish.
+second derivative over x has more, and how much higher the wheel's point there lies. Gap, place and curvature are those
+of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Over a rail that is the
+same everywhere the section is the rail's own and all three vanish.
 
 Where a head begins or ends under the wheel, its edge may be what is nearest; it then counts with the wheel's curvature
 alone. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
@@ -125,6 +126,17 @@ def _strip_over(wheel, pose, u):
     return w, radius * along * pose.q + (wheel.half_distance + w) * pose.ex, z
 
 
+@jit(allocates=False)
+def _parabola(a, b, c, d, e):
+    """Coefficients of the parabola through five even values that fits them best, those in the middle most: as a patch
+    that reaches a little beyond them weights what it feels, (1 - (t/2.5)^2)."""
+    # normal equations in t = -2..2: moments of the weights 1, 0.84, 0.36
+    even0, even2 = c + 0.84 * (b + d) + 0.36 * (a + e), 0.84 * (b + d) + 1.44 * (a + e)
+    c1 = (0.84 * (d - b) + 0.72 * (e - a)) / 4.56
+    c2 = (3.4 * even2 - 4.56 * even0) / (3.4 * 13.2 - 4.56 * 4.56)
+    return (even0 - 4.56 * c2) / 3.4, c1, c2
+
+
 @jit
 def _see(wheel, pose, x, rail, u, seen):
     """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,); returns the
@@ -152,23 +164,19 @@ def _see(wheel, pose, x, rail, u, seen):
         ahead = wheel_height(wheel, pose, plane, crest + 2.0 * h, 0.0, ahead)
         behind = wheel_height(wheel, pose, plane, crest - 2.0 * h, 0.0, behind)
         own = 0.125 * (ahead + behind - 2.0 * (lowest - nominal)) / (h * h)
-        top, t, second = g[best], 0.0, -2.0 * own
+        top, height, t, second = g[best], g[best], 0.0, -2.0 * own
         if 1 < best < n - 2 and g[best - 2] + g[best + 2] == g[best - 2] + g[best + 2]:
             a, b, c, d, e = g[best - 2], g[best - 1], g[best], g[best + 1], g[best + 2]
             if b == b and d == d:
                 d1, d2 = (a - 8.0 * b + 8.0 * d - e) / 12.0, (16.0 * (b + d) - a - e - 30.0 * c) / 12.0
-                d3, d4 = 0.5 * (e - a) - d + b, a + e - 4.0 * (b + d) + 6.0 * c
-                for _ in range(8):
-                    rate = d2 + t * (d3 + 0.5 * t * d4)
-                    if not rate < 0.0:
-                        break
-                    t -= (d1 + t * (d2 + t * (0.5 * d3 + t * d4 / 6.0))) / rate
-                    t = min(max(t, -1.0), 1.0)
-                top = c + t * (d1 + t * (0.5 * d2 + t * (d3 / 6.0 + t * d4 / 24.0)))
-                second = ((2.0 * (a + e) - b - d - 2.0 * c) / 7.0 + t * d3) / (h * h)
+                top = c - 0.5 * d1 * d1 / d2 if d2 < 0.0 and abs(d1) < -d2 else c
+                c0, c1, c2 = _parabola(a, b, c, d, e)
+                if c2 < 0.0:
+                    t = min(max(-0.5 * c1 / c2, -1.0), 1.0)
+                    height, second = c0 + t * (c1 + t * c2), 2.0 * c2 / (h * h)
         place = x[best] + t * h
         wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
-        seen[HEIGHT, k], seen[AHEAD, k] = top + lowest, place - crest
+        seen[HEIGHT, k], seen[AHEAD, k] = height + lowest, place - crest
         seen[BEND, k], seen[LIFT, k] = -0.5 * second - own, wheel_there + nominal - lowest
         if not touch >= top:
             touch = top

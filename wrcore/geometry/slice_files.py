@@ -1,12 +1,12 @@
 """Files of rails that change along the track: CONTACT's ``.slcs``, and a plain table of slices.
 
-``.slcs``: counters, a line ``s 'profile'`` per slice, and positions of feature lines (chord length from the section's
-first point, mm; -1: the line does not exist there); ``%`` begins a comment. Profiles that are columns are in the unit of
-s and count downwards, unless it is said otherwise.
+``.slcs``: counters, a line ``s 'profile'`` per slice, and positions of feature lines (chord length from the
+section's first point, mm; -1: the line does not exist there); ``%`` begins a comment. Profiles that are columns are in
+the unit of s and count downwards, unless it is said otherwise.
 
-Plain: a CSV with the columns s_m, profile (a point file, see `profile_files`) and, where a rail has several heads, head:
-a name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ... may
-give feature lines of a head: chord lengths from its inner end.
+Plain: a CSV with the columns s_m, profile (a point file, see `profile_files`) and, where a rail has several heads,
+head: a name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ...
+may give feature lines of a head: chord lengths from its inner end.
 
 Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 """
@@ -158,8 +158,8 @@ def _read_table(path, how):
         if len(words) != len(names):
             raise InputError(path, f"line {number}", f"expected {len(names)} fields, got {len(words)}")
         row = dict(zip(names, words, strict=True))
-        places = [_number(path, number, name, row[name], math_nan=True) for name in cuts]
-        places = np.array(places)[np.isfinite(places)]
+        given = np.array([_number(path, number, name, row[name], optional=True) for name in cuts])
+        places = given[np.isfinite(given)]
         if np.any(np.diff(places, prepend=0.0) <= 0.0):
             raise InputError(path, f"line {number}", "expected cuts above 0 that increase")
         s = _number(path, number, "s_m", row["s_m"])
@@ -169,12 +169,12 @@ def _read_table(path, how):
     return _assembled(path, list(heads.items()))
 
 
-def _number(path, line, name, text, math_nan=False):
+def _number(path, line, name, text, optional=False):
     try:
-        value = float(text) if text or not math_nan else np.nan
+        value = float(text) if text or not optional else np.nan
     except ValueError:
         value = np.inf
-    if np.isinf(value) or (np.isnan(value) and not math_nan):
+    if np.isinf(value) or (np.isnan(value) and not optional):
         raise InputError(path, f"{name}, line {line}", f"expected a number, got {text!r}")
     return value
 

@@ -139,14 +139,33 @@ def sheets_of(s, slices):
     """Sheets of one head's slices, a `Slice` or None at each of the rail's arc lengths ``s`` (m, increasing)."""
     size = next(one.cuts.size for one in slices if one)
     cuts = np.array([one.cuts if one else np.full(size, np.nan) for one in slices])
+    width = np.diff(cuts, axis=1)
+    counts = [int(np.ceil(np.max(w[np.isfinite(w)], initial=0.0) / PATH_STEP - 1e-9)) for w in width.T]
+    sections = [_section(one, counts) if one else [None] * (size - 1) for one in slices]
     sheets = []
     for part in range(size - 1):
-        ends = cuts[:, part : part + 2]
-        there = np.isfinite(ends).all(axis=1)
-        if there.any():
-            count = int(np.ceil(np.max(ends[there, 1] - ends[there, 0]) / PATH_STEP - 1e-9))
-            sheets += [_sheet(s, [slices[k] for k in run], ends[run], run, count) for run in _runs(there)]
+        for run in _runs(np.isfinite(width[:, part])):
+            sheets.append(_sheet(s, run, np.stack([sections[k][part] for k in run])))
     return sheets
+
+
+def _section(one, counts):
+    """Points (4, paths) of each part of a slice, None where it has none: the section is smooth across feature lines."""
+    from scipy.interpolate import CubicSpline
+
+    points = [None] * len(counts)
+    for run in _runs(np.isfinite(np.diff(one.cuts))):
+        share = [np.arange(counts[k]) / counts[k] for k in run]
+        low, high = one.cuts[run], one.cuts[run + 1]
+        at = np.concatenate([a + (b - a) * t for a, b, t in zip(low, high, share, strict=True)] + [high[-1:]])
+        section = one.curve(at)
+        rates = CubicSpline(at, section)(at, 1)
+        first = 0
+        for k, a, b in zip(run, low, high, strict=True):
+            here = slice(first, first + counts[k] + 1)
+            points[k] = np.concatenate([section[here], (b - a) / counts[k] * rates[here]], axis=1).T
+            first += counts[k]
+    return points
 
 
 def _runs(flags):
@@ -163,21 +182,13 @@ def _moved(sheet, shift):
     return replace(sheet, spline=spline, points=points)
 
 
-def _sheet(s, slices, ends, run, count):
-    """The part between the chord lengths ``ends`` (slices, 2) of a ``run`` of slices, on count + 1 paths."""
+def _sheet(s, run, points):
+    """The part with these points (slices, 4, paths) over a ``run`` of slices."""
     from scipy.interpolate import CubicSpline
 
-    share = np.arange(count + 1) / count
-    points = np.empty((len(slices), 4, count + 1))
-    for k, one in enumerate(slices):
-        low, high = ends[k]
-        at = low + (high - low) * share
-        points[k, :2] = one.curve(at).T
-        points[k, 2:] = CubicSpline(share, points[k, :2].T)(share, 1).T / count
     first = -np.inf if run[0] == 0 else s[run[0]]
     last = np.inf if run[-1] == s.size - 1 else s[run[-1]]
-    spline = CubicSpline(s[run], points) if run.size > 1 else None
-    return Sheet(first, last, s[run], spline, points)
+    return Sheet(first, last, s[run], CubicSpline(s[run], points) if run.size > 1 else None, points)
 
 
 @jit

@@ -24,6 +24,8 @@ from wrcore.geometry.standards import named_profile
 
 RADIUS, CROWN = 0.46, 0.3
 PROFILES = Path(os.environ.get("WRCORE_CONTACT", "")) / "testbank" / "profiles"
+ALONG = {"cross_nose": 0.05, "wing_rail": 0.05, "cross+wing_extd": 0.05, "uk_interrupt_v2": 0.05}
+"""Distance along the track within which the place is, at 95 %, mm."""
 REFUSED = "spike|not_converged|beyond_slices|few_elements|pmax_peaked"
 
 
@@ -43,13 +45,8 @@ def crown(u):
     return np.sqrt(CROWN**2 - u**2) - CROWN
 
 
-def cone(slope=0.0):
-    """A wheel of straight generators, with a flange that touches nothing."""
-    u = np.linspace(-0.05, 0.06, 221)
-    return ProfileCurve.from_points(u, -slope * u + 0.0, "wheel") if slope else flat_wheel(u)
-
-
-def flat_wheel(u):
+def cylinder():
+    """A wheel without flange and conicity."""
     return ProfileCurve("cylinder", "wheel", np.arange(-1000, 1201) * 5e-5, *np.zeros((3, 2201)))
 
 
@@ -57,7 +54,7 @@ def flat_wheel(u):
 def test_cylinder_touches_a_ramp_ahead_of_its_axle(tmp_path, rise):
     u = np.linspace(-0.03, 0.03, 121)
     ramp = rail(tmp_path, lambda s: (u, crown(u) + rise * s), np.linspace(-0.5, 0.5, 11))
-    pair, s, slope = WheelOnSlices(flat_wheel(u), ramp), 0.03, math.atan(rise)
+    pair, s, slope = WheelOnSlices(cylinder(), ramp), 0.03, math.atan(rise)
     geometry, touch = pair.under("right", s, 0.002)
     middle = round(-geometry.rail_start / geometry.rail_step)
     ahead, bend, lift = geometry.along[middle]
@@ -68,13 +65,11 @@ def test_cylinder_touches_a_ramp_ahead_of_its_axle(tmp_path, rise):
 
 
 def test_slices_that_are_alike_are_the_plain_rail(tmp_path):
-    points = (contact.TRAVELLING.parent / "unused", named_profile("UIC60-MBench", "rail", 1 / 40))[1]
-    inside = slice(None, None, 5)
-    head = (np.append(points.u[inside], points.u[-1]), np.append(points.f[inside], points.f[-1]))
-    u = np.unique(head[0], return_index=True)
-    low, high = points.u[0], points.u[-1]
-    at = np.concatenate([[low - 3e-4], u[0], [high + 3e-4]])
-    f = np.concatenate([[points.f[0] - 6e-3], head[1][u[1]], [points.f[-1] - 6e-3]])
+    head = named_profile("UIC60-MBench", "rail", 1 / 40)
+    u, f = np.append(head.u[::5], head.u[-1]), np.append(head.f[::5], head.f[-1])
+    u, unique = np.unique(u, return_index=True)
+    at = np.concatenate([u[:1] - 3e-4, u, u[-1:] + 3e-4])
+    f = np.concatenate([head.f[:1] - 6e-3, f[unique], head.f[-1:] - 6e-3])
     rail(tmp_path, lambda s: (at, f), [0.0, 1.0, 3.0])
     poses = {"pose_id": ["a", "b"], "y_m": [0.001, -0.003], "yaw_rad": [0.0, 0.002], "s_m": [0.5, 1.5]}
     found = [command(tmp_path, poses, pair=["--wheel", "S1002", "--rail", str(tmp_path / name)])
@@ -127,18 +122,14 @@ def test_load_goes_over_from_the_wing_to_the_nose(tmp_path):
         z = wheels.height("right", 0.0, load)
         found = wheels.at_height("right", 0.0, z)
         assert sum(one.vertical for one in found) == pytest.approx(load, rel=1e-6)
-        edge = made.angle * wheels.s - 0.036 - 0.5 * made.flangeway  # between the nose and the wing
-        on_nose = [one.vertical for one in found if -one.row[columns.Y] - slices_origin(wheels) < edge]
+        edge = 0.7175 + made.angle * wheels.s - 0.5 * made.flangeway  # between the nose and the wing
+        on_nose = [one.vertical for one in found if -one.row[columns.Y] < edge]
         shares.append(sum(on_nose) / load)
         heights.append(z)
     assert shares[0] == 0.0
     assert shares[-1] == pytest.approx(1.0)
     assert np.abs(np.diff(heights)).max() < 5e-4
     assert 0.0 < np.mean(shares) < 1.0
-
-
-def slices_origin(wheels):
-    return wheels.pair.rail_distance
 
 
 def test_heads_begin_and_end_at_slices(tmp_path):
@@ -192,17 +183,24 @@ def cases(name):
 
 @pytest.mark.parametrize("name", ["cross_nose", "wing_rail", "cross+wing_extd", "uk_interrupt_v2"])
 def test_crossings_against_contact(name):
-    found = []
     wheel = read_profile(contact.reference_path("crossing_cases").parent / contact.FILES["S1002"], "wheel")
     wheels = LoadedOnSlices(WheelOnSlices(wheel, read_slices(PROFILES / f"{name}.slcs")), resolution="fine")
-    rolling = Rolling(2.0, 4.3481181)
+    rolling, height, number, rows = Rolling(2.0, 4.3481181), [], [], []
     for case in cases(name)[::7]:
         pose = case.iloc[0]
         wheels.s, y = 1e-3 * pose.s_ws_mm, -1e-3 * pose.y_ws_mm
         z = wheels.height("right", y, pose.Fz_wheel_N, rolling=rolling)
-        ours = wheels.at_height("right", y, z, rolling=rolling)
-        other = case.sort_values("Fn_N", ascending=False)
-        found.append((1e6 * (RADIUS - z) - 1e3 * pose.z_ws_mm, len(ours) - len(other)))
-    height, number = np.array(found).T
+        ours = sorted(wheels.at_height("right", y, z, rolling=rolling), key=lambda one: one.row[columns.Y])
+        height.append(1e6 * (RADIUS - z) - 1e3 * pose.z_ws_mm)
+        number.append(len(ours) - len(case))
+        if len(ours) == len(case) == 1:
+            x, y, load, largest = ours[0].row[[columns.X, columns.Y, columns.NORMAL, columns.P_MAX]]
+            rows.append([1e3 * x - pose.x_tr_pc_mm, -1e3 * y - pose.y_tr_pc_mm,
+                         load / pose.Fn_N - 1.0, 1e-6 * largest / pose.pmax_MPa - 1.0])  # fmt: skip
+    x, y, load, largest = np.quantile(np.abs(rows), 0.95, axis=0)
+    assert x < ALONG[name]
+    assert y < 0.02
+    assert load < 0.02
+    assert largest < 0.03
     assert np.quantile(np.abs(height), 0.95) < 3.0
-    assert np.mean(number == 0) >= 0.95
+    assert np.mean(np.array(number) == 0) >= 0.95

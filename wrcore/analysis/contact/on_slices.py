@@ -3,14 +3,16 @@
 import math
 
 from wrcore.analysis.contact.loaded import LoadedWheels
+from wrcore.dynamics.wheel import ON_GRID
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
 
 MODELS = ("maximum", "moment", "exact")
 """Patch models that serve rails which change along the track."""
 
-FINER = 2
-"""Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them."""
+FINER = (2.0, 1.0, 1.5, 0.75)
+"""Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them. Where no solution is
+found with the first number, the next ones are tried."""
 
 _SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
 
@@ -26,9 +28,21 @@ class LoadedOnSlices(LoadedWheels):
             raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
         self.pair, self.s, self._seen = pair, 0.0, {}
         super().__init__(self._blank(), model, *how, **more)
-        strips = self._still.strips
-        self._still = self._still._replace(strips=strips._replace(strips=FINER * strips.strips))
+        self._levels = [round(f * self._still.strips.strips) for f in FINER]
+        self._level = 0
+        self._solve_with(0)
+
+    def _solve_with(self, level):
+        """Take one of the numbers of strips."""
+        self._level = level
+        if self._still.strips.strips:
+            self._still = self._still._replace(strips=self._still.strips._replace(strips=self._levels[level]))
+        self._renew()
+
+    def _renew(self):
         self._still_handle.renew(self._still)
+        for handle in self._rolling.values():
+            handle.renew(handle.value._replace(geometry=self.geometry, strips=self._still.strips))
 
     def _blank(self):
         """Geometry of the type that all have, of the first place of the rail with one."""
@@ -48,16 +62,19 @@ class LoadedOnSlices(LoadedWheels):
         if geometry is not None and geometry is not self.geometry:
             self.geometry = geometry
             self._still = self._still._replace(geometry=geometry)
-            self._still_handle.renew(self._still)
-            for handle in self._rolling.values():
-                handle.renew(handle.value._replace(geometry=geometry))
+            self._solve_with(0)
         return touch
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
         """As for `LoadedWheels`, at ``s``."""
         if math.isnan(self._lie(side, y, roll, yaw)):
             return []
-        return super().at_height(side, y, z, roll, yaw, rolling, friction, fields)
+        while True:
+            before = self._counters[ON_GRID]
+            found = super().at_height(side, y, z, roll, yaw, rolling, friction, fields)
+            if self._counters[ON_GRID] == before or self._level + 1 == len(self._levels):
+                return found
+            self._solve_with(self._level + 1)
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """As for `LoadedWheels`, at ``s``."""
