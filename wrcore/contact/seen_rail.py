@@ -30,9 +30,13 @@ from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.jit import jit
 
-REACH, STEP = 0.1, 2e-3
-"""Half of the length along the track that is looked at, and the distance of the sections there, m: ramps up to 1:4.6 of
-a wheel of 460 mm, and a window of four steps, a patch's length, for the curvature."""
+REACH, STEP, COARSE = 0.1, 1e-3, 4
+"""Half of the length along the track that is looked at, m: ramps up to 1:4.6 of a wheel of 460 mm; the distance of the
+sections there, m, and at every how many of them the wheel is first put."""
+
+WINDOW = 6e-3
+"""Half of the length over which the gap is fitted, m: a parabola feels as much of a cubic gap as patches of 9 to 10 mm
+do."""
 
 BELOW = 0.03
 """Depth below the section's lowest point at which what lies between its heads is put, m."""
@@ -127,14 +131,55 @@ def _strip_over(wheel, pose, u):
 
 
 @jit(allocates=False)
-def _parabola(a, b, c, d, e):
-    """Coefficients of the parabola through five even values that fits them best, those in the middle most: as a patch
-    that reaches a little beyond them weights what it feels, (1 - (t/2.5)^2)."""
-    # normal equations in t = -2..2: moments of the weights 1, 0.84, 0.36
-    even0, even2 = c + 0.84 * (b + d) + 0.36 * (a + e), 0.84 * (b + d) + 1.44 * (a + e)
-    c1 = (0.84 * (d - b) + 0.72 * (e - a)) / 4.56
-    c2 = (3.4 * even2 - 4.56 * even0) / (3.4 * 13.2 - 4.56 * 4.56)
-    return (even0 - 4.56 * c2) / 3.4, c1, c2
+def _parabola(x, g, best):
+    """Vertex, height and second derivative of the parabola that fits best around its own vertex, with the weight
+    (1 - (d/WINDOW)^2)^2 at a distance d: smooth in what is fitted. From the highest station; NaN at an end."""
+    n, h = x.size, x[1] - x[0]
+    centre, top, second = x[best], np.nan, np.nan
+    if best < 1 or best > n - 2 or not g[best - 1] + g[best + 1] == g[best - 1] + g[best + 1]:
+        return centre, top, second
+    reach = int(WINDOW / h) + 1
+    for _ in range(12):
+        s0 = s1 = s2 = s3 = s4 = t0 = t1 = t2 = 0.0
+        middle = int(round((centre - x[0]) / h))
+        for direction in (-1, 1):
+            i = middle if direction > 0 else middle - 1
+            while 0 <= i < n and abs(i - middle) <= reach and g[i] == g[i]:
+                d = (x[i] - centre) / WINDOW
+                if abs(d) < 1.0:
+                    w = (1.0 - d * d) ** 2
+                    s0, s1, s2, s3, s4 = s0 + w, s1 + w * d, s2 + w * d**2, s3 + w * d**3, s4 + w * d**4
+                    v = w * (g[i] - g[best])
+                    t0, t1, t2 = t0 + v, t1 + v * d, t2 + v * d * d
+                i += direction
+        m00, m01, m02 = s2 * s4 - s3 * s3, s3 * s2 - s1 * s4, s1 * s3 - s2 * s2
+        whole = s0 * m00 + s1 * m01 + s2 * m02
+        c1 = (t0 * m01 + t1 * (s0 * s4 - s2 * s2) + t2 * (s1 * s2 - s0 * s3)) / whole
+        c2 = (t0 * m02 + t1 * (s1 * s2 - s0 * s3) + t2 * (s0 * s2 - s1 * s1)) / whole
+        if not c2 < 0.0:
+            return x[best], np.nan, np.nan
+        c0 = (t0 - s1 * c1 - s2 * c2) / s0
+        step = -0.5 * c1 / c2
+        centre, top, second = centre + WINDOW * step, g[best] + c0 - 0.25 * c1 * c1 / c2, 2.0 * c2 / WINDOW**2
+        if abs(step) < 1e-10 or not abs(centre - x[best]) < WINDOW:
+            break
+    return centre, top, second
+
+
+@jit(allocates=False)
+def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
+    """Fill ``g`` with the height of the rail less that of the wheel at every ``step``-th station, NaN where one of them
+    is missing; returns the highest one, or -1."""
+    best = -1
+    for i in range(first, end, step):
+        g[i] = np.nan
+        if rail[i] == rail[i]:
+            n = wheel_height(wheel, pose, plane, x[i], 0.0, guess)
+            if n == n:
+                g[i], guess = rail[i] - n - plane.z, n
+                if best < 0 or g[i] > g[best]:
+                    best = i
+    return best
 
 
 @jit
@@ -142,39 +187,28 @@ def _see(wheel, pose, x, rail, u, seen):
     """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,); returns the
     height of the wheelset's centre at the first touch. Stations are evenly apart."""
     n, h, touch = x.size, x[1] - x[0], np.nan
-    g, nominal = np.empty(n), -wheel.rolling_radius
+    g, nominal, near = np.full(n, np.nan), -wheel.rolling_radius, 2 * int(WINDOW / h) + COARSE
     for k in range(u.size):
         seen[HEIGHT, k] = np.nan
         _, crest, lowest = _strip_over(wheel, pose, u[k])
         plane = ContactPlane(0.0, u[k] + wheel.rail_distance, nominal, 1.0, 0.0)
-        best, guess = -1, lowest - nominal
-        for i in range(n):
-            g[i] = np.nan
-            if rail[i, k] == rail[i, k]:
-                guess = wheel_height(wheel, pose, plane, x[i], 0.0, guess)
-                if not guess == guess:
-                    guess = lowest - nominal
-                    continue
-                g[i] = rail[i, k] - guess - nominal
-                if best < 0 or g[i] > g[best]:
-                    best = i
+        guess = lowest - nominal
+        best = _fill(wheel, pose, plane, x, rail[:, k], 0, n, COARSE, guess, g)
         if best < 0:
             continue
-        ahead = behind = wheel_height(wheel, pose, plane, crest, 0.0, lowest - nominal)
-        ahead = wheel_height(wheel, pose, plane, crest + 2.0 * h, 0.0, ahead)
-        behind = wheel_height(wheel, pose, plane, crest - 2.0 * h, 0.0, behind)
-        own = 0.125 * (ahead + behind - 2.0 * (lowest - nominal)) / (h * h)
-        top, height, t, second = g[best], g[best], 0.0, -2.0 * own
-        if 1 < best < n - 2 and g[best - 2] + g[best + 2] == g[best - 2] + g[best + 2]:
-            a, b, c, d, e = g[best - 2], g[best - 1], g[best], g[best + 1], g[best + 2]
-            if b == b and d == d:
-                d1, d2 = (a - 8.0 * b + 8.0 * d - e) / 12.0, (16.0 * (b + d) - a - e - 30.0 * c) / 12.0
-                top = c - 0.5 * d1 * d1 / d2 if d2 < 0.0 and abs(d1) < -d2 else c
-                c0, c1, c2 = _parabola(a, b, c, d, e)
-                if c2 < 0.0:
-                    t = min(max(-0.5 * c1 / c2, -1.0), 1.0)
-                    height, second = c0 + t * (c1 + t * c2), 2.0 * c2 / (h * h)
-        place = x[best] + t * h
+        _fill(wheel, pose, plane, x, rail[:, k], max(best - near, 0), min(best + near + 1, n), 1, guess, g)
+        for i in range(max(best - COARSE, 0), min(best + COARSE + 1, n)):
+            if g[i] > g[best]:
+                best = i
+        ahead = wheel_height(wheel, pose, plane, crest + WINDOW / 3.0, 0.0, guess)
+        behind = wheel_height(wheel, pose, plane, crest - WINDOW / 3.0, 0.0, guess)
+        own = 4.5 * (ahead + behind - 2.0 * guess) / WINDOW**2
+        top = g[best]
+        place, height, second = _parabola(x, g, best)
+        if not height == height:
+            height, second = top, -2.0 * own
+        else:
+            top = max(top, height)
         wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
         seen[HEIGHT, k], seen[AHEAD, k] = height + lowest, place - crest
         seen[BEND, k], seen[LIFT, k] = -0.5 * second - own, wheel_there + nominal - lowest

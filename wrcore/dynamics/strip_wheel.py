@@ -28,7 +28,7 @@ from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
-from wrcore.contact.strip import LIFT, make_pose, with_rail_along
+from wrcore.contact.strip import AHEAD, LIFT, make_pose, with_rail_along
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
@@ -76,7 +76,8 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
     the frame's origin and in its plane: friction (MZ about n), NORMAL, X and Y (means over the pressure of x and s),
     semi-axes, greatest pressure, and as ANGLE the mean slope of the strips.
     """
-    plane = ContactPlane(frame.x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
+    x = with_rail_along(model.geometry, AHEAD, frame.ur, -1.0, frame.x)
+    plane = ContactPlane(x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
     modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
     grid = grid_normal(model.geometry, pose, plane, modulus, GRID, GRID)
     wx, ws = np.empty(grid.gap.shape), np.empty(grid.gap.shape)

@@ -95,6 +95,9 @@ class LoadedWheels:
     of creepages); where strips find no solution a grid takes over.
     """
 
+    refines = True
+    """Whether a patch that strips do not solve is solved anew on finer grids."""
+
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
                  poisson_ratio=0.28, detection="spatial"):  # fmt: skip
         known = {"patch": (model, MODELS), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS),
@@ -200,7 +203,11 @@ class LoadedWheels:
             extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
-            if fields is not None and (self.always or self._counters[ON_GRID] > before):
+            on_grid = self._counters[ON_GRID] > before
+            if on_grid and not self.refines:
+                x, a, b = out[0, [columns.X, columns.SEMI_A, columns.SEMI_B]]
+                yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, None, True)
+            elif fields is not None and (self.always or on_grid):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
                 patch = self._fields(out[0], found.load, pose, friction) if fields else None

@@ -23,6 +23,8 @@ class LoadedOnSlices(LoadedWheels):
     ``s`` (m) is the arc length of the wheelset's cross-section. The rail is what a wheel sees of it in its pose
     (`wrcore.contact.seen_rail`)."""
 
+    refines = False
+
     def __init__(self, pair, model="exact", *how, **more):
         if model not in MODELS:
             raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
