@@ -93,7 +93,7 @@ def _pair(options, poses):
             raise InputError("wrcore contact", "--rail-distance", "expected this with rails of slices only")
         return pair_of(options).left.geometry
     if rail.alike and options.rail_distance is None:
-        options.rail = json.dumps(rail.first)  # which is YAML, too
+        options.rail = json.dumps(rail.first) if len(rail.first) > 1 else rail.first["points"]  # JSON is YAML, too
         return pair_of(options).left.geometry
     missing = poses.index[poses.s_m.isna()]
     if missing.size:
