@@ -34,9 +34,9 @@ REACH, STEP, COARSE = 0.1, 1e-3, 4
 """Half of the length along the track that is looked at, m: ramps up to 1:4.6 of a wheel of 460 mm; the distance of the
 sections there, m, and at every how many of them the wheel is first put."""
 
-WINDOW = 6e-3
-"""Half of the length over which the gap is fitted, m: a parabola feels as much of a cubic gap as patches of 9 to 10 mm
-do."""
+WINDOW = 5.5e-3
+"""Half of the length over which the gap is fitted, m: of a cubic gap the parabola feels w^2/3, and a pressure
+sqrt(1 - (x/a)^2) feels 3 a^2/7, as much for patches of 9.7 mm."""
 
 BELOW = 0.03
 """Depth below the section's lowest point at which what lies between its heads is put, m."""

@@ -10,7 +10,7 @@ from wrcore.geometry.track import SIDES
 MODELS = ("maximum", "moment", "exact")
 """Patch models that serve rails which change along the track."""
 
-FINER = (2.0, 1.0, 1.5, 0.75)
+FINER = (2.0, 1.75, 1.5, 1.0, 0.75)
 """Strips of a window, over those elsewhere: slender patches on sharp edges of heads want them. Where no solution is
 found with the first number, the next ones are tried."""
 
@@ -83,8 +83,13 @@ class LoadedOnSlices(LoadedWheels):
         touch = self._lie(side, y, roll, yaw)
         if math.isnan(touch):
             return math.nan
-        return super().height(side, y, load, roll, yaw, rolling, friction, vertical,
-                              touch - _SUNK if math.isnan(guess) else guess)  # fmt: skip
+        z = touch - _SUNK if math.isnan(guess) else guess
+        for _ in FINER:  # anew where another number of strips has been taken on the way
+            level = self._level
+            z = super().height(side, y, load, roll, yaw, rolling, friction, vertical, z)
+            if self._level == level or math.isnan(z):
+                break
+        return z
 
     def settled(self, y, load, yaw=0.0, rolling=None, friction=0.3, vertical=True):
         """As for `LoadedWheels`, at ``s``."""
