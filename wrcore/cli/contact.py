@@ -1,5 +1,7 @@
 """``wrcore contact``: the patches of a wheelset in given poses."""
 
+import json
+
 from wrcore.cli.files import output, write_csv
 from wrcore.cli.options import add_pair, as_runs, columns, pair_of
 from wrcore.errors import InputError
@@ -15,6 +17,7 @@ POSES = columns(
     **as_runs("y_m", "yaw_rad"),
     roll_rad="optional",
     z_m="optional",
+    s_m="of rails of slices: arc length of the wheelset's cross-section",
     V_m_per_s="optional: speed; where it is given creep forces act",
     omega_rad_per_s="optional: rolling rate, positive forward; empty: free rolling",
     vy_m_per_s="optional",
@@ -46,7 +49,12 @@ def add(commands):
         "contact", help="contact of a wheelset in given poses", description=ABOUT, epilog=f"{POSES}\n\n{FILES}"
     )
     command.add_argument("--poses", required=True, metavar="IN.csv", help="a pose per row")
-    add_pair(command)
+    add_pair(command, "; a rail of slices: FILE.slcs, a table (columns s_m, profile), or '{slices: FILE, ...}'")
+    command.add_argument(
+        "--rail-distance", type=float, metavar="m",
+        help="of the origin of slices from the track's centre, and heights as the files have them; left out: the first "
+        "slice lies as a rail that is the same everywhere",
+    )  # fmt: skip
     command.add_argument("--shear-modulus", type=float, default=8.2e10, metavar="Pa", help="of both bodies, Pa")
     command.add_argument("--poisson-ratio", type=float, default=0.28, metavar="nu", help="of both bodies")
     command.add_argument(
@@ -74,6 +82,31 @@ def add(commands):
     command.set_defaults(run=run)
 
 
+def _pair(options, poses):
+    """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail is one of slices."""
+    from wrcore.cli.options import profile_of, slices_of
+    from wrcore.contact.seen_rail import WheelOnSlices
+
+    rail = slices_of(options)
+    if rail is None:
+        if options.rail_distance is not None:
+            raise InputError("wrcore contact", "--rail-distance", "expected this with rails of slices only")
+        return pair_of(options).left.geometry
+    if rail.alike and options.rail_distance is None:
+        options.rail = json.dumps(rail.first) if len(rail.first) > 1 else rail.first["points"]  # JSON is YAML, too
+        return pair_of(options).left.geometry
+    missing = poses.index[poses.s_m.isna()]
+    if missing.size:
+        expected = "expected the arc length of the wheelset, as the rail is one of slices"
+        raise InputError(options.poses, f"s_m, row {missing[0] + 1}", expected)
+    distance = options.rail_distance
+    if distance is None:
+        rail, offset = rail.placed()
+        distance = 0.5 * options.gauge + offset
+    wheel = profile_of(options, options.wheel, "wheel")
+    return WheelOnSlices(wheel, rail, options.rolling_radius, options.tape_circle_half_distance, distance)
+
+
 def run(options):
     from wrcore.analysis.contact.poses import loaded_poses
     from wrcore.contact.pose_file import read_poses
@@ -81,7 +114,7 @@ def run(options):
     out = output(options.out)
     poses = read_poses(options.poses)
     table = loaded_poses(
-        poses, pair_of(options).left.geometry, options.wheel_load, options.patch, options.resolution, options.slip,
+        poses, _pair(options, poses), options.wheel_load, options.patch, options.resolution, options.slip,
         options.load_by, options.friction, options.detection, options.shear_modulus, options.poisson_ratio,
     )  # fmt: skip
     if table.empty:

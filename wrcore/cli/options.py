@@ -60,11 +60,11 @@ def as_runs(*names):
     return dict.fromkeys(names, "")
 
 
-def add_pair(command):
-    """Options of a wheel on a rail."""
+def add_pair(command, slices=""):
+    """Options of a wheel on a rail; ``slices``: what more a rail may be."""
     what = "profile: a name ('wrcore profiles'), a file of points, or '{points: FILE, ...}'"
     command.add_argument("--wheel", required=True, metavar="NAME|FILE", help=what)
-    command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what)
+    command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what + slices)
     command.add_argument("--unit", choices=("m", "mm", "inch"), help="of profile files that do not state it")
     command.add_argument("--smoothing", type=float, metavar="m", help="by which the curve may leave a file's points, m")
     command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
@@ -107,6 +107,21 @@ def profile_spec(options, spec):
     if options.smoothing is not None:
         described.setdefault("smoothing", options.smoothing)
     return described if len(described) > 1 else spec
+
+
+def slices_of(options):
+    """`RailSlices` of ``--rail``, None where it is a rail that is the same everywhere."""
+    from wrcore.errors.checked_yaml import parse_value
+    from wrcore.geometry.slice_files import is_slices, read_slices
+
+    spec = options.rail
+    said = spec.lstrip().startswith("{")
+    described = parse_value(spec) if said else {"slices": spec}
+    if not isinstance(described, dict) or "slices" not in described or not (said or is_slices(spec)):
+        return None
+    if options.unit:
+        described.setdefault("unit", options.unit)
+    return read_slices(described)
 
 
 def ratio(text):

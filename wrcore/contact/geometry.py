@@ -83,6 +83,8 @@ class ContactGeometry(NamedTuple):
     """Tape circle from the wheelset's centre, m."""
     rail_distance: float
     """Rail profile origin from the track's centre line, m."""
+    along: np.ndarray | tuple = ()
+    """(m, 3) where the rail changes along the track, at the rail's nodes: see `wrcore.contact.seen_rail`."""
 
 
 def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):

@@ -15,6 +15,9 @@ import numpy as np
 
 from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.strip import (
+    AHEAD,
+    BEND,
+    LIFT,
     cubic_at,
     curvature_at,
     gap_and_slope,
@@ -24,6 +27,7 @@ from wrcore.contact.strip import (
     slope_difference,
     strip_point,
     wheel_slope,
+    with_rail_along,
 )
 from wrcore.kernels.jit import jit
 
@@ -188,8 +192,9 @@ def _fill_patch(geometry, pose, u, along, radius, ur, rail_z, slope, penetration
     patch[ANGLE] = pose.side * _arc_tangent(slope)
     patch[COSINE], patch[SINE] = cosine, pose.side * slope * cosine
     patch[PENETRATION] = penetration
-    patch[X] = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
-    patch[Z] = rail_z - penetration * (secant - 0.5 * cosine)
+    x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+    patch[X] = with_rail_along(geometry, AHEAD, ur, 1.0, x)
+    patch[Z] = with_rail_along(geometry, LIFT, ur, 1.0, rail_z - penetration * (secant - 0.5 * cosine))
     patch[Y] = pose.side * (ur + geometry.rail_distance - 0.5 * penetration * slope * cosine)
 
 
@@ -248,7 +253,8 @@ def patch_at_maximum(geometry, pose, u, outside, beyond, patch):
     mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
     spread = math.copysign(math.sqrt(half * half + hxy * hxy), half)
     _fill_patch(geometry, pose, u, along, radius, ur, f, df, penetration, patch)
-    patch[CURVATURE_X] = 0.5 * max(mean + spread, CURVATURE_FLOOR)
+    around = with_rail_along(geometry, BEND, ur, 2.0 * rail_cos, mean + spread)
+    patch[CURVATURE_X] = 0.5 * max(around, CURVATURE_FLOOR)
     patch[CURVATURE_Y] = 0.5 * max(mean - spread, CURVATURE_FLOOR)
     return True
 
@@ -271,6 +277,6 @@ def patch_from_moments(geometry, pose, middle, m0, m1, m2, patch):
     slope_both = 0.5 * (wheel_slope(pose, slope, along) + df)
     cosine = 1.0 / math.sqrt(1.0 + slope_both * slope_both)
     _fill_patch(geometry, pose, u, along, radius, ur, f, slope_both, depth * cosine, patch)
-    patch[CURVATURE_X] = 0.5 / (radius * math.sqrt(1.0 + slope * slope))
+    patch[CURVATURE_X] = with_rail_along(geometry, BEND, ur, cosine, 0.5 / (radius * math.sqrt(1.0 + slope * slope)))
     patch[CURVATURE_Y] = depth / spread * cosine * cosine * cosine
     return True

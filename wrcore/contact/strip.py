@@ -15,9 +15,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
 from wrcore.kernels.jit import jit
+
+AHEAD, BEND, LIFT = range(3)
+"""Columns of `ContactGeometry.along`, what the rail's change along the track adds to a strip: x of its least gap, half
+of the gap's second derivative along x, and the height of the wheel's point there."""
 
 
 class Pose(NamedTuple):
@@ -66,6 +72,52 @@ def cubic_at(nodes, start, step, u):
     value = y0 + t * (d0 + t * (c2 + t * c3))
     slope = (d0 + t * (2.0 * c2 + 3.0 * t * c3)) * inverse
     return value, slope, (2.0 * c2 + 6.0 * t * c3) * (inverse * inverse)
+
+
+_AS_KERNELS = {"_nrt": False, "error_model": "numpy"}
+
+
+def _with_rail_along(along, start, step, column, ur, factor, value):
+    raise NotImplementedError
+
+
+@overload(_with_rail_along, inline="always", jit_options=_AS_KERNELS)
+def _of_its_type(along, start, step, column, ur, factor, value):
+    """Nothing at all for rails that are the same everywhere."""
+    if isinstance(along, types.BaseTuple):
+        return lambda along, start, step, column, ur, factor, value: value
+
+    def add(along, start, step, column, ur, factor, value):
+        position = (ur - start) / step
+        i = min(max(int(position), 0), along.shape[0] - 2)
+        t = min(max(position - i, 0.0), 1.0)
+        return value + factor * (along[i, column] * (1.0 - t) + along[i + 1, column] * t)
+
+    return add
+
+
+@jit(allocates=False, forceinline=True)
+def with_rail_along(geometry, column, ur, factor, value):
+    """``value`` of a strip over the rail coordinate ``ur``, and ``factor`` times what a rail that changes along the
+    track adds to it (`AHEAD`, `BEND`, `LIFT`)."""
+    return _with_rail_along(geometry.along, geometry.rail_start, geometry.rail_step, column, ur, factor, value)
+
+
+def _changes(along):
+    raise NotImplementedError
+
+
+@overload(_changes, inline="always", jit_options=_AS_KERNELS)
+def _changes_by_type(along):
+    if isinstance(along, types.BaseTuple):
+        return lambda along: False
+    return lambda along: True
+
+
+@jit(allocates=False, forceinline=True)
+def changes_along(geometry):
+    """Whether the rail changes along the track: known when a kernel is compiled."""
+    return _changes(geometry.along)
 
 
 @jit(allocates=False, forceinline=True)

@@ -51,7 +51,7 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows):
     nearest, pose = REACH, make_pose(1.0, y, z, ex, ey, ez, True)
     count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
     while first < count:
-        group = group_end(rows, count, first)
+        group = group_end(geometry, rows, count, first)
         while first < group:
             last = lobe_end(geometry, pose, rows, first, group, limits)
             depth, u = depth_of(rows, first, last, 0.0)

@@ -30,7 +30,7 @@ from wrcore.contact.patch.model import LOAD
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
-from wrcore.contact.strip import make_pose
+from wrcore.contact.strip import AHEAD, LIFT, make_pose, with_rail_along
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
@@ -78,7 +78,8 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
     the frame's origin and in its plane: friction (MZ about n), NORMAL, X and Y (means over the pressure of x and s),
     semi-axes, greatest pressure, and as ANGLE the mean slope of the strips.
     """
-    plane = ContactPlane(frame.x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
+    x = with_rail_along(model.geometry, AHEAD, frame.ur, -1.0, frame.x)
+    plane = ContactPlane(x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
     modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
     grid = grid_normal(model.geometry, pose, plane, modulus, GRID, GRID)
     wx, ws = np.empty(grid.gap.shape), np.empty(grid.gap.shape)
@@ -117,7 +118,7 @@ def _lifted(model, y, z, m, spatial, u, rows):
     count = find_patches(model.geometry, 1.0, y, z, m.ex, m.ey, m.ez, spatial, reduction.MOMENT, rows)
     best, low, high, first = 1e9, 0, 0, 0
     while first < count:
-        last = group_end(rows, count, first)
+        last = group_end(model.geometry, rows, count, first)
         for k in range(first, last):
             distance = abs(rows[k, reduction.U_WHEEL] - u)
             if distance < best:
@@ -303,7 +304,8 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                     work.wrench[1, k] *= 1.0 - share
                 more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work)
                 found = _mean(found, more, share)
-    fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z, found, work.wrench, out)
+    z = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - m.z)
+    fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z
     for k in range(6):
         wrench[k] += work.wrench[0, k] + work.wrench[1, k]
@@ -398,7 +400,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 wrench[k] = 0.0
             first = kept = group = 0
             while first < count:
-                last = group_end(rows, count, first)
+                last = group_end(contact.geometry, rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
                 work.spare[0], work.spare[UNSOLVED] = 0.0, 1.0 if rough else 0.0
                 call_address(

@@ -53,11 +53,9 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     centre; ``downwards``: the second one counts down; ``shift`` (m, 2): added to u and f after that. Where a wheel's
     u = 0 is: ``tape_circle`` (m), its distance from the file's origin, or ``flange_back`` (m), its distance from the
     innermost point. ``part``: of a MiniProf file of several; ``side`` (left or right) of a Vampire file."""
-    spec = _checked(spec if isinstance(spec, dict) else {"points": spec}, kind)
+    spec = spec if isinstance(spec, dict) else {"points": spec}
+    u, f, lines, inside, stated, told, assumed = read_points(spec, kind)
     path = Path(spec["points"])
-    u, f, lines, stated = _read(path, _text(path), spec, kind)
-    inside = _within(path, spec, u)
-    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside], path)
     turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
     curve = ProfileCurve.from_points(
         u, f, kind, str(path), lines=lines[inside], trim=stated.trimmed, inclination=turn,
@@ -72,6 +70,18 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
         warn(f"{path}: {kept}{guess} ('wrcore profiles' shows it)")
     told += f", {count}" + (f", left out ({_REASONS}): lines {_ranges(left_out)}" if left_out.size else "")
     return replace(curve, source=f"{curve.source}: {told}")
+
+
+def read_points(spec, kind):
+    """Points u (to the field side) and f (up), m, as `read_profile` reads them from a dict, before they are placed in
+    the track; the line number of each line with a point, which of them are inside ``within``, what the file states,
+    what was done, and which keys were assumed."""
+    spec = _checked(spec, kind)
+    path = Path(spec["points"])
+    u, f, lines, stated = _read(path, _text(path), spec, kind)
+    inside = _within(path, spec, u)
+    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside], path)
+    return u, f, lines, inside, stated, told, assumed
 
 
 def kind_of(path):

@@ -86,7 +86,7 @@ class NormalContact:
         count, pose = self.overlaps(sign * y, z, axle_direction(sign * roll, sign * yaw))
         found, first = [], 0
         while first < count:
-            last = group_end(self._patches, count, first)
+            last = group_end(self.geometry, self._patches, count, first)
             memory = self._memories.setdefault((side, len(found)), np.zeros(MEMORY))
             if not warm:
                 memory[0] = 0.0

@@ -347,7 +347,7 @@ def test_crests_of_nodes_are_those_of_strips(benchmark_pair, yaw):
     rows, ends = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(MAX_PATCHES, np.int64)
     nodes = np.zeros((gap.NODE_ROWS, MAX_PATCHES * gap.NODES))
     count = find_patches(benchmark_pair, 1.0, 5.8e-3, 0.4596, *axle_direction(0.0, yaw), True, MOMENT, rows)
-    last = gap.group_end(rows, count, 0)
+    last = gap.group_end(benchmark_pair, rows, count, 0)
     frame = gap.frame_of_overlaps(benchmark_pair, pose, rows, 0, last)
     found = ends[gap.look_over_overlaps(benchmark_pair, pose, frame, rows, 0, last, nodes, ends) - 1]
     pressed = nodes[:, :found][:, nodes[gap.NODE_GAP, :found] < 0.0]

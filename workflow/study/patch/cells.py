@@ -151,7 +151,7 @@ def depths_of(contact, left, overlaps):
     factor, pose = damping_factor(0.0, contact.damping, contact.damping_speed), make_pose(1.0, *left, True)
     count = find_patches(geometry, 1.0, *left, True, MOMENT, overlaps)
     while first < count:
-        end = group_end(overlaps, count, first)
+        end = group_end(geometry, overlaps, count, first)
         lift = (1.0 - factor ** (2.0 / 3.0)) * overlaps[first:end, PENETRATION].max()
         while first < end:
             last = lobe_end(geometry, pose, overlaps, first, end, (APART, FAR, SADDLE))

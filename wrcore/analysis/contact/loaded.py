@@ -95,6 +95,9 @@ class LoadedWheels:
     of creepages); where strips find no solution a grid takes over.
     """
 
+    refines = True
+    """Whether a patch that strips do not solve is solved anew on finer grids."""
+
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
                  poisson_ratio=0.28, detection="spatial"):  # fmt: skip
         known = {"patch": (model, MODELS), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS),
@@ -186,7 +189,7 @@ class LoadedWheels:
         count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
-            last, before = group_end(overlaps, count, first), self._counters[ON_GRID]
+            last, before = group_end(self.geometry, overlaps, count, first), self._counters[ON_GRID]
             work.spare[0] = 0.0
             found = UNKNOWN
             if contact.value.strips.looked_up:
@@ -200,7 +203,11 @@ class LoadedWheels:
             extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
-            if fields is not None and (self.always or self._counters[ON_GRID] > before):
+            on_grid = self._counters[ON_GRID] > before
+            if on_grid and not self.refines:
+                x, a, b = out[0, [columns.X, columns.SEMI_A, columns.SEMI_B]]
+                yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, None, True)
+            elif fields is not None and (self.always or on_grid):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
                 patch = self._fields(out[0], found.load, pose, friction) if fields else None
@@ -314,6 +321,10 @@ class LoadedWheels:
                          self._still.reduction, load, self.geometry.rolling_radius)  # fmt: skip
         if math.isnan(z) or (not self._still.strips.strips and rolling is None and vertical):
             return roll if not math.isnan(z) else math.nan, z
+        return self._levelled(roll, z, y, load, yaw, rolling, friction, vertical)
+
+    def _levelled(self, roll, z, y, load, yaw, rolling, friction, vertical):
+        """Roll (rad) and height (m) at which each wheel carries a load, from guesses."""
         before = difference = math.nan
         slope, left, right = ROLL_SLOPE, z, z
         for _ in range(_MOST_ROLLS):

@@ -5,7 +5,9 @@ import math
 import pandas as pd
 
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact import reduction as columns
+from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
 
@@ -26,7 +28,8 @@ def loaded_poses(
     instead of strips.
 
     z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
-    Neither: both are solved so that each wheel carries it. With V_m_per_s above 0 the wheelset rolls, freely where
+    Neither: both are solved so that each wheel carries it. In place of a ``geometry`` a `WheelOnSlices` stands for both
+    sides, at the arc length ``s_m`` of each pose. With V_m_per_s above 0 the wheelset rolls, freely where
     omega_rad_per_s is not given; else it stands. ``load_by``: the load (N per wheel) is the ``vertical`` sum of all
     forces on a wheel, or that of its ``normal`` forces; ``friction`` holds where a pose has no ``mu``; all else as for
     `LoadedWheels`.
@@ -35,9 +38,14 @@ def loaded_poses(
     check_number(friction, 0.0, 2.0, "contact", "friction")
     if load_by not in ("vertical", "normal"):
         raise InputError("load_by", "", f"expected vertical or normal, got {load_by!r}")
-    wheels = LoadedWheels(geometry, patch, resolution, slip, shear_modulus, poisson_ratio, detection)
+    on_slices = isinstance(geometry, WheelOnSlices)
+    kind = LoadedOnSlices if on_slices else LoadedWheels
+    wheels = kind(geometry, patch, resolution, slip, shear_modulus, poisson_ratio, detection)
     rows, on_grid = [], 0
     for pose in poses.itertuples():
+        if on_slices:
+            wheels.s = _given(pose, "s_m", math.nan)
+            check_number(wheels.s, -1e6, 1e6, "contact", "s_m", "m")
         y, yaw, mu = pose.y_m, pose.yaw_rad, _given(pose, "mu", friction)
         speed, rolling = _given(pose, "V_m_per_s", 0.0), None
         if speed > 0.0:

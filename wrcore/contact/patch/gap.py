@@ -14,12 +14,26 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Z
-from wrcore.contact.strip import cubic_at, curvature_at, gap_at, strip_point, wheel_slope
+from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Y, Z
+from wrcore.contact.strip import (
+    AHEAD,
+    BEND,
+    LIFT,
+    changes_along,
+    cubic_at,
+    curvature_at,
+    gap_at,
+    strip_point,
+    wheel_slope,
+    with_rail_along,
+)
 from wrcore.kernels.jit import FUSED, jit
 
 JOINED_ANGLE = 0.5
 """Neighbouring overlaps whose planes differ by less (rad) are one patch with one contact angle."""
+
+JOINED = 8e-3
+"""Overlaps that are closer than this across share a patch, as in CONTACT, m."""
 
 NODES = 48
 """Nodes over each overlap at which the gap is looked at."""
@@ -58,10 +72,13 @@ class Frame(NamedTuple):
 
 
 @jit(allocates=False)
-def group_end(patches, count, first):
-    """End of the run of overlaps, from ``first``, that are one patch."""
+def group_end(geometry, patches, count, first):
+    """End of the run of overlaps, from ``first``, that are one patch; where a rail may have several heads they are not
+    if they lie far apart."""
     last = first + 1
     while last < count and abs(patches[last, ANGLE] - patches[last - 1, ANGLE]) < JOINED_ANGLE:
+        if changes_along(geometry) and abs(patches[last, Y] - patches[last - 1, Y]) > JOINED:
+            break
         last += 1
     return last
 
@@ -86,7 +103,7 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
     f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
     angle = _mean_angle(geometry, pose, patches, first, last, math.atan(0.5 * (wheel_slope(pose, slope, along) + df)))
     x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
-    return Frame(math.cos(angle), math.sin(angle), x, ur, f, u)
+    return Frame(math.cos(angle), math.sin(angle), with_rail_along(geometry, AHEAD, ur, 1.0, x), ur, f, u)
 
 
 @jit(allocates=False)
@@ -131,8 +148,8 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _shape_at(geometry, pose, tangent, u, radius, slope, along, m):
-    """A (1/m) and the extreme point's x (m, from the wheelset's cross-section) of the wheel's strip at u."""
+def _shape_at(geometry, pose, tangent, u, ur, radius, slope, along, m):
+    """A (1/m) and the x of the least gap (m, from the wheelset's cross-section) of the wheel's strip at u, over ur."""
     rise = (m - tangent) / (1.0 + m * tangent)
     cosine = 1.0 / math.sqrt(1.0 + slope * slope)
     kappa = cosine / radius
@@ -141,7 +158,9 @@ def _shape_at(geometry, pose, tangent, u, radius, slope, along, m):
         profile = -curvature_at(geometry.wheel, geometry.wheel_start, geometry.wheel_step, u)
         kappa += (profile * cosine * cosine * cosine - kappa) * cross
     secant = math.sqrt(1.0 + rise * rise)  # 1/cos(delta_w - delta)
-    return 0.5 * kappa * secant, radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+    shape = with_rail_along(geometry, BEND, ur, secant / math.sqrt(1.0 + m * m), 0.5 * kappa * secant)
+    crest = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+    return shape, with_rail_along(geometry, AHEAD, ur, 1.0, crest)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -168,10 +187,10 @@ def strip_gap(geometry, pose, frame, s, u, ur):
         u += (s - here) / (pose.side * rate * (frame.cosine + m * frame.sine))
     top = normal + (s - here) * rise
     rate = pose.side * rate * (frame.cosine + m * frame.sine)
-    shape, crest = _shape_at(geometry, pose, tangent, u, radius, slope, along, m)
-    _, _, radius, slope, _, along = strip_point(geometry, pose, u + _PROBE)
+    shape, crest = _shape_at(geometry, pose, tangent, u, across, radius, slope, along, m)
+    across, _, radius, slope, _, along = strip_point(geometry, pose, u + _PROBE)
     m = wheel_slope(pose, slope, along)
-    shape_rate, crest_rate = _shape_at(geometry, pose, tangent, u + _PROBE, radius, slope, along, m)
+    shape_rate, crest_rate = _shape_at(geometry, pose, tangent, u + _PROBE, across, radius, slope, along, m)
     inverse = 1.0 / (_PROBE * rate)
     shape_rate, crest_rate = (shape_rate - shape) * inverse, (crest_rate - crest) * inverse
     crest -= frame.x
@@ -187,6 +206,7 @@ def strip_gap(geometry, pose, frame, s, u, ur):
     tilt = 0.5 * (rise + fall)
     lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
     gap, slope = (top - normal - (s - here) * fall) * lean, (rise - fall) * lean
+    top = with_rail_along(geometry, LIFT, ur, frame.cosine, top)
     return gap, slope, shape * lean, crest, shape_rate * lean, crest_rate, top, tilt, u, ur
 
 
@@ -238,8 +258,11 @@ def _fill_node(geometry, pose, frame, u, nodes, k):
     tilt = 0.5 * (rise + fall)
     lean = 1.0 / math.sqrt(1.0 + tilt * tilt)
     nodes[NODE_GAP, k] = gap * (frame.cosine - frame.sine * fall) * lean
-    nodes[NODE_SHAPE, k] = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
-    nodes[NODE_CREST, k] = radius * along * pose.q + (geometry.half_distance + u) * pose.ex - frame.x
+    shape = 0.5 * lean * math.sqrt((1.0 + rise * rise) / (1.0 + slope * slope)) / radius
+    upright = lean * math.sqrt((1.0 + rise * rise) / (1.0 + m * m))
+    nodes[NODE_SHAPE, k] = with_rail_along(geometry, BEND, ur, upright, shape)
+    crest = radius * along * pose.q + (geometry.half_distance + u) * pose.ex - frame.x
+    nodes[NODE_CREST, k] = with_rail_along(geometry, AHEAD, ur, 1.0, crest)
 
 
 @jit(allocates=False, fastmath=FUSED)

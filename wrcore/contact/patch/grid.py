@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.patch.edges import with_sharp_edges
+from wrcore.contact.patch.gap import JOINED
 from wrcore.contact.patch.grid_pressure import solve_pressure
 from wrcore.contact.patch.grid_traction import solve_traction
 from wrcore.contact.patch.surfaces import NO_RAIL, rail_height, surface_gap, wheel_height
@@ -22,9 +23,6 @@ REACH = 0.04
 
 SEARCH_STEP = 2.5e-4
 """Distance of the strips of that search, m."""
-
-JOINED = 8e-3
-"""Overlaps that are closer than this across share a patch, as in CONTACT, m."""
 
 COARSE, COARSE_STEP, MOST_COARSE = 16, 4e-4, 64
 """Elements along and, from as many up, across the overlap of the first solution, which shows where contact is; their

@@ -23,6 +23,7 @@ from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, loo
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
 from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
 from wrcore.contact.patch.windows import drop_starved, guess_squares, guess_windows, merge_close, newborn, start_strips
+from wrcore.contact.strip import changes_along
 from wrcore.kernels.jit import FUSED, jit
 
 _ROUNDS = 5
@@ -68,7 +69,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
     guess_squares(hertz, patches, first, work, stretches)
     windows = guess_windows(work, stretches, resolution)
-    kinds = 2 if pose.ex == 0.0 else 3
+    kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     if _resume(frame, memory, work, windows):
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:

@@ -14,7 +14,10 @@ from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y
 from wrcore.kernels.jit import FUSED, jit
 
 FEWEST_STRIPS, SLENDER_WINDOW = 8, 4.0
-"""Strips of a slender window, whatever the resolution, and the length over width from which it is one."""
+"""Strips of a slender window, whatever the usual resolution, and the length over width from which it is one."""
+
+_USUAL = 16
+"""Strips of wide windows beyond which slender ones have more, too: where rails have sharp edges."""
 
 MORE = 1.05
 """Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
@@ -95,7 +98,7 @@ def count_strips(width, length, resolution, more):
         if 0.0 < t <= 1.0 and more[WIDENED] == 1.0 and (step >= 1.0 or resolution != FEWEST_STRIPS):
             more[WEIGHT] = max(more[WEIGHT], t * t * (3.0 - 2.0 * t))
     if ratio < _STEPS[0]:
-        return FEWEST_STRIPS
+        return max(FEWEST_STRIPS, resolution - _USUAL)
     halves = 2 if ratio <= _STEPS[1] else 3 if ratio <= _STEPS[2] else 4
     return min(resolution * halves // 2, MAX_STRIPS)
 

@@ -1,0 +1,208 @@
+"""Wheels on rails of slices: against analytic cases, plain rails, and CONTACT."""
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.analysis.contact.test_poses import command
+from tests.contact.patch import contact_reference as contact
+from wrcore.analysis.contact.crossing import Crossing, write_crossing
+from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.on_slices import LoadedOnSlices
+from wrcore.contact import reduction as columns
+from wrcore.contact.seen_rail import WINDOW, WheelOnSlices
+from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profile_files import read_profile
+from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.standards import named_profile
+
+RADIUS, CROWN = 0.46, 0.08
+PROFILES = Path(os.environ.get("WRCORE_CONTACT", "")) / "testbank" / "profiles"
+ALONG = {"cross_nose": 0.05, "wing_rail": 0.05, "cross+wing_extd": 0.05, "uk_interrupt_v2": 0.05}
+"""Distance along the track within which the place is, at 95 %, mm."""
+REFUSED = "spike|not_converged|beyond_slices|few_elements|pmax_peaked"
+
+
+def rail(folder, points_at, arc_lengths):
+    """Rail of slices with the points (u, f) at each arc length, through files."""
+    rows = ["s_m,profile"]
+    for k, s in enumerate(arc_lengths):
+        points = np.column_stack(points_at(s))
+        np.savetxt(folder / f"{k}.csv", points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+        rows.append(f"{s:.12g},{k}.csv")
+    (folder / "rail.csv").write_text("\n".join(rows))
+    return read_slices(folder / "rail.csv")
+
+
+def crown(u):
+    """A rail's circular head."""
+    return np.sqrt(CROWN**2 - u**2) - CROWN
+
+
+def cylinder():
+    """A wheel without flange and conicity."""
+    return ProfileCurve("cylinder", "wheel", np.arange(-1000, 1201) * 5e-5, *np.zeros((3, 2201)))
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.05, 0.1, 0.2])
+def test_cylinder_touches_a_ramp_ahead_of_its_axle(tmp_path, rise):
+    u = np.linspace(-0.03, 0.03, 121)
+    ramp = rail(tmp_path, lambda s: (u, crown(u) + rise * s), np.linspace(-0.5, 0.5, 11))
+    pair, s, slope = WheelOnSlices(cylinder(), ramp), 0.03, math.atan(rise)
+    geometry, touch = pair.under("right", s, 0.002)
+    middle = round(-geometry.rail_start / geometry.rail_step)
+    ahead, bend, lift = geometry.along[middle]
+    assert touch == pytest.approx(RADIUS / math.cos(slope) + rise * s, abs=2e-9)
+    x = RADIUS * math.sin(slope)
+    fitted = x - x * WINDOW**2 / (6.0 * (RADIUS**2 - x**2))  # the circle is steeper ahead of x than behind it
+    assert ahead == pytest.approx(fitted, abs=2e-8)
+    assert lift == pytest.approx(RADIUS - math.sqrt(RADIUS**2 - fitted**2), abs=1e-8)
+    assert 0.5 / RADIUS + bend == pytest.approx(0.5 / RADIUS / math.cos(slope) ** 3, rel=2e-4)
+
+
+def test_slices_that_are_alike_are_the_plain_rail(tmp_path):
+    head = named_profile("UIC60-MBench", "rail", 1 / 40)
+    u, f = np.append(head.u[::5], head.u[-1]), np.append(head.f[::5], head.f[-1])
+    u, unique = np.unique(u, return_index=True)
+    at = np.concatenate([u[:1] - 3e-4, u, u[-1:] + 3e-4])
+    f = np.concatenate([head.f[:1] - 6e-3, f[unique], head.f[-1:] - 6e-3])
+    rail(tmp_path, lambda s: (at, f), [0.0, 1.0, 3.0])
+    poses = {"pose_id": ["a", "b"], "y_m": [0.001, -0.003], "yaw_rad": [0.0, 0.002], "s_m": [0.5, 1.5]}
+    found = [command(tmp_path, poses, pair=["--wheel", "S1002", "--rail", str(tmp_path / name)])
+             for name in ("rail.csv", "0.csv")]  # fmt: skip
+    pd.testing.assert_frame_equal(*found, check_exact=True)
+
+
+def test_alike_slices_seen_by_a_wheel_are_the_rail(tmp_path):
+    u = np.linspace(-0.03, 0.03, 121)
+    slices = rail(tmp_path, lambda s: (u, crown(u)), [0.0, 0.02, 0.05])
+    geometry, _ = WheelOnSlices(named_profile("S1002", "wheel"), slices).under("left", 0.3, 0.003, 0.002, 0.01)
+    at = geometry.rail_start + geometry.rail_step * np.arange(len(geometry.rail))
+    on = np.abs(at) < 0.029
+    assert np.abs(geometry.rail[on, 0] - crown(at[on])).max() < 2e-10
+    assert (np.abs(geometry.along[on]).max(axis=0) < (2e-8, 5e-5, 1e-12)).all()
+    assert slices.alike
+
+
+def test_a_rail_that_leaves_is_a_wheelset_that_turns(tmp_path):
+    angle, distance = 0.02, 0.75
+    u = np.linspace(-0.03, 0.03, 121)
+    stretched = u / math.cos(angle)
+    leaving = rail(tmp_path, lambda s: (stretched + math.tan(angle) * s, crown(u)), np.linspace(-0.3, 0.3, 13))
+    wheel = named_profile("S1002", "wheel")
+    plain = WheelOnRail(wheel, ProfileCurve.from_points(u, crown(u), "rail"), 0.46, 0.75, distance * math.cos(angle))
+    turned, straight = LoadedWheels(plain.geometry), LoadedOnSlices(WheelOnSlices(wheel, leaving))
+    load, rows = 5e4, []
+    for wheels, yaw in ((turned, -angle), (straight, 0.0)):
+        z = wheels.height("left", 0.0, load, yaw=yaw)
+        (one,) = wheels.at_height("left", 0.0, z, yaw=yaw)
+        rows.append((z, one))
+    (z0, one), (z1, other) = rows
+    assert z1 == pytest.approx(z0, abs=1e-7)
+    assert other.row[columns.NORMAL] == pytest.approx(one.row[columns.NORMAL], rel=1e-3)
+    assert other.row[columns.P_MAX] == pytest.approx(one.row[columns.P_MAX], rel=1e-2)
+    x, y = one.row[[columns.X, columns.Y]]
+    back = x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle) + y * math.cos(angle)
+    assert other.row[[columns.X, columns.Y]] == pytest.approx(np.array(back), abs=3e-5)
+
+
+def test_load_goes_over_from_the_wing_to_the_nose(tmp_path):
+    made = Crossing()
+    slices, offset = read_slices(write_crossing(tmp_path)).placed()
+    assert list(slices.begins()) == [pytest.approx(made.nose_begins, abs=1e-6)]
+    wheels = LoadedOnSlices(
+        WheelOnSlices(named_profile("S1002", "wheel"), slices, rail_distance=0.7175 + offset), "moment"
+    )
+    load, shares, heights = 5e4, [], []
+    for wheels.s in made.nose_begins + np.linspace(-0.1, made.after, 61):
+        z = wheels.height("right", 0.0, load)
+        found = wheels.at_height("right", 0.0, z)
+        assert sum(one.vertical for one in found) == pytest.approx(load, rel=1e-6)
+        edge = 0.7175 + made.angle * wheels.s - 0.5 * made.flangeway  # between the nose and the wing
+        on_nose = [one.vertical for one in found if -one.row[columns.Y] < edge]
+        shares.append(sum(on_nose) / load)
+        heights.append(z)
+    assert shares[0] == 0.0
+    assert shares[-1] == pytest.approx(1.0)
+    assert np.abs(np.diff(heights)).max() < 5e-4
+    assert 0.0 < np.mean(shares) < 1.0
+
+
+def test_heads_begin_and_end_at_slices(tmp_path):
+    slices = read_slices(write_crossing(tmp_path))
+    begin = Crossing().nose_begins
+    assert [len(slices.heads(s)) for s in (-1.0, begin - 1e-3, begin + 0.01)] == [1, 1, 2]
+    assert "parts begin or end at s = 0.672 m" in slices.source
+
+
+SLCS = """ 0.0 1.0 U_OFFSET, U_SCALE
+ 2 NSLC
+ {features} 0 0 NFEAT, NKINK, NACCEL
+ 1 U_INTPOL
+ 0.0 'a.txt'
+ {second} 'a.txt'
+{places}"""
+
+
+@pytest.mark.parametrize(
+    ("change", "where", "what"),
+    [
+        ({"second": "0.0"}, "line 6", "s that increases"),
+        ({"second": "x"}, "line 6", "arc length and profile"),
+        ({"features": "1"}, "line 3", "at least 2 feature lines"),
+        ({"features": "2"}, "s and 2 positions of feature lines", "truncated"),
+        ({"features": "3", "places": " 0.0 0 9 4\n"}, "line 7", "increase"),
+        ({"features": "2", "places": " 0.0 0 99\n 10.0 99 999"}, "line 8", "feature lines within"),
+        ({"places": "5 6"}, "line 7", "end of the file"),
+    ],
+)
+def test_faults_name_file_and_line(tmp_path, change, where, what):
+    u = np.linspace(-30.0, 30.0, 121)
+    np.savetxt(tmp_path / "a.txt", np.column_stack([u, u**2 / 600.0]))
+    (tmp_path / "rail.slcs").write_text(SLCS.format(**{"features": "0", "second": "10.0", "places": "", **change}))
+    with pytest.raises(InputError) as error:
+        read_slices(tmp_path / "rail.slcs")
+    assert "rail.slcs" in str(error.value)
+    assert where in str(error.value)
+    assert what in str(error.value)
+
+
+def cases(name):
+    """Cases of CONTACT without the flags that its README distrusts, a table per case."""
+    path = contact.reference_path("crossing_cases")
+    if path is None or not (PROFILES / f"{name}.slcs").is_file():
+        pytest.skip("needs crossing_cases.csv (WRCORE_REFERENCE) and CONTACT's repository (WRCORE_CONTACT)")
+    table = pd.read_csv(path)
+    grouped = table[table.set == name].groupby("case_id")
+    return [case for _, case in grouped if not case.flag.fillna("").str.contains(REFUSED).any()]
+
+
+@pytest.mark.parametrize("name", ["cross_nose", "wing_rail", "cross+wing_extd", "uk_interrupt_v2"])
+def test_crossings_against_contact(name):
+    wheel = read_profile(contact.reference_path("crossing_cases").parent / contact.FILES["S1002"], "wheel")
+    wheels = LoadedOnSlices(WheelOnSlices(wheel, read_slices(PROFILES / f"{name}.slcs")), resolution="fine")
+    rolling, height, number, rows = Rolling(2.0, 4.3481181), [], [], []
+    for case in cases(name)[::7]:
+        pose = case.iloc[0]
+        wheels.s, y = 1e-3 * pose.s_ws_mm, -1e-3 * pose.y_ws_mm
+        z = wheels.height("right", y, pose.Fz_wheel_N, rolling=rolling)
+        ours = sorted(wheels.at_height("right", y, z, rolling=rolling), key=lambda one: one.row[columns.Y])
+        height.append(1e6 * (RADIUS - z) - 1e3 * pose.z_ws_mm)
+        number.append(len(ours) - len(case))
+        if len(ours) == len(case) == 1:
+            x, y, load, largest = ours[0].row[[columns.X, columns.Y, columns.NORMAL, columns.P_MAX]]
+            rows.append([1e3 * x - pose.x_tr_pc_mm, -1e3 * y - pose.y_tr_pc_mm,
+                         load / pose.Fn_N - 1.0, 1e-6 * largest / pose.pmax_MPa - 1.0])  # fmt: skip
+    x, y, load, largest = np.quantile(np.abs(rows), 0.95, axis=0)
+    assert x < ALONG[name]
+    assert y < 0.02
+    assert load < 0.02
+    assert largest < 0.03
+    assert np.quantile(np.abs(height), 0.95) < 3.0
+    assert np.mean(np.array(number) == 0) >= 0.95

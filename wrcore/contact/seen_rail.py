@@ -1,0 +1,217 @@
+"""A rail that changes along the track, as a wheel in a pose sees it: one section, ready for every search and patch.
+
+At each lateral coordinate the gap between the wheel of revolution and the rail's surface z(x, y) is least at some x,
+ahead of the axle where the rail rises. The seen section has the height that gives a prismatic rail the same least gap,
+
+    f(y) = max_x (z_rail(x, y) - z_wheel(x, y)) + min_x z_wheel(x, y),
+
+which does not depend on the wheelset's height. What strips want beside it is kept at the section's nodes
+(`ContactGeometry.along`): how much further ahead the gap is least than over a prismatic rail, half of what the gap's
+second derivative over x has more, and how much higher the wheel's point there lies. Gap, place and curvature are those
+of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Over a rail that is the
+same everywhere the section is the rail's own and all three vanish.
+
+Where a head begins or ends under the wheel, its edge may be what is nearest; it then counts with the wheel's curvature
+alone. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wrcore.contact.detection import axle_direction
+from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.patch.surfaces import ContactPlane, wheel_height
+from wrcore.contact.strip import make_pose, strip_point
+from wrcore.geometry.profile import SPACING, ProfileCurve, averaged_second_derivative
+from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.track import SIDES
+from wrcore.kernels.jit import jit
+
+REACH, STEP, COARSE = 0.1, 1e-3, 4
+"""Half of the length along the track that is looked at, m: ramps up to 1:4.6 of a wheel of 460 mm; the distance of the
+sections there, m, and at every how many of them the wheel is first put."""
+
+WINDOW = 5.5e-3
+"""Half of the length over which the gap is fitted, m: of a cubic gap the parabola feels w^2/3, and a pressure
+sqrt(1 - (x/a)^2) feels 3 a^2/7, as much for patches of 9.7 mm."""
+
+BELOW = 0.03
+"""Depth below the section's lowest point at which what lies between its heads is put, m."""
+
+HEIGHT, AHEAD, BEND, LIFT = range(4)
+
+
+@dataclass(frozen=True)
+class WheelOnSlices:
+    """A wheel on a rail of slices.
+
+    Parameters
+    ----------
+    wheel : ProfileCurve
+    rail : RailSlices
+        In the coordinates of the track: u from ``rail_distance``, f from the plane from which the wheelset's height
+        counts.
+    rolling_radius, half_distance, rail_distance : float
+        As for `WheelOnRail`, m.
+    """
+
+    wheel: ProfileCurve
+    rail: RailSlices
+    rolling_radius: float = 0.46
+    half_distance: float = 0.75
+    rail_distance: float = 0.75
+
+    @cached_property
+    def _wheel_geometry(self):
+        """Geometry of the wheel over a level rail: what the search for the seen section takes of it."""
+        u = SPACING * np.arange(-400, 401)
+        level = ProfileCurve("level", "rail", u, *np.zeros((3, u.size)))
+        sizes = self.rolling_radius, self.half_distance, self.rail_distance
+        return contact_geometry(self.wheel, level, *sizes)
+
+    def under(self, side, s, y, roll=0.0, yaw=0.0):
+        """`ContactGeometry` of the section that the wheel of a ``side`` sees with the wheelset's centre at s, y (m), in
+        a roll and yaw (rad), and the height (m) of the centre at which it first touches; None and NaN where there is no
+        rail under the wheel."""
+        sign, wheel = SIDES[side], self._wheel_geometry
+        pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
+        low, high = (strip_point(wheel, pose, u)[0] for u in self.wheel.u[[0, -1]])
+        u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
+        x = self._stations(s)
+        rail = self.rail.heights(s + x, u)[0]
+        seen = np.zeros((4, u.size))
+        touch = _see(wheel, pose, x, rail, u, seen)
+        there = np.isfinite(seen[HEIGHT])
+        if there.sum() < 10:
+            return None, math.nan
+        f, slope = _filled(seen[HEIGHT], there)
+        curve = ProfileCurve(f"{self.rail.name} at s = {s:g} m", "rail", u, f, slope,
+                             averaged_second_derivative(u, f, slope))  # fmt: skip
+        geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
+        return geometry._replace(along=np.ascontiguousarray(seen[AHEAD:].T)), touch
+
+    def _stations(self, s):
+        """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
+        count = round(REACH / STEP)
+        begins = self.rail.begins() - s
+        begins = begins[np.abs(begins) < REACH]
+        shift = math.remainder(begins[np.argmin(np.abs(begins))], STEP) if begins.size else 0.0
+        return STEP * np.arange(-count, count + 1) + shift
+
+
+def _filled(f, there):
+    """Heights, with something far below where there is no rail, and slopes by differences of the fourth order."""
+    filled, slope = np.where(there, f, np.min(f, where=there, initial=np.inf) - BELOW), np.zeros(f.size)
+    ends = np.flatnonzero(np.diff(there.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    for first, last in ends:
+        part = f[first:last]
+        if part.size < 5:
+            filled[first:last] = filled.min()
+            continue
+        d = np.gradient(part, SPACING, edge_order=2)
+        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * SPACING)
+        slope[first:last] = d
+    return filled, slope
+
+
+@jit
+def _strip_over(wheel, pose, u):
+    """Wheel coordinate of the strip whose extreme point lies over the rail coordinate ``u``, and that point's x and
+    height (m)."""
+    w = u
+    for _ in range(12):
+        ur, z, radius, _, _, along = strip_point(wheel, pose, w)
+        if abs(u - ur) < 1e-12:
+            break
+        w += u - ur
+    return w, radius * along * pose.q + (wheel.half_distance + w) * pose.ex, z
+
+
+@jit(allocates=False)
+def _parabola(x, g, best):
+    """Vertex, height and second derivative of the parabola that fits best around its own vertex, with the weight
+    (1 - (d/WINDOW)^2)^2 at a distance d: smooth in what is fitted. From the highest station; NaN at an end."""
+    n, h = x.size, x[1] - x[0]
+    centre, top, second = x[best], np.nan, np.nan
+    if best < 1 or best > n - 2 or not g[best - 1] + g[best + 1] == g[best - 1] + g[best + 1]:
+        return centre, top, second
+    reach = int(WINDOW / h) + 1
+    for _ in range(12):
+        s0 = s1 = s2 = s3 = s4 = t0 = t1 = t2 = 0.0
+        middle = int(round((centre - x[0]) / h))
+        for direction in (-1, 1):
+            i = middle if direction > 0 else middle - 1
+            while 0 <= i < n and abs(i - middle) <= reach and g[i] == g[i]:
+                d = (x[i] - centre) / WINDOW
+                if abs(d) < 1.0:
+                    w = (1.0 - d * d) ** 2
+                    s0, s1, s2, s3, s4 = s0 + w, s1 + w * d, s2 + w * d**2, s3 + w * d**3, s4 + w * d**4
+                    v = w * (g[i] - g[best])
+                    t0, t1, t2 = t0 + v, t1 + v * d, t2 + v * d * d
+                i += direction
+        m00, m01, m02 = s2 * s4 - s3 * s3, s3 * s2 - s1 * s4, s1 * s3 - s2 * s2
+        whole = s0 * m00 + s1 * m01 + s2 * m02
+        c1 = (t0 * m01 + t1 * (s0 * s4 - s2 * s2) + t2 * (s1 * s2 - s0 * s3)) / whole
+        c2 = (t0 * m02 + t1 * (s1 * s2 - s0 * s3) + t2 * (s0 * s2 - s1 * s1)) / whole
+        if not c2 < 0.0:
+            return x[best], np.nan, np.nan
+        c0 = (t0 - s1 * c1 - s2 * c2) / s0
+        step = -0.5 * c1 / c2
+        centre, top, second = centre + WINDOW * step, g[best] + c0 - 0.25 * c1 * c1 / c2, 2.0 * c2 / WINDOW**2
+        if abs(step) < 1e-10 or not abs(centre - x[best]) < WINDOW:
+            break
+    return centre, top, second
+
+
+@jit(allocates=False)
+def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
+    """Fill ``g`` with the height of the rail less that of the wheel at every ``step``-th station, NaN where one of them
+    is missing; returns the highest one, or -1."""
+    best = -1
+    for i in range(first, end, step):
+        g[i] = np.nan
+        if rail[i] == rail[i]:
+            n = wheel_height(wheel, pose, plane, x[i], 0.0, guess)
+            if n == n:
+                g[i], guess = rail[i] - n - plane.z, n
+                if best < 0 or g[i] > g[best]:
+                    best = i
+    return best
+
+
+@jit
+def _see(wheel, pose, x, rail, u, seen):
+    """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,); returns the
+    height of the wheelset's centre at the first touch. Stations are evenly apart."""
+    n, h, touch = x.size, x[1] - x[0], np.nan
+    g, nominal, near = np.full(n, np.nan), -wheel.rolling_radius, 2 * int(WINDOW / h) + COARSE
+    for k in range(u.size):
+        seen[HEIGHT, k] = np.nan
+        _, crest, lowest = _strip_over(wheel, pose, u[k])
+        plane = ContactPlane(0.0, u[k] + wheel.rail_distance, nominal, 1.0, 0.0)
+        guess = lowest - nominal
+        best = _fill(wheel, pose, plane, x, rail[:, k], 0, n, COARSE, guess, g)
+        if best < 0:
+            continue
+        _fill(wheel, pose, plane, x, rail[:, k], max(best - near, 0), min(best + near + 1, n), 1, guess, g)
+        for i in range(max(best - COARSE, 0), min(best + COARSE + 1, n)):
+            if g[i] > g[best]:
+                best = i
+        ahead = wheel_height(wheel, pose, plane, crest + WINDOW / 3.0, 0.0, guess)
+        behind = wheel_height(wheel, pose, plane, crest - WINDOW / 3.0, 0.0, guess)
+        own = 4.5 * (ahead + behind - 2.0 * guess) / WINDOW**2
+        top = g[best]
+        place, height, second = _parabola(x, g, best)
+        if not height == height:
+            height, second = top, -2.0 * own
+        else:
+            top = max(top, height)
+        wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
+        seen[HEIGHT, k], seen[AHEAD, k] = height + lowest, place - crest
+        seen[BEND, k], seen[LIFT, k] = -0.5 * second - own, wheel_there + nominal - lowest
+        if not touch >= top:
+            touch = top
+    return touch

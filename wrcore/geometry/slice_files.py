@@ -1,0 +1,232 @@
+"""Files of rails that change along the track: CONTACT's ``.slcs``, and a plain table of slices.
+
+``.slcs``: counters, a line ``s 'profile'`` per slice, and positions of feature lines (chord length from the
+section's first point, mm; -1: the line does not exist there); ``%`` begins a comment. Profiles that are columns are in
+the unit of s and count downwards, unless it is said otherwise.
+
+Plain: a CSV with the columns s_m, profile (a point file, see `profile_files`) and, where a rail has several heads,
+head: a name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ...
+may give feature lines of a head: chord lengths from its inner end.
+
+Paths are relative to the file. Source: CONTACT's user guide and its test bank.
+"""
+
+import csv
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from wrcore.errors import InputError, one_of
+from wrcore.errors.input_files import check_regular
+from wrcore.geometry.profile_files import read_points
+from wrcore.geometry.slices import RailSlices, Slice, sheets_of
+
+SLICE_FILES = (".slcs",)
+MOST_SLICES = 100_000
+
+_CLOSE = 1e-7  # m; as for profiles
+_MM = 1e-3
+_KEYS = {"slices", "unit", "mirrored", "downwards"}
+
+
+def is_slices(path):
+    """Whether a file lists slices: by its ending, or a CSV whose header begins with s_m and names profiles."""
+    path = Path(path)
+    if path.suffix.lower() in SLICE_FILES:
+        return True
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    with path.open(errors="replace") as file:
+        names = [name.strip() for name in file.readline().lstrip("\ufeff").split(",")]
+    return "s_m" in names and "profile" in names
+
+
+def read_slices(spec):
+    """`RailSlices` from the path of a file of slices, or from a dict of ``slices`` (the path) and how to read profiles
+    that are columns: ``unit``, ``mirrored``, ``downwards`` as for `read_profile`. InputError names file and line."""
+    spec = spec if isinstance(spec, dict) else {"slices": spec}
+    for key in set(spec) - _KEYS:
+        raise InputError("rail", str(key), one_of(sorted(_KEYS), key))
+    path = Path(spec["slices"])
+    how = {key: value for key, value in spec.items() if key != "slices"}
+    return _read_slcs(path, how) if path.suffix.lower() in SLICE_FILES else _read_table(path, how)
+
+
+def _lines(path):
+    """Lines that say something, with their numbers."""
+    try:
+        check_regular(path)
+        text = path.read_text(errors="replace")
+    except (OSError, ValueError) as error:
+        fault = getattr(error, "strerror", None) or error
+        raise InputError(path, "", f"expected a readable file of slices: {fault}") from None
+    stripped = ((k, line.split("%")[0].strip()) for k, line in enumerate(text.splitlines(), 1))
+    return [(k, line) for k, line in stripped if line]
+
+
+class _Lines:
+    """Lines of a ``.slcs`` file one after the other."""
+
+    def __init__(self, path):
+        self.path, self._rest = path, iter(_lines(path))
+
+    def take(self, count, what):
+        """The next line's number, its first ``count`` numbers, and the line."""
+        number, line = next(self._rest, (0, None))
+        if line is None:
+            raise InputError(self.path, what, "expected this, got the end of the file (truncated?)")
+        words = re.split(r"[\s,]+", line)[:count]
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if len(values) < count or not np.isfinite(values).all():
+            numbers = "a number" if count == 1 else f"{count} numbers"
+            raise InputError(self.path, f"line {number}", f"expected {what}: {numbers}, got {line[:60]!r}")
+        return number, values, line
+
+    def rest(self):
+        return list(self._rest)
+
+
+def _read_slcs(path, how):
+    lines = _Lines(path)
+    number, (offset, scale), _ = lines.take(2, "offset and scale of s")
+    if not 1e-6 <= scale <= 1e6:
+        raise InputError(path, f"line {number}", f"expected a scale in mm per unit, got {scale:g}")
+    number, (count,), _ = lines.take(1, "the number of slices")
+    if not 1 <= count <= MOST_SLICES or count != int(count):
+        raise InputError(path, f"line {number}", f"expected 1 to {MOST_SLICES} slices, got {count:g}")
+    number, (features, kinks, steps), _ = lines.take(3, "numbers of features, kinks and accelerations")
+    if features != int(features) or not (features == 0 or 2 <= features <= 1000):
+        raise InputError(path, f"line {number}", f"expected 0 or at least 2 feature lines, got {features:g}")
+    number, (method,), _ = lines.take(1, "the method of interpolation")
+    if method != 1:
+        raise InputError(path, f"line {number}", f"expected 1, surfaces through the slices, got {method:g}")
+    listed = [_listed(lines) for _ in range(int(count))]
+    for what in ("kinks",) * (kinks > 0) + ("accelerations",) * (steps > 0):
+        lines.take(0, what)
+    places = [_places(lines, path, int(features), value) for _, value, _ in listed] if features else []
+    rest = lines.rest()
+    if rest:
+        raise InputError(path, f"line {rest[0][0]}", f"expected the end of the file, got {rest[0][1][:60]!r}")
+    unit = {1.0: "mm", 1000.0: "m"}.get(scale, "mm")
+    rows = []
+    for k, (number, value, name) in enumerate(listed):
+        columns = {"unit": unit, "downwards": True, **how} if not name.lower().endswith(".prr") else {}
+        rows.append((number, (value + offset) * scale * _MM, name, columns, places[k] if features else None))
+    told = f"{int(kinks)} kinks not kept (the surface stays smooth)" if kinks else ""
+    return _assembled(path, [("", rows)], told)
+
+
+def _listed(lines):
+    """Line, arc length (in the file's unit) and profile of a slice."""
+    number, (value,), line = lines.take(1, "arc length and profile of a slice")
+    name = re.search(r"'([^']+)'|\"([^\"]+)\"", line)
+    if name is None:
+        raise InputError(lines.path, f"line {number}", f"expected s and a profile in quotes, got {line[:60]!r}")
+    return number, value, name[1] or name[2]
+
+
+def _places(lines, path, features, value):
+    """Positions of a slice's feature lines, m; NaN: none."""
+    number, (at, *places), _ = lines.take(features + 1, f"s and {features} positions of feature lines")
+    if abs(at - value) > 1e-6 * max(1.0, abs(value)):
+        raise InputError(path, f"line {number}", f"expected the feature lines of the slice at {value:g}, got {at:g}")
+    places = np.array(places)
+    places = np.where(places < 0.0, np.nan, _MM * places)
+    if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
+        raise InputError(path, f"line {number}", "expected positions of feature lines that increase (they cross here)")
+    return number, places
+
+
+def _read_table(path, how):
+    """Slices of a CSV by their heads."""
+    header, *body = [(k, [word.strip() for word in next(csv.reader([line]))]) for k, line in _lines(path)] or [(0, [])]
+    names = [name.lstrip("\ufeff") for name in header[1]]
+    for wanted in ("s_m", "profile"):
+        if wanted not in names:
+            raise InputError(path, wanted, f"expected this column; found {', '.join(names)}")
+    cuts = [name for name in names if re.fullmatch(r"cut_\d+_m", name)]
+    for name in names:
+        if name not in ("s_m", "profile", "head", *cuts):
+            raise InputError(path, name, "unknown column; expected s_m, profile, head, cut_1_m, ...")
+    heads = {}
+    for number, words in body:
+        if len(words) != len(names):
+            raise InputError(path, f"line {number}", f"expected {len(names)} fields, got {len(words)}")
+        row = dict(zip(names, words, strict=True))
+        given = np.array([_number(path, number, name, row[name], optional=True) for name in cuts])
+        places = given[np.isfinite(given)]
+        if np.any(np.diff(places, prepend=0.0) <= 0.0):
+            raise InputError(path, f"line {number}", "expected cuts above 0 that increase")
+        s = _number(path, number, "s_m", row["s_m"])
+        heads.setdefault(row.get("head", ""), []).append((number, s, row["profile"], how, (number, places)))
+    if not heads:
+        raise InputError(path, "", "expected at least one slice, got none")
+    return _assembled(path, list(heads.items()))
+
+
+def _number(path, line, name, text, optional=False):
+    try:
+        value = float(text) if text or not optional else np.nan
+    except ValueError:
+        value = np.inf
+    if np.isinf(value) or (np.isnan(value) and not optional):
+        raise InputError(path, f"{name}, line {line}", f"expected a number, got {text!r}")
+    return value
+
+
+def _assembled(path, heads, told=""):
+    """`RailSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature lines))."""
+    stations = np.unique([row[1] for _, rows in heads for row in rows])
+    sheets, alike = [], len(heads) == 1
+    for head, rows in heads:
+        s = [row[1] for row in rows]
+        if np.any(np.diff(s) <= 0.0):
+            k = int(np.argmax(np.diff(s) <= 0.0)) + 1
+            expected = f"expected s that increases, got {s[k]:g} after {s[k - 1]:g} m"
+            raise InputError(path, f"line {rows[k][0]}", expected)
+        slices = {row[1]: _slice(path, row) for row in rows}
+        counts = sorted({one.cuts.size for one in slices.values()})
+        if len(counts) > 1:
+            raise InputError(path, "cut_1_m", f"expected as many cuts in all slices of head {head!r}, got {counts}")
+        sheets += sheets_of(stations, [slices.get(at) for at in stations])
+        alike = alike and len({(one.curve.c.tobytes(), one.cuts.tobytes()) for one in slices.values()}) == 1
+    if not sheets:
+        raise InputError(path, "features", "expected a part of the rail between two feature lines, got none")
+    profiles = len({row[2] for _, rows in heads for row in rows})
+    source = f"{stations.size} slices from s = {stations[0]:g} to {stations[-1]:g} m, {profiles} profiles, "
+    source += f"{len(sheets)} parts" + f", {told}" * bool(told)
+    _, _, name, how, _ = heads[0][1][0]
+    first = {"points": str(path.parent / name), **how}
+    rail = RailSlices(str(path), stations, tuple(sheets), source, alike, first)
+    ends = ", ".join(f"{end:g}" for end in rail.begins())
+    return replace(rail, source=f"{source}, parts begin or end at s = {ends} m") if ends else rail
+
+
+def _slice(path, row):
+    """A `Slice` from its profile; in a table its ends are feature lines, too."""
+    from scipy.interpolate import CubicSpline
+
+    number, s, name, how, cuts = row
+    u, f, *_ = read_points({"points": str(path.parent / name), **how}, "rail")
+    if u.size and u[-1] < u[0]:
+        u, f = u[::-1], f[::-1]
+    step = np.hypot(np.diff(u), np.diff(f))
+    kept = np.append(True, step > _CLOSE)
+    u, f = u[kept], f[kept]
+    if u.size < 4:
+        raise InputError(path.parent / name, "", f"expected at least 4 points, got {u.size} (line {number} of {path})")
+    length = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f))))
+    places = np.array([0.0, length[-1]])
+    if cuts is not None:
+        at, given = cuts
+        places = np.minimum(given, length[-1])
+        if path.suffix.lower() not in SLICE_FILES:
+            places = np.concatenate(([0.0], given, [length[-1]]))
+        if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
+            raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * length[-1]:.3f} mm of {name}")
+    return Slice(s, CubicSpline(length, np.column_stack([u, f])), places)
