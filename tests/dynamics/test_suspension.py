@@ -24,8 +24,9 @@ def model_with(contact, items, positions=((0.0, 0.0, 2.0), (0.0, 0.0, 1.0)), spi
     for item in items:
         check_element(item, "test")
     layout = Layout("test", ("upper", "lower"), np.array(positions, float), np.array(MASSES), np.array(spins), {})
-    model = make_model(contact, MASSES, INERTIAS, gravity=0.0, speed=speed)
-    bodies = model.bodies._replace(spins=np.array(spins, np.int64))
+    model, inertias = make_model(contact, MASSES, INERTIAS, gravity=0.0, speed=speed), np.array(INERTIAS)
+    inertias[list(spins), 2] = inertias[list(spins), 0]  # bodies of revolution
+    bodies = model.bodies._replace(spins=np.array(spins, np.int64), inertia=inertias)
     return model._replace(elements=compile_elements(items, layout, [], 0.0)[0], bodies=bodies)
 
 
@@ -34,7 +35,7 @@ def evaluate(model, state):
     work = workspace(model)
     rate = Equations(model, work)(0.0, state)
     wrenches = work.wrenches.copy()
-    for b, inertia in enumerate(INERTIAS):
+    for b, inertia in enumerate(model.bodies.inertia):
         A, w = work.rotations[b], state[STATE_SIZE * b + 10 : STATE_SIZE * b + 13]
         wrenches[b, 3:] += np.cross(w, A @ (inertia * (A.T @ w)))
     return wrenches, rate[2 * STATE_SIZE :]

@@ -25,13 +25,13 @@ import time
 import numpy as np
 from numba import typeof
 
+from wrcore.dynamics.blame import blame
 from wrcore.dynamics.contract import begin, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, SOLVED
 from wrcore.errors import InputError
 from wrcore.integrate import engine
-from wrcore.integrate.blame import blame
 from wrcore.integrate.blocks import new_system
 from wrcore.integrate.choice import cheaper_method
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch

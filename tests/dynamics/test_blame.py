@@ -8,9 +8,9 @@ import pytest
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
 from tests.dynamics.test_control import LAWS, STEERING, car
+from wrcore.dynamics.blame import blame
 from wrcore.dynamics.system import Equations
 from wrcore.errors.checked_yaml import read_yaml
-from wrcore.integrate.blame import blame
 from wrcore.kernels import own
 from wrcore.scene.description import compile_scene
 
