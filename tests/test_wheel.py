@@ -79,7 +79,7 @@ def test_what_is_claimed_of_pythons_is_what_runs():
     assert jobs["test"]["strategy"]["matrix"]["python"] == claimed
     assert project["requires-python"] == f">={claimed[0]}"
     commands = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
-    assert commands == ["make test", "make lint"]
+    assert [command for command in commands if command.startswith("make ")] == ["make test", "make lint"]
     assert "    make test " in (ROOT / "README.md").read_text("utf-8")
     needs = json.loads((ROOT / "codemeta.json").read_text("utf-8"))["softwareRequirements"]
     assert needs == [re.match(r"[\w.-]+", line)[0] for line in project["dependencies"]]

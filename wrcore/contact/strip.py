@@ -78,7 +78,14 @@ _AS_KERNELS = {"_nrt": False, "error_model": "numpy"}
 
 
 def _with_rail_along(along, start, step, column, ur, factor, value):
-    raise NotImplementedError
+    return _added(along, start, step, column, ur, factor, value) if len(along) else value
+
+
+def _added(along, start, step, column, ur, factor, value):
+    position = (ur - start) / step
+    i = min(max(int(position), 0), along.shape[0] - 2)
+    t = min(max(position - i, 0.0), 1.0)
+    return value + factor * (along[i, column] * (1.0 - t) + along[i + 1, column] * t)
 
 
 @overload(_with_rail_along, inline="always", jit_options=_AS_KERNELS)
@@ -86,14 +93,7 @@ def _of_its_type(along, start, step, column, ur, factor, value):
     """Nothing at all for rails that are the same everywhere."""
     if isinstance(along, types.BaseTuple):
         return lambda along, start, step, column, ur, factor, value: value
-
-    def add(along, start, step, column, ur, factor, value):
-        position = (ur - start) / step
-        i = min(max(int(position), 0), along.shape[0] - 2)
-        t = min(max(position - i, 0.0), 1.0)
-        return value + factor * (along[i, column] * (1.0 - t) + along[i + 1, column] * t)
-
-    return add
+    return _added
 
 
 @jit(allocates=False, forceinline=True)
@@ -104,7 +104,7 @@ def with_rail_along(geometry, column, ur, factor, value):
 
 
 def _changes(along):
-    raise NotImplementedError
+    return len(along) > 0
 
 
 @overload(_changes, inline="always", jit_options=_AS_KERNELS)
