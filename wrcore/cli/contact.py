@@ -1,6 +1,7 @@
 """``wrcore contact``: the patches of a wheelset in given poses."""
 
 import json
+import math
 
 from wrcore.cli.files import output, write_csv
 from wrcore.cli.options import add_pair, as_runs, columns, pair_of
@@ -18,6 +19,7 @@ POSES = columns(
     roll_rad="optional",
     z_m="optional",
     s_m="of rails of slices: arc length of the wheelset's cross-section",
+    pitch_rad="of wheels of slices: angle by which they have rolled forward",
     V_m_per_s="optional: speed; where it is given creep forces act",
     omega_rad_per_s="optional: rolling rate, positive forward; empty: free rolling",
     vy_m_per_s="optional",
@@ -49,7 +51,10 @@ def add(commands):
         "contact", help="contact of a wheelset in given poses", description=ABOUT, epilog=f"{POSES}\n\n{FILES}"
     )
     command.add_argument("--poses", required=True, metavar="IN.csv", help="a pose per row")
-    add_pair(command, "; a rail of slices: FILE.slcs, a table (columns s_m, profile), or '{slices: FILE, ...}'")
+    add_pair(
+        command, "; a rail of slices: FILE.slcs, a table (columns s_m, profile), or '{slices: FILE, ...}'; a wheel of "
+        "slices, out of round: FILE.slcw, a table (columns angle_rad, profile), or the same"
+    )  # fmt: skip
     command.add_argument(
         "--rail-distance", type=float, metavar="m",
         help="of the origin of slices from the track's centre, and heights as the files have them; left out: the first "
@@ -83,28 +88,35 @@ def add(commands):
 
 
 def _pair(options, poses):
-    """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail is one of slices."""
+    """What the wheels are on: `ContactGeometry`, or `WheelOnSlices` where the rail or the wheel is one of slices."""
     from wrcore.cli.options import profile_of, slices_of
     from wrcore.contact.seen_rail import WheelOnSlices
+    from wrcore.geometry.profile import GAUGE_DEPTH
 
-    rail = slices_of(options)
-    if rail is None:
-        if options.rail_distance is not None:
-            raise InputError("wrcore contact", "--rail-distance", "expected this with rails of slices only")
-        return pair_of(options).left.geometry
-    if rail.alike and options.rail_distance is None:
+    rail, out_of_round = slices_of(options, "rail"), slices_of(options, "wheel")
+    distance, sizes = options.rail_distance, (options.rolling_radius, options.tape_circle_half_distance)
+    if rail is None and out_of_round is None and distance is not None:
+        raise InputError("wrcore contact", "--rail-distance", "expected this with rails or wheels of slices only")
+    if rail is not None and rail.alike and distance is None:
         options.rail = json.dumps(rail.first) if len(rail.first) > 1 else rail.first["points"]  # JSON is YAML, too
+        rail = None
+    if rail is None and out_of_round is None:
         return pair_of(options).left.geometry
-    missing = poses.index[poses.s_m.isna()]
+    missing = poses.index[poses["pitch_rad" if rail is None else "s_m"].isna()]
     if missing.size:
-        expected = "expected the arc length of the wheelset, as the rail is one of slices"
-        raise InputError(options.poses, f"s_m, row {missing[0] + 1}", expected)
-    distance = options.rail_distance
-    if distance is None:
+        name, what = ("pitch_rad", "angle of the wheel") if rail is None else ("s_m", "arc length of the wheelset")
+        expected = f"expected the {what}, as the {'wheel' if rail is None else 'rail'} is one of slices"
+        raise InputError(options.poses, f"{name}, row {missing[0] + 1}", expected)
+    wheel = profile_of(options, options.wheel, "wheel") if out_of_round is None else out_of_round.round()
+    if rail is None:
+        rail = profile_of(options, options.rail, "rail")
+        distance = 0.5 * options.gauge + rail.gauge_offset(GAUGE_DEPTH) if distance is None else distance
+        if math.isnan(distance):
+            raise InputError(rail.name, "gauge", "expected a rail down to where the gauge is measured, or the distance")
+    elif distance is None:
         rail, offset = rail.placed()
         distance = 0.5 * options.gauge + offset
-    wheel = profile_of(options, options.wheel, "wheel")
-    return WheelOnSlices(wheel, rail, options.rolling_radius, options.tape_circle_half_distance, distance)
+    return WheelOnSlices(wheel, rail, *sizes, distance, out_of_round)
 
 
 def run(options):

@@ -109,19 +109,19 @@ def profile_spec(options, spec):
     return described if len(described) > 1 else spec
 
 
-def slices_of(options):
-    """`RailSlices` of ``--rail``, None where it is a rail that is the same everywhere."""
+def slices_of(options, kind):
+    """`RailSlices` of ``--rail`` or `WheelSlices` of ``--wheel``; None where it is the same everywhere."""
     from wrcore.errors.checked_yaml import parse_value
     from wrcore.geometry.slice_files import is_slices, read_slices
 
-    spec = options.rail
+    spec = getattr(options, kind)
     said = spec.lstrip().startswith("{")
     described = parse_value(spec) if said else {"slices": spec}
-    if not isinstance(described, dict) or "slices" not in described or not (said or is_slices(spec)):
+    if not isinstance(described, dict) or "slices" not in described or not (said or is_slices(spec, kind)):
         return None
     if options.unit:
         described.setdefault("unit", options.unit)
-    return read_slices(described)
+    return read_slices(described, kind)
 
 
 def ratio(text):

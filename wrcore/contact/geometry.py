@@ -85,6 +85,12 @@ class ContactGeometry(NamedTuple):
     """Rail profile origin from the track's centre line, m."""
     along: np.ndarray | tuple = ()
     """(m, 3) where the rail changes along the track, at the rail's nodes: see `wrcore.contact.seen_rail`."""
+    over: np.ndarray | tuple = ()
+    """(n, m): how much higher than at its nodes the rail is at stations along the track, as it is, not as a parabola,
+    m: for grids."""
+    over_start: float = 0.0
+    over_step: float = 1e-3
+    """Of the stations, from the wheelset's cross-section, m."""
 
 
 def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):

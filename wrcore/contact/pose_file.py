@@ -5,7 +5,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.checked_csv import read_csv_table
 
-POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0, "s_m": 1e6}
+POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0, "s_m": 1e6, "pitch_rad": 1e6}
 MOTION_LIMITS = {"V_m_per_s": 200.0, "omega_rad_per_s": 4e3, "vy_m_per_s": 200.0, "yaw_rate_rad_per_s": 1e3, "mu": 2.0}
 """Columns of poses and of their motion, and the greatest value that is taken for the unit."""
 
@@ -15,8 +15,8 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 
 def read_poses(path):
     """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m, s_m,
-    V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the file, the
-    column, the row and what was expected."""
+    pitch_rad, V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the
+    file, the column, the row and what was expected."""
     import pandas as pd
 
     frame = read_csv_table(path, "pose_id")

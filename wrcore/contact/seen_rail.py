@@ -11,6 +11,8 @@ second derivative over x has more, and how much higher the wheel's point there l
 of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Over a rail that is the
 same everywhere the section is the rail's own and all three vanish.
 
+A wheel out of round is seen in the same way, see `wrcore.contact.out_of_round`.
+
 Where a head begins or ends under the wheel, its edge may be what is nearest; it then counts with the wheel's curvature
 alone. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
 """
@@ -23,10 +25,11 @@ import numpy as np
 
 from wrcore.contact.detection import axle_direction
 from wrcore.contact.geometry import contact_geometry
+from wrcore.contact.out_of_round import reach_beyond
 from wrcore.contact.patch.surfaces import ContactPlane, wheel_height
 from wrcore.contact.strip import make_pose, strip_point
 from wrcore.geometry.profile import SPACING, ProfileCurve, averaged_second_derivative
-from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.slices import RailSlices, WheelSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.jit import jit
 
@@ -46,23 +49,27 @@ HEIGHT, AHEAD, BEND, LIFT = range(4)
 
 @dataclass(frozen=True)
 class WheelOnSlices:
-    """A wheel on a rail of slices.
+    """A wheel on a rail of slices, or a wheel out of round.
 
     Parameters
     ----------
     wheel : ProfileCurve
-    rail : RailSlices
+        Of a wheel out of round the profile of a wheel of revolution near it.
+    rail : RailSlices or ProfileCurve
         In the coordinates of the track: u from ``rail_distance``, f from the plane from which the wheelset's height
         counts.
     rolling_radius, half_distance, rail_distance : float
         As for `WheelOnRail`, m.
+    out_of_round : WheelSlices, optional
+        Of both wheels alike.
     """
 
     wheel: ProfileCurve
-    rail: RailSlices
+    rail: RailSlices | ProfileCurve
     rolling_radius: float = 0.46
     half_distance: float = 0.75
     rail_distance: float = 0.75
+    out_of_round: WheelSlices | None = None
 
     @cached_property
     def _wheel_geometry(self):
@@ -72,18 +79,21 @@ class WheelOnSlices:
         sizes = self.rolling_radius, self.half_distance, self.rail_distance
         return contact_geometry(self.wheel, level, *sizes)
 
-    def under(self, side, s, y, roll=0.0, yaw=0.0):
+    def under(self, side, s, y, roll=0.0, yaw=0.0, turned=0.0):
         """`ContactGeometry` of the section that the wheel of a ``side`` sees with the wheelset's centre at s, y (m), in
-        a roll and yaw (rad), and the height (m) of the centre at which it first touches; None and NaN where there is no
-        rail under the wheel."""
+        a roll and yaw (rad), ``turned`` (rad) forward, and the height (m) of the centre at which it first touches; None
+        and NaN where there is no rail under the wheel."""
         sign, wheel = SIDES[side], self._wheel_geometry
         pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
         low, high = (strip_point(wheel, pose, u)[0] for u in self.wheel.u[[0, -1]])
         u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
-        x = self._stations(s)
-        rail = self.rail.heights(s + x, u)[0]
+        x, beyond = self._stations(s), np.zeros((0, 0))
+        rail = self._heights(s + x, u)
+        if self.out_of_round is not None:
+            beyond = reach_beyond(self.out_of_round, wheel, pose, turned, x, _strips_over(wheel, pose, u))
+            rail = rail + beyond
         seen = np.zeros((4, u.size))
-        touch = _see(wheel, pose, x, rail, u, seen)
+        touch = _see(wheel, pose, x, rail, beyond, u, seen)
         there = np.isfinite(seen[HEIGHT])
         if there.sum() < 10:
             return None, math.nan
@@ -91,12 +101,21 @@ class WheelOnSlices:
         curve = ProfileCurve(f"{self.rail.name} at s = {s:g} m", "rail", u, f, slope,
                              averaged_second_derivative(u, f, slope))  # fmt: skip
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
-        return geometry._replace(along=np.ascontiguousarray(seen[AHEAD:].T)), touch
+        over = np.where(np.isfinite(rail), rail - f, -BELOW)
+        along = np.ascontiguousarray(seen[AHEAD:].T)
+        return geometry._replace(along=along, over=over, over_start=x[0], over_step=STEP), touch
+
+    def _heights(self, s, u):
+        """Height of the rail (n, m), NaN where there is none."""
+        if isinstance(self.rail, RailSlices):
+            return self.rail.heights(s, u)[0]
+        inside = (u >= self.rail.u[0]) & (u <= self.rail.u[-1])
+        return np.tile(np.where(inside, self.rail(u), np.nan), (s.size, 1))
 
     def _stations(self, s):
         """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
         count = round(REACH / STEP)
-        begins = self.rail.begins() - s
+        begins = self.rail.begins() - s if isinstance(self.rail, RailSlices) else np.zeros(0)
         begins = begins[np.abs(begins) < REACH]
         shift = math.remainder(begins[np.argmin(np.abs(begins))], STEP) if begins.size else 0.0
         return STEP * np.arange(-count, count + 1) + shift
@@ -128,6 +147,15 @@ def _strip_over(wheel, pose, u):
             break
         w += u - ur
     return w, radius * along * pose.q + (wheel.half_distance + w) * pose.ex, z
+
+
+@jit
+def _strips_over(wheel, pose, u):
+    """Wheel coordinates of the strips over rail coordinates, m."""
+    found = np.empty(u.size)
+    for k in range(u.size):
+        found[k] = _strip_over(wheel, pose, u[k])[0]
+    return found
 
 
 @jit(allocates=False)
@@ -183,9 +211,10 @@ def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
 
 
 @jit
-def _see(wheel, pose, x, rail, u, seen):
-    """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,); returns the
-    height of the wheelset's centre at the first touch. Stations are evenly apart."""
+def _see(wheel, pose, x, rail, beyond, u, seen):
+    """Fill ``seen`` (4, m) over rail coordinates ``u`` (m,) from heights of the rail (n, m) at ``x`` (n,), and what of
+    them is the wheel reaching ``beyond`` its round (n, m; empty: nothing); returns the height of the wheelset's centre
+    at the first touch. Stations are evenly apart."""
     n, h, touch = x.size, x[1] - x[0], np.nan
     g, nominal, near = np.full(n, np.nan), -wheel.rolling_radius, 2 * int(WINDOW / h) + COARSE
     for k in range(u.size):
@@ -210,6 +239,10 @@ def _see(wheel, pose, x, rail, u, seen):
         else:
             top = max(top, height)
         wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
+        if len(beyond):
+            at = (place - x[0]) / h
+            i = min(max(int(at), 0), n - 2)
+            wheel_there -= beyond[i, k] + (at - i) * (beyond[i + 1, k] - beyond[i, k])
         seen[HEIGHT, k], seen[AHEAD, k] = height + lowest, place - crest
         seen[BEND, k], seen[LIFT, k] = -0.5 * second - own, wheel_there + nominal - lowest
         if not touch >= top:

@@ -74,7 +74,7 @@ def cubic_at(nodes, start, step, u):
     return value, slope, (2.0 * c2 + 6.0 * t * c3) * (inverse * inverse)
 
 
-_AS_KERNELS = {"_nrt": False, "error_model": "numpy"}
+AS_KERNELS = {"_nrt": False, "error_model": "numpy"}
 
 
 def _with_rail_along(along, start, step, column, ur, factor, value):
@@ -88,7 +88,7 @@ def _added(along, start, step, column, ur, factor, value):
     return value + factor * (along[i, column] * (1.0 - t) + along[i + 1, column] * t)
 
 
-@overload(_with_rail_along, inline="always", jit_options=_AS_KERNELS)
+@overload(_with_rail_along, inline="always", jit_options=AS_KERNELS)
 def _of_its_type(along, start, step, column, ur, factor, value):
     """Nothing at all for rails that are the same everywhere."""
     if isinstance(along, types.BaseTuple):
@@ -107,7 +107,7 @@ def _changes(along):
     return len(along) > 0
 
 
-@overload(_changes, inline="always", jit_options=_AS_KERNELS)
+@overload(_changes, inline="always", jit_options=AS_KERNELS)
 def _changes_by_type(along):
     if isinstance(along, types.BaseTuple):
         return lambda along: False

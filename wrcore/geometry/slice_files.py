@@ -1,12 +1,14 @@
-"""Files of rails that change along the track: CONTACT's ``.slcs``, and a plain table of slices.
+"""Files of rails that change along the track and of wheels out of round: CONTACT's ``.slcs`` and ``.slcw``, and plain
+tables of slices.
 
 ``.slcs``: counters, a line ``s 'profile'`` per slice, and positions of feature lines (chord length from the
 section's first point, mm; -1: the line does not exist there); ``%`` begins a comment. Profiles that are columns are in
-the unit of s and count downwards, unless it is said otherwise.
+the unit of s and count downwards, unless it is said otherwise. ``.slcw`` is the same over the wheel's angle in place of
+s, in radians.
 
 Plain: a CSV with the columns s_m, profile (a point file, see `profile_files`) and, where a rail has several heads,
 head: a name. A head exists from the first to the last of successive slices that have it. Columns cut_1_m, cut_2_m, ...
-may give feature lines of a head: chord lengths from its inner end.
+may give feature lines of a head: chord lengths from its inner end. A wheel's has angle_rad in place of s_m.
 
 Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 """
@@ -18,40 +20,48 @@ from pathlib import Path
 
 import numpy as np
 
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError, check_number, one_of
 from wrcore.errors.input_files import check_regular
 from wrcore.geometry.profile_files import read_points
-from wrcore.geometry.slices import RailSlices, Slice, sheets_of
+from wrcore.geometry.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
 
-SLICE_FILES = (".slcs",)
+SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
+PLACES = {"rail": "s_m", "wheel": "angle_rad"}
+"""The ending of files of slices of a rail and of a wheel, and the column of a table that says where a slice is."""
 MOST_SLICES = 100_000
 
 _CLOSE = 1e-7  # m; as for profiles
 _MM = 1e-3
-_KEYS = {"slices", "unit", "mirrored", "downwards"}
+_KEYS = {"slices", "unit", "mirrored", "downwards", "wavelength"}
 
 
-def is_slices(path):
-    """Whether a file lists slices: by its ending, or a CSV whose header begins with s_m and names profiles."""
+def is_slices(path, kind="rail"):
+    """Whether a file lists slices of a ``kind``: by its ending, or a CSV whose header has s_m (of wheels angle_rad) and
+    profile."""
     path = Path(path)
-    if path.suffix.lower() in SLICE_FILES:
+    if path.suffix.lower() == SLICE_FILES[kind]:
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     with path.open(errors="replace") as file:
         names = [name.strip() for name in file.readline().lstrip("\ufeff").split(",")]
-    return "s_m" in names and "profile" in names
+    return PLACES[kind] in names and "profile" in names
 
 
-def read_slices(spec):
-    """`RailSlices` from the path of a file of slices, or from a dict of ``slices`` (the path) and how to read profiles
-    that are columns: ``unit``, ``mirrored``, ``downwards`` as for `read_profile`. InputError names file and line."""
+def read_slices(spec, kind="rail"):
+    """`RailSlices`, of a wheel `WheelSlices`, from the path of a file of slices, or from a dict of ``slices`` (the
+    path) and how to read profiles that are columns: ``unit``, ``mirrored``, ``downwards`` as for `read_profile`; and a
+    ``wavelength`` (m): of waves so long half is left, shorter ones of measured sections are evened out. InputError
+    names file and line."""
     spec = spec if isinstance(spec, dict) else {"slices": spec}
     for key in set(spec) - _KEYS:
-        raise InputError("rail", str(key), one_of(sorted(_KEYS), key))
+        raise InputError(kind, str(key), one_of(sorted(_KEYS), key))
     path = Path(spec["slices"])
     how = {key: value for key, value in spec.items() if key != "slices"}
-    return _read_slcs(path, how) if path.suffix.lower() in SLICE_FILES else _read_table(path, how)
+    if "wavelength" in how:
+        check_number(how["wavelength"], 0.0, 0.1, kind, "wavelength", "m")
+    read = _read_slcs if path.suffix.lower() in SLICE_FILES.values() else _read_table
+    return read(path, how, kind)
 
 
 def _lines(path):
@@ -91,9 +101,11 @@ class _Lines:
         return list(self._rest)
 
 
-def _read_slcs(path, how):
+def _read_slcs(path, how, kind):
     lines = _Lines(path)
     number, (offset, scale), _ = lines.take(2, "offset and scale of s")
+    if kind == "wheel" and scale != 1.0:
+        raise InputError(path, f"line {number}", f"expected a scale of 1, angles in radians, got {scale:g}")
     if not 1e-6 <= scale <= 1e6:
         raise InputError(path, f"line {number}", f"expected a scale in mm per unit, got {scale:g}")
     number, (count,), _ = lines.take(1, "the number of slices")
@@ -103,8 +115,9 @@ def _read_slcs(path, how):
     if features != int(features) or not (features == 0 or 2 <= features <= 1000):
         raise InputError(path, f"line {number}", f"expected 0 or at least 2 feature lines, got {features:g}")
     number, (method,), _ = lines.take(1, "the method of interpolation")
-    if method != 1:
-        raise InputError(path, f"line {number}", f"expected 1, surfaces through the slices, got {method:g}")
+    if method != 1 and not (kind == "wheel" and method == 2):
+        expected = "expected 1, surfaces through the slices" + ", or 2, slices as control points" * (kind == "wheel")
+        raise InputError(path, f"line {number}", f"{expected}, got {method:g}")
     listed = [_listed(lines) for _ in range(int(count))]
     for what in ("kinks",) * (kinks > 0) + ("accelerations",) * (steps > 0):
         lines.take(0, what)
@@ -113,12 +126,13 @@ def _read_slcs(path, how):
     if rest:
         raise InputError(path, f"line {rest[0][0]}", f"expected the end of the file, got {rest[0][1][:60]!r}")
     unit = {1.0: "mm", 1000.0: "m"}.get(scale, "mm")
-    rows = []
+    rows, unit_of_place = [], scale * _MM if kind == "rail" else 1.0
     for k, (number, value, name) in enumerate(listed):
-        columns = {"unit": unit, "downwards": True, **how} if not name.lower().endswith(".prr") else {}
-        rows.append((number, (value + offset) * scale * _MM, name, columns, places[k] if features else None))
+        stated = name.lower().endswith((".prr", ".prw"))
+        columns = {**({} if stated else {"unit": unit, "downwards": True}), **how}
+        rows.append((number, (value + offset) * unit_of_place, name, columns, places[k] if features else None))
     told = f"{int(kinks)} kinks not kept (the surface stays smooth)" if kinks else ""
-    return _assembled(path, [("", rows)], told)
+    return _assembled(path, [("", rows)], kind, told, method == 1)
 
 
 def _listed(lines):
@@ -142,17 +156,18 @@ def _places(lines, path, features, value):
     return number, places
 
 
-def _read_table(path, how):
+def _read_table(path, how, kind):
     """Slices of a CSV by their heads."""
     header, *body = [(k, [word.strip() for word in next(csv.reader([line]))]) for k, line in _lines(path)] or [(0, [])]
     names = [name.lstrip("\ufeff") for name in header[1]]
-    for wanted in ("s_m", "profile"):
+    place = PLACES[kind]
+    for wanted in (place, "profile"):
         if wanted not in names:
             raise InputError(path, wanted, f"expected this column; found {', '.join(names)}")
     cuts = [name for name in names if re.fullmatch(r"cut_\d+_m", name)]
     for name in names:
-        if name not in ("s_m", "profile", "head", *cuts):
-            raise InputError(path, name, "unknown column; expected s_m, profile, head, cut_1_m, ...")
+        if name not in (place, "profile", "head", *cuts):
+            raise InputError(path, name, f"unknown column; expected {place}, profile, head, cut_1_m, ...")
     heads = {}
     for number, words in body:
         if len(words) != len(names):
@@ -162,11 +177,11 @@ def _read_table(path, how):
         places = given[np.isfinite(given)]
         if np.any(np.diff(places, prepend=0.0) <= 0.0):
             raise InputError(path, f"line {number}", "expected cuts above 0 that increase")
-        s = _number(path, number, "s_m", row["s_m"])
+        s = _number(path, number, place, row[place])
         heads.setdefault(row.get("head", ""), []).append((number, s, row["profile"], how, (number, places)))
     if not heads:
         raise InputError(path, "", "expected at least one slice, got none")
-    return _assembled(path, list(heads.items()))
+    return _assembled(path, list(heads.items()), kind)
 
 
 def _number(path, line, name, text, optional=False):
@@ -179,8 +194,9 @@ def _number(path, line, name, text, optional=False):
     return value
 
 
-def _assembled(path, heads, told=""):
-    """`RailSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature lines))."""
+def _assembled(path, heads, kind, told="", through=True):
+    """`RailSlices` or `WheelSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature
+    lines)); ``through`` as for `sheets_of`."""
     stations = np.unique([row[1] for _, rows in heads for row in rows])
     sheets, alike = [], len(heads) == 1
     for head, rows in heads:
@@ -189,11 +205,14 @@ def _assembled(path, heads, told=""):
             k = int(np.argmax(np.diff(s) <= 0.0)) + 1
             expected = f"expected s that increases, got {s[k]:g} after {s[k - 1]:g} m"
             raise InputError(path, f"line {rows[k][0]}", expected)
-        slices = {row[1]: _slice(path, row) for row in rows}
+        slices = {row[1]: _slice(path, row, kind) for row in rows}
         counts = sorted({one.cuts.size for one in slices.values()})
         if len(counts) > 1:
             raise InputError(path, "cut_1_m", f"expected as many cuts in all slices of head {head!r}, got {counts}")
-        sheets += sheets_of(stations, [slices.get(at) for at in stations])
+        listed = [slices.get(at) for at in stations]
+        if kind == "wheel":
+            return _wheel(path, stations, listed, through)
+        sheets += sheets_of(stations, listed)
         alike = alike and len({(one.curve.c.tobytes(), one.cuts.tobytes()) for one in slices.values()}) == 1
     if not sheets:
         raise InputError(path, "features", "expected a part of the rail between two feature lines, got none")
@@ -207,12 +226,24 @@ def _assembled(path, heads, told=""):
     return replace(rail, source=f"{source}, parts begin or end at s = {ends} m") if ends else rail
 
 
-def _slice(path, row):
-    """A `Slice` from its profile; in a table its ends are feature lines, too."""
-    from scipy.interpolate import CubicSpline
+def _wheel(path, angles, slices, through):
+    """`WheelSlices` at angles (rad)."""
+    turn = angles[-1] - angles[0]
+    if turn > TURN + 1e-9:
+        raise InputError(path, PLACES["wheel"], f"expected angles within one turn, got {turn:g} rad")
+    gap = TURN - turn
+    if angles.size > 3 and gap < 1.5 * np.diff(angles).max():  # once round: the neighbours beyond either end are known
+        more = slice(int(gap < 1e-9), 3), slice(-3, -1 if gap < 1e-9 else None)
+        slices = [*slices[more[1]], *slices, *slices[more[0]]]
+        angles = np.concatenate([angles[more[1]] - TURN, angles, angles[more[0]] + TURN])
+    return WheelSlices(str(path), angles, tuple(sheets_of(angles, slices, through)))
 
+
+def _slice(path, row, kind):
+    """A `Slice` from its profile; in a table its ends are feature lines, too."""
     number, s, name, how, cuts = row
-    u, f, *_ = read_points({"points": str(path.parent / name), **how}, "rail")
+    how, wavelength = {key: how[key] for key in how if key != "wavelength"}, how.get("wavelength", 0.0)
+    u, f, *_ = read_points({"points": str(path.parent / name), **how}, kind)
     if u.size and u[-1] < u[0]:
         u, f = u[::-1], f[::-1]
     step = np.hypot(np.diff(u), np.diff(f))
@@ -225,8 +256,18 @@ def _slice(path, row):
     if cuts is not None:
         at, given = cuts
         places = np.minimum(given, length[-1])
-        if path.suffix.lower() not in SLICE_FILES:
+        if path.suffix.lower() not in SLICE_FILES.values():
             places = np.concatenate(([0.0], given, [length[-1]]))
         if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
             raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * length[-1]:.3f} mm of {name}")
-    return Slice(s, CubicSpline(length, np.column_stack([u, f])), places)
+    return Slice(s, _section_curve(length, np.column_stack([u, f]), wavelength), places)
+
+
+def _section_curve(length, points, wavelength):
+    """Cubic spline through points over their chord length, or without their waves shorter than a wavelength (m)."""
+    from scipy.interpolate import CubicSpline, make_smoothing_spline
+
+    if not wavelength:
+        return CubicSpline(length, points)
+    weight = (length.size - 1) / length[-1] * (wavelength / TURN) ** 4
+    return make_smoothing_spline(length, points, lam=weight)

@@ -1,4 +1,4 @@
-"""Rails that change along the track: sections at arc lengths, and the surface between them.
+"""Rails that change along the track and wheels out of round: sections at arc lengths or angles, and what lies between.
 
 A section is cut by feature lines into parts, each with the same number of points in all slices. Through the points that
 correspond run cubic splines along the track (not-a-knot), so that features are interpolated along, not across. A part
@@ -21,6 +21,8 @@ cubic spline through them, which evens out what is shorter."""
 
 NARROWEST = 2e-3
 """A head is at least so wide, m."""
+
+TURN = 2.0 * np.pi
 
 # Of a point on a path: its place, and its rates over the path's number.
 U, F, U_RATE, F_RATE = range(4)
@@ -107,14 +109,7 @@ class RailSlices:
     def heights(self, s, u):
         """Height (m) of the rail at arc lengths (n,) over lateral coordinates (m,) that increase evenly, its slope
         across, and its slope along the track, each (n, m); NaN where there is no rail or only a wall."""
-        s, u = np.atleast_1d(np.asarray(s, float)), np.ascontiguousarray(u, float)
-        found = np.full((3, s.size, u.size), np.nan)
-        step = (u[-1] - u[0]) / (u.size - 1) if u.size > 1 else 1.0
-        for sheet in self.sheets:
-            there = np.flatnonzero((s >= sheet.first) & (s <= sheet.last))
-            if there.size:
-                _lay(sheet.at(s[there]), sheet.at(s[there], 1), there, u, step, found)
-        return found
+        return _heights(self.sheets, s, u)
 
     def heads(self, s, spacing=SPACING):
         """Heads at an arc length (m), `ProfileCurve` each, from the track's centre outwards: runs of the section that
@@ -135,8 +130,56 @@ class RailSlices:
         return heads
 
 
-def sheets_of(s, slices):
-    """Sheets of one head's slices, a `Slice` or None at each of the rail's arc lengths ``s`` (m, increasing)."""
+@dataclass(frozen=True)
+class WheelSlices:
+    """A wheel of slices: its profile at angles about its axle, constant beyond them unless they go round.
+
+    Lateral coordinates u count to the field side, heights f up, from the tape circle: the radius is r0 - f. Angles
+    count from the wheel's lowest point, when it has not turned, towards x ahead.
+    """
+
+    name: str
+    angles: np.ndarray
+    """Of the slices, rad; of a wheel with slices all round with three more beyond either end."""
+    sheets: tuple
+
+    def round(self):
+        """`ProfileCurve` of a wheel of revolution near it: of the slice that reaches furthest at the tape circle."""
+        f = self.heights(self.angles, np.zeros(1))[0, :, 0]
+        if not np.isfinite(f).any():
+            raise InputError(self.name, "", "expected profiles that reach over the tape circle, u = 0")
+        at = self.angles[np.nanargmin(f)]
+        points = [sheet.at(at)[0] for sheet in self.sheets]
+        low, high = min(p[U].min() for p in points), max(p[U].max() for p in points)
+        u = SPACING * np.arange(np.ceil(low / SPACING), np.floor(high / SPACING) + 1)
+        f, slope, _ = self.heights(at, u)[:, 0]
+        (run,) = [run for run in _runs(np.isfinite(f)) if u[run[0]] <= 0.0 <= u[run[-1]]]
+        second = averaged_second_derivative(u[run], f[run], slope[run])
+        return ProfileCurve(self.name, "wheel", u[run], f[run].copy(), slope[run].copy(), second, self.name)
+
+    def heights(self, angles, u):
+        """Height (m) at angles (n,) of any turn over lateral coordinates (m,) that increase evenly, its slope across,
+        and its rate over the angle (m/rad), each (n, m); NaN where there is no profile or only a wall."""
+        middle = 0.5 * (self.angles[0] + self.angles[-1])
+        within = middle + np.remainder(np.asarray(angles) - middle + 0.5 * TURN, TURN) - 0.5 * TURN
+        return _heights(self.sheets, within, u)
+
+
+def _heights(sheets, s, u):
+    """Height of sheets and both slopes, see `RailSlices.heights`."""
+    s, u = np.atleast_1d(np.asarray(s, float)), np.ascontiguousarray(u, float)
+    found = np.full((3, s.size, u.size), np.nan)
+    step = (u[-1] - u[0]) / (u.size - 1) if u.size > 1 else 1.0
+    for sheet in sheets:
+        there = np.flatnonzero((s >= sheet.first) & (s <= sheet.last))
+        if there.size:
+            _lay(sheet.at(s[there]), sheet.at(s[there], 1), there, u, step, found)
+    return found
+
+
+def sheets_of(s, slices, through=True):
+    """Sheets of one head's slices, a `Slice` or None at each of the rail's arc lengths ``s`` (m, increasing); not
+    ``through`` the slices: they are the control points of cubic B-splines, which even out what they hold."""
     size = next(one.cuts.size for one in slices if one)
     cuts = np.array([one.cuts if one else np.full(size, np.nan) for one in slices])
     width = np.diff(cuts, axis=1)
@@ -145,7 +188,7 @@ def sheets_of(s, slices):
     sheets = []
     for part in range(size - 1):
         for run in _runs(np.isfinite(width[:, part])):
-            sheets.append(_sheet(s, run, np.stack([sections[k][part] for k in run])))
+            sheets.append(_sheet(s, run, np.stack([sections[k][part] for k in run]), through))
     return sheets
 
 
@@ -182,13 +225,26 @@ def _moved(sheet, shift):
     return replace(sheet, spline=spline, points=points)
 
 
-def _sheet(s, run, points):
+def _sheet(s, run, points, through):
     """The part with these points (slices, 4, paths) over a ``run`` of slices."""
     from scipy.interpolate import CubicSpline
 
     first = -np.inf if run[0] == 0 else s[run[0]]
     last = np.inf if run[-1] == s.size - 1 else s[run[-1]]
-    return Sheet(first, last, s[run], CubicSpline(s[run], points) if run.size > 1 else None, points)
+    spline = None
+    if run.size > 1:
+        spline = CubicSpline(s[run], points) if through else _approximating(s[run], points)
+    return Sheet(first, last, s[run], spline, points)
+
+
+def _approximating(s, points):
+    """Cubic B-spline over s with ``points`` as control points, the outermost ones twice: at evenly spaced slices it
+    takes (1, 4, 1)/6 of three neighbours."""
+    from scipy.interpolate import BSpline
+
+    ends = (s[1] - s[0]) * np.arange(-3, 0), (s[-1] - s[-2]) * np.arange(1, 4)
+    knots = np.concatenate([s[0] + ends[0], s, s[-1] + ends[1]])
+    return BSpline(knots, np.concatenate([points[:1], points, points[-1:]]), 3)
 
 
 @jit

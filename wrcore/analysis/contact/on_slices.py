@@ -1,4 +1,4 @@
-"""A loaded wheel on a rail of slices: crossings, switches, joints."""
+"""A loaded wheel on a rail of slices, or a wheel out of round: crossings, switches, joints, flats."""
 
 import math
 
@@ -7,7 +7,7 @@ from wrcore.dynamics.wheel import ON_GRID
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
 
-MODELS = ("maximum", "moment", "exact")
+MODELS = ("maximum", "moment", "exact", "grid")
 """Patch models that serve rails which change along the track."""
 
 FINER = (2.0, 1.75, 1.5, 1.0, 0.75)
@@ -18,17 +18,18 @@ _SUNK = 5e-5  # first guess of a wheel's approach to its rail, m
 
 
 class LoadedOnSlices(LoadedWheels):
-    """`LoadedWheels` on rails of slices, both alike: of a `WheelOnSlices`; arguments as there.
+    """`LoadedWheels` out of round or on rails of slices, both alike: of a `WheelOnSlices`; arguments as there.
 
-    ``s`` (m) is the arc length of the wheelset's cross-section. The rail is what a wheel sees of it in its pose
-    (`wrcore.contact.seen_rail`)."""
+    ``s`` (m) is the arc length of the wheelset's cross-section, ``turned`` (rad) the angle by which it has rolled. The
+    rail is what a wheel sees of it in its pose (`wrcore.contact.seen_rail`). Strips know parabolas along the track, a
+    ``grid`` knows the surfaces: where an edge lies in a patch their greatest pressures differ."""
 
     refines = False
 
     def __init__(self, pair, model="exact", *how, **more):
         if model not in MODELS:
             raise InputError("contact", "patch", one_of(MODELS, model) + " on rails of slices")
-        self.pair, self.s, self._seen = pair, 0.0, {}
+        self.pair, self.s, self.turned, self._seen = pair, 0.0, 0.0, {}
         super().__init__(self._blank(), model, *how, **more)
         self._levels = [round(f * self._still.strips.strips) for f in FINER]
         self._level = 0
@@ -48,7 +49,7 @@ class LoadedOnSlices(LoadedWheels):
 
     def _blank(self):
         """Geometry of the type that all have, of the first place of the rail with one."""
-        for s in self.pair.rail.s:
+        for s in getattr(self.pair.rail, "s", (0.0,)):
             for side in SIDES:
                 geometry, _ = self.pair.under(side, float(s), 0.0)
                 if geometry is not None:
@@ -57,7 +58,7 @@ class LoadedOnSlices(LoadedWheels):
 
     def _lie(self, side, y, roll, yaw):
         """Lay a wheel on what it sees; returns the height of its first touch, NaN where there is nothing."""
-        pose = (self.s, y, roll, yaw)
+        pose = (self.s, y, roll, yaw, self.turned)
         if self._seen.get(side, (None,))[0] != pose:
             self._seen[side] = pose, *self.pair.under(side, *pose)
         _, geometry, touch = self._seen[side]

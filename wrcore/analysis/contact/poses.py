@@ -29,10 +29,10 @@ def loaded_poses(
 
     z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
     Neither: both are solved so that each wheel carries it. In place of a ``geometry`` a `WheelOnSlices` stands for both
-    sides, at the arc length ``s_m`` of each pose. With V_m_per_s above 0 the wheelset rolls, freely where
-    omega_rad_per_s is not given; else it stands. ``load_by``: the load (N per wheel) is the ``vertical`` sum of all
-    forces on a wheel, or that of its ``normal`` forces; ``friction`` holds where a pose has no ``mu``; all else as for
-    `LoadedWheels`.
+    sides, at the arc length ``s_m`` of each pose, rolled forward by ``pitch_rad``. With V_m_per_s above 0 the wheelset
+    rolls, freely where omega_rad_per_s is not given; else it stands. ``load_by``: the load (N per wheel) is the
+    ``vertical`` sum of all forces on a wheel, or that of its ``normal`` forces; ``friction`` holds where a pose has no
+    ``mu``; all else as for `LoadedWheels`.
     """
     check_number(wheel_load, 1e-9, 1e6, "contact", "wheel_load", "N")
     check_number(friction, 0.0, 2.0, "contact", "friction")
@@ -44,8 +44,7 @@ def loaded_poses(
     rows, on_grid = [], 0
     for pose in poses.itertuples():
         if on_slices:
-            wheels.s = _given(pose, "s_m", math.nan)
-            check_number(wheels.s, -1e6, 1e6, "contact", "s_m", "m")
+            wheels.s, wheels.turned = _given(pose, "s_m", 0.0), _given(pose, "pitch_rad", 0.0)
         y, yaw, mu = pose.y_m, pose.yaw_rad, _given(pose, "mu", friction)
         speed, rolling = _given(pose, "V_m_per_s", 0.0), None
         if speed > 0.0:

@@ -1,15 +1,18 @@
 """Gap and rigid slip of the real surfaces over a contact plane: the wheel of revolution above the swept rail.
 
 A contact plane has the axes (1) x forward, (2) s to the left in the plane, (3) n from rail into wheel. Wheel and rail
-are cut by the lines along n through its points, without any expansion along x or s.
+are cut by the lines along n through its points, without any expansion along x or s. A rail that changes along the track
+is higher than its section by `ContactGeometry.over`.
 """
 
 import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 
-from wrcore.contact.strip import cubic_at
+from wrcore.contact.strip import AS_KERNELS, cubic_at
 from wrcore.kernels.jit import jit
 
 NO_RAIL = 1.0
@@ -102,6 +105,40 @@ def wheel_height(geometry, pose, plane, x, s, n):
     return np.nan
 
 
+def _over(over, start, step, rail_start, rail_step, x, u):
+    return _height_over(over, start, step, rail_start, rail_step, x, u) if len(over) else 0.0
+
+
+def _height_over(over, start, step, rail_start, rail_step, x, u):
+    """Cubic through four stations, linear across."""
+    at, across = (x - start) / step, (u - rail_start) / rail_step
+    i, j = min(max(int(at), 1), over.shape[0] - 3), min(max(int(across), 0), over.shape[1] - 2)
+    f, g = min(max(at - i, -1.0), 2.0), min(max(across - j, 0.0), 1.0)
+    a, b, c, d = over[i - 1], over[i], over[i + 1], over[i + 2]
+    found = 0.0
+    for k, w in ((j, 1.0 - g), (j + 1, g)):
+        rise, back = c[k] - b[k], 0.5 * (c[k] - a[k])
+        ahead = 0.5 * (d[k] - b[k])
+        found += w * (b[k] + f * (back + f * (3.0 * rise - 2.0 * back - ahead + f * (back + ahead - 2.0 * rise))))
+    return found
+
+
+@overload(_over, inline="always", jit_options=AS_KERNELS)
+def _over_by_type(over, start, step, rail_start, rail_step, x, u):
+    """Nothing at all for rails that are the same everywhere."""
+    if isinstance(over, types.BaseTuple):
+        return lambda over, start, step, rail_start, rail_step, x, u: 0.0
+    return _height_over
+
+
+@jit(allocates=False, forceinline=True)
+def rail_over(geometry, x, u):
+    """How much higher than its section the rail is at x from the wheelset's cross-section, m."""
+    return _over(
+        geometry.over, geometry.over_start, geometry.over_step, geometry.rail_start, geometry.rail_step, x, u
+    )  # fmt: skip
+
+
 @jit(allocates=False)
 def surface_gap(geometry, pose, plane, x, s, gap, height):
     """Gap between wheel and rail over a contact plane, exactly as the surfaces are, at points ``x`` (nx,), ``s`` (ns,)
@@ -116,7 +153,8 @@ def surface_gap(geometry, pose, plane, x, s, gap, height):
         for i in range(x.size):
             wheel = wheel_height(geometry, pose, plane, x[i], s[j], n)
             if wheel == wheel and rail == rail:
-                gap[i, j], height[i, j], n = wheel - rail, wheel, wheel
+                over = plane.cosine * rail_over(geometry, plane.x + x[i], u)
+                gap[i, j], height[i, j], n = wheel - rail - over, wheel, wheel
             else:
                 gap[i, j], height[i, j] = NO_RAIL, 0.0
 
