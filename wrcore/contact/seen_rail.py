@@ -78,20 +78,39 @@ class WheelOnSlices:
         rail under the wheel."""
         sign, wheel = SIDES[side], self._wheel_geometry
         pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
-        low, high = (strip_point(wheel, pose, u)[0] for u in self.wheel.u[[0, -1]])
+        low, high = (strip_point(wheel, pose, u)[0] for u in self._ends)
         u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
-        x = self._stations(s)
-        rail = self.rail.heights(s + x, u)[0]
-        seen = np.zeros((4, u.size))
-        touch = _see(wheel, pose, x, rail, u, seen)
+        seen, touch = self._seen(pose, s, u)
         there = np.isfinite(seen[HEIGHT])
         if there.sum() < 10:
             return None, math.nan
-        f, slope = _filled(seen[HEIGHT], there)
+        f, slope = filled(seen[HEIGHT], SPACING, np.min(seen[HEIGHT], where=there, initial=np.inf) - BELOW)
         curve = ProfileCurve(f"{self.rail.name} at s = {s:g} m", "rail", u, f, slope,
                              averaged_second_derivative(u, f, slope))  # fmt: skip
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
         return geometry._replace(along=np.ascontiguousarray(seen[AHEAD:].T)), touch
+
+    def straight(self, s, u):
+        """Section (4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees with
+        its cross-section at s (m): rows `HEIGHT`, NaN where there is none, to `LIFT`."""
+        return self._seen(make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), s, u)[0]
+
+    def strips(self, u):
+        """Of its strips over rail coordinates, for the same wheelset: 1/R (1/m), and what a small yaw (rad) moves their
+        points that touch ahead, less that of half the distance of the tape circles (m), (2, m)."""
+        at = u + self.rail_distance - self.half_distance
+        inside = np.clip(at, *self._ends)
+        radius = self.rolling_radius - self.wheel(inside)
+        return np.stack([1.0 / radius, at - radius * self.wheel(inside, 1)])
+
+    @property
+    def _ends(self):
+        return self.wheel.u[0], self.wheel.u[-1]
+
+    def _seen(self, pose, s, u):
+        """Section (4, m) and height of the first touch in a pose of the wheel as a left one."""
+        x, seen = self._stations(s), np.zeros((4, u.size))
+        return seen, _see(self._wheel_geometry, pose, x, self.rail.heights(s + x, u)[0], u, seen)
 
     def _stations(self, s):
         """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
@@ -102,19 +121,19 @@ class WheelOnSlices:
         return STEP * np.arange(-count, count + 1) + shift
 
 
-def _filled(f, there):
-    """Heights, with something far below where there is no rail, and slopes by differences of the fourth order."""
-    filled, slope = np.where(there, f, np.min(f, where=there, initial=np.inf) - BELOW), np.zeros(f.size)
-    ends = np.flatnonzero(np.diff(there.astype(int), prepend=0, append=0)).reshape(-1, 2)
+def filled(f, spacing, floor):
+    """Heights over evenly spaced lateral coordinates, with a ``floor`` where there is no rail (NaN) or only a shred of
+    it, and slopes by differences of the fourth order."""
+    heights, slope = np.full(f.size, floor), np.zeros(f.size)
+    ends = np.flatnonzero(np.diff(np.isfinite(f).astype(int), prepend=0, append=0)).reshape(-1, 2)
     for first, last in ends:
         part = f[first:last]
         if part.size < 5:
-            filled[first:last] = filled.min()
             continue
-        d = np.gradient(part, SPACING, edge_order=2)
-        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * SPACING)
-        slope[first:last] = d
-    return filled, slope
+        d = np.gradient(part, spacing, edge_order=2)
+        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * spacing)
+        heights[first:last], slope[first:last] = part, d
+    return heights, slope
 
 
 @jit

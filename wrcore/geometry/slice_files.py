@@ -209,8 +209,6 @@ def _assembled(path, heads, told=""):
 
 def _slice(path, row):
     """A `Slice` from its profile; in a table its ends are feature lines, too."""
-    from scipy.interpolate import CubicSpline
-
     number, s, name, how, cuts = row
     u, f, *_ = read_points({"points": str(path.parent / name), **how}, "rail")
     if u.size and u[-1] < u[0]:
@@ -220,13 +218,13 @@ def _slice(path, row):
     u, f = u[kept], f[kept]
     if u.size < 4:
         raise InputError(path.parent / name, "", f"expected at least 4 points, got {u.size} (line {number} of {path})")
-    length = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f))))
-    places = np.array([0.0, length[-1]])
-    if cuts is not None:
-        at, given = cuts
-        places = np.minimum(given, length[-1])
-        if path.suffix.lower() not in SLICE_FILES:
-            places = np.concatenate(([0.0], given, [length[-1]]))
-        if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
-            raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * length[-1]:.3f} mm of {name}")
-    return Slice(s, CubicSpline(length, np.column_stack([u, f])), places)
+    one = Slice.through(s, u, f)
+    if cuts is None:
+        return one
+    (at, given), ends = cuts, one.cuts
+    places = np.minimum(given, ends[1])
+    if path.suffix.lower() not in SLICE_FILES:
+        places = np.concatenate((ends[:1], given, ends[1:]))
+    if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
+        raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * ends[1]:.3f} mm of {name}")
+    return replace(one, cuts=places)

@@ -35,6 +35,14 @@ class Slice:
     cuts: np.ndarray
     """(features,) chord lengths of the feature lines, m; NaN where a line does not exist."""
 
+    @classmethod
+    def through(cls, s, u, f):
+        """A slice through points u, f (m) from the track's centre outwards; its ends are its only feature lines."""
+        from scipy.interpolate import CubicSpline
+
+        length = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f))))
+        return cls(s, CubicSpline(length, np.column_stack([u, f])), length[[0, -1]])
+
 
 @dataclass(frozen=True)
 class Sheet:
@@ -83,6 +91,12 @@ class RailSlices:
         """The rail moved by ``du`` to the field side and ``df`` up, m."""
         shift = np.array([du, df, 0.0, 0.0])[:, None]
         return replace(self, sheets=tuple(_moved(sheet, shift) for sheet in self.sheets))
+
+    def along(self, plain, depth=GAUGE_DEPTH):
+        """The rail moved so that the first slice's inner face, within ``depth`` (m) of its top, and its top lie where
+        those of a ``plain`` rail do, in whose coordinates it is then."""
+        placed, distance = self.placed(depth)
+        return placed.moved(distance - plain.gauge_offset(depth), 0.0)
 
     def placed(self, depth=GAUGE_DEPTH):
         """The rail moved so that the first slice's highest point is its origin, and the distance (m, positive) from
