@@ -43,6 +43,8 @@ BELOW = 0.03
 
 HEIGHT, AHEAD, BEND, LIFT = range(4)
 
+_CLOSE = 1e-9  # m
+
 
 @dataclass(frozen=True)
 class WheelOnSlices:
@@ -91,9 +93,20 @@ class WheelOnSlices:
         return geometry._replace(along=np.ascontiguousarray(seen[AHEAD:].T)), touch
 
     def straight(self, s, u):
-        """Section (4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees with
-        its cross-section at s (m): rows `HEIGHT`, NaN where there is none, to `LIFT`."""
-        return self._seen(make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), s, u)[0]
+        """Sections (n, 4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees
+        with its cross-section at s (n,), multiples of `STEP` apart, m: rows `HEIGHT`, NaN where there is none, to
+        `LIFT`."""
+        pose, seen = make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), np.zeros((s.size, 4, u.size))
+        count = 2 * round(REACH / STEP) + 1
+        every = self._where_parts_begin(s[0] - REACH + STEP * np.arange(round((s[-1] - s[0]) / STEP) + count))
+        rail = self.rail.heights(every, u)[0]
+        for at, section in zip(s, seen, strict=True):
+            x, first = self._stations(at), round((at - s[0]) / STEP)
+            heights = rail[first : first + count]
+            if abs(at + x[0] - every[first]) > _CLOSE:  # another part begins nearby
+                heights = self.rail.heights(self._where_parts_begin(at + x), u)[0]
+            _see(self._wheel_geometry, pose, x, heights, u, section)
+        return seen
 
     def strips(self, u):
         """Of its strips over rail coordinates, for the same wheelset: 1/R (1/m), and what a small yaw (rad) moves their
@@ -110,7 +123,14 @@ class WheelOnSlices:
     def _seen(self, pose, s, u):
         """Section (4, m) and height of the first touch in a pose of the wheel as a left one."""
         x, seen = self._stations(s), np.zeros((4, u.size))
-        return seen, _see(self._wheel_geometry, pose, x, self.rail.heights(s + x, u)[0], u, seen)
+        rail = self.rail.heights(self._where_parts_begin(s + x), u)[0]
+        return seen, _see(self._wheel_geometry, pose, x, rail, u, seen)
+
+    def _where_parts_begin(self, s):
+        """Arc lengths (n,), m, with those that miss the beginning of a part by rounding on it."""
+        for begin in self.rail.begins():
+            s = np.where(np.abs(s - begin) < _CLOSE, begin, s)
+        return s
 
     def _stations(self, s):
         """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""

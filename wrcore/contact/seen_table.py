@@ -69,9 +69,12 @@ def seen_table(pair, plain, backwards=False):
     laid the other way round, whose arc lengths then count from the same origin against those of its slices."""
     wide = _widened(pair)
     first, last = (pair.rail.s[k] + sign * (REACH + BLEND) for k, sign in ((0, -1.0), (-1, 1.0)))
+    begins = pair.rail.begins()
+    if begins.size:  # at a node
+        first = begins[0] - S_STEP * np.ceil((begins[0] - first) / S_STEP)
     s = first + S_STEP * np.arange(int(np.ceil((last - first) / S_STEP)) + 1)
     u = _lateral(wide, plain)
-    seen = np.array([wide.straight(at, u) for at in s])
+    seen = wide.straight(s, u)
     floor = min(np.nanmin(seen[:, SEEN_HEIGHT]), plain.f.min()) - BELOW
     sections = np.zeros((s.size, 2, ROWS, u.size))
     for k, (there, one) in enumerate(zip(seen[:, SEEN_HEIGHT], sections[:, 0], strict=True)):

@@ -24,7 +24,7 @@ TRAVEL = 0.02
 """Longest step of a run while a wheelset is on such a rail, m."""
 
 PLACE, YAW, IN_STRETCH = range(3)
-"""What is known of the section that a wheel's arrays hold: its place in the table, in steps, the yaw that it is seen in,
+"""What is known of the section that a wheel's arrays hold: its place in the table, in steps, the yaw it is seen in,
 and its stretch."""
 
 

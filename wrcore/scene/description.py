@@ -336,6 +336,7 @@ def compile_scene(
     if scene.crossing is not None:
         pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
         geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(scene.crossing, pairs))
+        geometry = geometries[0]  # of the type of all
         if "support" not in data["track"]:
             warn_of_rigid_rails(scene.source)
     support, elements = track_support(
