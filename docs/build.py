@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 GUIDES = (
-    "first_result", "bring_your_own", "scenes", "tracks", "vehicle_files", "own_physics", "freight_wagon",
+    "first_result", "bring_your_own", "scenes", "tracks", "crossings", "vehicle_files", "own_physics", "freight_wagon",
     "co_simulation", "fmi", "sweeps", "clusters", "arrays", "assessment", "wear", "how_runs_end", "accuracy", "limits",
     "patch", "stability", "response", "cost", "comparison", "gallery", "evidence", "versions",
 )  # fmt: skip

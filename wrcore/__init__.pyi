@@ -15,6 +15,7 @@ from wrcore.analysis.contact.patch import patch as patch
 from wrcore.analysis.pictures.draw import draw as draw
 from wrcore.analysis.pictures.plot_contact import plot_pair as plot_pair
 from wrcore.analysis.pictures.plot_creep import plot_creep_force as plot_creep_force
+from wrcore.analysis.pictures.plot_crossing import plot_crossing as plot_crossing
 from wrcore.analysis.pictures.plot_patch import plot_wheel_on_rail as plot_wheel_on_rail
 from wrcore.analysis.pictures.plot_response import plot_frequency_response as plot_frequency_response
 from wrcore.analysis.pictures.plot_run import plot_run as plot_run

@@ -92,6 +92,7 @@ def _pair(options, poses):
     from wrcore.cli.options import profile_of, slices_of
     from wrcore.contact.seen_rail import WheelOnSlices
     from wrcore.geometry.profile import GAUGE_DEPTH
+    from wrcore.geometry.slices import RailSlices
 
     rail, out_of_round = slices_of(options, "rail"), slices_of(options, "wheel")
     distance, sizes = options.rail_distance, (options.rolling_radius, options.tape_circle_half_distance)
@@ -109,10 +110,13 @@ def _pair(options, poses):
         raise InputError(options.poses, f"{name}, row {missing[0] + 1}", expected)
     wheel = profile_of(options, options.wheel, "wheel") if out_of_round is None else out_of_round.round()
     if rail is None:
-        rail = profile_of(options, options.rail, "rail")
-        distance = 0.5 * options.gauge + rail.gauge_offset(GAUGE_DEPTH) if distance is None else distance
+        curve = profile_of(options, options.rail, "rail")
+        distance = 0.5 * options.gauge + curve.gauge_offset(GAUGE_DEPTH) if distance is None else distance
         if math.isnan(distance):
-            raise InputError(rail.name, "gauge", "expected a rail down to where the gauge is measured, or the distance")
+            raise InputError(
+                curve.name, "gauge", "expected a rail down to where the gauge is measured, or the distance"
+            )
+        rail = RailSlices.of(curve)
     elif distance is None:
         rail, offset = rail.placed()
         distance = 0.5 * options.gauge + offset

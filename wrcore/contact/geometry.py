@@ -24,10 +24,10 @@ LANES = 8
 _MOST_BLOCKS = 56
 """Blocks that are told apart: of the 64 bits of a word, in whole registers, one left over."""
 
-_MARGIN = 4
-_SAFETY = 1.5
+MARGIN = 4
+SAFETY = 1.5
 """Covers what roll and yaw add to a profile's second derivative."""
-SECOND_BOUND = 8.0 / (_SAFETY * SCAN_STEP**2)
+SECOND_BOUND = 8.0 / (SAFETY * SCAN_STEP**2)
 """Bound of a second derivative (1/m) over its reserve (m)."""
 
 LARGEST_OFFSET = 0.6 * SCAN_STEP
@@ -43,7 +43,7 @@ SMALL_SHARE = 0.15
 """Share of LARGEST_OFFSET up to which tighter bounds hold."""
 
 YAW_LIMIT = 0.02
-"""Yaw (rad) up to which `_zone_planar_errors` holds."""
+"""Yaw (rad) up to which `zone_planar_errors` holds."""
 
 
 class ContactGeometry(NamedTuple):
@@ -63,7 +63,7 @@ class ContactGeometry(NamedTuple):
     zone_gaps: np.ndarray
     """(shifts 2 PARTS, blocks): see `_zone_gaps`; of each shift poses of small angles first."""
     zone_planar_errors: np.ndarray
-    """(shifts, blocks): see `_zone_planar_errors`."""
+    """(shifts, blocks): see `zone_planar_errors`."""
     block: int
     """Strips per block: LANES, or a multiple of it where the rail is very wide."""
     fine_wheel: np.ndarray
@@ -97,12 +97,11 @@ def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
     """ContactGeometry of the profiles of a `WheelOnRail` and its lengths."""
     scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
-    limits = SMALL_SHARE * LARGEST_OFFSET, LARGEST_OFFSET
-    gaps = [_zone_gaps(scan_wheel, scan_rail, block, rolling_radius, limit) for limit in limits]
+    gaps = zone_gaps(scan_wheel, scan_rail, block, rolling_radius)
     return ContactGeometry(
         np.column_stack([-wheel.f, -wheel.df, -wheel.d2f]), np.column_stack([rail.f, rail.df, rail.d2f]),
         scan_wheel, scan_rail,
-        np.concatenate(gaps, 1).reshape(-1, gaps[0].shape[2]), _zone_planar_errors(scan_wheel, scan_rail, block), block,
+        gaps, zone_planar_errors(scan_wheel, scan_rail, block), block,
         _padded(_strip_rows(rolling_radius - wheel.f, -wheel.df)), _padded(_fine_rail(wheel, rail)),
         float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
@@ -117,7 +116,7 @@ def _reserve(curve, nodes):
     first = np.searchsorted(curve.u, nodes - SCAN_STEP, side="left")
     last = np.searchsorted(curve.u, nodes + SCAN_STEP, side="right")
     bound = [second[i:j].max() if j > i else 0.0 for i, j in zip(first, last, strict=True)]
-    return _SAFETY * 0.125 * SCAN_STEP**2 * np.array(bound)
+    return SAFETY * 0.125 * SCAN_STEP**2 * np.array(bound)
 
 
 def _wheel_scan(wheel, rolling_radius, window):
@@ -147,10 +146,16 @@ def _padded(rows):
     return np.pad(rows, ((0, 0), (0, LANES)))
 
 
-def _zone_gaps(wheel, rail, block, rolling_radius, limit):
-    """Lower bounds of gaps, so that the scan can leave out what is far from contact.
+def zone_gaps(wheel, rail, block, rolling_radius):
+    """Lower bounds of gaps, so that the scan can leave out what is far from contact: see `_zone_gaps`; of each shift
+    those for small angles first."""
+    limits = SMALL_SHARE * LARGEST_OFFSET, LARGEST_OFFSET
+    gaps = [_zone_gaps(wheel, rail, block, rolling_radius, limit) for limit in limits]
+    return np.concatenate(gaps, 1).reshape(-1, gaps[0].shape[2])
 
-    Entry (shift, part, block): at height 0 and roll 0 no strip of the block, a run of rail cells, comes closer than
+
+def _zone_gaps(wheel, rail, block, rolling_radius, limit):
+    """Entry (shift, part, block): at height 0 and roll 0 no strip of the block, a run of rail cells, comes closer than
     this to being close (see `scan`), if the first wheel node is ``shift`` and the strips stand in the part
     ``part`` of PARTS of their cells. Roll and yaw of a `scan.cell_offset` up to ``limit`` move a strip by up to
     ``offset`` from there, and only upwards but for ``sag``."""
@@ -176,7 +181,7 @@ def _zone_gaps(wheel, rail, block, rolling_radius, limit):
     return gaps
 
 
-def _zone_planar_errors(wheel, rail, block):
+def zone_planar_errors(wheel, rail, block):
     """Largest penetration, over yaw^2 up to YAW_LIMIT, that planar detection can miss in each block (shift, block)."""
     cells = rail.shape[1]
     missed = YAW_LIMIT**2 * 0.5 * SECOND_BOUND * rail[RAIL_RESERVE] * sliding_window_view(wheel[ALONG] ** 2, cells)
@@ -206,11 +211,11 @@ def _rail_scan(rail):
     count = int((rail.u[-1] - rail.u[0]) / SCAN_STEP + 1e-9)
     u = rail.u[0] + SCAN_STEP * np.arange(count + 1)
     f, df = rail(u), rail(u, 1)
-    block = LANES * math.ceil((count + 2 * _MARGIN) / (LANES * _MOST_BLOCKS))
-    cells = np.zeros((6, block * math.ceil((count + 2 * _MARGIN) / block)))
+    block = LANES * math.ceil((count + 2 * MARGIN) / (LANES * _MOST_BLOCKS))
+    cells = np.zeros((6, block * math.ceil((count + 2 * MARGIN) / block)))
     cells[0], cells[RAIL_COSINE] = -1.0, 1.0
-    middle = slice(_MARGIN, _MARGIN + count)
+    middle = slice(MARGIN, MARGIN + count)
     cells[:4, middle] = _cubics(f, df, SCAN_STEP)
     cells[RAIL_RESERVE, middle] = _reserve(rail, u[:-1] + 0.5 * SCAN_STEP)
     cells[RAIL_COSINE, middle] = 1.0 / np.sqrt(1.0 + (0.5 * (df[:-1] + df[1:])) ** 2)
-    return cells, float(u[0] - _MARGIN * SCAN_STEP), block
+    return cells, float(u[0] - MARGIN * SCAN_STEP), block

@@ -46,6 +46,8 @@ BELOW = 0.03
 
 HEIGHT, AHEAD, BEND, LIFT = range(4)
 
+_CLOSE = 1e-9  # m
+
 
 @dataclass(frozen=True)
 class WheelOnSlices:
@@ -55,7 +57,7 @@ class WheelOnSlices:
     ----------
     wheel : ProfileCurve
         Of a wheel out of round the profile of a wheel of revolution near it.
-    rail : RailSlices or ProfileCurve
+    rail : RailSlices
         In the coordinates of the track: u from ``rail_distance``, f from the plane from which the wheelset's height
         counts.
     rolling_radius, half_distance, rail_distance : float
@@ -65,7 +67,7 @@ class WheelOnSlices:
     """
 
     wheel: ProfileCurve
-    rail: RailSlices | ProfileCurve
+    rail: RailSlices
     rolling_radius: float = 0.46
     half_distance: float = 0.75
     rail_distance: float = 0.75
@@ -85,19 +87,13 @@ class WheelOnSlices:
         and NaN where there is no rail under the wheel."""
         sign, wheel = SIDES[side], self._wheel_geometry
         pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
-        low, high = (strip_point(wheel, pose, u)[0] for u in self.wheel.u[[0, -1]])
+        low, high = (strip_point(wheel, pose, u)[0] for u in self._ends)
         u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
-        x, beyond = self._stations(s), np.zeros((0, 0))
-        rail = self._heights(s + x, u)
-        if self.out_of_round is not None:
-            beyond = reach_beyond(self.out_of_round, wheel, pose, turned, x, _strips_over(wheel, pose, u))
-            rail = rail + beyond
-        seen = np.zeros((4, u.size))
-        touch = _see(wheel, pose, x, rail, beyond, u, seen)
+        seen, touch, x, rail = self._seen(pose, s, u, turned)
         there = np.isfinite(seen[HEIGHT])
         if there.sum() < 10:
             return None, math.nan
-        f, slope = _filled(seen[HEIGHT], there)
+        f, slope = filled(seen[HEIGHT], SPACING, np.min(seen[HEIGHT], where=there, initial=np.inf) - BELOW)
         curve = ProfileCurve(f"{self.rail.name} at s = {s:g} m", "rail", u, f, slope,
                              averaged_second_derivative(u, f, slope))  # fmt: skip
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
@@ -105,35 +101,73 @@ class WheelOnSlices:
         along = np.ascontiguousarray(seen[AHEAD:].T)
         return geometry._replace(along=along, over=over, over_start=x[0], over_step=STEP), touch
 
-    def _heights(self, s, u):
-        """Height of the rail (n, m), NaN where there is none."""
-        if isinstance(self.rail, RailSlices):
-            return self.rail.heights(s, u)[0]
-        inside = (u >= self.rail.u[0]) & (u <= self.rail.u[-1])
-        return np.tile(np.where(inside, self.rail(u), np.nan), (s.size, 1))
+    def straight(self, s, u):
+        """Sections (n, 4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees
+        with its cross-section at s (n,), multiples of `STEP` apart, m: rows `HEIGHT`, NaN where there is none, to
+        `LIFT`."""
+        pose, seen = make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), np.zeros((s.size, 4, u.size))
+        count = 2 * round(REACH / STEP) + 1
+        every = self._where_parts_begin(s[0] - REACH + STEP * np.arange(round((s[-1] - s[0]) / STEP) + count))
+        rail = self.rail.heights(every, u)[0]
+        for at, section in zip(s, seen, strict=True):
+            x, first = self._stations(at), round((at - s[0]) / STEP)
+            heights = rail[first : first + count]
+            if abs(at + x[0] - every[first]) > _CLOSE:  # another part begins nearby
+                heights = self.rail.heights(self._where_parts_begin(at + x), u)[0]
+            _see(self._wheel_geometry, pose, x, heights, np.zeros((0, 0)), u, section)
+        return seen
+
+    def strips(self, u):
+        """Of its strips over rail coordinates, for the same wheelset: 1/R (1/m), and what a small yaw (rad) moves their
+        points that touch ahead, less that of half the distance of the tape circles (m), (2, m)."""
+        at = u + self.rail_distance - self.half_distance
+        inside = np.clip(at, *self._ends)
+        radius = self.rolling_radius - self.wheel(inside)
+        return np.stack([1.0 / radius, at - radius * self.wheel(inside, 1)])
+
+    @property
+    def _ends(self):
+        return self.wheel.u[0], self.wheel.u[-1]
+
+    def _seen(self, pose, s, u, turned):
+        """Section (4, m) and height of the first touch in a pose of the wheel as a left one, turned forward (rad);
+        stations (n,) and heights of the rail (n, m) there, with what the wheel reaches beyond its round."""
+        x, beyond, seen = self._stations(s), np.zeros((0, 0)), np.zeros((4, u.size))
+        rail = self.rail.heights(self._where_parts_begin(s + x), u)[0]
+        if self.out_of_round is not None:
+            wheel = self._wheel_geometry
+            beyond = reach_beyond(self.out_of_round, wheel, pose, turned, x, _strips_over(wheel, pose, u))
+            rail = rail + beyond
+        return seen, _see(self._wheel_geometry, pose, x, rail, beyond, u, seen), x, rail
+
+    def _where_parts_begin(self, s):
+        """Arc lengths (n,), m, with those that miss the beginning of a part by rounding on it."""
+        for begin in self.rail.begins():
+            s = np.where(np.abs(s - begin) < _CLOSE, begin, s)
+        return s
 
     def _stations(self, s):
         """Where sections are taken, from the wheelset's cross-section, m: where a part begins there is one."""
         count = round(REACH / STEP)
-        begins = self.rail.begins() - s if isinstance(self.rail, RailSlices) else np.zeros(0)
+        begins = self.rail.begins() - s
         begins = begins[np.abs(begins) < REACH]
         shift = math.remainder(begins[np.argmin(np.abs(begins))], STEP) if begins.size else 0.0
         return STEP * np.arange(-count, count + 1) + shift
 
 
-def _filled(f, there):
-    """Heights, with something far below where there is no rail, and slopes by differences of the fourth order."""
-    filled, slope = np.where(there, f, np.min(f, where=there, initial=np.inf) - BELOW), np.zeros(f.size)
-    ends = np.flatnonzero(np.diff(there.astype(int), prepend=0, append=0)).reshape(-1, 2)
+def filled(f, spacing, floor):
+    """Heights over evenly spaced lateral coordinates, with a ``floor`` where there is no rail (NaN) or only a shred of
+    it, and slopes by differences of the fourth order."""
+    heights, slope = np.full(f.size, floor), np.zeros(f.size)
+    ends = np.flatnonzero(np.diff(np.isfinite(f).astype(int), prepend=0, append=0)).reshape(-1, 2)
     for first, last in ends:
         part = f[first:last]
         if part.size < 5:
-            filled[first:last] = filled.min()
             continue
-        d = np.gradient(part, SPACING, edge_order=2)
-        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * SPACING)
-        slope[first:last] = d
-    return filled, slope
+        d = np.gradient(part, spacing, edge_order=2)
+        d[2:-2] = (part[:-4] - 8.0 * part[1:-3] + 8.0 * part[3:-1] - part[4:]) / (12.0 * spacing)
+        heights[first:last], slope[first:last] = part, d
+    return heights, slope
 
 
 @jit

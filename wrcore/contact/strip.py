@@ -121,6 +121,32 @@ def changes_along(geometry):
 
 
 @jit(allocates=False, forceinline=True)
+def lean_at(geometry, ur, pz):
+    """Cosine and sine of the angle about the axle between the rail's point under the wheel and what it touches where
+    its rail changes along the track: at the rail coordinate ``ur``, ``pz`` (m) over the axle. A body of revolution has
+    no normal there but the one through its axle."""
+    if not changes_along(geometry):
+        return 1.0, 0.0
+    ahead = with_rail_along(geometry, AHEAD, ur, 1.0, 0.0)
+    inverse = 1.0 / math.sqrt(ahead * ahead + pz * pz)
+    return -pz * inverse, ahead * inverse
+
+
+@jit(allocates=False, forceinline=True)
+def leaning(geometry, lean, x, z):
+    """Components of a vector in axes that lean so (`lean_at`): along the contact plane and upright to it."""
+    if changes_along(geometry):
+        return lean[0] * x + lean[1] * z, lean[0] * z - lean[1] * x
+    return x, z
+
+
+@jit(allocates=False, forceinline=True)
+def upright(geometry, lean, x, z):
+    """Components of a vector of leaning axes along the rail's frame."""
+    return leaning(geometry, (lean[0], -lean[1]), x, z)
+
+
+@jit(allocates=False, forceinline=True)
 def curvature_at(nodes, start, step, u):
     """Second derivative for Hertz: its window mean, interpolated linearly."""
     position = (u - start) / step

@@ -37,6 +37,7 @@ def structure(model):
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
         strips[:3], sizes, len(set(looked_up(model))), *model.controls.period, *map(np.shape, model.controls),
+        model.crossing.tables.shape,
     )  # fmt: skip
 
 
@@ -45,7 +46,7 @@ def with_kernels_of(model, other):
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
-    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples"
+    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides"
     kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
     kept |= {"elements": with_laws(model.elements), "controls": with_control_laws(model.controls)}

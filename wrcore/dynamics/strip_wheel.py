@@ -22,7 +22,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL, find_patches
 from wrcore.contact.normal import damping_factor, inverse_cube_root
 from wrcore.contact.patch import rolling, solve
-from wrcore.contact.patch.gap import frame_of_overlaps, group_end, rigid_slip
+from wrcore.contact.patch.gap import frame_of_overlaps, group_end, lean_of, rigid_slip
 from wrcore.contact.patch.gap import strip_wrenches as wrenches_of_strips
 from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
@@ -30,11 +30,11 @@ from wrcore.contact.patch.model import LOAD
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
-from wrcore.contact.strip import AHEAD, LIFT, make_pose, with_rail_along
+from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
 from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling
+from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, leaning_motion
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
 
@@ -249,7 +249,8 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 @jit(allocates=False, fastmath=FUSED)
 def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work):
     """Overlaps in ``work.rows`` of a left wheel, with a pose and a frame, that the damping lifts: its pose then, their
-    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row."""
+    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row. The
+    motion ``m`` is in axes that lean as the patch does."""
     speed = max(abs(m.vx), model.least_speed)
     depth, u, low, high = 0.0, 0.0, first, first
     for k in range(first, last):
@@ -258,10 +259,9 @@ def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work
             copy_into(out, rows[k])
     # a material point of the undeformed wheel, as the surfaces' slip has it
     py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
-    pz = frame.z - depth * frame.cosine - m.z
-    xi, eta, phi, approach = creepages(
-        m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, frame.x, py, pz, frame.cosine, frame.sine, speed
-    )
+    pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
+    px, pz = leaning(model.geometry, lean_of(model.geometry, pose, frame), frame.x, pz)
+    xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, speed)
     friction = falling(model, m.friction, xi, eta, speed)
     factor = damping_factor(approach, model.damping, model.damping_speed)
     lift = (1.0 - factor * inverse_cube_root(factor)) * depth
@@ -277,6 +277,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     speed, windows = max(abs(m.vx), model.least_speed), 0
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
+    m = leaning_motion(model.geometry, m, lean_of(model.geometry, pose, frame))
     pose, low, high, depth, creepage, friction = lifted_overlaps(
         model, m, pose, frame, spatial, rows, first, last, out, work
     )
@@ -305,10 +306,15 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                 more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work)
                 found = _mean(found, more, share)
     z = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - m.z)
-    fill_row(frame, frame.ur + model.geometry.rail_distance - m.y, z, found, work.wrench, out)
+    lean, total = lean_of(model.geometry, pose, frame), work.wrench[0]
+    fill_row(model.geometry, lean, frame, frame.ur + model.geometry.rail_distance - m.y, z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + m.y, out[reduction.Z] + m.z
     for k in range(6):
-        wrench[k] += work.wrench[0, k] + work.wrench[1, k]
+        total[k] += work.wrench[1, k]
+    for k in range(0, 6, 3):
+        total[k], total[k + 2] = upright(model.geometry, lean, total[k], total[k + 2])
+    for k in range(6):
+        wrench[k] += total[k]
     return found
 
 
@@ -331,8 +337,8 @@ def _mean(one, other, share):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def fill_row(frame, y, z, found, wrenches, out):
-    """Row of a patch about the pressure's centroid, from the wrenches of pressure and friction.
+def fill_row(geometry, lean, frame, y, z, found, wrenches, out):
+    """Row of a patch about the pressure's centroid, from the wrenches of pressure and friction, in axes that ``lean``.
 
     The pressure's resultant is the normal; the force along it holds what friction in the strips' planes has there.
     Creepages are the means of the rigid slip, moved by the least with which the forces do on them what friction does on
@@ -342,12 +348,13 @@ def fill_row(frame, y, z, found, wrenches, out):
     normal = math.sqrt(pressure[1] * pressure[1] + pressure[2] * pressure[2])
     cosine, sine = pressure[2] / normal, -pressure[1] / normal
     px, py, pz = frame.x + found.x, y + found.s * frame.cosine, z + found.s * frame.sine
+    out[reduction.X], out[reduction.Y], out[reduction.Z] = px, py, pz
+    px, pz = leaning(geometry, lean, px, pz)
     fx, fy, fz = friction[0], friction[1], friction[2]
     fs = fy * cosine + fz * sine
     turn_y, turn_z = friction[4] - pz * fx + px * fz, friction[5] - px * fy + py * fx
     mn = turn_z * cosine - turn_y * sine
     out[reduction.ANGLE], out[reduction.COSINE], out[reduction.SINE] = math.atan2(sine, cosine), cosine, sine
-    out[reduction.X], out[reduction.Y], out[reduction.Z] = px, py, pz
     out[reduction.SEMI_A], out[reduction.SEMI_B], out[reduction.P_MAX], out[reduction.CELL] = a, b, found.p_max, 0.0
     out[reduction.NORMAL] = normal + fz * cosine - fy * sine
     out[reduction.FX], out[reduction.FY], out[reduction.MZ] = fx, fs, mn

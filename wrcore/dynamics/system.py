@@ -18,6 +18,7 @@ from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, constraint_workspace
 from wrcore.dynamics.control import Controls, ControlWork, control_work, no_controls, with_controls
+from wrcore.dynamics.crossing import Crossing, lay_sections, no_crossing, shorten_step, with_own_arrays
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
 from wrcore.dynamics.inertia import (
@@ -82,6 +83,9 @@ class Model(NamedTuple):
     rails: int = 0  # address of the kernel that finds the wrenches of the rails of a flexible track
     controls: Controls = no_controls()  # control laws of the user's own
     samples: int = 0  # address of the kernel that takes their samples
+    crossing: Crossing = no_crossing()  # rails that change along the track
+    sections: int = 0  # address of the kernel that lays what the wheels see of them
+    strides: int = 0  # address of the kernel that keeps steps short on them
 
 
 class Workspace(NamedTuple):
@@ -106,6 +110,7 @@ class Workspace(NamedTuple):
     flexible_track: FlexibleTrackWork
     control: ControlWork
     principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
+    seen: np.ndarray  # (k, 2, 3): which sections of rails that change the wheels' arrays hold
 
 
 def state_size(model):
@@ -128,7 +133,7 @@ def workspace(model):
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
-        np.zeros(model.bodies.axes.shape),
+        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 3), np.nan),
     )  # fmt: skip
 
 
@@ -176,6 +181,8 @@ def wheel_motions(model, state, work):
                 row[MOTION.bend_y] = row[MOTION.bend_z] = 0.0
     if model.rail_friction != 0:
         call_address(model.rail_friction, model, state, work)
+    if model.sections != 0:
+        call_address(model.sections, model, state, work)
     for j in range(model.bodies.independent.shape[0]):
         k, half = model.bodies.independent[j, 0], state[independent_at(model.bodies, j)]
         for wheel in range(2):
@@ -286,6 +293,7 @@ def with_wheels(model):
         wheels, alone = [], contact._replace(geometries=())
         for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
             strips = contact.strips._replace(looked_up=of_rails[k % 2])
+            geometry = with_own_arrays(geometry) if len(model.crossing.tables) else geometry
             wheels.append(alone._replace(geometry=geometry, strips=strips))
         contact = alone._replace(wheels=tuple(wheels))
     if contact.strips.strips:
@@ -320,6 +328,9 @@ def with_kernels(model, work):
         kernels["torques"] = Kernel(add_drive, kind, 0.0, state, scratch, state)
     if len(model.friction.points):
         kernels["rail_friction"] = Kernel(fill_rail_friction, kind, state, scratch)
+    if len(model.crossing.tables):
+        kernels["sections"] = Kernel(lay_sections, kind, state, scratch)
+        kernels["strides"] = Kernel(shorten_step, kind, state, scratch, state, 0)
     if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
         kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
     if len(model.bodies.wheelsets):

@@ -64,7 +64,7 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
-    fill_row(frame, y, z, found, work.wrench, out)
+    fill_row(model.geometry, (1.0, 0.0), frame, y, z, found, work.wrench, out)
     out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
     heaviest = 0
     for q in range(1, lobes):

@@ -11,9 +11,10 @@ from wrcore.contact.detection import AUTO, SPATIAL, find_patches, planar_error_b
 from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
+from wrcore.contact.strip import changes_along, lean_at, leaning, upright
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD
-from wrcore.dynamics.motion import MOTION, motion_of
+from wrcore.dynamics.motion import MOTION, WheelMotion, motion_of
 from wrcore.kernels.handles import call_address, member_of
 from wrcore.kernels.jit import FUSED, jit
 
@@ -114,9 +115,22 @@ def falling(model, friction, xi, eta, speed):
     return friction * ((1.0 - ratio) * math.exp(-model.friction_decay * slip) + ratio)
 
 
+@jit(allocates=False, forceinline=True)
+def leaning_motion(geometry, m, lean):
+    """The motion with velocities in axes that lean so, see `lean_at`."""
+    if not changes_along(geometry):
+        return m
+    vx, vz = leaning(geometry, lean, m.vx, m.vz)
+    wx, wz = leaning(geometry, lean, m.wx, m.wz)
+    return WheelMotion(
+        m.side, m.y, m.z, m.ex, m.ey, m.ez, vx, m.vy, vz, wx, m.wy, wz, m.bend_y, m.bend_z, m.friction
+    )  # fmt: skip
+
+
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def patch_wrench(model, m, bend_y, bend_z, row, psi):
-    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
+    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left. Where the rail
+    changes along the track, ``model`` is the contact model of this very wheel, and the patch leans as the rail does.
 
     The rail bends by the curvatures ``bend_y`` and ``bend_z``, if the patch does not know yet; ``psi`` is its shape
     number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`. Creep laws and tables are
@@ -125,6 +139,8 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     """
     px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
     cosine, sine = row[reduction.COSINE], row[reduction.SINE]
+    lean = lean_at(model.geometry, row[reduction.U_RAIL], pz)
+    m, (px, pz) = leaning_motion(model.geometry, m, lean), leaning(model.geometry, lean, px, pz)
     speed = max(abs(m.vx), model.least_speed)
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
     row[reduction.CURVATURE_X] += 0.5 * (bend_y * sine - bend_z * cosine)  # rail bending away from the wheel
@@ -147,6 +163,7 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     row[reduction.FX], row[reduction.FY], row[reduction.MZ] = f1, f2, m3
     row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = xi, eta, phi
     mx, my, mz = py * gz - pz * gy, pz * f1 - px * gz - m3 * sine, px * gy - py * f1 + m3 * cosine
+    (f1, gz), (mx, mz) = upright(model.geometry, lean, f1, gz), upright(model.geometry, lean, mx, mz)
     return f1, gy, gz, mx, my, mz, missed
 
 
@@ -177,7 +194,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
                 gx, gy, gz, nx, ny, nz, missed = patch_wrench(
-                    model, motion_of(row), bend_y, bend_z, patches[i, wheel, k], 0.0
+                    contact_of(model, i, wheel), motion_of(row), bend_y, bend_z, patches[i, wheel, k], 0.0
                 )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
                 mx, my, mz = mx + nx, my + ny, mz + nz

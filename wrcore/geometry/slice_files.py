@@ -251,23 +251,13 @@ def _slice(path, row, kind):
     u, f = u[kept], f[kept]
     if u.size < 4:
         raise InputError(path.parent / name, "", f"expected at least 4 points, got {u.size} (line {number} of {path})")
-    length = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f))))
-    places = np.array([0.0, length[-1]])
-    if cuts is not None:
-        at, given = cuts
-        places = np.minimum(given, length[-1])
-        if path.suffix.lower() not in SLICE_FILES.values():
-            places = np.concatenate(([0.0], given, [length[-1]]))
-        if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
-            raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * length[-1]:.3f} mm of {name}")
-    return Slice(s, _section_curve(length, np.column_stack([u, f]), wavelength), places)
-
-
-def _section_curve(length, points, wavelength):
-    """Cubic spline through points over their chord length, or without their waves shorter than a wavelength (m)."""
-    from scipy.interpolate import CubicSpline, make_smoothing_spline
-
-    if not wavelength:
-        return CubicSpline(length, points)
-    weight = (length.size - 1) / length[-1] * (wavelength / TURN) ** 4
-    return make_smoothing_spline(length, points, lam=weight)
+    one = Slice.through(s, u, f, wavelength)
+    if cuts is None:
+        return one
+    (at, given), ends = cuts, one.cuts
+    places = np.minimum(given, ends[1])
+    if path.suffix.lower() not in SLICE_FILES.values():
+        places = np.concatenate((ends[:1], given, ends[1:]))
+    if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
+        raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * ends[1]:.3f} mm of {name}")
+    return replace(one, cuts=places)

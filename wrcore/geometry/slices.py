@@ -37,6 +37,18 @@ class Slice:
     cuts: np.ndarray
     """(features,) chord lengths of the feature lines, m; NaN where a line does not exist."""
 
+    @classmethod
+    def through(cls, s, u, f, wavelength=0.0):
+        """A slice through points u, f (m) from the track's centre outwards, or without their waves shorter than a
+        ``wavelength`` (m); its ends are its only feature lines."""
+        from scipy.interpolate import CubicSpline, make_smoothing_spline
+
+        length, points = np.append(0.0, np.cumsum(np.hypot(np.diff(u), np.diff(f)))), np.column_stack([u, f])
+        if not wavelength:
+            return cls(s, CubicSpline(length, points), length[[0, -1]])
+        weight = (length.size - 1) / length[-1] * (wavelength / TURN) ** 4
+        return cls(s, make_smoothing_spline(length, points, lam=weight), length[[0, -1]])
+
 
 @dataclass(frozen=True)
 class Sheet:
@@ -81,10 +93,22 @@ class RailSlices:
     first: object = None
     """How `read_profile` reads the first slice's profile (dict)."""
 
+    @classmethod
+    def of(cls, curve):
+        """A rail with the same `ProfileCurve` everywhere."""
+        sheets = sheets_of(np.zeros(1), [Slice.through(0.0, curve.u, curve.f)])
+        return cls(curve.name, np.zeros(1), tuple(sheets), curve.source, True)
+
     def moved(self, du, df):
         """The rail moved by ``du`` to the field side and ``df`` up, m."""
         shift = np.array([du, df, 0.0, 0.0])[:, None]
         return replace(self, sheets=tuple(_moved(sheet, shift) for sheet in self.sheets))
+
+    def along(self, plain, depth=GAUGE_DEPTH):
+        """The rail moved so that the first slice's inner face, within ``depth`` (m) of its top, and its top lie where
+        those of a ``plain`` rail do, in whose coordinates it is then."""
+        placed, distance = self.placed(depth)
+        return placed.moved(distance - plain.gauge_offset(depth), 0.0)
 
     def placed(self, depth=GAUGE_DEPTH):
         """The rail moved so that the first slice's highest point is its origin, and the distance (m, positive) from

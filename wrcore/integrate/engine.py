@@ -196,6 +196,14 @@ def take_samples(control, memory, scratch, equations, model, work):
 
 
 @jit(allocates=False)
+def keep_short(control, memory, model, work):
+    """Have the next step end where the rails begin to change along the track, and stay short on them; steps of a stated
+    length stay."""
+    if model.strides != 0 and control.fixed_step == 0.0:
+        call_address(model.strides, model, memory.state, work, memory.clock, NEXT)
+
+
+@jit(allocates=False)
 def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
@@ -238,6 +246,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
     n, last = state.shape[0], stages.shape[0] - 1
     while True:
         take_samples(control, memory, scratch, equations, model, work)
+        keep_short(control, memory, model, work)
         last_step = clock[T] - clock[T_OLD]
         outcome = write_outputs(control, tableau.dense, last_step, STILL, scratch.still, memory, record, model, work)
         if outcome != RUNNING or budget == 0:

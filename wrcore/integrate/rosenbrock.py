@@ -16,7 +16,7 @@ from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import factorise, solve_stage
-from wrcore.integrate.engine import accept, error_size, judge, take_samples, write_outputs
+from wrcore.integrate.engine import accept, error_size, judge, keep_short, take_samples, write_outputs
 from wrcore.integrate.jacobian import Jacobian, Joined, Sweep, joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import pace
@@ -108,6 +108,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
     hold = HOLD if tableau.reuse > 1 else 1.0
     while True:
         take_samples(control, memory, scratch, equations, model, work)
+        keep_short(control, memory, model, work)
         axes = turn_of(linear.jacobian)
         outcome = write_outputs(control, tableau.dense, 1.0, axes, drift, memory, record, model, work)
         if outcome != engine.RUNNING or budget == 0:

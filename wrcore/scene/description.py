@@ -25,6 +25,7 @@ from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, OWN, creep_data, own_law
 from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
+from wrcore.dynamics.crossing import no_crossing
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
@@ -35,6 +36,7 @@ from wrcore.errors.checked_yaml import name_of_function, parse_value, read_sourc
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.scene.control import outputs_of, read_controls
+from wrcore.scene.crossing import LaidCrossing, read_crossing, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
@@ -58,6 +60,8 @@ class Scene:
     track : Track
     pairs : tuple of WheelOnRail
         Of each wheel, left and right of wheelset after wheelset; empty where all are alike.
+    crossing : LaidCrossing, optional
+        Rails that change along the track.
     files : dict
         SHA-256 of all files that were read for it, by path.
 
@@ -78,6 +82,7 @@ class Scene:
     rail: ProfileCurve
     track: Track
     pairs: tuple[WheelOnRail, ...] = ()
+    crossing: LaidCrossing | None = None
     files: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -88,8 +93,7 @@ class Scene:
     @cached_property
     def alike(self) -> WheelOnRail:
         """``wheel`` on ``rail``."""
-        vehicle, distance = self.vehicle, self.track.rail_distance(self.rail)
-        return WheelOnRail(self.wheel, self.rail, vehicle.rolling_radius, vehicle.half_distance, distance)
+        return _alike(self.vehicle, self.wheel, self.rail, self.track)[0]
 
     @checked
     def pair(self, side: Annotated[str, OneOf(SIDES)] = "left", wheelset: Annotated[int, Within(0)] = 0) -> WheelOnRail:
@@ -173,6 +177,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     data["track"] = validate(data["track"], "track", source)
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
+    crossing = read_crossing(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
         raise InputError(source, "track.path", expected)
@@ -181,7 +186,13 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     read_controls(data, vehicle, folder, source)
     read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
     digests |= digests_of_files(vehicle.data["elements"], folder)
-    return Scene(data, source, vehicle, wheel, rail, track, pairs, digests)
+    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossing, digests)
+
+
+def _alike(vehicle, wheel, rail, track):
+    """The `WheelOnRail` of either side of every wheelset where all are alike."""
+    distance = track.rail_distance(rail)
+    return (WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, distance),) * 2
 
 
 def _of_a_change(error, source, asked):
@@ -317,10 +328,17 @@ def compile_scene(
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
-    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs  # known by their identity
+    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, scene.crossing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
+    geometries, crossing = tuple(pair.geometry for pair in scene.pairs), no_crossing()
+    if scene.crossing is not None:
+        pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
+        geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(scene.crossing, pairs))
+        geometry = geometries[0]  # of the type of all
+        if "support" not in data["track"]:
+            warn_of_rigid_rails(scene.source)
     support, elements = track_support(
         data["track"].get("support"), geometry.rail_distance, vehicle.elements, len(vehicle.bodies.wheelsets)
     )
@@ -337,7 +355,7 @@ def compile_scene(
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"],
                         friction.largest),
             friction.ratio, friction.decay,
-            tuple(pair.geometry for pair in scene.pairs), friction_factors=friction.factors,
+            geometries, friction_factors=friction.factors,
         ),
         elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
@@ -345,7 +363,7 @@ def compile_scene(
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
         friction=friction.rails, flexible_track=support,
         drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
-        controls=read_controls(data, vehicle, folder, scene.source),
+        controls=read_controls(data, vehicle, folder, scene.source), crossing=crossing,
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

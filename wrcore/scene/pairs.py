@@ -14,7 +14,15 @@ from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import SIDES
 
 LARGEST_WEAR = 0.05  # radii that differ by more than this from the vehicle's are taken for a mistake, m
-NAMED_BY = ("parameters", "profile", "points", "table", "law", "model")  # keys of a scene whose values name files
+NAMED_BY = (
+    "parameters",
+    "profile",
+    "points",
+    "slices",
+    "table",
+    "law",
+    "model",
+)  # keys of a scene whose values name files
 
 
 def find_file(path, folder, source, field):

@@ -10,13 +10,13 @@ import pytest
 
 from tests.analysis.contact.test_poses import command
 from tests.contact.patch import contact_reference as contact
-from wrcore.analysis.contact.crossing import Crossing, write_crossing
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WINDOW, WheelOnSlices
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
+from wrcore.geometry.crossing import Crossing, write_crossing
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile
 from wrcore.geometry.slice_files import read_slices

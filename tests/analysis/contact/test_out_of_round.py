@@ -18,6 +18,7 @@ from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile
 from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.standards import named_profile
 
 LOAD = 5e4
@@ -37,7 +38,7 @@ def wheel(folder, deviation_at, angles, u=None, f=None):
 
 def head():
     u = np.linspace(-0.03, 0.03, 121)
-    return ProfileCurve.from_points(u, crown(u), "rail")
+    return RailSlices.of(ProfileCurve.from_points(u, crown(u), "rail"))
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.4, 1.5, 3.0, 7.0])
@@ -64,7 +65,9 @@ def test_slices_that_are_alike_are_a_round_wheel(tmp_path):
     rail_head = named_profile("UIC60-MBench", "rail", 1 / 40)
     plain = LoadedWheels(WheelOnRail(made.round(), rail_head).geometry)
     distance = WheelOnRail(made.round(), rail_head).rail_distance
-    sliced = LoadedOnSlices(WheelOnSlices(made.round(), rail_head, rail_distance=distance, out_of_round=made))
+    sliced = LoadedOnSlices(
+        WheelOnSlices(made.round(), RailSlices.of(rail_head), rail_distance=distance, out_of_round=made)
+    )
     sliced.turned = 0.7
     heights = [one.height("right", 1e-3, LOAD) for one in (plain, sliced)]
     assert heights[1] == pytest.approx(heights[0], abs=1e-8)
@@ -132,7 +135,7 @@ def flat(name, wavelength, distance, spec):
     distance = 0.7175 + head.gauge_offset() if distance is None else distance
     table = pd.read_csv(path)
     table = table[(table.set == spec["set"]) & ~table.flag.fillna("").str.contains(REFUSED)]
-    return WheelOnSlices(made.round(), head, spec["radius"], 0.75, distance, made), table.iloc[::3]
+    return WheelOnSlices(made.round(), RailSlices.of(head), spec["radius"], 0.75, distance, made), table.iloc[::3]
 
 
 FLATS = {

@@ -49,7 +49,7 @@ class LoadedOnSlices(LoadedWheels):
 
     def _blank(self):
         """Geometry of the type that all have, of the first place of the rail with one."""
-        for s in getattr(self.pair.rail, "s", (0.0,)):
+        for s in self.pair.rail.s:
             for side in SIDES:
                 geometry, _ = self.pair.under(side, float(s), 0.0)
                 if geometry is not None:

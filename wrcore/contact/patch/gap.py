@@ -23,6 +23,8 @@ from wrcore.contact.strip import (
     cubic_at,
     curvature_at,
     gap_at,
+    lean_at,
+    leaning,
     strip_point,
     wheel_slope,
     with_rail_along,
@@ -275,21 +277,30 @@ def unroll(centre, width, tilt, place, own):
             place[i] = place[i - 1] + centre[i] - centre[i - 1] + 0.5 * (own[i] - width[i] + own[i - 1] - width[i - 1])
 
 
+@jit(allocates=False, forceinline=True)
+def lean_of(geometry, pose, frame):
+    """`lean_at` of a patch."""
+    return lean_at(geometry, frame.ur, with_rail_along(geometry, LIFT, frame.ur, 1.0, frame.z) - pose.z)
+
+
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def material_point(geometry, pose, frame, s, x, height, tilt):
-    """Point of a left wheel's undeformed surface on a strip, from the wheelset's centre, and its own plane's angle."""
+    """Point of a left wheel's undeformed surface on a strip, from the wheelset's centre, and its own plane's angle, in
+    axes that lean as the patch does."""
     cosine = 1.0 / math.sqrt(1.0 + tilt * tilt)
     across = frame.ur + geometry.rail_distance + s * frame.cosine - height * frame.sine
     z = frame.z + s * frame.sine + height * frame.cosine
     cosine, sine = cosine * (frame.cosine - frame.sine * tilt), cosine * (frame.sine + frame.cosine * tilt)
-    return frame.x + x, across - pose.y, z - pose.z, cosine, sine
+    px, pz = leaning(geometry, lean_of(geometry, pose, frame), frame.x + x, z - pose.z)
+    return px, across - pose.y, pz, cosine, sine
 
 
 @jit(allocates=False, fastmath=FUSED)
 def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, slip):
     """Rigid slip of a left wheel's over its rail's surface at the strips' middles, from the wheelset's motion.
 
-    ``velocity``: vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), rolling speed V > 0 (m/s). Strips (n,):
+    ``velocity``: vx, vy, vz (m/s) of the wheelset's centre, wx, wy, wz (rad/s), rolling speed V > 0 (m/s), in axes that
+    lean as the patch does. Strips (n,):
     s, X, height of the wheel's extreme point along n (m), slope of their own planes over s. Fills ``slip`` (4, n):
     velocity of the wheel's material point relative to the rail's over V along x, its slope over x (1/m), and both
     across in the strip's own plane. That point lies on the undeformed surface, as in CONTACT: equal bodies shorten
@@ -303,7 +314,8 @@ def rigid_slip(geometry, pose, frame, velocity, centre, middle, height, tilt, sl
 
 @jit(allocates=False, fastmath=FUSED)
 def strip_wrenches(geometry, pose, frame, centre, middle, height, tilt, load, force, share, pressure, friction):
-    """Add ``share`` of the wrenches of pressure and friction on the strips, about the wheelset's centre.
+    """Add ``share`` of the wrenches of pressure and friction on the strips, about the wheelset's centre, in axes that
+    lean as the patch does.
 
     The load (along n, N) acts along the normal of each strip's own plane, as the gap along n has it: n - tilt s. For
     friction this is `rigid_slip`, transposed: it takes from the wheelset what it does on the slip. ``force``, (3, n):

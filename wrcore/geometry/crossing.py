@@ -1,6 +1,6 @@
 """A crossing made by a formula, as a table of slices: wing rail and nose of a turnout 1:12, usable by anybody.
 
-    python -m wrcore.analysis.contact.crossing FOLDER
+    python -m wrcore.geometry.crossing FOLDER
 
 writes ``crossing.csv`` and its profiles, for a wheel that runs straight on. The wing bends away to the field side at
 s = 0, the knuckle. The nose begins where it is 12 mm wide; its running edge continues the wing's. All heads are those
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wrcore.geometry.slices import RailSlices, Slice, sheets_of
 from wrcore.geometry.standards import named_profile
 
 _EVEN = 5e-4  # distance of points, m
@@ -39,19 +40,38 @@ class Crossing:
     """Distance of the slices, about."""
     before: float = 0.3
     """Length before the knuckle."""
-    after: float = 0.5
-    """Length behind the nose's beginning."""
 
     @property
     def nose_begins(self):
         """A flangeway behind the knuckle both running edges meet, at the theoretical point; the nose is wider."""
         return (self.flangeway + self.first_width) / self.angle
 
+    @property
+    def after(self):
+        """Length behind the nose's beginning, up to where it is a whole head."""
+        head = named_profile("60E1", "rail", 0.0)
+        return (2.0 * head.gauge_offset(-head.f[0]) - self.first_width) / self.angle
+
     def arc_lengths(self):
         """Of the slices; at one of them the nose begins."""
         ends = -self.before, 0.0, self.nose_begins, self.nose_begins + self.after
         parts = [np.linspace(a, b, round((b - a) / self.step), endpoint=False) for a, b in pairwise(ends)]
         return np.concatenate([*parts, ends[-1:]])
+
+    def heads(self, s):
+        """Points u, f (m) of the heads at s (m), by their names."""
+        heads = {"wing": self.wing(s)}
+        return heads | {"nose": self.nose(s)} if s >= self.nose_begins - 1e-9 else heads
+
+    def rail(self):
+        """All of it as `RailSlices`."""
+        s = self.arc_lengths()
+        slices = [{name: Slice.through(at, *points) for name, points in self.heads(at).items()} for at in s]
+        sheets = [sheet for name in ("wing", "nose") for sheet in sheets_of(s, [one.get(name) for one in slices])]
+        name = f"crossing:1/{1.0 / self.angle:g}"
+        return RailSlices(
+            name, s, tuple(sheets), f"{s.size} slices made by a formula, from s = {s[0]:g} to {s[-1]:g} m"
+        )
 
     def wing(self, s):
         """Points u, f (m) of the wing rail at s (m)."""
@@ -76,11 +96,9 @@ def write_crossing(folder, crossing=None):
     folder.mkdir(parents=True, exist_ok=True)
     rows = ["s_m,head,profile"]
     for k, s in enumerate(crossing.arc_lengths()):
-        heads = {"wing": crossing.wing, "nose": crossing.nose}
-        for name in heads if s >= crossing.nose_begins - 1e-9 else ("wing",):
-            points = np.column_stack(heads[name](s))
+        for name, points in crossing.heads(s).items():
             file = f"{name}_{k + 1}.csv"
-            np.savetxt(folder / file, points, fmt="%.9f", delimiter=",", header="u_m,f_m", comments="")
+            np.savetxt(folder / file, np.column_stack(points), fmt="%.9f", delimiter=",", header="u_m,f_m", comments="")
             rows.append(f"{s:.6f},{name},{file}")
     path = folder / "crossing.csv"
     path.write_text("\n".join(rows) + "\n")

@@ -1,0 +1,50 @@
+"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints its table, and draws.
+
+Every vehicle begins in steady running and goes over the crossing of config/scenes/crossing.yaml."""
+
+import sys
+
+import numpy as np
+
+from tests.conftest import SCENES
+from wrcore.analysis.assessment.wheels import wheelsets_of
+from wrcore.analysis.pictures.plot_crossing import plot_crossing
+from wrcore.analysis.pictures.style import save_figure
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
+
+TRAILER = {
+    "vehicle": {"model": "trailer_vehicle", "parameters": "vehicles/trailer_vehicle.yaml", "axle_boxes": False},
+    "track.crossing.at": 14.0, "integration.duration": 1.8, "output.rate": 2000,
+}  # fmt: skip
+CASES = {
+    "suspended wheelset, facing": {},
+    "suspended wheelset, trailing": {"track.crossing.reversed": True, "track.crossing.at": 7.5},
+    "suspended wheelset, facing, exact": {"contact.patch": "exact"},
+    "trailer vehicle, facing": TRAILER,
+    "trailer vehicle, trailing": TRAILER | {"track.crossing.reversed": True, "track.crossing.at": 15.5},
+}
+
+
+def passage(changes):
+    """Run, and of its first wheelset static and largest load (kN), time without contact (ms), and of the lowest point
+    depth (mm)."""
+    run = simulate(load_scene(SCENES / "crossing.yaml", changes))
+    name = wheelsets_of(run)[0]
+    load = np.nan_to_num(run[f"{name}/right"]["N_N"]).sum(axis=1)
+    z, step = run[name]["z_m"], run.t[1] - run.t[0]
+    return run, (1e-3 * load[0], 1e-3 * load.max(), 1e3 * step * np.sum(load == 0.0), 1e3 * (z[0] - z.min()))
+
+
+def main(picture):
+    print("| passage | static N kN | greatest N kN | in the air ms | lowest mm |\n|---|---|---|---|---|")
+    for name, changes in CASES.items():
+        run, (static, largest, air, low) = passage(changes)
+        assert run.status == "completed", run.reason
+        print(f"| {name} | {static:.1f} | {largest:.0f} | {air:.1f} | {low:.2f} |")
+        if name == next(iter(CASES)):
+            save_figure(plot_crossing(run), picture)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,206 @@
+"""Runs over rails that change along the track."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from tests.dynamics.crossing_rails import write_rail
+from wrcore.contact.seen_rail import WheelOnSlices
+from wrcore.contact.seen_table import S_STEP, seen_table
+from wrcore.dynamics import crossing as crossing_kernels
+from wrcore.dynamics.system import Equations
+from wrcore.errors import InputError
+from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.standards import named_profile
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
+
+CROSSING = SCENES / "crossing.yaml"
+ROUND = {"wheel.profile": "cone:1/20", "rail": {"profile": "circle:0.3", "inclination": 0}, "initial.y": 0.0}
+RIGID = pytest.mark.filterwarnings("ignore")
+MASS, PITCH_INERTIA, GRAVITY, SPEED = 1813.0, 112.0, 9.81, 5.0
+
+
+def hump(s):
+    """Up 1:10 for a metre, with a metre of transition before and behind, and down again."""
+    s = min(max(s, 0.0), 7.0)
+    s = s if s < 3.5 else 7.0 - s
+    if s < 1.0:
+        return 0.1 * (s**3 - 0.5 * s**4)
+    return 0.1 * (s - 0.5) if s < 2.0 else 0.2 - 0.1 * ((3.0 - min(s, 3.0)) ** 3 - 0.5 * (3.0 - min(s, 3.0)) ** 4)
+
+
+@pytest.fixture(scope="module")
+def over_a_hump(tmp_path_factory):
+    """Run of a wheelset that rolls, free, over a hump of both rails."""
+    arc_lengths = np.append(np.arange(-0.1, 3.0, 0.05), np.arange(3.0, 7.1001, 0.05))
+    path = write_rail(tmp_path_factory.mktemp("hump"), arc_lengths, hump)
+    changes = {
+        "track.crossing": {"slices": str(path), "at": 1.0, "rail": "both"}, "speed": SPEED,
+        "contact.normal.damping.c_e": 1.0, "integration": {"duration": 0.7, "method": "tsit5", "rtol": 1e-6},
+        "output": {"rate": 500, "channels": ["pose", "velocity", "acceleration", "contact"]},
+    }  # fmt: skip
+    return simulate(load_scene(SCENES / "wheelset.yaml", ROUND | changes))
+
+
+def test_what_a_wheelset_gains_in_height_it_loses_in_speed(over_a_hump):
+    motion = over_a_hump["wheelset"]
+    lifted = MASS * GRAVITY * (motion["z_m"] - motion["z_m"][0])
+    moving = 0.5 * MASS * (motion["vx_m_per_s"] ** 2 + motion["vz_m_per_s"] ** 2)
+    turning = 0.5 * PITCH_INERTIA * motion["wy_rad_per_s"] ** 2
+    total = moving + turning + lifted
+    assert lifted[-1] > 3000.0
+    assert np.abs(total - total[0]).max() < 3e-4 * lifted[-1]
+
+
+def test_a_normal_force_on_a_ramp_has_no_moment_about_the_axle(over_a_hump):
+    # as a body rolls up an inclined plane: only friction turns the wheels, N is that of the plane
+    motion, patch = over_a_hump["wheelset"], over_a_hump["wheelset/right"]
+    s = motion["x_m"] - 1.0
+    on = (s > 1.2) & (s < 1.8)
+    radius = SPEED / motion["wy_rad_per_s"][0]
+    slope, inertia = math.atan(0.1), PITCH_INERTIA / (MASS * radius**2)
+    down = GRAVITY * math.sin(slope) / (1.0 + inertia)
+    along = motion["ax_m_per_s2"] * math.cos(slope) + motion["az_m_per_s2"] * math.sin(slope)
+    assert np.mean(along[on]) == pytest.approx(-down, rel=5e-3)
+    assert np.mean(patch["N_N"][on, 0]) == pytest.approx(0.5 * MASS * GRAVITY * math.cos(slope), rel=5e-3)
+    assert np.mean(patch["Fx_N"][on, 0]) == pytest.approx(0.5 * MASS * inertia * down, rel=5e-3)
+    assert np.mean(patch["x_m"][on, 0]) == pytest.approx(radius * math.sin(slope), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    plain = named_profile("60E1", "rail", 0.0)
+    slices = Crossing().rail().along(plain)
+    return WheelOnSlices(named_profile("S1002", "wheel"), slices, rail_distance=0.7175 + plain.gauge_offset())
+
+
+@pytest.fixture(scope="module")
+def table(pair):
+    return seen_table(pair, named_profile("60E1", "rail", 0.0))
+
+
+@pytest.mark.parametrize(
+    ("y", "yaw", "bound"), [(0.0, 0.0, 0.1e-6), (0.003, 0.0, 0.3e-6), (-0.003, 0.0, 0.3e-6), (0.0, 0.003, 0.2e-6)]
+)
+def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
+    # along the normal, where the wheel is within 1 mm when it touches; 95 % of places
+    rail, along = table.geometry.rail.copy(), table.geometry.along.copy()
+    u = table.geometry.rail_start + table.geometry.rail_step * np.arange(len(rail))
+    worst = []
+    for s in np.random.default_rng(1).uniform(-0.25, 1.2, 40):
+        exact, touch = pair.under("right", s, y, 0.0, yaw)
+        place = (s + pair.half_distance * math.sin(yaw) - table.begin) / S_STEP
+        crossing_kernels._interpolate(table.sections, table.strips, place, math.sin(yaw) / S_STEP, rail, along, False)
+        at = exact.rail_start + exact.rail_step * np.arange(len(exact.rail))
+        f, slope = (np.interp(u, at, exact.rail[:, column]) for column in (0, 1))
+        wheel = u + pair.rail_distance - pair.half_distance + y
+        height = touch - pair.rolling_radius + pair.wheel(wheel)
+        near = (height - f < 1e-3) & (wheel < pair.wheel.u[-1] - 2e-3)
+        worst.append(np.abs((rail[:, 0] - f) / np.sqrt(1.0 + slope**2))[near].max(initial=0.0))
+    assert np.quantile(worst, 0.95) < bound
+
+
+def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
+    path = write_rail(tmp_path, [0.0, 1.0, 2.0], lambda s: 0.0)
+    short = {"integration.duration": 0.1, "integration.method": "tsit5"}
+    runs = [
+        simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | short | more))
+        for more in ({}, {"track.crossing": {"slices": str(path), "at": 0.3}})
+    ]
+    for name in ("y_m", "z_m", "yaw_rad", "vx_m_per_s"):
+        np.testing.assert_array_equal(*(run["wheelset"][name] for run in runs))
+
+
+def test_scenes_without_one_compile_nothing_of_it():
+    model = Equations(compile_scene(load_scene(SCENES / "suspended_wheelset.yaml"))[0]).arguments[1].value
+    assert (model.sections, model.strides) == (0, 0)
+    assert model.contact.geometries == ()
+    assert model.contact.geometry.along == ()
+
+
+BRIEF = {"integration.duration": 0.5, "output.rate": 2000}
+
+
+@pytest.fixture(scope="module")
+def facing():
+    return simulate(load_scene(CROSSING, BRIEF))
+
+
+def loads(run, side):
+    """Normal force of a wheel, N."""
+    return np.nansum(run[f"wheelset/{side}"]["N_N"], axis=1)
+
+
+def test_left_and_right_are_mirror_images(facing):
+    other = simulate(load_scene(CROSSING, BRIEF, track__crossing__rail="left"))
+    np.testing.assert_allclose(other["wheelset"]["y_m"], -facing["wheelset"]["y_m"], rtol=0.0, atol=2e-6)
+    np.testing.assert_allclose(other["wheelset"]["z_m"], facing["wheelset"]["z_m"], rtol=0.0, atol=2e-6)
+
+
+def test_no_step_passes_over_the_nose(facing):
+    # the same impact with steps a fifth as long, and by an explicit method; the wheel lands on the nose, within mm
+    finer = simulate(load_scene(CROSSING, BRIEF, integration__longest_step=2e-4, integration__rtol=1e-6))
+    explicit = simulate(load_scene(CROSSING, BRIEF, integration__method="tsit5", integration__rtol=1e-6))
+    s = facing["wheelset"]["x_m"]
+    for run in (facing, explicit):
+        assert loads(run, "right").max() == pytest.approx(loads(finer, "right").max(), rel=0.02)
+        assert s[np.argmax(loads(run, "right"))] == pytest.approx(s[np.argmax(loads(finer, "right"))], abs=0.02)
+    assert loads(facing, "right").max() > 2.0 * loads(facing, "right")[0]
+    assert loads(facing, "right")[-1] == pytest.approx(loads(facing, "right")[0], rel=0.2)
+
+
+def test_a_crossing_costs_at_most_five_times_plain_track():
+    # right-hand sides: inside, with the sections laid, over outside, by processor time
+    import time
+
+    model, state = compile_scene(load_scene(CROSSING))
+    equations = Equations(model)
+    costs = []
+    for inside in (0.0, 1.0):
+        states = np.repeat(state[None, :], 2000, axis=0)
+        states[:, 0] += inside * np.linspace(6.2, 6.6, 2000) + (1.0 - inside) * np.linspace(0.0, 1.0, 2000)
+        equations.at(0.0, states[:10])
+        tries = []
+        for _ in range(5):
+            began = time.process_time()
+            equations.at(0.0, states)
+            tries.append(time.process_time() - began)
+        costs.append(min(tries))
+    assert costs[1] < 5.0 * costs[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "expected"),
+    [
+        ({"slices": "no.csv"}, "track.crossing.slices", "existing file"),
+        ({"slices": "crossing:2"}, "track.crossing.slices", "from 1/30 to 1/5"),
+        ({"at": 0.0}, "track.crossing.at", "no wheelset on it at the beginning"),
+        ({"rail": "inner"}, "track.crossing.rail", "'left', 'right' or 'both'"),
+        ({"length": 1.0}, "track.crossing.length", "unknown key"),
+    ],
+)
+def test_bad_input_names_its_key(changes, field, expected):
+    with pytest.raises(InputError, match=expected) as error:
+        load_scene(CROSSING, {f"track.crossing.{key}": value for key, value in changes.items()})
+    assert error.value.field == field
+
+
+def test_rails_that_do_not_join_are_refused(tmp_path):
+    path = write_rail(tmp_path, [0.0, 1.0, 2.0], lambda s: 2e-4 * s)
+    with pytest.raises(InputError, match="a last slice within 0.1 mm of the scene's rail"):
+        load_scene(SCENES / "wheelset.yaml", ROUND | {"track.crossing": {"slices": str(path), "at": 10.0}})
+
+
+def test_tables_of_pairs_are_refused():
+    with pytest.raises(InputError, match="expected maximum, moment or exact"):
+        load_scene(CROSSING, contact__patch="tabulated")
+
+
+def test_impact_on_rigid_rails_is_told(capsys):
+    scene = load_scene(CROSSING)
+    data = {**scene.data, "track": {key: value for key, value in scene.data["track"].items() if key != "support"}}
+    compile_scene(load_scene(data))
+    assert "impact on rigid rails is no result" in capsys.readouterr().err

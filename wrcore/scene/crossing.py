@@ -1,0 +1,137 @@
+"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from wrcore.contact.seen_rail import REACH, WheelOnSlices
+from wrcore.contact.seen_table import BLEND, seen_table
+from wrcore.dynamics.crossing import crossing_of
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.track import SIDES
+from wrcore.kernels.cache import warn
+from wrcore.scene.pairs import find_file
+
+JOINED = 1e-4
+"""How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
+
+RUNNING = -0.03, 0.01, -0.012
+"""Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class LaidCrossing:
+    """Where which rails of a scene change."""
+
+    rails: tuple
+    """`RailSlices` of the left and the right rail, in the coordinates of the plain ones; None where one is the same
+    everywhere."""
+    at: float
+    """Arc length of their s = 0, m."""
+    backwards: bool
+    """Whether their s counts against that of the track."""
+
+    @property
+    def ends(self):
+        """Arc lengths between which rails are not the plain ones, m."""
+        slices = next(rail for rail in self.rails if rail is not None)
+        low, high = slices.s[0] - REACH - BLEND, slices.s[-1] + REACH + BLEND
+        return (self.at - high, self.at - low) if self.backwards else (self.at + low, self.at + high)
+
+
+def read_crossing(data, vehicle, pairs, folder, source):
+    """`LaidCrossing` of a scene's content, checked against the schema, None where its rails are the same everywhere;
+    ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail they join."""
+    spec = data["track"].get("crossing")
+    if spec is None:
+        return None
+    if data["contact"]["patch"] == "tabulated":
+        expected = (
+            "expected maximum, moment or exact with track.crossing: tables are of rails that are the same everywhere"
+        )
+        raise InputError(source, "contact.patch", f"{expected}, got tabulated")
+    slices = _slices(spec["slices"], folder, source)
+    sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
+    depth = data["track"]["gauge_depth"]
+    rails = [
+        slices.along(pair.rail, depth) if side in sides else None for side, pair in zip(SIDES, pairs, strict=False)
+    ]
+    for rail, pair in zip(rails, pairs, strict=False):
+        if rail is not None:
+            _check_joints(rail, pair.rail, source)
+    laid = LaidCrossing(tuple(rails), float(spec["at"]), spec["reversed"])
+    if slices.alike:
+        return None
+    low, high = laid.ends
+    for name, x in zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True):
+        if low < x < high:
+            expected = (
+                f"expected no wheelset on it at the beginning, got {name} at {x:g} m, it from {low:g} to {high:g} m"
+            )
+            raise InputError(source, "track.crossing.at", expected)
+    return laid
+
+
+def _slices(spec, folder, source) -> RailSlices:
+    field = "track.crossing.slices"
+    kind, colon, value = spec.partition(":") if isinstance(spec, str) else ("", "", "")
+    if kind == "crossing" and colon:
+        angle = parse_ratio(value)
+        if not 1.0 / 30.0 <= angle <= 1.0 / 5.0:
+            raise InputError(
+                source, field, f"expected a crossing from 1/30 to 1/5, such as crossing:1/12, got {spec!r}"
+            )
+        return Crossing(angle).rail()
+    how = spec if isinstance(spec, dict) else {"slices": spec}
+    if not isinstance(how.get("slices"), str):
+        raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
+    return read_slices({**how, "slices": str(find_file(how["slices"], folder, source, field))})
+
+
+def _check_joints(slices, plain, source):
+    """An InputError where the first or the last slice is no continuation of the plain rail."""
+    low, high, depth = RUNNING
+    u = np.arange(low, high, 1e-3)
+    f, slope = plain(u), plain(u, 1)
+    for k, which in ((0, "first"), (-1, "last")):
+        off = np.abs(slices.heights(slices.s[k], u)[0, 0] - f) / np.sqrt(1.0 + slope**2)
+        off = np.where(f > depth, np.nan_to_num(off, nan=math.inf), 0.0)
+        worst = int(np.argmax(off))
+        if off[worst] > JOINED:
+            got = f"{1e3 * off[worst]:.3f} mm" if off[worst] < math.inf else "none"
+            expected = f"expected a {which} slice within {1e3 * JOINED:g} mm of the scene's rail {plain.name}"
+            raise InputError(source, "track.crossing.slices", f"{expected}, got {got} at u = {u[worst]:.3f} m")
+
+
+def seen_by_wheels(crossing, pairs):
+    """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
+    and the `wrcore.dynamics.crossing.Crossing`."""
+    known, tables, geometries, of_wheels = {}, [], [], []
+    for k, pair in enumerate(pairs):
+        slices = crossing.rails[k % 2]
+        if slices is None:
+            geometry = pair.geometry
+            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 3))))
+            of_wheels.append(-1)
+            continue
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius
+        if key not in known:
+            known[key] = len(tables)
+            wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
+            tables.append(seen_table(wheel, pair.rail, crossing.backwards))
+        of_wheels.append(known[key])
+        geometries.append(tables[known[key]].geometry)
+    found = crossing_of(tables, np.reshape(of_wheels, (-1, 2)))
+    return tuple(geometries), found._replace(begin=found.begin + crossing.at)
+
+
+@cache
+def warn_of_rigid_rails(source):
+    """Say, once, that impact on rails that do not give is no result."""
+    warn(f"{source}: impact on rigid rails is no result; track.support says how the track gives")
