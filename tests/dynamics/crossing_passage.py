@@ -1,4 +1,4 @@
-"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints its table, and draws.
+"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints its table, draws.
 
 Every vehicle begins in steady running and goes over the crossing of config/scenes/crossing.yaml."""
 

@@ -197,7 +197,7 @@ def _number(path, line, name, text, optional=False):
 def _assembled(path, heads, kind, told="", through=True):
     """`RailSlices` or `WheelSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature
     lines)); ``through`` as for `sheets_of`."""
-    stations = np.unique([row[1] for _, rows in heads for row in rows])
+    stations, known = np.unique([row[1] for _, rows in heads for row in rows]), {}
     sheets, alike = [], len(heads) == 1
     for head, rows in heads:
         s = [row[1] for row in rows]
@@ -205,7 +205,7 @@ def _assembled(path, heads, kind, told="", through=True):
             k = int(np.argmax(np.diff(s) <= 0.0)) + 1
             expected = f"expected s that increases, got {s[k]:g} after {s[k - 1]:g} m"
             raise InputError(path, f"line {rows[k][0]}", expected)
-        slices = {row[1]: _slice(path, row, kind) for row in rows}
+        slices = {row[1]: _slice(path, row, kind, known) for row in rows}
         counts = sorted({one.cuts.size for one in slices.values()})
         if len(counts) > 1:
             raise InputError(path, "cut_1_m", f"expected as many cuts in all slices of head {head!r}, got {counts}")
@@ -239,19 +239,13 @@ def _wheel(path, angles, slices, through):
     return WheelSlices(str(path), angles, tuple(sheets_of(angles, slices, through)))
 
 
-def _slice(path, row, kind):
-    """A `Slice` from its profile; in a table its ends are feature lines, too."""
-    number, s, name, how, cuts = row
-    how, wavelength = {key: how[key] for key in how if key != "wavelength"}, how.get("wavelength", 0.0)
-    u, f, *_ = read_points({"points": str(path.parent / name), **how}, kind)
-    if u.size and u[-1] < u[0]:
-        u, f = u[::-1], f[::-1]
-    step = np.hypot(np.diff(u), np.diff(f))
-    kept = np.append(True, step > _CLOSE)
-    u, f = u[kept], f[kept]
-    if u.size < 4:
-        raise InputError(path.parent / name, "", f"expected at least 4 points, got {u.size} (line {number} of {path})")
-    one = Slice.through(s, u, f, wavelength)
+def _slice(path, row, kind, known):
+    """A `Slice` from its profile, which is among those that are ``known`` from then on; in a table its ends are feature
+    lines, too."""
+    _, s, name, _, cuts = row
+    if name not in known:
+        known[name] = _profile(path, row, kind)
+    one = replace(known[name], s=s)
     if cuts is None:
         return one
     (at, given), ends = cuts, one.cuts
@@ -261,3 +255,18 @@ def _slice(path, row, kind):
     if np.any(np.diff(places[np.isfinite(places)]) <= 0.0):
         raise InputError(path, f"line {at}", f"expected feature lines within {1e3 * ends[1]:.3f} mm of {name}")
     return replace(one, cuts=places)
+
+
+def _profile(path, row, kind):
+    """The profile of a row as a `Slice` without feature lines."""
+    number, s, name, how, _ = row
+    how, wavelength = {key: how[key] for key in how if key != "wavelength"}, how.get("wavelength", 0.0)
+    u, f, *_ = read_points({"points": str(path.parent / name), **how}, kind)
+    if u.size and u[-1] < u[0]:
+        u, f = u[::-1], f[::-1]
+    step = np.hypot(np.diff(u), np.diff(f))
+    kept = np.append(True, step > _CLOSE)
+    u, f = u[kept], f[kept]
+    if u.size < 4:
+        raise InputError(path.parent / name, "", f"expected at least 4 points, got {u.size} (line {number} of {path})")
+    return Slice.through(s, u, f, wavelength)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,9 @@ def _check_joints(slices, plain, source):
 def seen_by_wheels(crossing, pairs):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
     and the `wrcore.dynamics.crossing.Crossing`."""
-    known, tables, geometries, of_wheels = {}, [], [], []
+    known: dict[Any, Any] = {}
+    tables: list[Any] = []
+    geometries, of_wheels = [], []
     for k, pair in enumerate(pairs):
         slices = crossing.rails[k % 2]
         if slices is None:
