@@ -166,8 +166,9 @@ def _read_table(path, how, kind):
             raise InputError(path, wanted, f"expected this column; found {', '.join(names)}")
     cuts = [name for name in names if re.fullmatch(r"cut_\d+_m", name)]
     for name in names:
-        if name not in (place, "profile", "head", *cuts):
-            raise InputError(path, name, f"unknown column; expected {place}, profile, head, cut_1_m, ...")
+        if name not in (place, "profile", *cuts) and not (name == "head" and kind == "rail"):
+            expected = f"unknown column; expected {place}, profile, {'head, ' * (kind == 'rail')}cut_1_m, ..."
+            raise InputError(path, name, expected)
     heads = {}
     for number, words in body:
         if len(words) != len(names):
@@ -198,7 +199,7 @@ def _assembled(path, heads, kind, told="", through=True):
     """`RailSlices` or `WheelSlices` of heads, each a name and rows (line, s, profile, how to read it, (line, feature
     lines)); ``through`` as for `sheets_of`."""
     stations, known = np.unique([row[1] for _, rows in heads for row in rows]), {}
-    sheets, alike = [], len(heads) == 1
+    sheets, alike = [], len(heads) == 1 and "wavelength" not in heads[0][1][0][3]
     for head, rows in heads:
         s = [row[1] for row in rows]
         if np.any(np.diff(s) <= 0.0):
