@@ -223,7 +223,9 @@ def _parabola(x, g, best):
         c0 = (t0 - s1 * c1 - s2 * c2) / s0
         step = -0.5 * c1 / c2
         centre, top, second = centre + WINDOW * step, g[best] + c0 - 0.25 * c1 * c1 / c2, 2.0 * c2 / WINDOW**2
-        if abs(step) < 1e-10 or not abs(centre - x[best]) < WINDOW:
+        if not abs(centre - x[best]) < WINDOW:  # an edge, or noise
+            return x[best], np.nan, np.nan
+        if abs(step) < 1e-10:
             break
     return centre, top, second
 

@@ -160,7 +160,7 @@ def test_flats_against_contact(name):
     worst = pd.DataFrame(rows, columns=["model", "height", "x", "p_max"]).groupby("model").agg(
         lambda values: np.quantile(np.abs(values), 0.95)
     )  # fmt: skip
-    assert worst.height["exact"] < 2.0
+    assert worst.height["exact"] < 2.2
     assert worst.height["grid"] < 0.3
     assert worst.x["grid"] < 0.05
     assert worst.p_max["grid"] < 0.06
