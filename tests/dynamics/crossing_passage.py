@@ -1,4 +1,4 @@
-"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints its table, and draws.
+"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints the table.
 
 Every vehicle begins in steady running and goes over the crossing of config/scenes/crossing.yaml."""
 
@@ -27,23 +27,24 @@ CASES = {
 
 
 def passage(changes):
-    """Run, and of its first wheelset static and largest load (kN), time without contact (ms), and of the lowest point
+    """Scene, run, and of its first wheelset static and largest load (kN), time without contact (ms), and of the lowest point
     depth (mm)."""
-    run = simulate(load_scene(SCENES / "crossing.yaml", changes))
+    scene = load_scene(SCENES / "crossing.yaml", changes)
+    run = simulate(scene)
     name = wheelsets_of(run)[0]
     load = np.nan_to_num(run[f"{name}/right"]["N_N"]).sum(axis=1)
     z, step = run[name]["z_m"], run.t[1] - run.t[0]
-    return run, (1e-3 * load[0], 1e-3 * load.max(), 1e3 * step * np.sum(load == 0.0), 1e3 * (z[0] - z.min()))
+    return scene, run, (1e-3 * load[0], 1e-3 * load.max(), 1e3 * step * np.sum(load == 0.0), 1e3 * (z[0] - z.min()))
 
 
 def main(picture):
     print("| passage | static N kN | greatest N kN | in the air ms | lowest mm |\n|---|---|---|---|---|")
     for name, changes in CASES.items():
-        run, (static, largest, air, low) = passage(changes)
+        scene, run, (static, largest, air, low) = passage(changes)
         assert run.status == "completed", run.reason
         print(f"| {name} | {static:.1f} | {largest:.0f} | {air:.1f} | {low:.2f} |")
         if name == next(iter(CASES)):
-            save_figure(plot_crossing(run), picture)
+            save_figure(plot_crossing(run, scene=scene), picture)
 
 
 if __name__ == "__main__":
