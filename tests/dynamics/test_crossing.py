@@ -26,6 +26,11 @@ ROUND = {"wheel.profile": "cone:1/20", "rail": {"profile": "circle:0.3", "inclin
 MASS, PITCH_INERTIA, GRAVITY, SPEED = 1813.0, 112.0, 9.81, 5.0
 
 
+def loads(run, side):
+    """Normal force of a wheel, N."""
+    return np.nansum(run[f"wheelset/{side}"]["N_N"], axis=1)
+
+
 def hump(s):
     """Up 1:10 for a metre, with a metre of transition before and behind, and down again."""
     s = min(max(s, 0.0), 7.0)
@@ -107,6 +112,37 @@ def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
     assert np.quantile(worst, 0.95) < bound
 
 
+KINK, STIFFNESS = 0.004, 8.1e7
+
+
+def dip(s):
+    """Two straights inclined by `KINK` against each other's mirror image, that level out over 2 m each."""
+    beyond = min(max(abs(s) - 1.0, 0.0), 2.0)
+    return KINK * (min(abs(s), 1.0) + beyond - 0.25 * beyond**2 - 2.0)
+
+
+def test_a_dipped_joint_is_a_blow_to_a_mass_on_a_spring(tmp_path):
+    # where the rails' direction changes by 2 KINK the wheelset's half falls onto the track's and the contact's springs,
+    # one behind the other, at 2 KINK V: the load grows by 2 KINK V sqrt(K M), with next to no damping
+    near = np.array([1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, *np.arange(0.1, 3.01, 0.1), 3.2])
+    path = write_rail(tmp_path, np.concatenate([-near[::-1], [0.0], near]), dip)
+    soft = {"stiffness": STIFFNESS, "damping": 1e3}
+    changes = {
+        "track.crossing": {"slices": str(path), "at": 5.0, "rail": "both"}, "contact.normal.damping.c_e": 1.0,
+        "track.support": {"rail": {"lateral": soft, "vertical": soft}},
+        "integration": {"duration": 0.27, "rtol": 1e-6}, "output": {"rate": 20000, "channels": ["pose", "contact"]},
+    }  # fmt: skip
+    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
+    load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 5.0
+    before = np.mean(load[(s > -0.5) & (s < -0.05)])
+    top = np.argmax(load)
+    assert 0.0 < s[top] < 0.2
+    radius = np.mean([patch[name][k, 0] for name in ("a_m", "b_m") for k in (0, top)])
+    contact = 2.0 * 82e9 / (1.0 - 0.28) * radius  # dN/d(delta) of Hertz, of a circle: 2 G a/(1 - nu)
+    springs = 1.0 / (1.0 / STIFFNESS + 1.0 / contact)
+    assert load[top] - before == pytest.approx(2.0 * KINK * 20.0 * math.sqrt(springs * 0.5 * MASS), rel=0.05)
+
+
 def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
     path = write_rail(tmp_path, [0.0, 1.0, 2.0], lambda s: 0.0)
     short = {"integration.duration": 0.1, "integration.method": "tsit5"}
@@ -131,11 +167,6 @@ BRIEF = {"integration.duration": 0.5, "output.rate": 2000}
 @pytest.fixture(scope="module")
 def facing():
     return simulate(load_scene(CROSSING, BRIEF))
-
-
-def loads(run, side):
-    """Normal force of a wheel, N."""
-    return np.nansum(run[f"wheelset/{side}"]["N_N"], axis=1)
 
 
 def test_left_and_right_are_mirror_images(facing):
