@@ -208,8 +208,8 @@ def test_its_page_is_read_and_run():
     assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 
 
-def test_right_hand_sides_on_a_crossing_cost_at_most_six_times_those_beside_it():
-    # of a wheelset alone, by processor time; measured 5
+def test_right_hand_sides_on_a_crossing_cost_at_most_five_times_those_beside_it():
+    # of a wheelset alone, by processor time
     model, state = compile_scene(load_scene(CROSSING))
     equations = Equations(model)
     costs = []
@@ -223,7 +223,7 @@ def test_right_hand_sides_on_a_crossing_cost_at_most_six_times_those_beside_it()
             equations.at(0.0, states)
             tries.append(time.process_time() - began)
         costs.append(min(tries))
-    assert costs[1] < 6.0 * costs[0]
+    assert costs[1] < 5.0 * costs[0]
 
 
 @pytest.mark.parametrize(
