@@ -130,7 +130,7 @@ def test_a_dipped_joint_is_a_blow_to_a_mass_on_a_spring(tmp_path):
     changes = {
         "track.crossing": {"slices": str(path), "at": 5.0, "rail": "both"}, "contact.normal.damping.c_e": 1.0,
         "track.support": {"rail": {"lateral": soft, "vertical": soft}},
-        "integration": {"duration": 0.27, "rtol": 1e-6}, "output": {"rate": 20000, "channels": ["pose", "contact"]},
+        "integration": {"duration": 0.27, "rtol": 1e-6}, "output": {"rate": 4000, "channels": ["pose", "contact"]},
     }  # fmt: skip
     run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
     load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 5.0
