@@ -1,7 +1,8 @@
-"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints its table, draws.
+"""The passages of reports/crossings.md: `python -m tests.dynamics.crossing_passage PICTURE` prints the table.
 
 Every vehicle begins in steady running and goes over the crossing of config/scenes/crossing.yaml."""
 
+import copy
 import sys
 
 import numpy as np
@@ -27,23 +28,42 @@ CASES = {
 
 
 def passage(changes):
-    """Run, and of its first wheelset static and largest load (kN), time without contact (ms), and of the lowest point
-    depth (mm)."""
-    run = simulate(load_scene(SCENES / "crossing.yaml", changes))
+    """Scene, run, and of its first wheelset static and largest load (kN), time without contact (ms) and depth of the
+    lowest point (mm)."""
+    scene = load_scene(SCENES / "crossing.yaml", changes)
+    run = simulate(scene)
     name = wheelsets_of(run)[0]
     load = np.nan_to_num(run[f"{name}/right"]["N_N"]).sum(axis=1)
     z, step = run[name]["z_m"], run.t[1] - run.t[0]
-    return run, (1e-3 * load[0], 1e-3 * load.max(), 1e3 * step * np.sum(load == 0.0), 1e3 * (z[0] - z.min()))
+    return scene, run, (1e-3 * load[0], 1e-3 * load.max(), 1e3 * step * np.sum(load == 0.0), 1e3 * (z[0] - z.min()))
+
+
+def cost(changes):
+    """Time of a metre of rough track on which a wheelset is on the crossing, over that of a metre without it."""
+    rough = {"spectrum": {"level": "low", "seed": 3, "length": 300, "begin": -60}}
+    scene = load_scene(SCENES / "crossing.yaml", changes | {"track.irregularity": rough})
+    plain = copy.deepcopy(scene.data)
+    del plain["track"]["crossing"]
+    plain["vehicle"]["parameters"] = str(SCENES.parent / plain["vehicle"]["parameters"])
+    low, high = scene.crossing.ends
+    inside = (high - low) * len(scene.vehicle.wheelset_names)
+    walls = [min(simulate(load_scene(one)).counters["wall_s"] for _ in range(5)) for one in (plain, scene)]
+    whole = scene.data["speed"] * scene.data["integration"]["duration"]
+    return 1.0 + (walls[1] / walls[0] - 1.0) * whole / inside
 
 
 def main(picture):
     print("| passage | static N kN | greatest N kN | in the air ms | lowest mm |\n|---|---|---|---|---|")
     for name, changes in CASES.items():
-        run, (static, largest, air, low) = passage(changes)
+        scene, run, (static, largest, air, low) = passage(changes)
         assert run.status == "completed", run.reason
         print(f"| {name} | {static:.1f} | {largest:.0f} | {air:.1f} | {low:.2f} |")
         if name == next(iter(CASES)):
-            save_figure(plot_crossing(run), picture)
+            save_figure(plot_crossing(run, scene=scene), picture)
+    print("\n| cost of a metre on it, over rough track | tsit5 | rodas4 |\n|---|---|---|")
+    for name in ("suspended wheelset, facing", "trailer vehicle, facing"):
+        costs = [cost(CASES[name] | {"integration.method": method}) for method in ("tsit5", "rodas4")]
+        print(f"| {name} | {costs[0]:.1f} | {costs[1]:.1f} |")
 
 
 if __name__ == "__main__":

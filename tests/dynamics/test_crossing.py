@@ -1,17 +1,21 @@
 """Runs over rails that change along the track."""
 
 import math
+import re
+import time
 
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ROOT, SCENES
 from tests.dynamics.crossing_rails import write_rail
+from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.contact.seen_rail import WheelOnSlices
-from wrcore.contact.seen_table import S_STEP, seen_table
-from wrcore.dynamics import crossing as crossing_kernels
+from wrcore.contact.seen_table import ROWS, S_STEP, seen_table
+from wrcore.dynamics.crossing import interpolate
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import parse_value
 from wrcore.geometry.crossing import Crossing
 from wrcore.geometry.standards import named_profile
 from wrcore.run.simulate import simulate
@@ -19,8 +23,12 @@ from wrcore.scene.description import compile_scene, load_scene
 
 CROSSING = SCENES / "crossing.yaml"
 ROUND = {"wheel.profile": "cone:1/20", "rail": {"profile": "circle:0.3", "inclination": 0}, "initial.y": 0.0}
-RIGID = pytest.mark.filterwarnings("ignore")
 MASS, PITCH_INERTIA, GRAVITY, SPEED = 1813.0, 112.0, 9.81, 5.0
+
+
+def loads(run, side):
+    """Normal force of a wheel, N."""
+    return np.nansum(run[f"wheelset/{side}"]["N_N"], axis=1)
 
 
 def hump(s):
@@ -93,7 +101,8 @@ def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
     for s in np.random.default_rng(1).uniform(-0.25, 1.2, 40):
         exact, touch = pair.under("right", s, y, 0.0, yaw)
         place = (s + pair.half_distance * math.sin(yaw) - table.begin) / S_STEP
-        crossing_kernels._interpolate(table.sections, table.strips, place, math.sin(yaw) / S_STEP, rail, along, False)
+        scratch = np.zeros((ROWS + 4, len(u)))
+        interpolate(table.sections, table.strips, place, math.sin(yaw) / S_STEP, scratch, rail, along, False)
         at = exact.rail_start + exact.rail_step * np.arange(len(exact.rail))
         f, slope = (np.interp(u, at, exact.rail[:, column]) for column in (0, 1))
         wheel = u + pair.rail_distance - pair.half_distance + y
@@ -101,6 +110,37 @@ def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
         near = (height - f < 1e-3) & (wheel < pair.wheel.u[-1] - 2e-3)
         worst.append(np.abs((rail[:, 0] - f) / np.sqrt(1.0 + slope**2))[near].max(initial=0.0))
     assert np.quantile(worst, 0.95) < bound
+
+
+KINK, STIFFNESS = 0.004, 8.1e7
+
+
+def dip(s):
+    """Two straights inclined by `KINK` against each other's mirror image, that level out over 2 m each."""
+    beyond = min(max(abs(s) - 1.0, 0.0), 2.0)
+    return KINK * (min(abs(s), 1.0) + beyond - 0.25 * beyond**2 - 2.0)
+
+
+def test_a_dipped_joint_is_a_blow_to_a_mass_on_a_spring(tmp_path):
+    # where the rails' direction changes by 2 KINK the wheelset's half falls onto the track's and the contact's springs,
+    # one behind the other, at 2 KINK V: the load grows by 2 KINK V sqrt(K M), with next to no damping
+    near = np.array([1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, *np.arange(0.1, 3.01, 0.1), 3.2])
+    path = write_rail(tmp_path, np.concatenate([-near[::-1], [0.0], near]), dip)
+    soft = {"stiffness": STIFFNESS, "damping": 1e3}
+    changes = {
+        "track.crossing": {"slices": str(path), "at": 5.0, "rail": "both"}, "contact.normal.damping.c_e": 1.0,
+        "track.support": {"rail": {"lateral": soft, "vertical": soft}},
+        "integration": {"duration": 0.27, "rtol": 1e-6}, "output": {"rate": 4000, "channels": ["pose", "contact"]},
+    }  # fmt: skip
+    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
+    load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 5.0
+    before = np.mean(load[(s > -0.5) & (s < -0.05)])
+    top = np.argmax(load)
+    assert 0.0 < s[top] < 0.2
+    radius = np.mean([patch[name][k, 0] for name in ("a_m", "b_m") for k in (0, top)])
+    contact = 2.0 * 82e9 / (1.0 - 0.28) * radius  # dN/d(delta) of Hertz, of a circle: 2 G a/(1 - nu)
+    springs = 1.0 / (1.0 / STIFFNESS + 1.0 / contact)
+    assert load[top] - before == pytest.approx(2.0 * KINK * 20.0 * math.sqrt(springs * 0.5 * MASS), rel=0.05)
 
 
 def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
@@ -129,11 +169,6 @@ def facing():
     return simulate(load_scene(CROSSING, BRIEF))
 
 
-def loads(run, side):
-    """Normal force of a wheel, N."""
-    return np.nansum(run[f"wheelset/{side}"]["N_N"], axis=1)
-
-
 def test_left_and_right_are_mirror_images(facing):
     other = simulate(load_scene(CROSSING, BRIEF, track__crossing__rail="left"))
     np.testing.assert_allclose(other["wheelset"]["y_m"], -facing["wheelset"]["y_m"], rtol=0.0, atol=2e-6)
@@ -152,10 +187,29 @@ def test_no_step_passes_over_the_nose(facing):
     assert loads(facing, "right")[-1] == pytest.approx(loads(facing, "right")[0], rel=0.2)
 
 
-def test_a_crossing_costs_at_most_five_times_plain_track():
-    # right-hand sides: inside, with the sections laid, over outside, by processor time
-    import time
+def test_its_picture_shows_the_load_going_over():
+    scene = load_scene(CROSSING, BRIEF)
+    figure = plot_crossing(simulate(scene), scene=scene)
+    load, share = figure.axes[2], figure.axes[3]
+    wing, nose = (line.get_ydata() for line in load.lines[:2])
+    assert [text.get_text() for text in load.get_legend().get_texts()] == ["outer head", "inner head"]
+    assert wing[0] == pytest.approx(54.5, abs=0.1) and wing[-1] == 0.0
+    assert nose[0] == 0.0 and nose.max() > 100.0
+    np.testing.assert_allclose(sum(line.get_ydata() for line in share.lines[:2])[:100], 1.0, rtol=1e-12)
+    with pytest.raises(InputError, match="a run with track.crossing"):
+        plot_crossing(
+            simulate(load_scene(SCENES / "wheelset.yaml", integration__duration=0.01)), scene=SCENES / "wheelset.yaml"
+        )
 
+
+def test_its_page_is_read_and_run():
+    text = (ROOT / "reports" / "crossings.md").read_text(encoding="utf-8")
+    (block,) = (parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL))
+    assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
+
+
+def test_right_hand_sides_on_a_crossing_cost_at_most_five_times_those_beside_it():
+    # of a wheelset alone, by processor time
     model, state = compile_scene(load_scene(CROSSING))
     equations = Equations(model)
     costs = []
@@ -200,7 +254,8 @@ def test_tables_of_pairs_are_refused():
 
 
 def test_impact_on_rigid_rails_is_told(capsys):
-    scene = load_scene(CROSSING)
-    data = {**scene.data, "track": {key: value for key, value in scene.data["track"].items() if key != "support"}}
+    data = load_scene(CROSSING).data
+    del data["track"]["support"]
+    data["vehicle"]["parameters"] = str(SCENES.parent / data["vehicle"]["parameters"])
     compile_scene(load_scene(data))
     assert "impact on rigid rails is no result" in capsys.readouterr().err

@@ -28,7 +28,7 @@ from wrcore.contact.seen_rail import BEND as SEEN_BEND
 from wrcore.contact.seen_rail import HEIGHT as SEEN_HEIGHT
 from wrcore.geometry.profile import ProfileCurve, averaged_second_derivative
 
-S_STEP, U_STEP = 2e-3, 2e-4
+S_STEP, U_STEP = 2e-3, 3e-4
 """Distances of the nodes along and across, m."""
 
 PER_CELL = round(SCAN_STEP / U_STEP)

@@ -96,36 +96,64 @@ def lay_sections(model, state, work):
                 known[IN_STRETCH], gaps = stretch, geometry.zone_gaps
                 for i in range(gaps.shape[0]):
                     copy_into(gaps[i], crossing.bounds[table, stretch, i])
-            _interpolate(
-                crossing.sections[table], crossing.strips[table], place, yaw / crossing.step, geometry.rail,
-                geometry.along, model.contact.reduction == MAXIMUM,
+            interpolate(
+                crossing.sections[table], crossing.strips[table], place, yaw / crossing.step, work.section,
+                geometry.rail, geometry.along, model.contact.reduction == MAXIMUM,
             )  # fmt: skip
             _lay_cells(geometry.rail, geometry.scan_rail)
 
 
-@jit(allocates=False, fastmath=FUSED)
-def _interpolate(sections, strips, place, yaw, rail, along, curved):
+@jit(allocates=False)
+def interpolate(sections, strips, place, yaw, scratch, rail, along, curved):
     """Write the section at a place, for a wheel that yaws by so many steps per metre, into the nodes of a rail; with
-    second derivatives if it is ``curved``."""
-    last = sections.shape[0] - 1.0
-    for j in range(rail.shape[0]):
-        here = min(max(place + yaw * strips[1, j], 0.0), last)
-        i = min(int(here), sections.shape[0] - 2)
-        t = here - i
-        b, e = t * t * (3.0 - 2.0 * t), t * (1.0 - t)
-        a, d, e = 1.0 - b, e * (1.0 - t), -e * t
-        low, high = sections[i, 0], sections[i + 1, 0]
-        low_rate, high_rate = sections[i, 1], sections[i + 1, 1]
-        rail[j, 0] = a * low[HEIGHT, j] + b * high[HEIGHT, j] + d * low_rate[HEIGHT, j] + e * high_rate[HEIGHT, j]
-        rail[j, 1] = a * low[SLOPE, j] + b * high[SLOPE, j] + d * low_rate[SLOPE, j] + e * high_rate[SLOPE, j]
-        if curved:
-            rail[j, 2] = a * low[SECOND, j] + b * high[SECOND, j] + d * low_rate[SECOND, j] + e * high_rate[SECOND, j]
-        x = a * low[AHEAD, j] + b * high[AHEAD, j] + d * low_rate[AHEAD, j] + e * high_rate[AHEAD, j]
-        along[j, 0] = x
-        along[j, 1] = a * low[BEND, j] + b * high[BEND, j] + d * low_rate[BEND, j] + e * high_rate[BEND, j]
-        curvature = strips[0, j]  # R - sqrt(R^2 - x^2)
+    second derivatives if it is ``curved``. ``scratch`` is (ROWS + 4, m)."""
+    last, begin, size = sections.shape[0] - 2, 0, rail.shape[0]
+    while begin < size:  # runs of nodes between the same two sections
+        i, end = _step_of(place + yaw * strips[1, begin], last), begin + 1
+        while end < size and _step_of(place + yaw * strips[1, end], last) == i:
+            end += 1
+        _fill_weights(strips[1], place - i, yaw, begin, end, scratch[ROWS:])
+        for row in range(ROWS):
+            if row != SECOND or curved:
+                _mix(sections[i, 0, row], sections[i + 1, 0, row], sections[i, 1, row], sections[i + 1, 1, row],
+                     scratch[ROWS:], begin, end, scratch[row])  # fmt: skip
+        begin = end
+    _lay_nodes(strips[0], scratch, rail, along, curved)
+
+
+@jit(allocates=False, forceinline=True)
+def _step_of(place, last):
+    return min(max(int(place), 0), last)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _fill_weights(leads, place, yaw, begin, end, weights):
+    """Write the four weights of cubic Hermite polynomials at nodes."""
+    for j in range(np.uint64(begin), np.uint64(end)):
+        t = place + yaw * leads[j]
+        s = 1.0 - t
+        weights[0, j], weights[1, j] = s * s * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * s)
+        weights[2, j], weights[3, j] = t * s * s, -s * t * t
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _mix(low, high, low_rate, high_rate, weights, begin, end, out):
+    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
+    for j in range(np.uint64(begin), np.uint64(end)):
+        out[j] = a[j] * low[j] + b[j] * high[j] + c[j] * low_rate[j] + d[j] * high_rate[j]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _lay_nodes(curvatures, section, rail, along, curved):
+    """Write a section into the nodes of a rail."""
+    for j in range(np.uint64(rail.shape[0])):
+        rail[j, 0], rail[j, 1] = section[HEIGHT, j], section[SLOPE, j]
+        x, curvature = section[AHEAD, j], curvatures[j]
         square = (curvature * x) * (curvature * x)
-        along[j, 2] = 0.5 * curvature * x * x * (1.0 + square * (0.25 + square * (0.125 + square * 0.078125)))
+        lift = 0.5 * curvature * x * x * (1.0 + square * (0.25 + square * (0.125 + square * 0.078125)))
+        along[j, 0], along[j, 1], along[j, 2] = x, section[BEND, j], lift  # R - sqrt(R^2 - x^2)
+        if curved:
+            rail[j, 2] = section[SECOND, j]
 
 
 @jit(allocates=False, fastmath=FUSED)

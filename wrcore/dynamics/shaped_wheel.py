@@ -21,7 +21,7 @@ from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.build import PSI_MAX
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import motion_of
-from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, detect_patches, patch_wrench
+from wrcore.dynamics.wheel import OUT_OF_RANGE, contact_of, detect_patches, leaning_wrench
 from wrcore.kernels.jit import FUSED, jit
 
 STEPS = 16
@@ -80,7 +80,7 @@ def shaped_wrenches(model, motions, patches, counts, bounds, wrenches, counters,
                 slope = gap_at(contact.geometry, pose, row[U_WHEEL])[1]
                 half = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
                 row[PSI] = m.side * shape_number(overlap_skewness(contact.geometry, pose, row[U_WHEEL], half / STEPS))
-                gx, gy, gz, nx, ny, nz, missed = patch_wrench(contact, m, m.bend_y, m.bend_z, row, row[PSI])
+                gx, gy, gz, nx, ny, nz, missed = leaning_wrench(contact, m, m.bend_y, m.bend_z, row, row[PSI])
                 wrench[0], wrench[1], wrench[2] = wrench[0] + gx, wrench[1] + gy, wrench[2] + gz
                 wrench[3], wrench[4], wrench[5] = wrench[3] + nx, wrench[4] + ny, wrench[5] + nz
                 counters[OUT_OF_RANGE] += missed

@@ -14,6 +14,7 @@ import numpy as np
 
 from wrcore.contact.patch.model import StripWork, strip_work
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
+from wrcore.contact.seen_table import ROWS
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, constraint_workspace
@@ -111,6 +112,7 @@ class Workspace(NamedTuple):
     control: ControlWork
     principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
     seen: np.ndarray  # (k, 2, 3): which sections of rails that change the wheels' arrays hold
+    section: np.ndarray  # (ROWS + 4, m): scratch of :mod:`wrcore.dynamics.crossing`
 
 
 def state_size(model):
@@ -134,6 +136,7 @@ def workspace(model):
         np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
         np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 3), np.nan),
+        np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),
     )  # fmt: skip
 
 

@@ -129,8 +129,7 @@ def leaning_motion(geometry, m, lean):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def patch_wrench(model, m, bend_y, bend_z, row, psi):
-    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left. Where the rail
-    changes along the track, ``model`` is the contact model of this very wheel, and the patch leans as the rail does.
+    """Wrench of one patch about the wheelset's centre, and whether the creep law's range was left.
 
     The rail bends by the curvatures ``bend_y`` and ``bend_z``, if the patch does not know yet; ``psi`` is its shape
     number, 0 for an ellipse; see `wrcore.dynamics.shaped_wheel`. Creep laws and tables are
@@ -139,8 +138,6 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     """
     px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
     cosine, sine = row[reduction.COSINE], row[reduction.SINE]
-    lean = lean_at(model.geometry, row[reduction.U_RAIL], pz)
-    m, (px, pz) = leaning_motion(model.geometry, m, lean), leaning(model.geometry, lean, px, pz)
     speed = max(abs(m.vx), model.least_speed)
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
     row[reduction.CURVATURE_X] += 0.5 * (bend_y * sine - bend_z * cosine)  # rail bending away from the wheel
@@ -163,8 +160,24 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     row[reduction.FX], row[reduction.FY], row[reduction.MZ] = f1, f2, m3
     row[reduction.XI], row[reduction.ETA], row[reduction.PHI] = xi, eta, phi
     mx, my, mz = py * gz - pz * gy, pz * f1 - px * gz - m3 * sine, px * gy - py * f1 + m3 * cosine
-    (f1, gz), (mx, mz) = upright(model.geometry, lean, f1, gz), upright(model.geometry, lean, mx, mz)
     return f1, gy, gz, mx, my, mz, missed
+
+
+@jit(allocates=False, forceinline=True)
+def leaning_wrench(contact, m, bend_y, bend_z, row, psi):
+    """As `patch_wrench`, of a wheel's own contact model, with a patch that leans as the rail does under it."""
+    if not changes_along(contact.geometry):
+        return patch_wrench(contact, m, bend_y, bend_z, row, psi)
+    x, z = row[reduction.X], row[reduction.Z]
+    lean = lean_at(contact.geometry, row[reduction.U_RAIL], z - m.z)
+    px, pz = leaning(contact.geometry, lean, x, z - m.z)
+    row[reduction.X], row[reduction.Z] = px, pz + m.z
+    moving = leaning_motion(contact.geometry, m, lean)
+    fx, fy, fz, mx, my, mz, missed = patch_wrench(contact, moving, bend_y, bend_z, row, psi)
+    row[reduction.X], row[reduction.Z] = x, z
+    fx, fz = upright(contact.geometry, lean, fx, fz)
+    mx, mz = upright(contact.geometry, lean, mx, mz)
+    return fx, fy, fz, mx, my, mz, missed
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -193,7 +206,7 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 bend_y, bend_z = row[MOTION.bend_y], row[MOTION.bend_z]
             fx = fy = fz = mx = my = mz = 0.0
             for k in range(counts[i, wheel]):
-                gx, gy, gz, nx, ny, nz, missed = patch_wrench(
+                gx, gy, gz, nx, ny, nz, missed = leaning_wrench(
                     contact_of(model, i, wheel), motion_of(row), bend_y, bend_z, patches[i, wheel, k], 0.0
                 )
                 fx, fy, fz = fx + gx, fy + gy, fz + gz

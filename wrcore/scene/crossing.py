@@ -3,12 +3,11 @@
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from wrcore.contact.seen_rail import REACH, WheelOnSlices
-from wrcore.contact.seen_table import BLEND, seen_table
+from wrcore.contact.seen_table import BLEND, SeenTable, seen_table
 from wrcore.dynamics.crossing import crossing_of
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
@@ -113,8 +112,8 @@ def _check_joints(slices, plain, source):
 def seen_by_wheels(crossing, pairs):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
     and the `wrcore.dynamics.crossing.Crossing`."""
-    known: dict[Any, Any] = {}
-    tables: list[Any] = []
+    known: dict[tuple, int] = {}
+    tables: list[SeenTable] = []
     geometries, of_wheels = [], []
     for k, pair in enumerate(pairs):
         slices = crossing.rails[k % 2]

@@ -50,8 +50,8 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     Examples
     --------
     >>> import wrcore as wr
-    >>> run = wr.simulate(wr.example("crossing"), integration__duration=0.4, output__rate=2000)
-    >>> [axes.get_ylabel() for axes in wr.plot_crossing(run).axes]
+    >>> scene = wr.load_scene(wr.example("crossing"), integration__duration=0.4, output__rate=2000)
+    >>> [axes.get_ylabel() for axes in wr.plot_crossing(wr.simulate(scene), scene=scene).axes]
     ['height / mm', 'radius / mm', 'load / kN', 'share', 'y / mm']
     """
     scene = as_scene(scene) if scene is not None else load_scene(run.scene)
@@ -69,10 +69,11 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     for head, color in zip(range(passage.most), COLORS[1:], strict=False):
         on = passage.head == head
         load = np.where(on, passage.load, 0.0).sum(axis=1)
-        name = "outer head" if head == 0 else f"head {head + 1} from outside"
+        name = ("outer head", "inner head")[head] if passage.most < 3 else f"head {head + 1} from outside"
+        whole = passage.load.sum(axis=1)
         axes[1].plot(*passage.over_s(on, MM * passage.radius), ".", markersize=2, color=color)
         axes[2].plot(passage.s, 1e-3 * load, color=color, label=name)
-        axes[3].plot(passage.s, load / np.maximum(passage.load.sum(axis=1), LEAST), color=color)
+        axes[3].plot(passage.s, load / np.where(whole > LEAST, whole, np.nan), color=color)
         axes[4].plot(passage.where[on], MM * passage.y[on], ".", markersize=2, color=color)
     for s, inner, outer in passage.plan(scene.crossing):
         axes[4].fill_between(s, inner, outer, color=RAIL, alpha=0.5, linewidth=0.0)
