@@ -132,6 +132,22 @@ def test_load_goes_over_from_the_wing_to_the_nose(tmp_path):
     assert 0.0 < np.mean(shares) < 1.0
 
 
+def test_exact_load_goes_over_without_a_jump():
+    # under 54.5 kN it goes over within some 9 mm: 1.1 to 1.2 % per 0.1 mm, evenly
+    made, plain = Crossing(), named_profile("60E1", "rail", 0.0)
+    slices, distance = made.rail().along(plain), 0.7175 + plain.gauge_offset()
+    wheels = LoadedOnSlices(WheelOnSlices(named_profile("S1002", "wheel"), slices, rail_distance=distance))
+    load, shares = 54546.0, []
+    for wheels.s in 0.7305 + 1e-4 * np.arange(11):
+        found = wheels.at_height("right", 0.0, wheels.height("right", 0.0, load))
+        edge = 0.7175 + made.angle * wheels.s - 0.5 * made.flangeway
+        shares.append(sum(one.vertical for one in found if -one.row[columns.Y] < edge) / load)
+    steps = np.diff(shares)
+    assert 0.1 < shares[0] < shares[-1] < 0.9
+    assert steps.max() < 0.013
+    assert np.ptp(steps) < 0.002
+
+
 def test_heads_begin_and_end_at_slices(tmp_path):
     slices = read_slices(write_crossing(tmp_path))
     begin = Crossing().nose_begins
