@@ -10,7 +10,7 @@ import pytest
 
 from tests.analysis.contact.test_poses import command
 from tests.contact.patch import contact_reference as contact
-from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WINDOW, WheelOnSlices
@@ -197,33 +197,32 @@ def cases(name):
     return [case for _, case in grouped if not case.flag.fillna("").str.contains(REFUSED).any()]
 
 
-SHARP = pytest.mark.xfail(reason="slender patches on sharp edges: p_max within 3.8 and 5.1 % at 95 %, places 0.057 mm")
-
-
-@pytest.mark.parametrize("name", [
-    "cross_nose", "wing_rail", pytest.param("cross+wing_extd", marks=SHARP),
-    pytest.param("uk_interrupt_v2", marks=SHARP),
-])  # fmt: skip
+@pytest.mark.parametrize("name", ["cross_nose", "wing_rail", "cross+wing_extd", "uk_interrupt_v2"])
 def test_crossings_against_contact(name):
     chosen = cases(name)[::7]
     wheel = read_profile(contact.reference_path("crossing_cases").parent / contact.FILES["S1002"], "wheel")
-    wheels = LoadedOnSlices(WheelOnSlices(wheel, read_slices(PROFILES / f"{name}.slcs")), resolution="fine")
-    rolling, height, number, rows = Rolling(2.0, 4.3481181), [], [], []
+    pair = WheelOnSlices(wheel, read_slices(PROFILES / f"{name}.slcs"))
+    models = {"exact": LoadedOnSlices(pair, resolution="fine"), "grid": LoadedOnSlices(pair, "grid")}
+    rows, number = [], []
     for case in chosen:
         pose = case.iloc[0]
-        wheels.s, y = 1e-3 * pose.s_ws_mm, -1e-3 * pose.y_ws_mm
-        z = wheels.height("right", y, pose.Fz_wheel_N, rolling=rolling)
-        ours = sorted(wheels.at_height("right", y, z, rolling=rolling), key=lambda one: one.row[columns.Y])
-        height.append(1e6 * (RADIUS - z) - 1e3 * pose.z_ws_mm)
-        number.append(len(ours) - len(case))
-        if len(ours) == len(case) == 1:
-            x, y, load, largest = ours[0].row[[columns.X, columns.Y, columns.NORMAL, columns.P_MAX]]
-            rows.append([1e3 * x - pose.x_tr_pc_mm, -1e3 * y - pose.y_tr_pc_mm,
-                         load / pose.Fn_N - 1.0, 1e-6 * largest / pose.pmax_MPa - 1.0])  # fmt: skip
-    x, y, load, largest = np.quantile(np.abs(rows), 0.95, axis=0)
-    assert x < 0.05
-    assert y < 0.02
-    assert load < 0.02
-    assert largest < 0.03
-    assert np.quantile(np.abs(height), 0.95) < 3.0
-    assert np.mean(np.array(number) == 0) >= 0.95
+        for model, wheels in models.items():
+            wheels.s, y = 1e-3 * pose.s_ws_mm, -1e-3 * pose.y_ws_mm
+            z = wheels.height("right", y, pose.Fz_wheel_N)
+            ours = sorted(wheels.at_height("right", y, z), key=lambda one: one.row[columns.Y])
+            number.append(len(ours) == len(case))
+            if len(ours) == len(case) == 1:
+                x, y, load, largest = ours[0].row[[columns.X, columns.Y, columns.NORMAL, columns.P_MAX]]
+                rows.append([model, 1e6 * (RADIUS - z) - 1e3 * pose.z_ws_mm, 1e3 * x - pose.x_tr_pc_mm,
+                             -1e3 * y - pose.y_tr_pc_mm, load / pose.Fn_N - 1.0,
+                             1e-6 * largest / pose.pmax_MPa - 1.0])  # fmt: skip
+    found = pd.DataFrame(rows, columns=["model", "height", "x", "y", "load", "p_max"]).groupby("model").agg(
+        lambda values: np.quantile(np.abs(values), 0.95)
+    )  # fmt: skip
+    assert found.height.max() < 3.0
+    assert found.x["exact"] < 0.05
+    assert found.y.max() < 0.02
+    assert found.load.max() < 0.02
+    assert found.p_max["grid"] < 0.03
+    assert found.p_max["exact"] < 0.04
+    assert np.mean(number) >= 0.95
