@@ -187,9 +187,9 @@ def test_faults_name_file_and_line(tmp_path, change, where, what):
     assert what in str(error.value)
 
 
-def cases(name):
-    """Cases of CONTACT without the flags that its README distrusts, a table per case."""
-    path = contact.reference_path("crossing_cases")
+def cases(name, path):
+    """Cases of CONTACT, of the file at the path (None: absent), without the flags that its README distrusts, a table
+    per case."""
     if path is None or not (PROFILES / f"{name}.slcs").is_file():
         pytest.skip("needs crossing_cases.csv (WRCORE_REFERENCE) and CONTACT's repository (WRCORE_CONTACT)")
     table = pd.read_csv(path)
@@ -199,8 +199,9 @@ def cases(name):
 
 @pytest.mark.parametrize("name", ["cross_nose", "wing_rail", "cross+wing_extd", "uk_interrupt_v2"])
 def test_crossings_against_contact(name):
-    chosen = cases(name)[::7]
-    wheel = read_profile(contact.reference_path("crossing_cases").parent / contact.FILES["S1002"], "wheel")
+    path = contact.reference_path("crossing_cases")
+    chosen = cases(name, path)[::7]
+    wheel = read_profile(path.parent / contact.FILES["S1002"], "wheel")
     pair = WheelOnSlices(wheel, read_slices(PROFILES / f"{name}.slcs"))
     models = {"exact": LoadedOnSlices(pair, resolution="fine"), "grid": LoadedOnSlices(pair, "grid")}
     rows, number = [], []

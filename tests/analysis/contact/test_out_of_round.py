@@ -124,9 +124,10 @@ def test_faults_name_file_and_line(tmp_path, change, where, what):
     assert what in str(error.value)
 
 
-def flat(name, wavelength, distance, spec):
-    """Wheels with a flat, and CONTACT's cases, without the flags that its README distrusts, of those."""
-    path, files = contact.reference_path("wheel_flat_cases"), PROFILES.parents[1]
+def flat(name, path, wavelength, distance, spec):
+    """Wheels with a flat, and CONTACT's cases, of the file at the path (None: absent), without the flags that its
+    README distrusts, of those."""
+    files = PROFILES.parents[1]
     found = {p.name: p for p in (*files.rglob("*.slcw"), *files.rglob("*.prr"))} if path is not None else {}
     if f"{name}.slcw" not in found:
         pytest.skip("needs wheel_flat_cases.csv (WRCORE_REFERENCE) and CONTACT's repository (WRCORE_CONTACT)")
@@ -147,7 +148,7 @@ FLATS = {
 
 @pytest.mark.parametrize("name", FLATS)
 def test_flats_against_contact(name):
-    pair, cases = flat(name, *FLATS[name])
+    pair, cases = flat(name, contact.reference_path("wheel_flat_cases"), *FLATS[name])
     wheels, rows = {model: LoadedOnSlices(pair, model, "fine") for model in ("exact", "grid")}, []
     for case in cases.itertuples():
         for model, one in wheels.items():
