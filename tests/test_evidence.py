@@ -7,6 +7,7 @@ from study.report.evidence import PAGE, ROOT, page, read, source_of
 ROWS = [row for section in read()["sections"] for row in section["rows"]]
 ABSENT = (
     "shared_file", "uic519", "worn_on_uic60", "loaded_partial_slip", "one_pose_many_creepages", "contacts_files",
+    "crossing_cases", "wheel_flat_cases",
 )  # fmt: skip
 """What a test names that needs files which are not distributed."""
 
