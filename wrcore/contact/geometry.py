@@ -86,11 +86,8 @@ class ContactGeometry(NamedTuple):
     along: np.ndarray | tuple = ()
     """(m, 3) where the rail changes along the track, at the rail's nodes: see `wrcore.contact.seen_rail`."""
     over: np.ndarray | tuple = ()
-    """(n, m): how much higher than at its nodes the rail is at stations along the track, as it is, not as a parabola,
-    m: for grids."""
-    over_start: float = 0.0
-    over_step: float = 1e-3
-    """Of the stations, from the wheelset's cross-section, m."""
+    """(n, 1 + m): stations along the track, evenly apart, from the wheelset's cross-section, m; how much higher than at
+    its nodes the rail is there, as it is, not as a parabola, m: for grids."""
 
 
 def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):

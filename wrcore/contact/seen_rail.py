@@ -99,7 +99,7 @@ class WheelOnSlices:
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
         over = np.where(np.isfinite(rail), rail - f, -BELOW)
         along = np.ascontiguousarray(seen[AHEAD:].T)
-        return geometry._replace(along=along, over=over, over_start=x[0], over_step=STEP), touch
+        return geometry._replace(along=along, over=np.column_stack([x, over])), touch
 
     def straight(self, s, u):
         """Sections (n, 4, m) over rail coordinates (m,), evenly apart, that the wheel of a wheelset in the middle sees

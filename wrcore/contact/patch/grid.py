@@ -15,7 +15,7 @@ from wrcore.contact.patch.edges import with_sharp_edges
 from wrcore.contact.patch.gap import JOINED
 from wrcore.contact.patch.grid_pressure import solve_pressure
 from wrcore.contact.patch.grid_traction import solve_traction
-from wrcore.contact.patch.surfaces import NO_RAIL, rail_height, rail_over, surface_gap, wheel_height
+from wrcore.contact.patch.surfaces import NO_RAIL, rail_height, rail_over, station_of, surface_gap, wheel_height
 from wrcore.kernels.jit import jit
 
 REACH = 0.04
@@ -80,15 +80,16 @@ class GridTraction(NamedTuple):
 def _overlap_over(geometry, pose, plane, s, u, rail):
     """As `_strip_overlap`, on a rail that changes along the track, looked at from station to station."""
     least, first, last, guess = NO_RAIL, 0.0, -1.0, rail
+    step = station_of(geometry, 1) - station_of(geometry, 0)
     for i in range(len(geometry.over)):
-        x = geometry.over_start + i * geometry.over_step - plane.x
+        x = station_of(geometry, i) - plane.x
         wheel = wheel_height(geometry, pose, plane, x, s, guess)
         if wheel == wheel:
             guess = wheel
             gap = wheel - rail - plane.cosine * rail_over(geometry, plane.x + x, u)
             least = min(least, gap)
             if gap < 0.0:
-                first, last = (first if last >= first else x - geometry.over_step), x + geometry.over_step
+                first, last = (first if last >= first else x - step), x + step
     return u, 0.5 * (first + last), least, 0.5 * max(last - first, 0.0)
 
 

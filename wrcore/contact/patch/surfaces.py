@@ -105,18 +105,18 @@ def wheel_height(geometry, pose, plane, x, s, n):
     return np.nan
 
 
-def _over(over, start, step, rail_start, rail_step, x, u):
-    return _height_over(over, start, step, rail_start, rail_step, x, u) if len(over) else 0.0
+def _over(over, rail_start, rail_step, x, u):
+    return _height_over(over, rail_start, rail_step, x, u) if len(over) else 0.0
 
 
-def _height_over(over, start, step, rail_start, rail_step, x, u):
+def _height_over(over, rail_start, rail_step, x, u):
     """Cubic through four stations, linear across."""
-    at, across = (x - start) / step, (u - rail_start) / rail_step
-    i, j = min(max(int(at), 1), over.shape[0] - 3), min(max(int(across), 0), over.shape[1] - 2)
+    at, across = (x - over[0, 0]) / (over[1, 0] - over[0, 0]), (u - rail_start) / rail_step
+    i, j = min(max(int(at), 1), over.shape[0] - 3), min(max(int(across), 0), over.shape[1] - 3)
     f, g = min(max(at - i, -1.0), 2.0), min(max(across - j, 0.0), 1.0)
     a, b, c, d = over[i - 1], over[i], over[i + 1], over[i + 2]
     found = 0.0
-    for k, w in ((j, 1.0 - g), (j + 1, g)):
+    for k, w in ((j + 1, 1.0 - g), (j + 2, g)):
         rise, back = c[k] - b[k], 0.5 * (c[k] - a[k])
         ahead = 0.5 * (d[k] - b[k])
         found += w * (b[k] + f * (back + f * (3.0 * rise - 2.0 * back - ahead + f * (back + ahead - 2.0 * rise))))
@@ -124,19 +124,34 @@ def _height_over(over, start, step, rail_start, rail_step, x, u):
 
 
 @overload(_over, inline="always", jit_options=AS_KERNELS)
-def _over_by_type(over, start, step, rail_start, rail_step, x, u):
+def _over_by_type(over, rail_start, rail_step, x, u):
     """Nothing at all for rails that are the same everywhere."""
     if isinstance(over, types.BaseTuple):
-        return lambda over, start, step, rail_start, rail_step, x, u: 0.0
+        return lambda over, rail_start, rail_step, x, u: 0.0
     return _height_over
 
 
 @jit(allocates=False, forceinline=True)
 def rail_over(geometry, x, u):
     """How much higher than its section the rail is at x from the wheelset's cross-section, m."""
-    return _over(
-        geometry.over, geometry.over_start, geometry.over_step, geometry.rail_start, geometry.rail_step, x, u
-    )  # fmt: skip
+    return _over(geometry.over, geometry.rail_start, geometry.rail_step, x, u)
+
+
+def _station(over, i):
+    return over[i, 0] if len(over) else 0.0
+
+
+@overload(_station, inline="always", jit_options=AS_KERNELS)
+def _station_by_type(over, i):
+    if isinstance(over, types.BaseTuple):
+        return lambda over, i: 0.0
+    return lambda over, i: over[i, 0]
+
+
+@jit(allocates=False, forceinline=True)
+def station_of(geometry, i):
+    """The i-th station of a rail that changes along the track, m."""
+    return _station(geometry.over, i)
 
 
 @jit(allocates=False)
