@@ -103,11 +103,14 @@ def _pair(options, poses):
         rail = None
     if rail is None and out_of_round is None:
         return pair_of(options).left.geometry
-    missing = poses.index[poses["pitch_rad" if rail is None else "s_m"].isna()]
-    if missing.size:
-        name, what = ("pitch_rad", "angle of the wheel") if rail is None else ("s_m", "arc length of the wheelset")
-        expected = f"expected the {what}, as the {'wheel' if rail is None else 'rail'} is one of slices"
-        raise InputError(options.poses, f"{name}, row {missing[0] + 1}", expected)
+    for slices, name, what in (
+        (rail, "s_m", "arc length of the wheelset"),
+        (out_of_round, "pitch_rad", "wheel's angle"),
+    ):
+        missing = poses.index[poses[name].isna()]
+        if slices is not None and missing.size:
+            expected = f"expected the {what}, as the {'rail' if slices is rail else 'wheel'} is one of slices"
+            raise InputError(options.poses, f"{name}, row {missing[0] + 1}", expected)
     wheel = profile_of(options, options.wheel, "wheel") if out_of_round is None else out_of_round.round()
     if rail is None:
         curve = profile_of(options, options.rail, "rail")

@@ -11,6 +11,7 @@ from tests.analysis.contact.test_poses import command
 from tests.contact.patch import contact_reference as contact
 from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
+from wrcore.cli import main
 from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.wheel_on_rail import WheelOnRail
@@ -99,6 +100,18 @@ def test_command_takes_wheels_out_of_round(tmp_path):
                     pair=pair)  # fmt: skip
     heights = found.groupby("pose_id").z_wheelset_m.first()
     assert 1e-4 < heights["b"] - heights["a"] < 5e-4
+
+
+def test_a_wheel_without_its_angle_is_refused(tmp_path, capsys):
+    wheel(tmp_path, lambda a: 0.0, [0.0, 1.0])
+    u = np.linspace(-0.03, 0.03, 61)
+    rail(tmp_path, lambda s: (u, crown(u) + 1e-3 * s), [0.0, 1.0])
+    poses = pd.DataFrame({"pose_id": ["a"], "y_m": [0.0], "yaw_rad": [0.0], "s_m": [0.5]})
+    poses.to_csv(tmp_path / "poses.csv", index=False)
+    files = ["--poses", str(tmp_path / "poses.csv"), "--out", str(tmp_path / "out.csv")]
+    pair = ["--wheel", str(tmp_path / "wheel.csv"), "--rail", str(tmp_path / "rail.csv")]
+    assert main(["contact", *files, *pair, "--rail-distance", "0.75", "--wheel-load", "5e4"]) == 2
+    assert "pitch_rad, row 1: expected the wheel's angle" in capsys.readouterr().err
 
 
 SLCW = " 0.0 {scale} OFFSET, SCALE\n 2 NSLC\n 0 0 0 NFEAT\n {method} INTPOL\n 0.0 'a.txt'\n {second} 'a.txt'\n"
