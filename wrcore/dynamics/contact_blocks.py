@@ -4,18 +4,21 @@ Of all parts of the Jacobian those of the contacts change fastest. Between two J
 date without an evaluation of the whole vehicle: for each wheelset the wrench's derivatives C by its pose and velocity
 are found in the rails' own frames, and to the accelerations of the wheelset and of bodies joined to it they add A C,
 where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along
-the rail and a turn about the axle change nothing, and differences of velocities need no search for patches.
+the rail and a turn about the axle change nothing. Where patches are ellipses, differences of the pose are of the
+search alone, and `patch_slopes` does the rest; else they are of the wrenches, and those of velocities need no search.
 """
 
 import math
 
+from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
+from wrcore.dynamics.contact_slopes import MOVES, SAME, SLOPES, differentiable, patch_slopes
 from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
-from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
+from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import press_wheels
+from wrcore.dynamics.wheel import contact_of, press_wheels
 from wrcore.kernels.handles import call_address
 from wrcore.kernels.jit import FUSED, jit
 
@@ -23,8 +26,11 @@ DISPLACEMENT, TURN, SPEED, SPIN = 1e-8, 1e-8, 1e-7, 1e-7
 """Differences: m, rad, m/s and rad/s."""
 
 DIRECTIONS = 12
-ALONG, ROLL, PITCH, YAW = 0, 3, 4, 5
+ALONG, ACROSS, UP, ROLL, PITCH, YAW = range(6)
 """Columns of a body: displacement, rotation, velocity, angular velocity; and some of them."""
+
+MOVING = ACROSS, UP, ROLL, YAW
+"""Those that move patches."""
 
 UNIT = 1e3
 """Wrench whose accelerations are looked at, N and N m."""
@@ -91,16 +97,26 @@ def _moved(base, direction, difference, row):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_column(rail, direction, base, wrench, scale, columns):
-    """Add a derivative, ``scale`` times a difference of wrenches in a rail's frame (axes: columns of ``rail``)."""
+def _add_column(rail, direction, slope, scale, columns):
+    """Add ``scale`` times a derivative of a wrench in a rail's frame (axes: columns of ``rail``)."""
     i, first = direction % 3, direction - direction % 3
-    fx, fy, fz = (wrench[0] - base[0]) * scale, (wrench[1] - base[1]) * scale, (wrench[2] - base[2]) * scale
-    mx, my, mz = (wrench[3] - base[3]) * scale, (wrench[4] - base[4]) * scale, (wrench[5] - base[5]) * scale
+    fx, fy, fz = slope[0] * scale, slope[1] * scale, slope[2] * scale
+    mx, my, mz = slope[3] * scale, slope[4] * scale, slope[5] * scale
     for axis in range(3):
         share, column = rail[axis, i], columns[first + axis]
         for j in range(3):
             column[j] += share * (rail[j, 0] * fx + rail[j, 1] * fy + rail[j, 2] * fz)
             column[3 + j] += share * (rail[j, 0] * mx + rail[j, 1] * my + rail[j, 2] * mz)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_slope(jacobian, k, wheel, direction, slope, columns):
+    """Add a derivative of a wheel's wrench in a direction to the ``columns`` of its wheelset; a turn about the axle
+    changes nothing."""
+    rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
+    _add_column(rail, direction, slope, 1.0, columns)
+    if direction == ROLL or direction == YAW:
+        _add_column(rail, PITCH, slope, -(m.ex if direction == ROLL else m.ez) / m.ey, columns)
 
 
 @jit(allocates=False)
@@ -120,17 +136,71 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     """Fill ``columns`` (k, 12, 6) with the derivatives of the rails' force and moment by displacement, rotation,
     velocity and angular velocity of their wheelsets, in axes turned by an ``angle`` (rad). Differences of velocities
     are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
-    wheelsets, base, found, mode = model.bodies.wheelsets, jacobian.motions, jacobian.wrenches, ELLIPSES
+    wheelsets, base = model.bodies.wheelsets, jacobian.motions
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
     wheel_motions(model, state, work)
     _take_rails(jacobian, angle, work)
-    press_wheels(model, work, mode)
     for k in range(wheelsets.shape[0]):
         for wheel in range(2):
             copy_into(base[k, wheel], work.motions[k, wheel])
-            copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     columns[:] = 0.0
+    if not (differentiable(model.contact) and _move_patches(jacobian, model, work)):
+        _difference_wrenches(jacobian, model, work, fine, columns)
+        return
+    slopes = jacobian.slopes
+    for k in range(wheelsets.shape[0]):
+        for wheel in range(2):
+            slopes[:], m, found = 0.0, motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
+            for patch in range(work.counts[k, wheel]):
+                patch_slopes(
+                    contact_of(model.contact, k, wheel), m, found[0, patch], found, patch, (DISPLACEMENT, TURN),
+                    jacobian.law, slopes,
+                )  # fmt: skip
+            for j in range(SLOPES):
+                direction = MOVING[j] if j < MOVES else j + 2
+                _add_slope(jacobian, k, wheel, direction, slopes[j], columns[k])
+
+
+@jit(allocates=False)
+def _move_patches(jacobian, model, work):
+    """Fill ``jacobian.patches`` with all patches as they are and after differences of the pose; False where a
+    difference makes others of them."""
+    base, found = jacobian.motions, jacobian.patches
+    press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
+    for move in range(1 + MOVES):
+        if move > 0:
+            direction = MOVING[move - 1]
+            for k in range(base.shape[0]):
+                for wheel in range(2):
+                    difference = DISPLACEMENT if direction < 3 else TURN
+                    _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
+                    jacobian.counts[k, wheel] = work.counts[k, wheel]
+            press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
+        for k in range(base.shape[0]):
+            for wheel in range(2):
+                count = work.counts[k, wheel]
+                if move > 0 and count != jacobian.counts[k, wheel]:
+                    return False
+                for patch in range(count):
+                    copy_into(found[move, k, wheel, patch], work.patches[k, wheel, patch])
+                    place = found[0, k, wheel, patch, reduction.U_WHEEL]
+                    if abs(found[move, k, wheel, patch, reduction.U_WHEEL] - place) > SAME:
+                        return False
+    return True
+
+
+@jit(allocates=False)
+def _difference_wrenches(jacobian, model, work, fine, columns):
+    """`contact_blocks` by differences of the wrenches."""
+    base, found, slope = jacobian.motions, jacobian.wrenches, jacobian.slopes[0]
+    for k in range(base.shape[0]):
+        for wheel in range(2):
+            copy_into(work.motions[k, wheel], base[k, wheel])
+    press_wheels(model, work, ELLIPSES)
+    for k in range(base.shape[0]):
+        for wheel in range(2):
+            copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     for step in range(DIRECTIONS):
         direction = (step + 6) % DIRECTIONS  # velocities first: the patches are those of the pose
         mode = ELLIPSES | PATCHES_HELD if direction >= 6 else ELLIPSES
@@ -145,11 +215,9 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
         press_wheels(model, work, mode)
         for k in range(base.shape[0]):
             for wheel in range(2):
-                rail, row, m = jacobian.rails[k, wheel], work.rail_wrenches[k, wheel], motion_of(base[k, wheel])
-                _add_column(rail, direction, found[k, wheel], row, 1.0 / difference, columns[k])
-                if direction == ROLL or direction == YAW:  # a turn about the axle changes nothing
-                    share = -(m.ex if direction == ROLL else m.ez) / m.ey
-                    _add_column(rail, PITCH, found[k, wheel], row, share / difference, columns[k])
+                for i in range(6):
+                    slope[i] = (work.rail_wrenches[k, wheel, i] - found[k, wheel, i]) / difference
+                _add_slope(jacobian, k, wheel, direction, slope, columns[k])
 
 
 @jit(allocates=False, fastmath=FUSED)

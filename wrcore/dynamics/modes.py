@@ -15,3 +15,6 @@ PATCHES_HELD = 4
 
 WRENCHES_HELD = 8
 """The rails' wrenches are those found last."""
+
+PATCHES_ONLY = 16
+"""Ellipses: patches are found, no wrenches."""

@@ -13,7 +13,7 @@ from wrcore.contact.normal import HertzTable, loaded_ellipse
 from wrcore.contact.patch.model import StripModel
 from wrcore.contact.strip import changes_along, lean_at, leaning, upright
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
-from wrcore.dynamics.modes import FRESH, PATCHES_HELD
+from wrcore.dynamics.modes import FRESH, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, WheelMotion, motion_of
 from wrcore.kernels.handles import call_address, member_of
 from wrcore.kernels.jit import FUSED, jit
@@ -70,7 +70,7 @@ def shaped(contact):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
+def normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed):
     """`normal_contact`, and a/b and its logarithm."""
     return loaded_ellipse(
         model.hertz, model.shear_modulus / (1.0 - model.poisson_ratio), model.damping, model.damping_speed, penetration,
@@ -81,7 +81,7 @@ def _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed
 @jit(allocates=False, fastmath=FUSED)
 def normal_contact(model, penetration, curvature_x, curvature_y, approach_speed):
     """Normal force (N) by Eq. (7) and the semi-axes (m) of the Hertz ellipse that carries it."""
-    force, a, b, _, _ = _normal_contact(model, penetration, curvature_x, curvature_y, approach_speed)
+    force, a, b, _, _ = normal_ellipse(model, penetration, curvature_x, curvature_y, approach_speed)
     return force, a, b
 
 
@@ -141,7 +141,7 @@ def patch_wrench(model, m, bend_y, bend_z, row, psi):
     speed = max(abs(m.vx), model.least_speed)
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
     row[reduction.CURVATURE_X] += 0.5 * (bend_y * sine - bend_z * cosine)  # rail bending away from the wheel
-    normal, a, b, axis_ratio, log_axis_ratio = _normal_contact(
+    normal, a, b, axis_ratio, log_axis_ratio = normal_ellipse(
         model, row[reduction.PENETRATION], row[reduction.CURVATURE_X], row[reduction.CURVATURE_Y], approach
     )
     limit = falling(model, m.friction, xi, eta, speed) * normal
@@ -199,6 +199,8 @@ def wheel_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                 m, contact = motion_of(motions[i, wheel]), contact_of(model, i, wheel)
                 count, bound, _ = detect_patches(contact, m, patches[i, wheel])
                 counts[i, wheel], bounds[i, wheel] = count, bound
+    if mode & PATCHES_ONLY:
+        return
     for i in range(motions.shape[0]):
         for wheel in range(2):
             row, wrench, bend_y, bend_z = motions[i, wheel], wrenches[i, wheel], 0.0, 0.0

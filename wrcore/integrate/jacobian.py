@@ -18,8 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.contact_blocks import DIRECTIONS, DISPLACEMENT, SPEED, SPIN, TURN, contacts_alone, renew_contacts
+from wrcore.dynamics.contact_slopes import MOVES, SLOPES
 from wrcore.dynamics.contract import turn_rate
 from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
 from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
@@ -82,6 +84,10 @@ class Jacobian(NamedTuple):
     motions: np.ndarray
     wrenches: np.ndarray
     idle: np.ndarray
+    patches: np.ndarray
+    counts: np.ndarray
+    slopes: np.ndarray
+    law: np.ndarray
     """Scratch of :mod:`wrcore.dynamics.contact_blocks`."""
 
 
@@ -138,7 +144,8 @@ def new_jacobian(model):
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
         np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
         np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)),
-        np.zeros(6 * n),
+        np.zeros(6 * n), np.zeros((1 + MOVES, k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64),
+        np.zeros((SLOPES, 6)), np.zeros((8, 4)),
     )  # fmt: skip
 
 
