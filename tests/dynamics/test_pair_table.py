@@ -179,7 +179,8 @@ def test_power_of_the_wrench_is_that_of_the_patch(rolling_wheels, vx):
     m = WheelMotion(1.0, -1.5e-3, z, ex, math.sqrt(1.0 - ex * ex - ez * ez), ez, *velocity, 0.0, 0.0, 0.3)
     rows, row, wrench = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(6)
     count = find_patches(wheels.geometry, *m[:6], True, reduction.MOMENT, rows)
-    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, wheels._work_handle)
+    work = wheels._work
+    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, work.spare, wheels._work_handle)
     place = row[[reduction.X, reduction.Y, reduction.Z]] - [0.0, m.y, m.z]
     drift = velocity[:3] + np.cross(velocity[3:], place)
     approach = drift[1] * row[reduction.SINE] - drift[2] * row[reduction.COSINE]

@@ -24,6 +24,7 @@ MOTORS = (
 CASES = {
     "wheelset": ("suspended_wheelset", []),
     "wheelset in a curve": ("suspended_wheelset", [CURVE]),
+    "wheelset, looked up": ("suspended_wheelset", ["contact.patch=tabulated", "initial.y=0.002"]),
     "vehicle": ("trailer_vehicle", []),
     "vehicle with axle boxes": ("trailer_vehicle", ["vehicle.axle_boxes=true"]),
     "locomotive": ("locomotive", [BRAKED, "initial.y=0.002"]),

@@ -11,10 +11,13 @@ ELLIPSES = 2
 the model."""
 
 PATCHES_HELD = 4
-"""Ellipses keep the patches found last: only velocities have changed."""
+"""Patches are those kept, or found, last: only velocities have changed."""
 
 WRENCHES_HELD = 8
 """The rails' wrenches are those found last."""
 
 PATCHES_ONLY = 16
 """Ellipses: patches are found, no wrenches."""
+
+PATCHES_KEPT = 32
+"""Patches that are looked up are kept for `PATCHES_HELD`."""

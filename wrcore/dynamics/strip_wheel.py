@@ -31,7 +31,7 @@ from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
-from wrcore.dynamics.modes import ELLIPSES, FRESH, WARM
+from wrcore.dynamics.modes import ELLIPSES, FRESH, PATCHES_HELD, PATCHES_KEPT, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, leaning_motion
@@ -43,6 +43,9 @@ SLENDER = 3.0
 
 UNSOLVED = 1
 """Place in a spare memory: not 0 where what a table does not have is not to be solved."""
+
+HOLD, KEEP, USE = 2, 1.0, 2.0
+"""Another one: whether a wheel's only lobe is to be kept, or used as it was kept, see `StripWork.kept`."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
 """Elements along and across the patch of the grid, and the tolerance of its tractions."""
@@ -112,8 +115,10 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _lifted(model, y, z, m, spatial, u, rows):
-    """Overlaps of a lifted wheel and, of its groups, the one nearest to wheel coordinate ``u``: (pose, first, last)."""
+def lifted(model, m, frame, lift, spatial, u, rows):
+    """Overlaps of a wheel lifted along a frame's normal (m) and, of its groups, the one nearest to wheel coordinate
+    ``u``: (pose, first, last)."""
+    y, z = m.y - lift * frame.sine, m.z + lift * frame.cosine
     pose = make_pose(1.0, y, z, m.ex, m.ey, m.ez, spatial)
     count = find_patches(model.geometry, 1.0, y, z, m.ex, m.ey, m.ez, spatial, reduction.MOMENT, rows)
     best, low, high, first = 1e9, 0, 0, 0
@@ -247,16 +252,10 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work):
-    """Overlaps in ``work.rows`` of a left wheel, with a pose and a frame, that the damping lifts: its pose then, their
-    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row. The
-    motion ``m`` is in axes that lean as the patch does."""
+def lift_of(model, m, pose, frame, depth):
+    """What the damping lifts a left wheel by along the normal of a frame, of a ``depth``, m; creepages and coefficient
+    of friction. The motion ``m`` is in axes that lean as the patch does."""
     speed = max(abs(m.vx), model.least_speed)
-    depth, u, low, high = 0.0, 0.0, first, first
-    for k in range(first, last):
-        if rows[k, reduction.PENETRATION] > depth:
-            depth, u = rows[k, reduction.PENETRATION], rows[k, reduction.U_WHEEL]
-            copy_into(out, rows[k])
     # a material point of the undeformed wheel, as the surfaces' slip has it
     py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
     pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
@@ -264,10 +263,23 @@ def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, speed)
     friction = falling(model, m.friction, xi, eta, speed)
     factor = damping_factor(approach, model.damping, model.damping_speed)
-    lift = (1.0 - factor * inverse_cube_root(factor)) * depth
+    return (1.0 - factor * inverse_cube_root(factor)) * depth, (xi, eta, phi), friction
+
+
+@jit(allocates=False, fastmath=FUSED)
+def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work):
+    """Overlaps in ``work.rows`` of a left wheel, with a pose and a frame, that the damping lifts: its pose then, their
+    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row. The
+    motion ``m`` is in axes that lean as the patch does."""
+    depth, u, low, high = 0.0, 0.0, first, first
+    for k in range(first, last):
+        if rows[k, reduction.PENETRATION] > depth:
+            depth, u = rows[k, reduction.PENETRATION], rows[k, reduction.U_WHEEL]
+            copy_into(out, rows[k])
+    lift, creepage, friction = lift_of(model, m, pose, frame, depth)
     if lift < depth:
-        pose, low, high = _lifted(model, m.y - lift * frame.sine, m.z + lift * frame.cosine, m, spatial, u, work.rows)
-    return pose, low, high, depth - lift, (xi, eta, phi), friction
+        pose, low, high = lifted(model, m, frame, lift, spatial, u, work.rows)
+    return pose, low, high, depth - lift, creepage, friction
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -393,7 +405,7 @@ def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters,
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """As `wheel_wrenches`, with patches on strips; arguments as there. Ellipses stand in for what is solved, not for
     what a table has."""
-    rough = mode & ELLIPSES > 0
+    rough, held, keep = mode & ELLIPSES > 0, mode & PATCHES_HELD > 0, KEEP if mode & PATCHES_KEPT else 0.0
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
@@ -402,14 +414,28 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
             seen = motion_of(motions[i, wheel])
             m = as_left(seen)
-            count, bound, spatial = detect_patches(contact, m, rows)
             for k in range(6):
                 wrench[k] = 0.0
+            if held and work.kept[i, wheel, 0] > 0.0:
+                work.spare[HOLD] = USE
+                call_address(
+                    contact.strips.group, contact, m, True, rows, 0, 0, work.out, wrench, counters, work.kept[i, wheel],
+                    work,
+                )  # fmt: skip
+                if seen.side < 0.0:
+                    mirror(rows, 0, wrench)
+                continue
+            if keep > 0.0:
+                work.kept[i, wheel, 0] = 0.0
+            count, bound, spatial = detect_patches(contact, m, rows)
             first = kept = group = 0
             while first < count:
                 last = group_end(contact.geometry, rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
+                if keep > 0.0:
+                    memory = work.kept[i, wheel]
                 work.spare[0], work.spare[UNSOLVED] = 0.0, 1.0 if rough else 0.0
+                work.spare[HOLD] = keep if last - first == count else 0.0
                 call_address(
                     contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
                     work,

@@ -16,8 +16,8 @@ from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import add_force, frame_of_rows
-from wrcore.contact.patch.model import KERNEL, LOAD, LOBE_COLUMNS, MODEL
+from wrcore.contact.patch.gap import Frame, add_force, frame_of_rows
+from wrcore.contact.patch.model import KERNEL, LOAD, LOBE_COLUMNS, MODEL, NUMBERS
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import (
@@ -32,7 +32,18 @@ from wrcore.dynamics.pair_table import (
     tabulated_force,
     weigh,
 )
-from wrcore.dynamics.strip_wheel import NOTHING, UNSOLVED, Solution, fill_row, lifted_overlaps
+from wrcore.dynamics.strip_wheel import (
+    HOLD,
+    KEEP,
+    NOTHING,
+    UNSOLVED,
+    USE,
+    Solution,
+    fill_row,
+    lift_of,
+    lifted,
+    lifted_overlaps,
+)
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
@@ -47,9 +58,60 @@ TURNS, STEPS, ROLLS = 3, 6, 3
 """Lobes are looked up so many times, with so many steps towards balance between, and rolled so many times."""
 
 
+KEPT, DEEPEST, LIFTED, DEPTH, DEEPER, FRAME = range(6)
+KEPT_ROW = 12
+"""Places in what is kept of a wheel: whether it is, its deepest overlap, what the damping lifts it by and its depth D
+(m), what D changes by that; the six numbers of its frame; its row, and what that changes by the lift."""
+
+FARTHER = 1e-9
+"""Difference of the lift, m."""
+
+
 @jit(allocates=False, fastmath=FUSED)
-def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
-    """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
+def _keep(model, m, frame, lift, low, high, kept, work):
+    """Keep a wheel's only lobe, just looked up, and what it changes by the lift."""
+    rows, one, other, ahead = work.rows, work.numbers[0], work.numbers[1], -1.0 if m.vx < 0.0 else 1.0
+    depth, u = depth_of(rows, low, high, 0.0)
+    pose, low, high = lifted(model, m, frame, lift + FARTHER, True, u, rows)
+    if high == low:
+        return
+    further, u = depth_of(rows, low, high, 0.0)
+    t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
+    cell, fx, fy, fz, gx, gy, gz, turn = locate(model.strips.table, u, False, t, m.ez, further, ahead * m.ex)
+    if cell == 0 or further <= 0.0:
+        return
+    weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
+    look_up(model.strips.table.cells[cell], work.weights, other)
+    look_modes_up(model.strips.table.cells[cell], work.weights, other)
+    kept[LIFTED], kept[DEPTH], kept[DEEPER] = lift, depth, (further - depth) / FARTHER
+    kept[FRAME], kept[FRAME + 1], kept[FRAME + 2] = frame.cosine, frame.sine, frame.x
+    kept[FRAME + 3], kept[FRAME + 4], kept[FRAME + 5] = frame.ur, frame.z, frame.u
+    for k in range(NUMBERS):
+        kept[KEPT_ROW + k], kept[KEPT_ROW + NUMBERS + k] = one[k], (other[k] - one[k]) / FARTHER
+    kept[KEPT] = 1.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_kept(model, m, kept, wrench, counters, work):
+    """Add the wrench of a wheel whose only lobe was kept, for other velocities."""
+    frame = Frame(kept[FRAME], kept[FRAME + 1], kept[FRAME + 2], kept[FRAME + 3], kept[FRAME + 4], kept[FRAME + 5])
+    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True)
+    more = lift_of(model, m, pose, frame, kept[DEEPEST])[0] - kept[LIFTED]
+    numbers, modulus = work.numbers[0], contact_modulus(model.shear_modulus, model.poisson_ratio)
+    for k in range(NUMBERS):
+        numbers[k] = kept[KEPT_ROW + k] + more * kept[KEPT_ROW + NUMBERS + k]
+    work.lobes[0, NORMAL] = _load(modulus, numbers, kept[DEPTH] + more * kept[DEEPER])
+    work.wrench[:] = 0.0
+    y, z = frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z
+    _roll_lobes(model, m, frame, y, z, -1.0 if m.vx < 0.0 else 1.0, 1, counters, work)
+    for k in range(6):
+        wrench[k] += work.wrench[0, k] + work.wrench[1, k]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
+    """As `group_wrench`, looked up; UNKNOWN where the table has no answer. Keeps a wheel's only lobe in ``memory`` if
+    ``work.spare`` asks for it."""
     frame = frame_of_rows(rows, first, last)
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     pose, low, high, left, _, _ = lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work)
@@ -61,6 +123,9 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     if lobes == 0:  # the lattices are of spatial detection
         counters[SOLVED] += 1
         return UNKNOWN
+    if work.spare[HOLD] == KEEP and lobes == 1:
+        memory[DEEPEST] = out[reduction.PENETRATION]
+        _keep(model, m, frame, memory[DEEPEST] - left, low, high, memory, work)
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
@@ -79,7 +144,10 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
 def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """`tabulated_wrench`, or what the solver finds, for who calls it by its address; a normal force below 0 where that
     is not wanted."""
-    found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work)
+    if work.spare[HOLD] == USE:
+        _add_kept(model, m, memory, wrench, counters, work)
+        return
+    found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
     if found.load < 0.0 and work.spare[UNSOLVED] > 0.0:
         out[reduction.NORMAL] = -1.0
     elif found.load < 0.0:

@@ -49,6 +49,9 @@ NODES, NUMBERS, MODES = 48, 64, 24
 LOBE_COLUMNS = 6
 """Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
 
+KEPT_NUMBERS = 12 + 2 * NUMBERS
+"""Of a wheel with one lobe, while its place stays: see `wrcore.dynamics.tabulated_wheel`."""
+
 
 KERNEL, MODEL, ELLIPSES, LOAD = range(4)
 """Addresses in `StripModel.solver`."""
@@ -106,6 +109,8 @@ class StripWork(NamedTuple):
     weights: np.ndarray
     modes: np.ndarray
     """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and (3 MODES,): of a patch that is looked up."""
+    kept: np.ndarray
+    """(wheelsets, 2, KEPT_NUMBERS): wheels of which one lobe is kept while their places stay."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -159,6 +164,6 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES), np.zeros(3 * MODES),
-        normal,
+        np.zeros((wheelsets if model.looked_up else 0, 2, KEPT_NUMBERS)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip
