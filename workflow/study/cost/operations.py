@@ -32,7 +32,7 @@ WHERE = {
     ("wrcore.contact.detection", "near_blocks"): "search",
     ("wrcore.contact.detection", "scan"): "search",
     ("wrcore.dynamics.wheel", "creepages"): "Hertz",
-    ("wrcore.dynamics.wheel", "_normal_contact"): "Hertz",
+    ("wrcore.dynamics.wheel", "normal_ellipse"): "Hertz",
     ("wrcore.dynamics.wheel", "creep_force_at"): "creep",
 }
 """Stage that begins with a function, by the module that calls it and its name there; all else belongs to the caller."""
