@@ -16,7 +16,6 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import damping_factor
 from wrcore.contact.strip import changes_along
 from wrcore.creep.laws import LAWS, creep_force_at
-from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.wheel import falling, normal_ellipse
 from wrcore.kernels.jit import FUSED, jit
 
