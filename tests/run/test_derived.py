@@ -65,6 +65,16 @@ def test_pressure_of_an_ellipse_and_quotient_of_what_is_stored():
         run["wheelset/left"]["p_max_Pa"]
 
 
+def test_radii_and_conicity_of_given_contacts():
+    """Radii of 0.46 m and a tenth of y more or less, on rails whose middle is that of the track; none at the middle."""
+    run = hunting_run()
+    wheelset = run["wheelset"]
+    np.testing.assert_allclose(run["wheelset/right"].rolling_radius_m, 0.46 - 0.1 * wheelset.y_m, rtol=1e-12)
+    off = np.abs(wheelset.y_m) > 1e-4
+    np.testing.assert_allclose(wheelset.effective_conicity[off], 0.1, rtol=1e-9)
+    assert np.isnan(wheelset.effective_conicity[~off]).all()
+
+
 def on_cones(**changes):
     """A free wheelset with cones on rails of circles, 4 s, and the conicity that it has for small displacements."""
     scene = load_scene(cone(
