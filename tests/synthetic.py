@@ -33,6 +33,8 @@ def hunting_run(detection="planar", growth=0.1, frequency=2.6, duration=4.0, fla
             sides[side][name][:, 0] = 0.0
         sides[side]["u_wheel_m"][:, 0] = 3e-3 - 4 * out * y
         sides[side]["u_rail_m"][:, 0] = 2e-3 - 3 * out * y
+        sides[side]["y_m"][:, 0] = out * (0.75 + 2e-3) - 3 * y
+        sides[side]["z_m"][:, 0] = -0.1 * out * y  # a conicity of 0.1
         sides[side]["N_N"][:, 0] = 8.9e3
         sides[side]["contact_angle_rad"][:, 0] = 0.03
     if flange_at is not None:

@@ -97,7 +97,7 @@ def test_what_was_changed_and_where_it_shows_most(capsys):
     said = repr(found)
     assert "contact.detection: 'planar', 'spatial'" in said and "801 times, 0 to 4 s" in said
     summary = found.summary
-    assert summary["relative"].is_monotonic_decreasing and summary["group"].tolist().count("wheelset") == 12
+    assert summary["relative"].is_monotonic_decreasing and summary["group"].tolist().count("wheelset") == 14
     assert summary.set_index("channel").loc["N_N", "group"] == "wheelset/left"
 
 

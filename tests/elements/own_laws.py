@@ -64,6 +64,10 @@ def no_number(stretch, speed, states, parameters, rates):
     return stretch / abs(stretch - 1e-4) if stretch else float("nan")
 
 
+def words(stretch, speed, states, parameters, rates):
+    return "much"
+
+
 @njit
 def beyond(stretch, speed, states, parameters, rates):
     rates[len(rates)] = 1.0

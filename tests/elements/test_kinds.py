@@ -184,6 +184,7 @@ def test_a_compiled_law_is_as_fast_as_a_built_in_one(tmp_path):
 FAULTS = {
     "two_numbers": "expected a force in N, or force, stored energy and dissipated power",
     "no_number": "expected finite numbers",
+    "words": "expected finite numbers",
     "beyond": "expected a function that works on a test call: IndexError",
     "stumbles": "expected a function that works on a test call: RuntimeError: no such luck",
     "number": "expected a function 'number'",

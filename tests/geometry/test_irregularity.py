@@ -97,6 +97,9 @@ SPECTRA = [
     ("level", "low", 1.17723e-6), ("level", "high", 3.15330e-6),
     ("alignment", "low", 6.18697e-7), ("alignment", "high", 1.78833e-6),
     ("cross_angle", "low", 1.18417e-6),
+    # 0.25 A 0.67980 / (0.25 (0.25 + 0.67980)); 4 times 0.25 A_v 0.67980 / (0.92980 (0.25 + W_s^2)), over 2.25
+    ("level", "fra_5", 1.53171e-5), ("alignment", "fra_5", 5.57117e-6), ("cross_angle", "fra_5", 7.36850e-6),
+    ("level", "fra_6", 2.47851e-6), ("alignment", "fra_6", 2.47851e-6), ("cross_angle", "fra_6", 2.49310e-6),
 ]  # fmt: skip
 
 
@@ -105,7 +108,7 @@ def test_spectra_have_their_published_values(quantity, level, value):
     assert spectrum(quantity, level, 0.5) == pytest.approx(value, rel=1e-5)
 
 
-@pytest.mark.parametrize("level", ["low", "high"])
+@pytest.mark.parametrize("level", ["low", "high", "fra_5"])
 def test_variance_of_a_whole_period_is_the_integral_of_the_one_sided_spectrum(monkeypatch, level):
     # over a whole period each cosine has variance a^2 / 2 exactly: what is left is Simpson's rule on 1500 shares
     monkeypatch.setattr("scipy.fft.next_fast_len", lambda n, real: n // 2)
@@ -116,6 +119,12 @@ def test_variance_of_a_whole_period_is_the_integral_of_the_one_sided_spectrum(mo
         integral, _ = quad(lambda w, q=quantity: float(spectrum(q, level, w)), 2 * np.pi / 80, 2 * np.pi / 3)
         assert found.var() == pytest.approx(integral, rel=1e-5), quantity
     assert values[:, 0] == pytest.approx(values[:, 2], abs=1e-18)  # no change of gauge
+
+
+def test_waves_of_american_spectra_are_as_high_as_the_page_says():
+    for level, rms in (("low", 2.1e-3), ("high", 3.4e-3), ("fra_6", 3.0e-3), ("fra_5", 7.6e-3)):
+        variance, _ = quad(lambda w, of=level: float(spectrum("level", of, w)), 2 * np.pi / 80, 2 * np.pi / 3)
+        assert math.sqrt(variance) == pytest.approx(rms, abs=0.06e-3)
 
 
 def test_variance_over_seeds_is_the_integral_within_the_sampling_error():

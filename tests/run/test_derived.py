@@ -1,10 +1,13 @@
 """Derived channels: the same from a stored run and when a scene asks for them, by one name; wrong names are refused."""
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import wrcore as wr
+from tests.analysis.response.test_curving import cone
 from tests.conftest import SCENES
 from tests.synthetic import hunting_run
 from wrcore.errors import InputError
@@ -60,6 +63,55 @@ def test_pressure_of_an_ellipse_and_quotient_of_what_is_stored():
     np.testing.assert_allclose(run["wheelset/left"].Y_over_Q, 0.2)
     with pytest.raises(KeyError, match="no channel 'p_max_Pa'"):
         run["wheelset/left"]["p_max_Pa"]
+
+
+def test_radii_and_conicity_of_given_contacts():
+    """Radii of 0.46 m and a tenth of y more or less, on rails whose middle is that of the track; none at the middle."""
+    run = hunting_run()
+    wheelset = run["wheelset"]
+    np.testing.assert_allclose(run["wheelset/right"].rolling_radius_m, 0.46 - 0.1 * wheelset.y_m, rtol=1e-12)
+    off = np.abs(wheelset.y_m) > 1e-4
+    np.testing.assert_allclose(wheelset.effective_conicity[off], 0.1, rtol=1e-9)
+    assert np.isnan(wheelset.effective_conicity[~off]).all()
+
+
+def on_cones(**changes):
+    """A free wheelset with cones on rails of circles, 4 s, and the conicity that it has for small displacements."""
+    scene = load_scene(cone(
+        speed=10.0, initial={"y": 0.002}, integration={"duration": 4.0, "rtol": 1e-8, "atol": 1e-11},
+        output={"rate": 100.0, "channels": ["pose", "contact"]}, **changes,
+    ))  # fmt: skip
+    slope, radius, rail = 0.05, 0.46, 0.3
+    e = scene.track.rail_distance(scene.rail) - rail * math.sin(math.atan(slope))
+    return wr.simulate(scene), slope * (e + rail * slope) / (e - radius * slope)
+
+
+def test_a_cone_has_its_own_conicity():
+    """At each instant within what 2 mm and the yaw of the swing make of it; over the swing within 0.2 %."""
+    run, conicity = on_cones()
+    wheelset, left = run["wheelset"], run["wheelset/left"]
+    y, difference = wheelset.y_m, wheelset.rolling_radius_difference_m
+    off = np.abs(y) > 1e-4
+    np.testing.assert_allclose(wheelset.effective_conicity[off], conicity, rtol=0.015)
+    assert np.isnan(wheelset.effective_conicity[~off]).all() and not off.all()
+    assert np.sum(difference * y) / (2.0 * np.sum(y**2)) == pytest.approx(conicity, rel=2e-3)
+    np.testing.assert_array_equal(difference, left.rolling_radius_m - run["wheelset/right"].rolling_radius_m)
+    compressed = 0.46 - 0.05 * left.u_wheel_m[:, 0] - left.rolling_radius_m  # by half of the penetration
+    np.testing.assert_allclose(compressed, 0.5 * left.penetration_m[:, 0], rtol=0.01)
+
+
+def test_conicity_counts_from_the_middle_of_the_rails_as_they_lie(tmp_path):
+    """Both rails swing by 5 mm: what the wheelset is off the track's middle then says nothing."""
+    s = np.linspace(0.0, 60.0, 241)
+    pd.DataFrame({"s_m": s, "alignment_m": 0.005 * np.sin(np.pi * s / 60.0) ** 2}).to_csv(
+        tmp_path / "swing.csv", index=False
+    )
+    irregularity = {"points": str(tmp_path / "swing.csv"), "fade_in": 0.0, "fade_out": 0.0}
+    run, conicity = on_cones(track={"irregularity": irregularity})
+    wheelset = run["wheelset"]
+    assert np.nanmax(np.abs(wheelset.rolling_radius_difference_m / (2.0 * wheelset.y_m) - conicity)) > 0.03
+    found = wheelset.effective_conicity[np.isfinite(wheelset.effective_conicity)]
+    np.testing.assert_allclose(found, conicity, rtol=0.02)
 
 
 def test_wrong_names_say_what_was_meant(runs):

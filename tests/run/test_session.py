@@ -220,7 +220,7 @@ def test_a_crossing_is_located_and_leaves_the_trajectory_as_it_was():
     assert session.run_until(0.3)
     np.testing.assert_array_equal(session.state, once.end_state)
     other = wr.start(scene)
-    assert other.run_until(lambda values: values["wheelset.y_m"] < below, dt=0.003)
+    assert other.run_until(lambda values: values["wheelset.y_m"] < below < values["wheelset/left.Q_N"], dt=0.003)
     assert other.time == pytest.approx(found, abs=2e-9)
     assert not other.run_until("wheelset.y_m > 1", latest=0.2) and other.time == 0.2
 
@@ -282,7 +282,7 @@ def test_what_cannot_be_is_one_line(tmp_path):
     for end in ("wheelset.y_m", "wheelset.y_m > high", "wheelset.y_m = 1"):
         with pytest.raises(wr.InputError, match="end: expected a time, a function, or a channel"):
             session.run_until(end)
-    with pytest.raises(wr.InputError, match="session: end: expected one of .*; did you mean 'wheelset.y_m'"):
+    with pytest.raises(KeyError, match="no channel 'ym' in 'wheelset'"):
         session.run_until(lambda channels: channels["wheelset.ym"] > 0.0)
     with pytest.raises(wr.InputError, match="integration.method: expected a compiled method"):
         wr.start(scene_of(**{"integration.method": "scipy_rk45"}))

@@ -88,7 +88,7 @@ def test_a_vehicle_as_content():
         ("vehicle.elements.primary_spring_1_left.stifness=3", "did you mean 'stiffness'?"),
         ("vehicle.bodies.car_body.mas=3", "bodies.car_body.mas: unknown key"),
         ("vehicle.bodies.car_body.mass=-3", "vehicle.bodies.car_body.mass: expected a mass in kg, above 0"),
-        ("vehicle.bodies.car_body.mass.factor=heavy", "mass.factor: expected -1e+06 to 1e+06 , got 'heavy'"),
+        ("vehicle.bodies.car_body.mass.factor=heavy", "mass.factor: expected -1e+06 to 1e+06, got 'heavy'"),
         ("vehicle.bodies.car_body.kind.factor=2", "kind.factor: expected numbers to multiply in the file, got 'body'"),
         ("vehicle.bodies.car_body.masses.factor=2", "expected numbers to multiply in the file, got None"),
         ("vehicle.bodies.car_body.position.w=2", "position.w: expected one of x, y, z of three numbers"),

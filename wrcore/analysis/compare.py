@@ -24,7 +24,7 @@ from wrcore.run.simulation import flat
 SAME_TIME = 1e-9
 """Output times of two runs that are closer than this are the same, s."""
 
-PLACES = ("x_m", "y_m", "z_m", "s_m", "u_wheel_m", "u_rail_m", "s_wheel_rad")
+PLACES = ("x_m", "y_m", "z_m", "s_m", "u_wheel_m", "u_rail_m", "s_wheel_rad", "rolling_radius_m")
 MOTION = ("m", "rad", "m/s", "rad/s", "m/s^2")
 """Channels of contacts, and units of those of bodies, whose zero means little: they are measured by how they vary."""
 

@@ -6,6 +6,9 @@ spins and the force elements' internal states. The residual is what acceleration
 beside those of the turn. Nothing drives a vehicle: creep slows it down in a curve, all its velocities in proportion.
 This common acceleration is an unknown, too, unless elements lead to the moving frame, which then pulls.
 
+Balances are found one from another, by Broyden's method: slopes are taken by differences once, learn from each step and
+stay, from one curve to the next, until they mislead (C. G. Broyden, Math. Comp. 19 (1965) 577-593).
+
 States here are those of a tangent track: places, rotations and spins in the axes of the track where a body is, x its
 arc length. :func:`on_circle` lays them along the curve.
 """
@@ -15,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.balance.equilibrium import RESIDUAL
 from wrcore.balance.linear import RANK, moved_states
+from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations, independent_at, internal_states
@@ -24,15 +27,26 @@ from wrcore.dynamics.track import TrackModel
 from wrcore.geometry.irregularity import no_irregularity
 from wrcore.geometry.path import PathData
 from wrcore.geometry.path_pieces import CANT_BASE, COLUMNS, CURVATURE, ROLL, WIDENING, X
+from wrcore.kernels.handles import Handle
 
 STEP, SPIN_STEP, SLOWING_STEP = 1e-7, 1e-6, 1e-3
 """Of the difference quotients in places (m, rad), spins (rad/s) and the common acceleration (m/s^2)."""
 
 MOST_STEPS, HALVINGS = 40, 12
-"""Newton's steps towards one balance, and how often each is halved."""
+"""Steps towards one balance, and how often one by fresh slopes is halved."""
+
+MISLED = 0.5
+"""A step that leaves more than this part of what was left asks for fresh slopes."""
+
+LAST_STEP, LAST_LEFT = 1e-7, 1e-6
+"""Where a step shorter than the one (m, rad, rad/s, m/s^2) leaves less than the other (m/s^2, rad/s^2), Broyden's
+method ends."""
 
 LEAST_PART = 2.0**-8
 """Part of the way between two curves below which the way is not divided any more."""
+
+FAR, STRAIGHT = np.array([1e-3, 0.1, 0.01, 10.0]), 0.1
+"""Differences of curves that count alike, of each number; a way turns by less than this where it goes straight on."""
 
 
 class Curve(NamedTuple):
@@ -59,15 +73,18 @@ class CurveBalance:
     """Common one of all velocities, along the track, m/s^2: negative where creep slows the vehicle down."""
     residual: float
     """Largest acceleration or rate left (m/s^2, rad/s^2, m/s)."""
+    patches: np.ndarray
+    """(k, 2, MAX_PATCHES, PATCH_COLUMNS): of the wheelsets' left and right wheels, NaN where absent."""
+    way: np.ndarray
+    """(4,): from the curve whose balance it was found from, in units of ``FAR``."""
+    moves: np.ndarray
+    """(unknowns,): from that balance."""
 
 
-def curve_model(model, curve, aside=0.0):
-    """The model on a curve without end, perfect; ``aside`` is that of `wrcore.geometry.path.PathData`."""
-    row = np.zeros((1, COLUMNS))
-    row[0, X + 1] = 1.0
-    row[0, CURVATURE], row[0, ROLL], row[0, WIDENING] = curve.curvature, -curve.cant / CANT_BASE, curve.widening
-    path = PathData(row, np.array([-np.inf]), np.zeros(1, np.int64), 0.0, 1.0, aside)
-    return model._replace(track=TrackModel(False, path, no_irregularity()), speed=curve.speed)
+def at_rest(model, state):
+    """Static equilibrium as the balance of straight track."""
+    straight, nothing = Curve(0.0, 0.0, 0.0, float(model.speed)), np.zeros(0)
+    return CurveBalance(straight, state, 0.0, 0.0, nothing, np.zeros(4), nothing)
 
 
 def on_circle(model, curve, states):
@@ -100,12 +117,34 @@ def _turn(parts, angle, axis):
     parts[..., OMEGA + j] = np.cos(angle) * w[..., j] + np.sin(angle) * w[..., i]
 
 
-class _Turning:
-    """What is left of accelerations in a curve, and how moves change it."""
+class Slopes(NamedTuple):
+    """How what is left changes with the unknowns."""
 
-    def __init__(self, model, curve, aside):
-        self.model = curve_model(model._replace(beta=model.beta or 1.0), curve, aside)
-        self.curve, self.equations = curve, Equations(self.model)
+    inverse: np.ndarray  # (unknowns, rows): the step towards the balance, per what is left
+    weights: np.ndarray  # (rows,): by these, each row's largest slope is 1
+    scales: np.ndarray  # (unknowns,): square of the largest slope in each unknown, by the weights
+
+    def size(self, left):
+        """Of what is left, by the weights."""
+        return np.max(np.abs(self.weights * left))
+
+    def learned(self, step, change):
+        """With Broyden's update: the least one by which a step makes the change that it made."""
+        along = (self.scales * step) @ self.inverse
+        return self._replace(inverse=self.inverse + np.outer(step - self.inverse @ change, along) / (along @ change))
+
+
+class Turning:
+    """A model on curves without end, perfect ones, and what it has learned of its slopes there; ``aside`` is that of
+    `wrcore.geometry.path.PathData`."""
+
+    def __init__(self, model, aside=0.0):
+        self.row = np.zeros((1, COLUMNS))  # where the equations read of the curve
+        self.row[0, X + 1] = 1.0
+        path = PathData(self.row, np.array([-np.inf]), np.zeros(1, np.int64), 0.0, 1.0, aside)
+        track = TrackModel(False, path, no_irregularity())
+        self.model = model._replace(beta=model.beta or 1.0, track=track)
+        self.equations, self.curve, self.slopes = Equations(self.model), None, None
         n, spins = len(model.bodies.mass), 6 * np.flatnonzero(model.bodies.spins) + 4
         places = np.delete(np.arange(6 * n), spins)
         self.columns = np.concatenate([places, 6 * n + spins, 12 * n + np.arange(internal_states(model))])
@@ -113,6 +152,20 @@ class _Turning:
         self.steps[len(places) : len(places) + len(spins)], self.steps[-1] = SPIN_STEP, SLOWING_STEP
         if np.any(model.elements.pairs[:, 1] == FRAME):
             self.steps = self.steps[:-1]  # the frame pulls
+
+    def enter(self, curve):
+        """Go over to a curve."""
+        row = self.row[0]
+        row[CURVATURE], row[ROLL], row[WIDENING] = curve.curvature, -curve.cant / CANT_BASE, curve.widening
+        kernel, handle, work = self.equations.arguments
+        faster, self.curve = curve.speed / handle.value.speed, curve
+        if faster != 1.0:
+            self.equations.arguments = kernel, Handle(handle.value._replace(speed=curve.speed)), work
+            if self.slopes is not None:  # creepages are velocities over the speed
+                spins = self.steps[: len(self.columns)] == SPIN_STEP
+                ratio = np.where(np.append(spins, [False] * (len(self.steps) - len(spins))), faster, 1.0)
+                inverse, scales = self.slopes.inverse * ratio[:, None], self.slopes.scales / ratio**2
+                self.slopes = self.slopes._replace(inverse=inverse, scales=scales)
 
     def moved(self, state, acceleration, moves):
         """States (k, size) and accelerations (k,) after moves (k, unknowns)."""
@@ -138,51 +191,73 @@ class _Turning:
             inner[:, at - STATE_SIZE * n] -= slowing[:, 0] * turning[:, at]
         return np.hstack([left.reshape(len(states), -1), inner])
 
+    def _begin(self, known, curve, straight_on):
+        """Way and moves from a balance to where the next one is sought, and state and acceleration there."""
+        way, moves = np.subtract(curve, known.curve) / FAR, np.zeros(len(self.steps))
+        ratio = (way @ known.way) / (known.way @ known.way)
+        if straight_on and ratio > 0.0 and np.linalg.norm(way - ratio * known.way) < STRAIGHT * np.linalg.norm(way):
+            moves = ratio * known.moves
+        state = known.state.copy()
+        omegas = state[: STATE_SIZE * len(self.model.bodies.mass)].reshape(-1, STATE_SIZE)[:, OMEGA:]
+        omegas *= curve.speed / known.curve.speed
+        states, accelerations = self.moved(state, known.acceleration, moves[None])
+        return way, moves, states[0], accelerations[0]
 
-def _solve(turning, state, acceleration):
-    """Newton's method from a state: `CurveBalance` of the best one that it finds. Slopes serve again for as long as a
-    step leaves less than a tenth."""
-    slopes, steps = None, turning.steps
-    left = turning.left(state[None], np.array([acceleration]))[0]
-    for _ in range(MOST_STEPS):
-        if slopes is None:
-            moved = turning.left(*turning.moved(state, acceleration, np.diag(steps)))
-            slopes = ((moved - left) / steps[:, None]).T
-            largest = np.max(np.abs(slopes), axis=1)
-            weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
-            inverse = np.linalg.pinv(weights[:, None] * slopes, RANK * 1e-2)
-        size = np.max(np.abs(weights * left))
-        step = inverse @ (-weights * left)
-        for halving in range(HALVINGS):
-            states, tried = turning.moved(state, acceleration, 0.5**halving * step[None])
-            new = turning.left(states, tried)[0]
-            if np.max(np.abs(weights * new)) < (1.0 - 0.1 * 0.5**halving) * size:
+    def balance(self, known, curve, straight_on):
+        """`CurveBalance` of a curve, sought from that of another one, or from where the way to that one leads
+        ``straight_on``."""
+        way, moves, state, acceleration = self._begin(known, curve, straight_on)
+        self.enter(curve)
+        left = self.left(state[None], np.array([acceleration]))[0]
+        for _ in range(MOST_STEPS):
+            fresh = self.slopes is None
+            slopes = self._fresh_slopes(state, acceleration, left) if fresh else self.slopes
+            step, size, part = -slopes.inverse @ left, slopes.size(left), 2.0
+            for _ in range(HALVINGS if fresh else 1):
+                part *= 0.5
+                states, tried = self.moved(state, acceleration, part * step[None])
+                new = self.left(states, tried)[0]
+                if slopes.size(new) < (1.0 - 0.1 * part) * size:
+                    break
+            else:
+                self.slopes = None
+                if fresh:
+                    self.left(state[None], np.array([acceleration]))  # leaves the patches of this state
+                    break
+                continue
+            misled = slopes.size(new) > MISLED * size
+            self.slopes = None if misled else slopes.learned(part * step, new - left)
+            state, acceleration, left, moves = states[0], tried[0], new, moves + part * step
+            if np.max(np.abs(left)) < LAST_LEFT and np.max(np.abs(part * step)) < LAST_STEP:
                 break
-        else:
-            break
-        part = np.max(np.abs(weights * new)) / size
-        state, acceleration, left = states[0], tried[0], new
-        if np.max(np.abs(left)) < RESIDUAL or part > 0.1 and np.max(np.abs(left)) < 1e2 * RESIDUAL:
-            break
-        slopes = slopes if part < 0.1 else None
-    return CurveBalance(turning.curve, state, float(acceleration), float(np.max(np.abs(left))))
+        absent = np.arange(MAX_PATCHES) >= self.equations.work.counts[..., None]
+        patches = np.where(absent[..., None], np.nan, self.equations.work.patches)
+        residual = float(np.max(np.abs(left)))
+        return CurveBalance(curve, state, float(acceleration), residual, patches, way, moves)
+
+    def _fresh_slopes(self, state, acceleration, left):
+        """`Slopes` by differences in all unknowns."""
+        moved = self.left(*self.moved(state, acceleration, np.diag(self.steps)))
+        slopes = ((moved - left) / self.steps[:, None]).T
+        largest = np.max(np.abs(slopes), axis=1)
+        weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
+        slopes *= weights[:, None]
+        return Slopes(np.linalg.pinv(slopes, RANK * 1e-2) * weights, weights, np.max(np.abs(slopes), axis=0) ** 2)
 
 
 @np.errstate(all="ignore")  # what overflows is no balance
-def solve_curve(model, known, curve, limit, aside=0.0):
+def solve_curve(turning, known, curve, limit):
     """The `CurveBalance` of a curve, from that of another: directly, or by way of curves between both, as near to each
     other as it takes. A ``residual`` above the limit (m/s^2) means that none was found; it is then of the last curve
     tried."""
-    reached, part = 0.0, 1.0
-    before = known
+    reached, part, straight_on, before = 0.0, 1.0, True, known
     while reached < 1.0:
         target = known.curve.towards(curve, min(reached + part, 1.0))
-        faster = before.state.copy()
-        omegas = faster[: STATE_SIZE * len(model.bodies.mass)].reshape(-1, STATE_SIZE)[:, OMEGA:]
-        omegas *= target.speed / before.curve.speed
-        found = _solve(_Turning(model, target, aside), faster, before.acceleration)
+        found = turning.balance(before, target, straight_on)
         if found.residual < limit:
             before, reached, part = found, reached + part, 2.0 * part
+        elif straight_on:
+            straight_on = False
         elif part > LEAST_PART:
             part *= 0.5
         else:

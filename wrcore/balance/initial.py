@@ -95,14 +95,14 @@ def _standing(scene, model, offset):
     return state
 
 
-def static_equilibrium(scene, model):
+def static_equilibrium(scene, model, at_rest=None):
     """The vehicle of a scene in static equilibrium, centred on a tangent, perfect track, without friction, with the
-    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip.
+    load of each wheel; all bodies move at the scene's speed, wheelsets roll without slip. ``at_rest`` is its `rest`.
 
     Its state is one of the model without its drive (:func:`wrcore.dynamics.drive.undriven`). An InputError if there is
     none near the nominal position.
     """
-    at_rest = rest(scene, model)
+    at_rest = at_rest or rest(scene, model)
     state = _moving(model, at_rest)
     for k in range(len(model.bodies.wheelsets)):
         _roll_as_it_stands(scene, model, k, state)

@@ -56,7 +56,7 @@ def check_number(value, low, high, source, field, unit=""):
     ``source`` and ``field`` as for :class:`InputError`.
     """
     if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
-        raise InputError(source, field, f"expected {low:g} to {high:g} {unit}, got {short(value)}")
+        raise InputError(source, field, f"expected {f'{low:g} to {high:g} {unit}'.strip()}, got {short(value)}")
     return float(value)
 
 

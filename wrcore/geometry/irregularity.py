@@ -46,6 +46,12 @@ VERTICAL = {"low": 4.032e-7, "high": 1.080e-6}
 LATERAL = {"low": 2.119e-7, "high": 6.125e-7}
 """Roughness factor A_a, m rad."""
 
+FRA_SHARE, FRA_CUTOFF = 0.25, 0.8245
+"""Factor k, and cut-off wave number (rad/m), of the American spectra."""
+
+FRA = {"fra_5": (2.095e-5, 7.62e-6, 0.8209), "fra_6": (3.39e-6, 3.39e-6, 0.4380)}
+"""Of the FRA's track classes 5 and 6: roughness factors A_v and A_a (m rad), cut-off of cross level (rad/m)."""
+
 
 class IrregularityData(NamedTuple):
     """Irregularity for kernels; without one ``coefficients.shape[0] == 0``."""
@@ -228,11 +234,19 @@ def _check_overshoot(s, values, grid, carried, path, lines):
 
 
 def spectrum(quantity, level, omega):
-    """German (ERRI B 176 RP 1, 1993; constants as in public codes) power spectral density over wave numbers ``omega``
-    (rad/m) of the mean "level" or "alignment" (m^2/(rad/m)), or of the "cross_angle" between the rails' heights
-    (rad^2/(rad/m)), at the disturbance level "low" or "high". One-sided and per rad/m: a band's variance is the
-    integral of S over its positive wave numbers, without a further factor 2 or 2 pi."""
+    """Power spectral density over wave numbers ``omega`` (rad/m) of the mean "level" or "alignment" (m^2/(rad/m)), or
+    of the "cross_angle" between the rails' heights (rad^2/(rad/m)). One-sided and per rad/m: a band's variance is the
+    integral of S over its positive wave numbers, without a further factor 2 or 2 pi.
+
+    "low" or "high": German (ERRI B 176 RP 1, 1993; constants as in public codes). "fra_5" or "fra_6": American, of the
+    FRA's track classes 5 and 6 (X. Lei, N.-A. Noda, J. Sound Vib. 258 (2002) 147-165; constants as two public codes
+    have them alike, which those of classes 1 to 4 are not found to be)."""
     square = np.asarray(omega, float) ** 2
+    if level in FRA:
+        vertical, lateral, cross = FRA[level]
+        factor = lateral if quantity == "alignment" else vertical
+        density = FRA_SHARE * factor * FRA_CUTOFF**2 / (square + FRA_CUTOFF**2)
+        return density / HALF_BASE**2 / (square + cross**2) if quantity == "cross_angle" else density / square
     factor = (LATERAL if quantity == "alignment" else VERTICAL)[level]
     density = factor * CUTOFF_C**2 / ((square + CUTOFF_R**2) * (square + CUTOFF_C**2))
     if quantity == "cross_angle":
@@ -242,8 +256,8 @@ def spectrum(quantity, level, omega):
 
 def generate(level, seed, length, spacing, shortest, longest):
     """Arc lengths s from 0 to about ``length`` (n,) and deviations (n, 4), not faded, all in m, of random irregularity
-    with the German spectra ("low" or "high"), wavelengths from ``shortest`` to ``longest`` (m); the same seed, length
-    and spacing (m) give the same track.
+    with a :func:`spectrum`, wavelengths from ``shortest`` to ``longest`` (m); the same seed, length and spacing (m)
+    give the same track.
 
     A sum of cosines with random phases: their wave numbers are the multiples of 2 pi / period, the period being at
     least twice the length, and each carries the variance of its own share of the band. Alignment, level and cross level

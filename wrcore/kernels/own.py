@@ -187,7 +187,11 @@ def tried(own, sizes, *arguments):
 
 def finite(*values):
     """Raise an InputError without a source where a test call left something not finite."""
-    if not all(np.isfinite(value).all() for value in values):
+    try:
+        good = all(np.isfinite(np.asarray(value, float)).all() for value in values)
+    except (TypeError, ValueError):
+        good = False
+    if not good:
         raise InputError("", "", f"expected finite numbers from a test call, got {list(map(np.asarray, values))}")
 
 

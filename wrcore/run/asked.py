@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError
 from wrcore.run.run import Run
 
 COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": operator.gt}
@@ -24,10 +24,14 @@ def on_grid(t: float, dt: float) -> float:
 
 
 class Named(dict[str, float]):
-    """Channels by name, for functions of a user's own."""
+    """Channels by name, for functions of a user's own; what follows from them is found when it is asked for."""
+
+    def __init__(self, values: Mapping[str, float], find: Callable[[str], Mapping[str, float]]) -> None:
+        super().__init__(values)
+        self._find = find
 
     def __missing__(self, name: str) -> float:
-        raise InputError("session", "end", one_of(self, name))
+        return self._find(name)[name]
 
 
 def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]], bool]]:

@@ -1,10 +1,15 @@
-"""Channels that follow from those of contacts: forces on the rails, wear and pressure of wheels, sum of Y of wheelsets.
+"""Channels that follow from those of contacts: forces on the rails, wear, pressure and rolling radius of wheels, sum of
+Y and conicity of wheelsets.
 
 Definitions. Q: vertical force of a wheel on its rail, positive downwards. Y: its lateral force on the rail in the plane
 of the track, positive to the field side (a flange pushes with positive Y). Y/Q: their quotient wheel by wheel. Sum of
 Y: lateral force of a wheelset on the track, to the left. Wear number T gamma: |Fx xi + Fy eta| summed over the patches
 (N), and with spin |Fx xi + Fy eta + Mz phi|. Creep power: what friction dissipates, -V (Fx xi + Fy eta + Mz phi) summed
-over the patches (W). Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b).
+over the patches (W). Greatest pressure: of each patch; of ellipses 3 N/(2 pi a b). Rolling radius: distance of a
+wheel's contact points from the axle, by their normal forces where there are several. Its difference, left less right,
+is positive where it steers a wheelset back that is off to the left (EN 15302). Effective conicity: this difference over
+twice the wheelset's displacement from the middle of both contacts' rails (Wickens, Fundamentals of Rail Vehicle
+Dynamics (2003)); of a cone its slope, to first order.
 
 The work of a patch per metre run, -(Fx xi + Fy eta + Mz phi), is what friction turns into heat and wear, never negative
 (Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), section 1.3). T gamma is its amount without the
@@ -22,13 +27,21 @@ import numpy as np
 from wrcore.geometry.track import SIDES
 
 UNLOADED = 1e3  # below this Q counts as no contact and Y/Q is left out, N
+CENTRED = 1e-4  # nearer to the middle of its rails a wheelset has no conicity, m
 
 OF_WHEELS = {
     "Q": "Q_N", "Y": "Y_N", "Y_over_Q": "Y_over_Q", "T_gamma": "T_gamma_N", "T_gamma_spin": "T_gamma_spin_N",
-    "creep_power": "creep_power_W", "p_max": "p_max_Pa",
+    "creep_power": "creep_power_W", "p_max": "p_max_Pa", "rolling_radius": "rolling_radius_m",
 }  # fmt: skip
-OF_WHEELSETS = {"sum_Y": "sum_Y_N"}
+OF_WHEELSETS = {
+    "sum_Y": "sum_Y_N", "rolling_radius_difference": "rolling_radius_difference_m",
+    "effective_conicity": "effective_conicity",
+}  # fmt: skip
 """Names in ``output.channels`` of a scene, and the channels of wheels or wheelsets that they stand for."""
+
+POSE = {"y_m", "z_m", "roll_rad", "yaw_rad"}
+PLACES = {"x_m", "y_m", "z_m", "u_rail_m", "N_N"}
+"""Channels of wheelsets and of wheels from which rolling radii follow."""
 
 Groups = Mapping[str, Mapping[str, np.ndarray]]
 
@@ -56,6 +69,20 @@ def creep_work(fx, fy, mz, xi, eta, phi):
     sliding = fx * xi + fy * eta
     whole = sliding + mz * phi
     return tuple(np.nansum(part, axis=-1) for part in (np.abs(sliding), np.abs(whole), -whole))
+
+
+def rolling_radius(body: Mapping[str, np.ndarray], contact: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Rolling radius (n,) of a wheel, m, from its wheelset's pose and its contacts; NaN off the rail."""
+    roll, yaw = body["roll_rad"][:, None], body["yaw_rad"][:, None]
+    ahead, aside, up = contact["x_m"], contact["y_m"] - body["y_m"][:, None], contact["z_m"] - body["z_m"][:, None]
+    along = np.cos(roll) * (np.cos(yaw) * aside - np.sin(yaw) * ahead) + np.sin(roll) * up
+    return _by_load(contact, np.sqrt(ahead**2 + aside**2 + up**2 - along**2))
+
+
+def _by_load(contact, values):
+    """Means (n,) of what patches (n, patches) have, by their normal forces; NaN where there is none."""
+    load = np.nansum(contact["N_N"], axis=-1)
+    return np.nansum(contact["N_N"] * values, axis=-1) / np.where(load > 0.0, load, np.nan)
 
 
 def quotient(vertical: np.ndarray, lateral: np.ndarray) -> np.ndarray:
@@ -87,25 +114,40 @@ def derived_channels(groups: Groups, group: str, speed: float) -> dict[str, Call
         found["creep_power_W"] = partial(_power, contact, groups[wheelset], speed)
     if {"N_N", "a_m", "b_m"} <= contact.keys():
         found["p_max_Pa"] = partial(_pressure, contact)
+    if PLACES <= contact.keys() and POSE <= groups[wheelset].keys():
+        found["rolling_radius_m"] = partial(rolling_radius, groups[wheelset], contact)
     return {name: compute for name, compute in found.items() if name not in contact}
 
 
 def _of_wheelset(groups, group, speed):
-    wheels = {side: f"{group}/{side}" for side in SIDES}
-    if "sum_Y_N" in groups[group] or not all(wheel in groups for wheel in wheels.values()):
+    wheels = {side: groups.get(f"{group}/{side}") for side in SIDES}
+    if None in wheels.values():
         return {}
-    known = {side: (groups[wheel], derived_channels(groups, wheel, speed)) for side, wheel in wheels.items()}
-    if not all("Y_N" in stored or "Y_N" in derived for stored, derived in known.values()):
-        return {}
-    return {"sum_Y_N": partial(_sum, known)}
+    known = {side: (wheel, derived_channels(groups, f"{group}/{side}", speed)) for side, wheel in wheels.items()}
+    found: dict[str, Callable[[], np.ndarray]] = {}
+    if all("Y_N" in stored or "Y_N" in derived for stored, derived in known.values()):
+        found["sum_Y_N"] = partial(_sum, known, "Y_N")
+    if all("rolling_radius_m" in stored or "rolling_radius_m" in derived for stored, derived in known.values()):
+        found["rolling_radius_difference_m"] = partial(_sum, known, "rolling_radius_m")
+        if "y_m" in groups[group] and all(PLACES <= wheel.keys() for wheel in wheels.values()):
+            found["effective_conicity"] = partial(_conicity, known, groups[group])
+    return {name: compute for name, compute in found.items() if name not in groups[group]}
 
 
 def _known(stored, derived, name):
     return stored[name] if name in stored else derived[name]()
 
 
-def _sum(known):  # here and below: functions of the file, which other processes find
-    return sum(SIDES[side] * _known(*known[side], "Y_N") for side in SIDES)
+def _sum(known, name):  # here and below: functions of the file, which other processes find
+    return sum(SIDES[side] * _known(*known[side], name) for side in SIDES)
+
+
+def _conicity(known, body):
+    wheels = {side: stored for side, (stored, _) in known.items()}
+    rails = (_by_load(wheel, wheel["y_m"] - SIDES[side] * wheel["u_rail_m"]) for side, wheel in wheels.items())
+    displacement = body["y_m"] - 0.5 * sum(rails)
+    off = np.where(np.abs(displacement) > CENTRED, displacement, np.nan)
+    return _sum(known, "rolling_radius_m") / (2.0 * off)
 
 
 def _quotient(contact, forces):

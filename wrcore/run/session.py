@@ -259,8 +259,8 @@ class Session:
         ----------
         end : float, str or callable
             A time, s; a condition such as ``"wheelset.y_m > 0.004"`` (a name of :meth:`channels`, ``<`` or ``>``, a
-            number); or a function of all :meth:`channels` that says whether it holds. It is seen if it holds at the
-            end of a step. Where it holds already, the session stays.
+            number); or a function of all :meth:`channels`, and of what follows from them, that says whether it holds.
+            It is seen if it holds at the end of a step. Where it holds already, the session stays.
         dt : float
             Length of the steps, s.
         latest : float
@@ -284,7 +284,7 @@ class Session:
             while self.time < end and self.status == "running":
                 self._reach(min(on_grid(self.time + dt, dt), float(end)))
             return self.time >= end
-        names, holds = condition_of(end) if isinstance(end, str) else ((), lambda values: end(Named(values)))
+        names, holds = ((), lambda values: end(Named(values, self.channels))) if callable(end) else condition_of(end)
         while not holds(self.channels(*names)):
             if self.time >= latest or self.status != "running":
                 return False

@@ -225,7 +225,7 @@ class Simulation:
             contacts = self._contact_channels(name, patches[:, k])
             if "contact" in wanted:
                 groups |= contacts
-            moving = {name: _body_channels(*motion, ("velocity",))}
+            moving = {name: _body_channels(*motion, ("pose", "velocity"))}
             for group, channels in asked_for(wanted, contacts | moving, scene.data["speed"]).items():
                 groups[group] = groups.get(group, {}) | channels
             if "contact" in wanted and scene.detection == "auto":

@@ -10,19 +10,18 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wrcore.analysis.response.frequency_response import observable
-from wrcore.analysis.stability.stability import rising
-from wrcore.balance.curve import Curve, CurveBalance, curve_model, on_circle, solve_curve
+from wrcore.analysis.stability.stability import rising, straight_ahead
+from wrcore.balance.curve import Curve, CurveBalance, Turning, at_rest, solve_curve
 from wrcore.balance.initial import LARGEST_REST_ON_STRIPS
-from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.drive import undriven
+from wrcore.contact.reduction import CHANNELS
+from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY, angles
 from wrcore.dynamics.marker import FRAME
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.path_pieces import CANT_BASE
 from wrcore.geometry.track import LEAST_RADIUS, SIDES, WIDENED
 from wrcore.run.run import Run
-from wrcore.run.simulation import ArcLengths, Simulation
-from wrcore.scene.description import Scene, Source, as_scene, static_equilibrium
+from wrcore.scene.description import Scene, Source, as_scene
 from wrcore.vehicle.description import GRAVITY
 
 LARGEST_REST = 1e-4
@@ -102,8 +101,7 @@ def quasi_static_curving(
     ]
     curving = Curving(scene)
     found = dict(curving.follow(curves))
-    tables = [curving.table(curve, found[k]).assign(radius_m=radii[k]) for k, curve in enumerate(curves)]
-    return pd.concat(tables, ignore_index=True)
+    return curving.table(radii, curves, [found[k] for k in range(len(curves))])
 
 
 class Curving:
@@ -116,12 +114,11 @@ class Curving:
                 raise InputError(scene.source, f"elements.{item['name']}", expected)
         if np.any(scene.vehicle.joints.bodies == FRAME):
             raise InputError(scene.source, "vehicle", "expected one without joints to the moving frame")
-        self.simulation = Simulation(observable(scene))
-        self.model = undriven(self.simulation.model)
-        self.aside = WIDENED[scene.data["track"]["widened"]]
-        self.limit = LARGEST_REST_ON_STRIPS if self.model.contact.strips.strips else LARGEST_REST
-        state = static_equilibrium(self.simulation.scene, self.model).state
-        self.straight = CurveBalance(Curve(0.0, 0.0, 0.0, float(self.model.speed)), state, 0.0, 0.0)
+        self.scene = observable(scene)
+        model, state = straight_ahead(self.scene)
+        self.turning = Turning(model, WIDENED[scene.data["track"]["widened"]])
+        self.limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
+        self.straight = at_rest(model, state)
 
     def follow(self, curves):
         """Pairs of a curve's number and its `CurveBalance`, from the widest curve on, to the left and to the right."""
@@ -129,36 +126,42 @@ class Curving:
             known = self.straight
             numbers = [k for k, curve in enumerate(curves) if math.copysign(1.0, curve.curvature) == side]
             for k in sorted(numbers, key=lambda k: abs(curves[k].curvature)):
-                found = solve_curve(self.model, known, curves[k], self.limit, self.aside)
+                found = solve_curve(self.turning, known, curves[k], self.limit)
                 known = found if found.residual < self.limit else known
                 yield k, found
 
-    def observe(self, found: CurveBalance) -> Run:
-        """The channels of a balance."""
-        at, n = STATE_SIZE * self.model.bodies.wheelsets, len(self.model.bodies.mass)
-        self.simulation.arc_lengths = ArcLengths(found.state[at], found.state[: STATE_SIZE * n : STATE_SIZE])
-        model = curve_model(self.model, found.curve, self.aside)
-        return self.simulation.observe(model, np.zeros(1), on_circle(model, found.curve, found.state[None]))
+    def observe(self, found: list[CurveBalance]) -> Run:
+        """Channels of balances, one after the other as if over time."""
+        vehicle, groups = self.scene.vehicle, {}
+        states, patches = (np.array([getattr(one, name) for one in found]) for name in ("state", "patches"))
+        for body, name in enumerate(vehicle.body_names):
+            part = states[:, STATE_SIZE * body : STATE_SIZE * (body + 1)]
+            roll, _, yaw = angles(part[:, EULER:VELOCITY])
+            groups[name] = {"y_m": part[:, 1], "roll_rad": roll, "yaw_rad": yaw}
+        for k, name in enumerate(vehicle.wheelset_names):
+            for side, rows in zip(SIDES, np.moveaxis(patches[:, k], 1, 0), strict=True):
+                groups[f"{name}/{side}"] = {key: rows[..., column] for key, column in CHANNELS.items()}
+        return Run(self.scene.data, "completed", "", np.arange(len(found)), groups)
 
-    def table(self, curve: Curve, found: CurveBalance) -> pd.DataFrame:
-        """Rows of :func:`quasi_static_curving` of a curve."""
-        run, rows = self.observe(found), []
-        good = 1.0 if found.residual < self.limit else np.nan
-        side, bend = math.copysign(1.0, curve.curvature), abs(curve.curvature)
-        for name in self.simulation.scene.vehicle.wheelset_names:
+    def table(self, radii: np.ndarray, curves: list[Curve], found: list[CurveBalance]) -> pd.DataFrame:
+        """Rows of :func:`quasi_static_curving`."""
+        run, parts = self.observe(found), []
+        residuals, slowing = (np.array([getattr(one, name) for one in found]) for name in ("residual", "acceleration"))
+        good = np.where(residuals < self.limit, 1.0, np.nan)
+        bends, cants, _, speeds = np.abs(curves).T
+        cants *= np.copysign(1.0, [curve.curvature * curve.cant for curve in curves])
+        for name in self.scene.vehicle.wheelset_names:
             for wheel in SIDES:
-                values = {key: run[name][key][0] for key in ("y_m", "yaw_rad")}
-                contact = run[f"{name}/{wheel}"]
-                values |= {key: contact[key][0] for key in ("Q_N", "Y_N", "Y_over_Q", "T_gamma_N")}
-                values |= {"sum_Y_N": run[name].sum_Y_N[0], "acceleration_m_per_s2": found.acceleration}
-                rows.append({
-                    "radius_m": side / bend if bend else math.inf, "speed_m_per_s": curve.speed,
-                    "cant_m": side * curve.cant,
-                    "cant_deficiency_m": CANT_BASE * curve.speed**2 * bend / GRAVITY - side * curve.cant,
+                values = {key: run[name][key] for key in ("y_m", "yaw_rad")}
+                values |= {key: run[f"{name}/{wheel}"][key] for key in ("Q_N", "Y_N", "Y_over_Q", "T_gamma_N")}
+                values |= {"sum_Y_N": run[name].sum_Y_N, "acceleration_m_per_s2": slowing}
+                parts.append(pd.DataFrame({
+                    "radius_m": radii, "speed_m_per_s": speeds, "cant_m": cants,
+                    "cant_deficiency_m": CANT_BASE * speeds**2 * bends / GRAVITY - cants,
                     "wheelset": name, "side": wheel, **{key: good * value for key, value in values.items()},
-                    "residual_m_per_s2": found.residual,
-                })  # fmt: skip
-        return pd.DataFrame(rows)
+                    "residual_m_per_s2": residuals,
+                }))  # fmt: skip
+        return pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
 
 
 @checked
@@ -203,8 +206,8 @@ def roll_coefficient(scene: Source, cant: Annotated[float, Within(1e-4, 0.5, "m"
     if not found.residual < curving.limit:
         expected = f"expected one on which the vehicle has a balance, got {cant:g}"
         raise InputError("roll_coefficient", "cant", f"{expected}: {found.residual:.2g} m/s^2 are left")
-    run = curving.observe(found)
-    names = curving.simulation.scene.vehicle.body_names
+    run = curving.observe([found])
+    names = curving.scene.vehicle.body_names
     roll = -np.array([run[name].roll_rad[0] for name in names])
     return pd.DataFrame({
         "body": names, "cant_m": cant, "roll_rad": roll, "roll_coefficient": roll / math.asin(cant / CANT_BASE)

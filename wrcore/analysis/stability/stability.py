@@ -37,9 +37,11 @@ def straight_ahead(scene):
     """Model of a scene on a tangent, perfect track, without motors, brakes and controller (they have no steady state),
     and the state in which its vehicle is in static equilibrium at the track's centre, wherever the scene lets it start.
     """
-    model, _ = compile_scene(scene)
+    parts: dict = {}
+    model, _ = compile_scene(scene, shared=parts)
+    (at_rest,) = (part for (name, *_), part in parts.items() if name == "rest")
     model = undriven(model)._replace(track=TrackModel(True, tangent_path(), no_irregularity()))
-    return model, static_equilibrium(scene, model).state
+    return model, static_equilibrium(scene, model, at_rest).state
 
 
 def at_speed(model, state, speed, elapsed=0.0):
