@@ -1,4 +1,5 @@
-"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``."""
+"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``, and what wheels see of them
+and of their own shapes."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from wrcore.contact.seen_rail import REACH, WheelOnSlices
-from wrcore.contact.seen_table import BLEND, SeenTable, seen_table
-from wrcore.dynamics.crossing import crossing_of
+from wrcore.contact.seen_table import BLEND, SeenTable, seen_table, turned_table
+from wrcore.dynamics.crossing import crossing_of, laid_at, laid_under
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry.crossing import Crossing
@@ -109,28 +110,41 @@ def _check_joints(slices, plain, source):
             raise InputError(source, "track.crossing.slices", f"{expected}, got {got} at u = {u[worst]:.3f} m")
 
 
-def seen_by_wheels(crossing, pairs):
+def seen_by_wheels(crossing, shapes, pairs, starts):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
-    and the `wrcore.dynamics.crossing.Crossing`."""
+    and the `wrcore.dynamics.crossing.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc lengths
+    (k,) at which wheelsets begin, m."""
     known: dict[tuple, int] = {}
     tables: list[SeenTable] = []
-    geometries, of_wheels = [], []
+    geometries, of_wheels, laid = [], [], []
     for k, pair in enumerate(pairs):
-        slices = crossing.rails[k % 2]
-        if slices is None:
+        slices = crossing.rails[k % 2] if crossing else None
+        shape, angle = shapes[k] if shapes else (None, 0.0)
+        if slices is None and shape is None:
             geometry = pair.geometry
-            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 3))))
+            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 4))))
             of_wheels.append(-1)
+            laid.append(np.zeros(8))
             continue
-        key = id(pair.wheel), id(pair.rail), pair.rolling_radius
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(slices), id(shape)
         if key not in known:
             known[key] = len(tables)
-            wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-            tables.append(seen_table(wheel, pair.rail, crossing.backwards))
+            tables.append(turned_table(pair, shape) if slices is None else _seen_rail(pair, slices, crossing.backwards))
+        table = tables[known[key]]
         of_wheels.append(known[key])
-        geometries.append(tables[known[key]].geometry)
-    found = crossing_of(tables, np.reshape(of_wheels, (-1, 2)))
-    return tuple(geometries), found._replace(begin=found.begin + crossing.at)
+        geometries.append(table.geometry)
+        if slices is None:
+            radius = 0.5 * (pairs[k - k % 2].rolling_radius + pairs[k + 1 - k % 2].rolling_radius)
+            laid.append(laid_under(table, starts[k // 2], angle, radius, shape.shortest))
+        else:
+            laid.append(laid_at(table, table.begin + crossing.at, pair.half_distance))
+    return tuple(geometries), crossing_of(tables, of_wheels, laid)
+
+
+def _seen_rail(pair, slices, backwards):
+    """`SeenTable` of slices in place of a pair's rail."""
+    wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
+    return seen_table(wheel, pair.rail, backwards)
 
 
 @cache
