@@ -207,7 +207,7 @@ def test_its_picture_shows_the_load_going_over():
 def test_its_page_is_read_and_run():
     text = (ROOT / "reports" / "crossings.md").read_text(encoding="utf-8")
     blocks = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
-    assert len(blocks) == 2
+    assert len(blocks) == 3
     for block in blocks:
         assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 

@@ -118,14 +118,14 @@ class WheelOnSlices:
             _see(self._wheel_geometry, pose, x, heights, np.zeros((0, 0)), u, section)
         return seen
 
-    def turned(self, angles, u, beyond):
+    def turned(self, places, u, beyond):
         """Sections (n, 4, m) over rail coordinates (m,) that the wheel of a wheelset in the middle sees of a level
-        rail, turned forward by angles (n,), rad, where it reaches ``beyond(angle, x, strips)``, (stations, m), its
-        round at stations x and wheel coordinates ``strips``, m."""
+        rail at places (n,), where it reaches ``beyond(place, x, strips)``, (stations, m), its round, or the rail is as
+        much higher, at stations x and wheel coordinates ``strips``, m."""
         geometry, pose, x = self._wheel_geometry, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
-        strips, seen = _strips_over(geometry, pose, u), np.zeros((angles.size, 4, u.size))
-        for angle, section in zip(angles, seen, strict=True):
-            reach = beyond(angle, x, strips)
+        strips, seen = _strips_over(geometry, pose, u), np.zeros((places.size, 4, u.size))
+        for place, section in zip(places, seen, strict=True):
+            reach = beyond(place, x, strips)
             _see(geometry, pose, x, reach, reach, u, section)
         return seen
 

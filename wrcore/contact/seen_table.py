@@ -4,9 +4,9 @@ The sections of `wrcore.contact.seen_rail`, for a wheelset in the middle and wit
 `S_STEP` apart; between these runs a cubic Hermite polynomial along the track. Before the first and behind the last
 slice the rail goes over, along `BLEND`, into one that is the same everywhere, and stays that.
 
-A wheel out of round is seen over its angle in the same way: round it goes on for ever. Its sections are the plain
-rail's and what the wheel reaches further at strips of some radii, with splines between these; of a wheel that is round
-in part the table goes over into the plain rail there, as it is.
+A wheel out of round is seen over its angle in the same way, a corrugated rail over a wave: both go on for ever. Their
+sections are the plain rail's and what the wheel reaches further, or the rail is higher, at strips of some radii, with
+splines between these; of a wheel that is round in part the table goes over into the plain rail there, as it is.
 
 A wheelset that is moved sideways sees the section through strips of a radius dR larger or smaller: it lies
 x^2 dR/(2 R^2) higher for a wheel that touches x ahead of its axle. One that yaws sees it as far ahead as its wheel is.
@@ -109,8 +109,8 @@ def seen_table(pair, plain, backwards=False):
     return _with_bounds(SeenTable(float(s[0]), S_STEP, sections, wide.strips(u), geometry, np.zeros(0)))
 
 
-def turned_table(pair, shape):
-    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound`."""
+def shape_table(pair, shape):
+    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound`, or the rail of a `Corrugation`."""
     from scipy.interpolate import make_interp_spline
 
     plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
@@ -123,8 +123,8 @@ def turned_table(pair, shape):
     radii, some = np.unique(np.round(1.0 / curvatures[own], 6), return_index=True)
     some = own[some[np.unique(np.searchsorted(radii, np.linspace(radii[0], radii[-1], COLUMNS)))]]
     radii = 1.0 / curvatures[some]
-    angles = first + step * np.arange(count)
-    seen = wide.turned(angles, u[some], lambda angle, x, strips: shape.reach(radii, angle, x))
+    places = first + step * np.arange(count)
+    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(radii, place, x))
     seen = make_interp_spline(radii, seen, k=min(3, radii.size - 1), axis=2)(
         np.clip(1.0 / curvatures, radii[0], radii[-1])
     )[:, [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]]
@@ -140,7 +140,7 @@ def turned_table(pair, shape):
     for k in (0, -1):
         sections[k] = 0.0
         sections[k, 0] = everywhere
-    strips = np.stack([curvatures, leads - at])
+    strips = np.stack([curvatures, leads - at * shape.level])
     geometry = _plain_geometry(pair, plain, u, everywhere)
     return _with_bounds(SeenTable(first, step, sections, strips, geometry, np.zeros(0)), faded=True)
 

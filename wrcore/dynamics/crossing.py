@@ -5,7 +5,8 @@ The kernels of search and patches know one rail profile per wheel. On such a rai
 (`wrcore.contact.seen_table`), interpolated for the arc length at which it is, written into the wheel's own arrays
 before its contact is looked for. Where nothing changes nothing is written.
 
-A wheel out of round is a round one on a rail whose sections come again with each turn. Its angle is that of rolling
+A wheel out of round is a round one on a rail whose sections come again with each turn, as a corrugated rail's do with
+each wave. Its angle is that of rolling
 without slip, s over the mean of the wheelset's radii: it follows from the state. A run begins with round wheels; they
 take their shape over the first half turn.
 """
@@ -30,11 +31,12 @@ from wrcore.kernels.jit import FUSED, jit
 TRAVEL = 0.02
 """Longest step of a run while a wheelset is on such a rail, m."""
 
-BEGIN, STEP, LAST, PERIOD, LEAD, LEAN, START, STRIDE = range(8)
+BEGIN, STEP, LAST, PERIOD, LEAD, LEAN, START, END, FADE, STRIDE = range(10)
 """Of a wheel's table: arc length of its first section, distance of the sections (m), number of the last one, distance
 after which they come again (in steps; 0: never), how far ahead a yaw moves what the wheel sees (m/rad), whether
-patches lean with the rail (1) or it is level (0), arc length from which the wheel goes out of round (-inf: from
-everywhere), and longest step on it (m)."""
+patches lean with the rail (1) or it is level (0), arc lengths between which sections that come again are there, length
+over which these come and go (m), and longest step on all (m)."""
+LAID = 10
 
 PLACE, YAW, IN_STRETCH = range(3)
 """What is known of the section that a wheel's arrays hold: its place in the table, in steps, the yaw it is seen in,
@@ -52,32 +54,42 @@ class Crossing(NamedTuple):
     bounds: np.ndarray  # (tables, 1 + stretches, rows, blocks)
     tables: np.ndarray
     """(k, 2) int: the table of each wheel, -1 for a round one on a rail that is the same everywhere."""
-    laid: np.ndarray  # (k, 2, 8): `BEGIN` to `STRIDE` of each wheel
+    laid: np.ndarray  # (k, 2, LAID): `BEGIN` to `STRIDE` of each wheel
 
 
 def no_crossing():
     """A `Crossing` where no rail changes."""
     sizes = (0, 0, 2, ROWS, 0), (0, 2, 0), (0, 0, 0, 0)
-    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2), np.int64), np.zeros((0, 2, 8)))
+    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2), np.int64), np.zeros((0, 2, LAID)))
 
 
 def crossing_of(tables, of_wheels, laid):
-    """`Crossing` of a list of `SeenTable`, the table of each wheel (2 k,), -1: none, and how it is laid (2 k, 8)."""
+    """`Crossing` of a list of `SeenTable`, the table of each wheel (2 k,), -1: none, and how it is laid (2 k, LAID)."""
     parts = (_stacked([getattr(one, name) for one in tables]) for name in ("sections", "strips", "bounds"))
-    return Crossing(*parts, np.reshape(of_wheels, (-1, 2)).astype(np.int64), np.reshape(laid, (-1, 2, 8)))
+    return Crossing(*parts, np.reshape(of_wheels, (-1, 2)).astype(np.int64), np.reshape(laid, (-1, 2, LAID)))
 
 
 def laid_at(table, begin, lead):
     """How the `SeenTable` of a rail is laid under a wheel whose tape circle is ``lead`` (m) from the middle."""
-    return [begin, S_STEP, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, TRAVEL]
+    return [begin, S_STEP, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, math.inf, 1.0, TRAVEL]
 
 
 def laid_under(table, start, angle, radius, shortest):
     """How the `SeenTable` of a wheel out of round is laid: at the arc length ``start`` (m) the ``angle`` (rad) of a
     wheelset with a mean ``radius`` (m) touches; what is not round is no shorter than ``shortest`` (m)."""
     begin, step = start + (table.begin - angle) * radius, table.step * radius
-    stride = max(min(TRAVEL, 0.25 * shortest), 1e-3)
-    return [begin, step, len(table.sections) - 1, 2.0 * math.pi / table.step, 0.0, 0.0, start, stride]
+    turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)
+    last, fade = len(table.sections) - 1, 0.5 * turn * radius
+    return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]
+
+
+def laid_along(table, corrugation, lead):
+    """As `laid_at`, of a `Corrugation`."""
+    begin, last, wave = corrugation.begin, len(table.sections) - 1, corrugation.wavelength
+    stride, end = min(TRAVEL, 0.25 * wave), begin + corrugation.length
+    return [
+        begin + table.begin, table.step, last, wave / table.step, lead, 1.0, begin, end, corrugation.fade, stride
+    ]  # fmt: skip
 
 
 def _stacked(arrays):
@@ -105,7 +117,11 @@ def lay_sections(model, state, work):
             geometry, laid = contact_of(model.contact, k, wheel).geometry, crossing.laid[k, wheel]
             row, known, last = work.motions[k, wheel], work.seen[k, wheel], laid[LAST]
             yaw = row[MOTION.side] * row[MOTION.ex]
-            place = _place_of(laid, s + laid[LEAD] * yaw)
+            place, share = _place_of(laid, s + laid[LEAD] * yaw), 1.0
+            if laid[PERIOD] > 0.0:
+                share = min(s - laid[START], laid[END] - s) / laid[FADE]
+                if share <= 0.0:
+                    place = last
             if not place > 0.0:  # a stage that is not finite, too
                 place = 0.0
             place = min(place, last)
@@ -121,7 +137,6 @@ def lay_sections(model, state, work):
                 known[IN_STRETCH], gaps = stretch, geometry.zone_gaps
                 for i in range(gaps.shape[0]):
                     copy_into(gaps[i], crossing.bounds[table, stretch, i])
-            share = 2.0 * (s - laid[START]) / (laid[STEP] * laid[PERIOD]) if laid[PERIOD] > 0.0 else 1.0
             interpolate(
                 crossing.sections[table], crossing.strips[table], laid, place, yaw / laid[STEP], share, work.section,
                 geometry.rail, geometry.along, model.contact.reduction == MAXIMUM,
@@ -139,7 +154,7 @@ def _place_of(laid, s):
 @jit(allocates=False)
 def interpolate(sections, strips, laid, place, yaw, share, scratch, rail, along, curved):
     """Write the section at a place, for a wheel that yaws by so many steps per metre, into the nodes of a rail; with
-    second derivatives if it is ``curved``. Below a ``share`` of 1 the wheel goes out of round yet. ``scratch`` is
+    second derivatives if it is ``curved``. Below a ``share`` of 1 it goes over into the plain rail. ``scratch`` is
     (ROWS + 4, m)."""
     last, begin, size = int(laid[LAST]) - 1, 0, rail.shape[0]
     while begin < size:  # runs of nodes between the same two sections
@@ -152,8 +167,7 @@ def interpolate(sections, strips, laid, place, yaw, share, scratch, rail, along,
                 _mix(sections[i, 0, row], sections[i + 1, 0, row], sections[i, 1, row], sections[i + 1, 1, row],
                      scratch[ROWS:], begin, end, scratch[row])  # fmt: skip
         begin = end
-    if share < 1.0:
-        share = max(share, 0.0)
+    if 0.0 < share < 1.0:
         _fade(sections[0, 0], share * share * (3.0 - 2.0 * share), size, scratch)
     _lay_nodes(strips[0], scratch, rail, along, curved)
     if laid[LEAN] == 0.0:
@@ -253,5 +267,6 @@ def shorten_step(model, state, work, clock, at):
                 place, left = _place_of(laid, s), laid[STRIDE]
                 if place > laid[LAST]:
                     left = max((PAD + laid[PERIOD] - place) * laid[STEP], left)
+                left = max(left, laid[START] - s, s - laid[END])
             if speed * clock[at] > left:
                 clock[at] = left / speed

@@ -81,6 +81,8 @@ class OutOfRound:
     flats: tuple
     waves: tuple = ()
     """Each a `Wave` or `Measured`."""
+    level = True
+    """Whether patches stay level under it."""
 
     def deviation(self, angles):
         """What its radius is longer at angles (rad) than that of the circle, m."""

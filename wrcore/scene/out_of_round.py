@@ -9,6 +9,7 @@ from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
+from wrcore.scene.crossing import refuse_tables
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01
@@ -37,9 +38,7 @@ def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
         shapes.append((shape, angle))
     if not any(shape for shape, _ in shapes):
         return ()
-    if data["contact"]["patch"] == "tabulated":
-        expected = "expected maximum, moment or exact with wheels out of round: tables are of round ones"
-        raise InputError(source, "contact.patch", f"{expected}, got tabulated")
+    refuse_tables(data, "wheels out of round", source)
     return tuple(shapes)
 
 

@@ -198,12 +198,7 @@ def cases(name, path):
     return [case for _, case in grouped if not case.flag.fillna("").str.contains(REFUSED).any()]
 
 
-MISPLACED = pytest.mark.xfail(strict=True, reason="one place in twenty lies 2.9 mm off along the track")
-
-
-@pytest.mark.parametrize("name", [
-    "cross_nose", "wing_rail", pytest.param("cross+wing_extd", marks=MISPLACED), "uk_interrupt_v2",
-])  # fmt: skip
+@pytest.mark.parametrize("name", ["cross_nose", "wing_rail", "cross+wing_extd", "uk_interrupt_v2"])
 def test_crossings_against_contact(name):
     path = contact.reference_path("crossing_cases")
     chosen = cases(name, path)[::7]
