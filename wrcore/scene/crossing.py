@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from wrcore.contact.seen_rail import REACH, WheelOnSlices
-from wrcore.contact.seen_table import BLEND, SeenTable, seen_table, shape_table
+from wrcore.contact.seen_rail import REACH
+from wrcore.contact.seen_table import BLEND, SeenTable, shape_table
 from wrcore.dynamics.crossing import LAID, crossing_of, laid_along, laid_at, laid_under
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
@@ -18,6 +18,7 @@ from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
+from wrcore.scene.kept_tables import kept_table
 from wrcore.scene.pairs import find_file
 
 JOINED = 1e-4
@@ -151,7 +152,7 @@ def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
         if key not in known:
             known[key] = len(tables)
             tables.append(
-                _seen_rail(pair, slices, crossing.backwards) if slices is not None else shape_table(pair, shape or wave)
+                kept_table(pair, slices, crossing.backwards) if slices is not None else shape_table(pair, shape or wave)
             )
         table = tables[known[key]]
         of_wheels.append(known[key])
@@ -164,12 +165,6 @@ def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
         else:
             laid.append(laid_at(table, table.begin + crossing.at, pair.half_distance))
     return tuple(geometries), crossing_of(tables, of_wheels, laid)
-
-
-def _seen_rail(pair, slices, backwards):
-    """`SeenTable` of slices in place of a pair's rail."""
-    wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-    return seen_table(wheel, pair.rail, backwards)
 
 
 @cache
