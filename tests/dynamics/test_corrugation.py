@@ -25,8 +25,8 @@ def test_a_wheel_rides_on_a_wave_as_geometry_has_it(wavelength, amplitude, bound
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
     table = shape_table(pair, Corrugation(wavelength, amplitude, 0.0, 10.0, 1.0, ("left",)))
     middle = round(-table.geometry.rail_start / U_STEP)
-    s, x = (table.begin + table.step * np.arange(len(table.sections)))[1:-1], np.linspace(-0.09, 0.09, 18001)
-    rise = table.sections[1:-1, 0, HEIGHT, middle] - table.geometry.rail[middle, 0]
+    s, x = (table.begin + table.step * np.arange(len(table.sections)))[2:-2], np.linspace(-0.09, 0.09, 18001)
+    rise = table.sections[2:-2, 0, HEIGHT, middle] - table.geometry.rail[middle, 0]
     wheel = RADIUS - np.sqrt(RADIUS**2 - x**2)
     expected = [(amplitude * np.cos(2.0 * math.pi / wavelength * (at + x)) - wheel).max() for at in s]
     assert rise == pytest.approx(np.array(expected), abs=bound)
@@ -74,5 +74,7 @@ def test_what_does_not_go_together_is_refused():
         load_scene(SCENES / "crossing.yaml", wave)
     with pytest.raises(InputError, match="no wheels out of round on the left rail"):
         load_scene(SCENES / "suspended_wheelset.yaml", wave | {"wheel.left.out_of_round": FLAT})
+    with pytest.raises(InputError, match="rises less than 0.2, got 0.377"):
+        load_scene(SCENES / "suspended_wheelset.yaml", wave | {"track.corrugation.amplitude": 3e-3})
     with pytest.raises(InputError, match="tables are of round wheels and smooth rails"):
         load_scene(SCENES / "suspended_wheelset.yaml", wave | {"contact.patch": "tabulated"})

@@ -8,8 +8,9 @@ from scipy.integrate import solve_ivp
 
 from tests.conftest import SCENES
 from wrcore.contact import reduction as columns
-from wrcore.contact.seen_table import AHEAD, HEIGHT, U_STEP, shape_table
+from wrcore.contact.seen_table import AHEAD, HEIGHT, PAD, ROWS, U_STEP, shape_table
 from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.dynamics.crossing import interpolate, laid_under
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
@@ -162,12 +163,24 @@ def test_what_a_wheel_reaches_is_its_geometry():
         table = shape_table(pair, shape)
         middle = round(-table.geometry.rail_start / U_STEP)
         angles = table.begin + table.step * np.arange(len(table.sections))
-        inner = np.flatnonzero(np.abs(angles) < 0.3)[1:-1]
+        inner = np.flatnonzero(np.abs(angles) < 0.3)[2:-2]
         rise = table.sections[inner, 0, HEIGHT, middle] - table.geometry.rail[middle, 0]
         assert rise == pytest.approx(lowest(deviation, 0.15)(RADIUS * angles[inner]), abs=bound)
         if shape.waves:  # dh/ds = x/R
             slope = np.gradient(rise, RADIUS * table.step)
             assert table.sections[inner, 0, AHEAD, middle] == pytest.approx(RADIUS * slope, abs=1e-5)
+
+
+def test_a_yawed_wheel_finds_the_plain_rail_beyond_its_table():
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    table = shape_table(pair, OutOfRound(RADIUS, (), (Wave(20, 1e-3),)))
+    laid, plain = np.array(laid_under(table, 0.0, 0.0, RADIUS, 0.1)), table.sections[0, 0, HEIGHT]
+    rail, along = table.geometry.rail.copy(), table.geometry.along.copy()
+    scratch = np.zeros((ROWS + 4, len(rail)))
+    for yaw in (0.0, 0.02, -0.04):
+        turn = yaw / (table.step * RADIUS)
+        interpolate(table.sections, table.strips, laid, PAD + 0.3, turn, 1.0, scratch, rail, along, False)
+        assert 0.5e-3 < np.abs(rail[:, 0] - plain).max() < 1.1e-3
 
 
 FLAT = {"flats": [{"length": 0.1, "depth": 9e-4}]}
@@ -222,6 +235,10 @@ def test_wheels_begin_round():
     ("changes", "field", "expected"),
     [
         ({"left": {"out_of_round": {"angle": 1.0}}}, "wheel.left.out_of_round", "flats, polygon or table"),
+        ({"left": {"out_of_round": {"flats": [{"length": 0.02, "depth": 2e-3}]}}}, "wheel.left.out_of_round",
+         "rises less than 0.2 along the wheel"),
+        ({"left": {"out_of_round": {"polygon": [{"order": 60, "amplitude": 2e-3}]}}}, "wheel.left.out_of_round",
+         "less than 0.2 along the wheel, got 0.261"),
         ({"left": {"out_of_round": {"flat": 1}}}, "wheel.left.out_of_round.flat", "unknown key"),
         ({"left": {"out_of_round": {"table": "no.csv"}}}, "wheel.left.out_of_round.table", "existing file"),
         ({"wheelsets": {"wheelset": {"right": {"out_of_round": {"polygon": [{"order": 0, "amplitude": 1e-4}]}}}}},

@@ -137,7 +137,7 @@ def shape_table(pair, shape):
     sections[:, 0, SECOND] += np.gradient(slope, U_STEP, axis=1)
     sections[:, 0, AHEAD:] = seen[:, 1:]
     _add_rates(sections, np.ones((count, u.size), bool))
-    for k in (0, -1):
+    for k in (0, 1, -2, -1):  # two of them, so that strips far ahead of or behind a yawed axle find the plain rail
         sections[k] = 0.0
         sections[k, 0] = everywhere
     strips = np.stack([curvatures, leads - at * shape.level])

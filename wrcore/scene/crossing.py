@@ -24,6 +24,9 @@ from wrcore.scene.pairs import find_file
 JOINED = 1e-4
 """How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
 
+STEEPEST_ALONG = 0.2
+"""Slopes along the track that a wheel is laid on: what it touches lies within `REACH` of its axle."""
+
 RUNNING = -0.03, 0.01, -0.012
 """Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
 
@@ -120,6 +123,10 @@ def read_corrugation(data, crossing, shapes, source):
             other = "track.crossing" if changes else "wheels out of round"
             expected = f"expected no {other} on the {side} rail where it is corrugated"
             raise InputError(source, "track.corrugation.rail", expected)
+    slope = 2.0 * math.pi * spec["amplitude"] / spec["wavelength"]
+    if not slope < STEEPEST_ALONG:
+        expected = f"expected a wave that rises less than {STEEPEST_ALONG:g}, got {slope:.3g}"
+        raise InputError(source, "track.corrugation.amplitude", expected)
     refuse_tables(data, "corrugated rails", source)
     return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
 

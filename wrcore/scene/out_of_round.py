@@ -9,7 +9,7 @@ from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
-from wrcore.scene.crossing import refuse_tables
+from wrcore.scene.crossing import STEEPEST_ALONG, refuse_tables
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01
@@ -54,7 +54,13 @@ def _shape(spec, radius, field, folder, source):
         waves.append(_measured(find_file(spec["table"], folder, source, f"{field}.table")))
     if not flats and not waves:
         raise InputError(source, field, "expected flats, polygon or table, got none")
-    return OutOfRound(radius, flats, tuple(waves))
+    shape = OutOfRound(radius, flats, tuple(waves))
+    around = np.linspace(0.0, TURN, 20001)
+    slope = np.abs(np.diff(shape.deviation(around))).max() / (radius * around[1])
+    if not slope < STEEPEST_ALONG:
+        expected = f"expected a surface that rises less than {STEEPEST_ALONG:g} along the wheel, got {slope:.3g}"
+        raise InputError(source, field, expected)
+    return shape
 
 
 def _measured(path):
