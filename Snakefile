@@ -21,6 +21,7 @@ include: "workflow/rules/cost.smk"
 include: "workflow/rules/sweeps.smk"
 include: "workflow/rules/hard_cases.smk"
 include: "workflow/rules/wear.smk"
+include: "workflow/rules/crossings.smk"
 include: "workflow/rules/report.smk"
 
 

@@ -235,6 +235,6 @@ def test_pages_of_the_report_open_without_a_network_and_hold_everything(smoke):
 
     pages = [smoke / "report" / "index.html", *sorted((smoke / "report").glob("[0-9]*.html"))]
     check_pages(pages)
-    assert len(pages) == 14
+    assert len(pages) == 15
     text = "".join(page.read_text("utf-8") for page in pages)
     assert all(f"{name}.png" in text for name in FIGURES + CREEP_FIGURES + CONTACT_FIGURES + BENCHMARK_FIGURES)

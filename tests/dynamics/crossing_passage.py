@@ -4,6 +4,7 @@ Every vehicle begins in steady running and goes over the crossing of config/scen
 
 import copy
 import sys
+import time
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from tests.conftest import SCENES
 from wrcore.analysis.assessment.wheels import wheelsets_of
 from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.analysis.pictures.style import save_figure
+from wrcore.dynamics.system import Equations
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import load_scene
+from wrcore.scene.description import compile_scene, load_scene
 
 TRAILER = {
     "vehicle": {"model": "trailer_vehicle", "parameters": "vehicles/trailer_vehicle.yaml", "axle_boxes": False},
@@ -52,6 +54,32 @@ def cost(changes):
     return 1.0 + (walls[1] / walls[0] - 1.0) * whole / inside
 
 
+def evaluations():
+    """Processor time (us) of a right-hand side of a wheelset: without a crossing, beside it, on it; on wheels that are
+    polygons, and with a flat where they are round."""
+    plain = copy.deepcopy(load_scene(SCENES / "crossing.yaml").data)
+    plain["vehicle"]["parameters"] = str(SCENES.parent / plain["vehicle"]["parameters"])
+    del plain["track"]["crossing"]
+    polygon, flat = {"polygon": [{"order": 10, "amplitude": 2e-5}]}, {"flats": [{"length": 0.06}]}
+    shapes = [plain | {"wheel": plain["wheel"] | {side: {"out_of_round": shape} for side in ("left", "right")}}
+              for shape in (polygon, flat)]  # fmt: skip
+    cases = {"plain": (plain, 0.5), "beside": (SCENES / "crossing.yaml", 0.5), "on it": (SCENES / "crossing.yaml", 6.4),
+             "polygons": (shapes[0], 3.0), "beside flats": (shapes[1], 0.5)}  # fmt: skip
+    return {name: _evaluation(*case) for name, case in cases.items()}
+
+
+def _evaluation(scene, place):
+    """Least processor time (us) of a right-hand side about a place (m)."""
+    model, state = compile_scene(load_scene(scene))
+    equations, states, tries = Equations(model), np.repeat(state[None, :], 2000, axis=0), []
+    states[:, 0] += np.linspace(place - 0.2, place + 0.2, len(states))
+    for _ in range(20):
+        began = time.process_time()
+        equations.at(0.0, states)
+        tries.append(time.process_time() - began)
+    return 1e6 * min(tries) / len(states)
+
+
 def main(picture):
     print("| passage | static N kN | greatest N kN | in the air ms | lowest mm |\n|---|---|---|---|---|")
     for name, changes in CASES.items():
@@ -64,6 +92,10 @@ def main(picture):
     for name in ("suspended wheelset, facing", "trailer vehicle, facing"):
         costs = [cost(CASES[name] | {"integration.method": method}) for method in ("tsit5", "rodas4")]
         print(f"| {name} | {costs[0]:.1f} | {costs[1]:.1f} |")
+    times = evaluations()
+    print("\nA right-hand side, over that without a crossing: " + ", ".join(
+        f"{name} {value / times['plain']:.2f}" for name, value in times.items()
+    ))  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -57,6 +57,7 @@ def check_config():
         for name, changes in config["critical_speed"]["variants"].items():
             place = f"critical_speed.vehicles.{vehicle} with critical_speed.variants.{name}"
             scenes[place] = (entry["scene"], entry["set"] | changes)
+    scenes["crossings.scene"] = (config["crossings"]["scene"], {})
     scenes["patch.cells"] = (config["patch"]["cells"]["scene"], config["patch"]["cells"]["set"])
     for vehicle, entry in config["patch"]["runs"]["vehicles"].items():
         for name, model in config["patch"]["runs"]["models"].items():

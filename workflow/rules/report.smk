@@ -51,6 +51,7 @@ rule study:
         rules.hard_cases_study.input,
         rules.sweeps.input,
         rules.wear_study.input,
+        rules.crossings_study.input,
         rules.ivp_study.input,
         rules.speeds_study.input,
         rules.speed_against_error.output,

@@ -98,7 +98,8 @@ class WheelOnSlices:
                              averaged_second_derivative(u, f, slope))  # fmt: skip
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
         over = np.where(np.isfinite(rail), rail - f, -BELOW)
-        along = np.ascontiguousarray(seen[AHEAD:].T)
+        level = self.out_of_round is not None and self.rail.s.size == 1
+        along = np.column_stack([*seen[AHEAD:], np.zeros(u.size) if level else seen[AHEAD]])
         return geometry._replace(along=along, over=np.column_stack([x, over])), touch
 
     def straight(self, s, u):
@@ -115,6 +116,17 @@ class WheelOnSlices:
             if abs(at + x[0] - every[first]) > _CLOSE:  # another part begins nearby
                 heights = self.rail.heights(self._where_parts_begin(at + x), u)[0]
             _see(self._wheel_geometry, pose, x, heights, np.zeros((0, 0)), u, section)
+        return seen
+
+    def turned(self, places, u, beyond):
+        """Sections (n, 4, m) over rail coordinates (m,) that the wheel of a wheelset in the middle sees of a level
+        rail at places (n,), where it reaches ``beyond(place, x, strips)``, (stations, m), its round, or the rail is as
+        much higher, at stations x and wheel coordinates ``strips``, m."""
+        geometry, pose, x = self._wheel_geometry, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
+        strips, seen = _strips_over(geometry, pose, u), np.zeros((places.size, 4, u.size))
+        for place, section in zip(places, seen, strict=True):
+            reach = beyond(place, x, strips)
+            _see(geometry, pose, x, reach, reach, u, section)
         return seen
 
     def strips(self, u):

@@ -4,6 +4,10 @@ The sections of `wrcore.contact.seen_rail`, for a wheelset in the middle and wit
 `S_STEP` apart; between these runs a cubic Hermite polynomial along the track. Before the first and behind the last
 slice the rail goes over, along `BLEND`, into one that is the same everywhere, and stays that.
 
+A wheel out of round is seen over its angle in the same way, a corrugated rail over a wave: both go on for ever. Their
+sections are the plain rail's and what the wheel reaches further, or the rail is higher, at strips of some radii, with
+splines between these; of a wheel that is round in part the table goes over into the plain rail there, as it is.
+
 A wheelset that is moved sideways sees the section through strips of a radius dR larger or smaller: it lies
 x^2 dR/(2 R^2) higher for a wheel that touches x ahead of its axle. One that yaws sees it as far ahead as its wheel is.
 """
@@ -27,6 +31,7 @@ from wrcore.contact.seen_rail import BELOW, REACH, WheelOnSlices, filled
 from wrcore.contact.seen_rail import BEND as SEEN_BEND
 from wrcore.contact.seen_rail import HEIGHT as SEEN_HEIGHT
 from wrcore.geometry.profile import ProfileCurve, averaged_second_derivative
+from wrcore.geometry.slices import RailSlices
 
 S_STEP, U_STEP = 2e-3, 3e-4
 """Distances of the nodes along and across, m."""
@@ -37,6 +42,13 @@ PER_CELL = round(SCAN_STEP / U_STEP)
 BLEND, PLAY = 0.1, 0.012
 """Length over which a rail goes over into one that is the same everywhere, and how far a wheel may be off its place
 beyond the ends of its profile, m."""
+
+COLUMNS = 9
+"""Radii of the strips for which a wheel out of round is seen."""
+
+PAD = 16
+"""Nodes of a wheel out of round before its turn, or before and behind what is not round of it: a wheel that yaws sees
+strips of other places."""
 
 STRETCH = 64
 """Steps along the track for which bounds of gaps are taken together."""
@@ -49,19 +61,21 @@ ROWS = 5
 
 @dataclass(frozen=True)
 class SeenTable:
-    """Sections over arc length."""
+    """Sections over arc length, or over the angle of a wheel."""
 
     begin: float
-    """Arc length of the first node, m."""
+    """Arc length (m) or angle (rad) of the first node."""
+    step: float
+    """From one to the next, m or rad."""
     sections: np.ndarray
-    """(n, 2, ROWS, m): rows, and their rates over s times `S_STEP`; the first and the last one are the plain rail."""
+    """(n, 2, ROWS, m): rows, and their rates times the step; the first and the last one are the plain rail."""
     strips: np.ndarray
     """(2, m): of the wheel's strips over them 1/R (1/m), and how far a yaw moves their points that touch, over what it
     moves that of the tape circle's plane, m/rad."""
     geometry: ContactGeometry
     """On the plain rail."""
     bounds: np.ndarray
-    """(stretches + 1, ...): `ContactGeometry.zone_gaps` over each stretch, and at last of the plain rail."""
+    """(1 + stretches, ...): `ContactGeometry.zone_gaps` of the plain rail, then over each stretch."""
 
 
 def seen_table(pair, plain, backwards=False):
@@ -91,10 +105,51 @@ def seen_table(pair, plain, backwards=False):
         s, sections = -s[::-1], sections[::-1].copy()
         sections[:, 1] *= -1.0
         sections[:, :, AHEAD] *= -1.0
-    curve = ProfileCurve(plain.name, "rail", u, *everywhere[: SECOND + 1].copy())
+    geometry = _plain_geometry(pair, plain, u, everywhere)
+    return _with_bounds(SeenTable(float(s[0]), S_STEP, sections, wide.strips(u), geometry, np.zeros(0)))
+
+
+def shape_table(pair, shape):
+    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound`, or the rail of a `Corrugation`."""
+    from scipy.interpolate import make_interp_spline
+
+    plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
+    wide = _widened(WheelOnSlices(pair.wheel, RailSlices.of(plain), *sizes))
+    u = _lateral(wide, plain)
+    first, step, count = shape.nodes(S_STEP, PAD)
+    curvatures, leads = wide.strips(u)
+    at = u + pair.rail_distance - pair.half_distance
+    own = np.flatnonzero((at >= pair.wheel.u[0]) & (at <= pair.wheel.u[-1]))
+    radii, some = np.unique(np.round(1.0 / curvatures[own], 6), return_index=True)
+    some = own[some[np.unique(np.searchsorted(radii, np.linspace(radii[0], radii[-1], COLUMNS)))]]
+    radii = 1.0 / curvatures[some]
+    places = first + step * np.arange(count)
+    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(radii, place, x))
+    seen = make_interp_spline(radii, seen, k=min(3, radii.size - 1), axis=2)(
+        np.clip(1.0 / curvatures, radii[0], radii[-1])
+    )[:, [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]]
+    sections = np.zeros((count, 2, ROWS, u.size))
+    everywhere = _plain_section(plain, u, plain.f.min() - BELOW)
+    sections[:, 0] = everywhere
+    sections[:, 0, HEIGHT] += seen[:, 0]
+    slope = np.gradient(seen[:, 0], U_STEP, axis=1)
+    sections[:, 0, SLOPE] += slope
+    sections[:, 0, SECOND] += np.gradient(slope, U_STEP, axis=1)
+    sections[:, 0, AHEAD:] = seen[:, 1:]
+    _add_rates(sections, np.ones((count, u.size), bool))
+    for k in (0, 1, -2, -1):  # two of them, so that strips far ahead of or behind a yawed axle find the plain rail
+        sections[k] = 0.0
+        sections[k, 0] = everywhere
+    strips = np.stack([curvatures, leads - at * shape.level])
+    geometry = _plain_geometry(pair, plain, u, everywhere)
+    return _with_bounds(SeenTable(first, step, sections, strips, geometry, np.zeros(0)), faded=True)
+
+
+def _plain_geometry(pair, plain, u, section):
+    """`ContactGeometry` on a rail with the rows of the plain one, of the type of those that change."""
+    curve = ProfileCurve(plain.name, "rail", u, *section[: SECOND + 1].copy())
     geometry = contact_geometry(pair.wheel, curve, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-    geometry = geometry._replace(along=np.zeros((u.size, 3)))
-    return _with_bounds(SeenTable(float(s[0]), sections, wide.strips(u), geometry, np.zeros(0)))
+    return geometry._replace(along=np.zeros((u.size, 4)))
 
 
 def _widened(pair):
@@ -139,15 +194,18 @@ def _add_rates(sections, exists):
     rates[:] = np.where(count > 0, np.nansum(both, axis=0) / np.maximum(count, 1), 0.0)
 
 
-def _with_bounds(table):
-    """The table with bounds that hold for all sections of a stretch, and for all poses that are not planar."""
+def _with_bounds(table, faded=False):
+    """The table with bounds that hold for all sections of a stretch, ``faded`` into the plain rail or not, and for all
+    poses that are not planar."""
     geometry, cells = table.geometry, (table.sections.shape[3] - 1) // PER_CELL
     values, rates = table.sections[:, 0], np.abs(table.sections[:, 1])
     bend = np.abs(np.diff(values[:, SLOPE], axis=1)) / U_STEP
     reserve = 1.5 * SAFETY * 0.125 * SCAN_STEP**2 * _of_cells(bend, cells, 1)
     top = _of_cells(values[:, HEIGHT] + 0.15 * (rates[:, HEIGHT] + np.roll(rates[:, HEIGHT], -1, 0)), cells, 0)
+    if faded:
+        top, reserve = np.maximum(top, top[0]), np.maximum(reserve, reserve[0])
     wheel, radius = geometry.scan_wheel, geometry.rolling_radius
-    bounds = []
+    bounds = [geometry.zone_gaps]
     for first in range(0, len(top) - 1, STRETCH):
         here, rail = slice(first, first + STRETCH + 1), geometry.scan_rail.copy()
         middle = slice(MARGIN, MARGIN + cells)
@@ -156,8 +214,7 @@ def _with_bounds(table):
         bounds.append(zone_gaps(wheel, rail, geometry.block, radius))
     rail[RAIL_RESERVE, middle] = reserve.max(axis=0)
     geometry = geometry._replace(zone_planar_errors=zone_planar_errors(wheel, rail, geometry.block))
-    found = np.array([*bounds, geometry.zone_gaps])
-    return replace(table, geometry=geometry, bounds=found)
+    return replace(table, geometry=geometry, bounds=np.array(bounds))
 
 
 def _of_cells(values, cells, beside):

@@ -21,9 +21,10 @@ from numba.extending import overload
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
 from wrcore.kernels.jit import jit
 
-AHEAD, BEND, LIFT = range(3)
+AHEAD, BEND, LIFT, LEAN = range(4)
 """Columns of `ContactGeometry.along`, what the rail's change along the track adds to a strip: x of its least gap, half
-of the gap's second derivative along x, and the height of the wheel's point there."""
+of the gap's second derivative along x, the height of the wheel's point there, and x as far as the rail's slope makes
+it: 0 for a wheel out of round on a level rail."""
 
 
 class Pose(NamedTuple):
@@ -124,10 +125,10 @@ def changes_along(geometry):
 def lean_at(geometry, ur, pz):
     """Cosine and sine of the angle about the axle between the rail's point under the wheel and what it touches where
     its rail changes along the track: at the rail coordinate ``ur``, ``pz`` (m) over the axle. A body of revolution has
-    no normal there but the one through its axle."""
+    no normal there but the one through its axle; under a wheel out of round the rail stays level."""
     if not changes_along(geometry):
         return 1.0, 0.0
-    ahead = with_rail_along(geometry, AHEAD, ur, 1.0, 0.0)
+    ahead = with_rail_along(geometry, LEAN, ur, 1.0, 0.0)
     inverse = 1.0 / math.sqrt(ahead * ahead + pz * pz)
     return -pz * inverse, ahead * inverse
 

@@ -81,7 +81,9 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
     the frame's origin and in its plane: friction (MZ about n), NORMAL, X and Y (means over the pressure of x and s),
     semi-axes, greatest pressure, and as ANGLE the mean slope of the strips.
     """
-    x = with_rail_along(model.geometry, AHEAD, frame.ur, -1.0, frame.x)
+    x = frame.x
+    if len(model.geometry.over) == 0:  # the grid knows no more than the section
+        x = with_rail_along(model.geometry, AHEAD, frame.ur, -1.0, x)
     plane = ContactPlane(x, frame.ur + model.geometry.rail_distance, frame.z, frame.cosine, frame.sine)
     modulus = model.shear_modulus / (1.0 - model.poisson_ratio)
     grid = grid_normal(model.geometry, pose, plane, modulus, GRID, GRID)

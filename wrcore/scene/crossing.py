@@ -1,4 +1,5 @@
-"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``."""
+"""Rails that change along the track, a crossing say, from a scene's key ``track.crossing``, and what wheels see of them
+and of their own shapes."""
 
 import math
 from dataclasses import dataclass
@@ -6,20 +7,25 @@ from functools import cache
 
 import numpy as np
 
-from wrcore.contact.seen_rail import REACH, WheelOnSlices
-from wrcore.contact.seen_table import BLEND, SeenTable, seen_table
-from wrcore.dynamics.crossing import crossing_of
+from wrcore.contact.seen_rail import REACH
+from wrcore.contact.seen_table import BLEND, SeenTable, shape_table
+from wrcore.dynamics.crossing import LAID, crossing_of, laid_along, laid_at, laid_under
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
+from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.crossing import Crossing
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
+from wrcore.scene.kept_tables import kept_table
 from wrcore.scene.pairs import find_file
 
 JOINED = 1e-4
 """How far the surfaces of the first and the last slice may be from that of the rail they join, m."""
+
+STEEPEST_ALONG = 0.2
+"""Slopes along the track that a wheel is laid on: what it touches lies within `REACH` of its axle."""
 
 RUNNING = -0.03, 0.01, -0.012
 """Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
@@ -51,11 +57,7 @@ def read_crossing(data, vehicle, pairs, folder, source):
     spec = data["track"].get("crossing")
     if spec is None:
         return None
-    if data["contact"]["patch"] == "tabulated":
-        expected = (
-            "expected maximum, moment or exact with track.crossing: tables are of rails that are the same everywhere"
-        )
-        raise InputError(source, "contact.patch", f"{expected}, got tabulated")
+    refuse_tables(data, "track.crossing", source)
     slices = _slices(spec["slices"], folder, source)
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     depth = data["track"]["gauge_depth"]
@@ -109,28 +111,67 @@ def _check_joints(slices, plain, source):
             raise InputError(source, "track.crossing.slices", f"{expected}, got {got} at u = {u[worst]:.3f} m")
 
 
-def seen_by_wheels(crossing, pairs):
+def read_corrugation(data, crossing, shapes, source):
+    """`Corrugation` of a scene's content, None where its rails are smooth."""
+    spec = data["track"].get("corrugation")
+    if spec is None:
+        return None
+    sides = tuple(SIDES) if spec["rail"] == "both" else (spec["rail"],)
+    for k, side in enumerate(SIDES):
+        changes = crossing is not None and crossing.rails[k] is not None
+        if side in sides and (changes or any(shape for shape, _ in shapes[k::2])):
+            other = "track.crossing" if changes else "wheels out of round"
+            expected = f"expected no {other} on the {side} rail where it is corrugated"
+            raise InputError(source, "track.corrugation.rail", expected)
+    slope = 2.0 * math.pi * spec["amplitude"] / spec["wavelength"]
+    if not slope < STEEPEST_ALONG:
+        expected = f"expected a wave that rises less than {STEEPEST_ALONG:g}, got {slope:.3g}"
+        raise InputError(source, "track.corrugation.amplitude", expected)
+    refuse_tables(data, "corrugated rails", source)
+    return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
+
+
+def refuse_tables(data, what, source):
+    """An InputError where a scene looks contact up in tables."""
+    if data["contact"]["patch"] == "tabulated":
+        expected = f"expected maximum, moment or exact with {what}: tables are of round wheels and smooth rails"
+        raise InputError(source, "contact.patch", f"{expected}, got tabulated")
+
+
+def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
-    and the `wrcore.dynamics.crossing.Crossing`."""
+    and the `wrcore.dynamics.crossing.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc lengths
+    (k,) at which wheelsets begin, m."""
     known: dict[tuple, int] = {}
     tables: list[SeenTable] = []
-    geometries, of_wheels = [], []
+    geometries, of_wheels, laid = [], [], []
     for k, pair in enumerate(pairs):
-        slices = crossing.rails[k % 2]
-        if slices is None:
+        slices = crossing.rails[k % 2] if crossing else None
+        shape, angle = shapes[k] if shapes else (None, 0.0)
+        wave = corrugation if corrugation and list(SIDES)[k % 2] in corrugation.sides else None
+        if slices is None and shape is None and wave is None:
             geometry = pair.geometry
-            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 3))))
+            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 4))))
             of_wheels.append(-1)
+            laid.append(np.zeros(LAID))
             continue
-        key = id(pair.wheel), id(pair.rail), pair.rolling_radius
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(slices), id(shape or wave)
         if key not in known:
             known[key] = len(tables)
-            wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-            tables.append(seen_table(wheel, pair.rail, crossing.backwards))
+            tables.append(
+                kept_table(pair, slices, crossing.backwards) if slices is not None else shape_table(pair, shape or wave)
+            )
+        table = tables[known[key]]
         of_wheels.append(known[key])
-        geometries.append(tables[known[key]].geometry)
-    found = crossing_of(tables, np.reshape(of_wheels, (-1, 2)))
-    return tuple(geometries), found._replace(begin=found.begin + crossing.at)
+        geometries.append(table.geometry)
+        if shape is not None:
+            radius = 0.5 * (pairs[k - k % 2].rolling_radius + pairs[k + 1 - k % 2].rolling_radius)
+            laid.append(laid_under(table, starts[k // 2], angle, radius, shape.shortest))
+        elif wave is not None:
+            laid.append(laid_along(table, wave, pair.half_distance))
+        else:
+            laid.append(laid_at(table, table.begin + crossing.at, pair.half_distance))
+    return tuple(geometries), crossing_of(tables, of_wheels, laid)
 
 
 @cache

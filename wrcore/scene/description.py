@@ -33,12 +33,15 @@ from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError, short
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import name_of_function, parse_value, read_source, validate
+from wrcore.geometry.corrugation import Corrugation
+from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.scene.control import outputs_of, read_controls
-from wrcore.scene.crossing import LaidCrossing, read_crossing, seen_by_wheels, warn_of_rigid_rails
+from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossing, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
+from wrcore.scene.out_of_round import read_out_of_round
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
@@ -62,6 +65,9 @@ class Scene:
         Of each wheel, left and right of wheelset after wheelset; empty where all are alike.
     crossing : LaidCrossing, optional
         Rails that change along the track.
+    out_of_round : tuple
+        Shape and angle at the beginning of each wheel, in the order of ``pairs``; empty where all are round.
+    corrugation : Corrugation, optional
     files : dict
         SHA-256 of all files that were read for it, by path.
 
@@ -83,6 +89,8 @@ class Scene:
     track: Track
     pairs: tuple[WheelOnRail, ...] = ()
     crossing: LaidCrossing | None = None
+    out_of_round: tuple[tuple[OutOfRound | None, float], ...] = ()
+    corrugation: Corrugation | None = None
     files: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -178,6 +186,8 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
     crossing = read_crossing(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
+    shapes = read_out_of_round(data, vehicle, pairs, crossing, folder, source)
+    corrugation = read_corrugation(data, crossing, shapes, source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
         raise InputError(source, "track.path", expected)
@@ -186,7 +196,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     read_controls(data, vehicle, folder, source)
     read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
     digests |= digests_of_files(vehicle.data["elements"], folder)
-    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossing, digests)
+    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossing, shapes, corrugation, digests)
 
 
 def _alike(vehicle, wheel, rail, track):
@@ -328,14 +338,16 @@ def compile_scene(
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
-    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, scene.crossing  # known by their identity
+    changing = scene.crossing, scene.out_of_round, scene.corrugation
+    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     geometries, crossing = tuple(pair.geometry for pair in scene.pairs), no_crossing()
-    if scene.crossing is not None:
+    if any(changing):
         pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
-        geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(scene.crossing, pairs))
+        starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
+        geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(*changing, pairs, starts))
         geometry = geometries[0]  # of the type of all
         if "support" not in data["track"]:
             warn_of_rigid_rails(scene.source)

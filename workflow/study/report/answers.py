@@ -152,6 +152,16 @@ def _wear(read):
     )
 
 
+def _crossings(read):
+    table = read("crossings/models.csv")
+    said = [
+        f"{row.model} errs by {1e6 * row.height_largest_m:.2g} µm in height and {_percent(row.p_max_worst)} in "
+        f"greatest pressure at worst, and takes {row.cpu_s / table.cpu_s.iloc[0]:.2g} of its time"
+        for row in table.iloc[1:].itertuples()
+    ]
+    return f"On the nose of a crossing, against {table.model.iloc[0]}: {'; '.join(said)}."
+
+
 ANSWERS = {
     "01 The paper's values and ours": _paper_values,
     "02 The paper's figures": _paper_figures,
@@ -166,5 +176,6 @@ ANSWERS = {
     "11 Benchmark of integrators": _ivp,
     "12 Sweeps": _sweeps,
     "13 Wear": _wear,
+    "14 Crossings": _crossings,
 }
 """By category of the results, in reading order."""

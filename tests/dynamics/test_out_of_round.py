@@ -1,0 +1,266 @@
+"""Runs on wheels out of round: against linear oscillators, and the geometry of the wheel's path."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.conftest import SCENES
+from wrcore.contact import reduction as columns
+from wrcore.contact.seen_table import AHEAD, HEIGHT, PAD, ROWS, U_STEP, shape_table
+from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.dynamics.crossing import interpolate, laid_under
+from wrcore.dynamics.system import Equations
+from wrcore.errors import InputError
+from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
+from wrcore.geometry.standards import named_profile
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
+
+MASS, LOAD, RADIUS = 906.5, 54546.0, 0.46  # half a wheelset
+STIFFNESS, DAMPING = 8.1e7, 6e4  # of the track, N/m and N s/m
+SOFT = {"rail": dict.fromkeys(("lateral", "vertical"), {"stiffness": STIFFNESS, "damping": DAMPING})}
+HALF_TURN = math.pi * RADIUS
+
+
+def rolling(shape, speed, travel, **changes):
+    """Run of a wheelset whose wheels both have a shape: a cone each, on circular heads, without damping of contact."""
+    wheel = {"profile": "cone:1/20", "left": {"out_of_round": shape}, "right": {"out_of_round": shape}}
+    given = {
+        "wheel": wheel, "rail": {"profile": "circle:0.3", "inclination": 0}, "initial.y": 0.0, "speed": speed,
+        "track.support": SOFT, "contact.normal.damping.c_e": 1.0,
+        "integration": {"duration": travel / speed, "rtol": 1e-6}, "output.rate": 800 * speed,
+    }  # fmt: skip
+    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", given | changes))
+    assert run.status == "completed", run.reason
+    return run
+
+
+def load_of(run):
+    return np.nansum(run["wheelset/right"]["N_N"], axis=1)
+
+
+def contact_stiffness(run):
+    """dN/d(delta) of Hertz at the beginning, of an ellipse as of the circle between: 2 G a/(1 - nu), N/m."""
+    patch = run["wheelset/right"]
+    return 2.0 * 82e9 / (1.0 - 0.28) * np.mean([patch[name][0, 0] for name in ("a_m", "b_m")])
+
+
+def load_over_a_wave(amplitude, wave_number, speed, contact):
+    """Amplitude (N) of a mass's load on a wave: m omega^2 A/(1 - m omega^2/k), k of track and contact one behind the
+    other; where the surface bends by A k^2 the contact's approach grows by a sixth of what its curvature does."""
+    square, omega = MASS * (wave_number * speed) ** 2, wave_number * speed
+    springs = 1.0 / (STIFFNESS + 1j * omega * DAMPING) + 1.0 / contact
+    felt = amplitude * (1.0 - 1.5 * LOAD / contact * RADIUS * wave_number**2 / 6.0)
+    return -square * felt / (1.0 - square * springs)
+
+
+@pytest.mark.parametrize(("order", "amplitude", "speed"), [(1, 5e-4, 20.0), (10, 5e-5, 10.0), (20, 2e-5, 20.0)])
+def test_polygons_drive_a_mass_on_springs(order, amplitude, speed):
+    run = rolling({"polygon": [{"order": order, "amplitude": amplitude}]}, speed, 12.0)
+    s = run["wheelset"]["x_m"]
+    late = s > 6.0
+    phase = order * (math.pi + s[late] / RADIUS)
+    waves = np.column_stack([np.ones(phase.size), np.cos(phase), np.sin(phase)])
+    _, cosine, sine = np.linalg.lstsq(waves, load_of(run)[late])[0]
+    expected = load_over_a_wave(amplitude, order / RADIUS, speed, contact_stiffness(run))
+    assert cosine - 1j * sine == pytest.approx(expected, rel=5e-3)
+
+
+def test_an_eccentric_wheel_touches_below_its_own_centre():
+    # the rail is level: N is upright, and its moment about the axle is N x; all torque is that of the pitch inertia
+    run = rolling({"polygon": [{"order": 1, "amplitude": 5e-4}]}, 5.0, 9.0)
+    patch, angle = run["wheelset/right"], math.pi + run["wheelset"]["x_m"] / RADIUS
+    late = run["wheelset"]["x_m"] > 4.0
+    assert patch["x_m"][late, 0] == pytest.approx(-5e-4 * np.sin(angle[late]), abs=2e-6)
+    assert np.ptp(patch["z_m"][late, 0]) < 0.02 * 5e-4
+    rolled = run["wheelset"]["wy_rad_per_s"] * (run["wheelset"]["z_m"] - patch["z_m"][:, 0])
+    assert rolled[late] == pytest.approx(run["wheelset"]["vx_m_per_s"][late], rel=2e-4)
+
+
+def lowest(deviation, reach):
+    """Height of the axle of a wheel with radii ``RADIUS + deviation(angle)`` over a level line when it stands, over
+    the distance that it has rolled: the lowest of all its points touches."""
+    around, places = np.linspace(-0.7, 0.7, 60001), np.linspace(-reach, reach, 801)
+    radii = RADIUS + deviation(around)
+    heights = [(radii * np.cos(around - place / RADIUS)).max() - RADIUS for place in places]
+    return lambda x: np.interp(x, places, heights, left=0.0, right=0.0)
+
+
+def rounded(length, depth):
+    half = math.asin(0.5 * length / RADIUS)
+    return lambda angle: np.where(np.abs(angle) < half, -0.5 * depth * (1.0 + np.cos(math.pi * angle / half)), 0.0)
+
+
+def chord(length):
+    half = math.asin(0.5 * length / RADIUS)
+    return lambda angle: np.where(np.abs(angle) < half, RADIUS * (math.cos(half) / np.cos(angle) - 1.0), 0.0)
+
+
+def on_two_springs(path, speed, places, contact):
+    """Load (N) over places (m) of a mass that follows a path on Hertz's spring and the track's, with the ``contact``
+    stiffness (N/m) at rest."""
+    approach = 1.5 * LOAD / contact
+    hertz, t = LOAD / approach**1.5, (places - places[0]) / speed
+
+    def load(t, z, sunk):
+        return hertz * np.maximum(approach + LOAD / STIFFNESS - sunk - z + path(places[0] + speed * t), 0.0) ** 1.5
+
+    def rates(t, state):
+        force = load(t, state[0], state[2])
+        return state[1], (force - LOAD) / MASS, (force - STIFFNESS * state[2]) / DAMPING
+
+    start = 0.0, 0.0, LOAD / STIFFNESS
+    found = solve_ivp(rates, (0.0, t[-1]), start, t_eval=t, rtol=1e-8, atol=1e-10, max_step=1e-3 / speed)
+    return load(t, found.y[0], found.y[2])
+
+
+@pytest.mark.parametrize(
+    ("flat", "speed", "bound"),
+    [
+        ({"length": 0.1, "depth": 9e-4}, 10.0, 0.015),
+        ({"length": 0.1, "depth": 9e-4}, 20.0, 0.015),
+        ({"length": 0.06}, 2.5, 0.05),
+        ({"length": 0.04}, 20.0, 0.08),
+    ],
+)
+def test_a_flat_is_a_path_under_a_mass_on_springs(flat, speed, bound):
+    run = rolling({"flats": [flat]}, speed, HALF_TURN + 0.25)
+    s = run["wheelset"]["x_m"] - HALF_TURN
+    near = s > -0.2
+    shape = rounded(**flat) if "depth" in flat else chord(**flat)
+    expected = on_two_springs(lowest(shape, 0.3), speed, s[near], contact_stiffness(run))
+    found = load_of(run)[near]
+    assert expected.max() > 1.3 * LOAD
+    assert found.max() == pytest.approx(expected.max(), rel=bound)
+    assert s[near][np.argmax(found)] == pytest.approx(s[near][np.argmax(expected)], abs=4e-3)
+    assert np.sum(found == 0.0) == pytest.approx(np.sum(expected == 0.0), abs=2 + 0.3 * np.sum(expected == 0.0))
+
+
+@pytest.mark.parametrize(("part", "stays"), [(0.5, True), (1.1, False)])
+def test_a_wheel_leaves_its_rail_beyond_the_speed_at_which_it_falls_slower_than_it_turns(part, stays):
+    # it turns about a fresh flat's edge: v^2/R of the axle, and the load is N0 - m v^2/R, until that is below zero
+    speed, length = part * math.sqrt(LOAD / MASS * RADIUS), 0.16
+    run = rolling({"flats": [{"length": length}]}, speed, HALF_TURN + 0.1)
+    s = run["wheelset"]["x_m"] - HALF_TURN
+    turning = (s > -0.5 * length + 5e-3) & (s < -5e-3)
+    load = load_of(run)[turning]
+    if stays:
+        assert load.min() > 0.0
+        assert np.mean(load) == pytest.approx(LOAD - MASS * speed**2 / RADIUS, rel=0.02)
+    else:
+        assert np.mean(load == 0.0) > 0.3
+
+
+def test_what_a_wheel_reaches_is_its_geometry():
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    for shape, deviation, bound in (
+        (OutOfRound(RADIUS, (Flat(0.1, 9e-4),)), rounded(0.1, 9e-4), 2e-6),
+        (OutOfRound(RADIUS, (Flat(0.06),)), chord(0.06), 2.5e-5),  # an edge is rounded over the window of a patch
+        (OutOfRound(RADIUS, (), (Wave(1, 1e-3),)), lambda angle: 1e-3 * np.cos(angle), 2e-6),
+    ):
+        table = shape_table(pair, shape)
+        middle = round(-table.geometry.rail_start / U_STEP)
+        angles = table.begin + table.step * np.arange(len(table.sections))
+        inner = np.flatnonzero(np.abs(angles) < 0.3)[2:-2]
+        rise = table.sections[inner, 0, HEIGHT, middle] - table.geometry.rail[middle, 0]
+        assert rise == pytest.approx(lowest(deviation, 0.15)(RADIUS * angles[inner]), abs=bound)
+        if shape.waves:  # dh/ds = x/R
+            slope = np.gradient(rise, RADIUS * table.step)
+            assert table.sections[inner, 0, AHEAD, middle] == pytest.approx(RADIUS * slope, abs=1e-5)
+
+
+def test_a_yawed_wheel_finds_the_plain_rail_beyond_its_table():
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    table = shape_table(pair, OutOfRound(RADIUS, (), (Wave(20, 1e-3),)))
+    laid, plain = np.array(laid_under(table, 0.0, 0.0, RADIUS, 0.1)), table.sections[0, 0, HEIGHT]
+    rail, along = table.geometry.rail.copy(), table.geometry.along.copy()
+    scratch = np.zeros((ROWS + 4, len(rail)))
+    for yaw in (0.0, 0.02, -0.04):
+        turn = yaw / (table.step * RADIUS)
+        interpolate(table.sections, table.strips, laid, PAD + 0.3, turn, 1.0, scratch, rail, along, False)
+        assert 0.5e-3 < np.abs(rail[:, 0] - plain).max() < 1.1e-3
+
+
+FLAT = {"flats": [{"length": 0.1, "depth": 9e-4}]}
+
+
+def test_exact_patches_and_stiff_methods_agree_on_it():
+    speed, travel = 20.0, HALF_TURN + 0.12
+    explicit = rolling(FLAT, speed, travel, **{"integration.method": "tsit5"})
+    stiff = rolling(FLAT, speed, travel, **{"integration.method": "rodas4", "integration.rtol": 1e-4})
+    exact = rolling(FLAT, speed, travel, **{"contact.patch": "exact", "integration.rtol": 1e-4})
+    for run, bound in ((stiff, 0.01), (exact, 0.03)):
+        assert load_of(run).max() == pytest.approx(load_of(explicit).max(), rel=bound)
+
+
+def test_a_flat_on_one_wheel_comes_again_with_each_turn():
+    changes = {"wheel.wheelsets.wheelset_2.left.out_of_round": FLAT | {"angle": 1.0}, "integration.duration": 0.4}
+    changes |= {"integration.method": "tsit5", "output.rate": 4000, "track.support": SOFT}
+    run = simulate(load_scene(SCENES / "trailer_vehicle.yaml", changes))
+    load = {name: np.nansum(run[name]["N_N"], axis=1) for name in ("wheelset_2/left", "wheelset_1/left")}
+    s = run["wheelset_2"]["x_m"] - run["wheelset_2"]["x_m"][0]
+    angle = np.remainder(1.0 + s / RADIUS + math.pi, 2.0 * math.pi) - math.pi
+    hit = load["wheelset_2/left"] > 1.3 * load["wheelset_2/left"][0]
+    turns = np.unique(np.round((1.0 + s[hit] / RADIUS) / (2.0 * math.pi)))
+    assert turns.tolist() == list(range(1, 1 + int((0.9 + s[-1] / RADIUS) / (2.0 * math.pi))))
+    assert np.abs(angle[hit]).max() < 0.4
+    assert np.ptp(load["wheelset_1/left"]) < 0.1 * load["wheelset_1/left"][0]
+
+
+def test_a_table_is_the_wave_that_it_holds(tmp_path):
+    angles = np.linspace(0.0, 2.0 * math.pi, 129)
+    rows = "".join(f"{a:.9f},{5e-5 * math.cos(4 * a):.12f}\n" for a in angles)
+    (tmp_path / "wheel.csv").write_text("angle_rad,deviation_m\n" + rows)
+    wave, table = {"polygon": [{"order": 4, "amplitude": 5e-5}]}, {"table": str(tmp_path / "wheel.csv")}
+    one, other = (load_of(rolling(shape, 20.0, 4.0)) for shape in (wave, table))
+    assert np.ptp(one) > 2000.0
+    assert other == pytest.approx(one, abs=0.01 * np.ptp(one))
+
+
+def test_wheels_begin_round():
+    model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {
+        "wheel.left.out_of_round": {"polygon": [{"order": 3, "amplitude": 1e-3}], "angle": 0.0}, "initial.y": 0.0,
+    }))  # fmt: skip
+    equations = Equations(model)
+    equations(0.0, state)
+    for column in (columns.NORMAL, columns.PENETRATION, columns.Z):
+        left, right = equations.work.patches[0, :, 0, column]
+        assert left == pytest.approx(right, rel=1e-3, abs=1e-7)
+    assert model.crossing.tables.tolist() == [[0, -1]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "expected"),
+    [
+        ({"left": {"out_of_round": {"angle": 1.0}}}, "wheel.left.out_of_round", "flats, polygon or table"),
+        ({"left": {"out_of_round": {"flats": [{"length": 0.02, "depth": 2e-3}]}}}, "wheel.left.out_of_round",
+         "rises less than 0.2 along the wheel"),
+        ({"left": {"out_of_round": {"polygon": [{"order": 60, "amplitude": 2e-3}]}}}, "wheel.left.out_of_round",
+         "less than 0.2 along the wheel, got 0.261"),
+        ({"left": {"out_of_round": {"flat": 1}}}, "wheel.left.out_of_round.flat", "unknown key"),
+        ({"left": {"out_of_round": {"table": "no.csv"}}}, "wheel.left.out_of_round.table", "existing file"),
+        ({"wheelsets": {"wheelset": {"right": {"out_of_round": {"polygon": [{"order": 0, "amplitude": 1e-4}]}}}}},
+         "wheel.wheelsets.wheelset.right.out_of_round.polygon", "1 .eccentric. to 60"),
+    ],
+)  # fmt: skip
+def test_bad_input_names_its_key(changes, field, expected):
+    with pytest.raises(InputError, match=expected) as error:
+        load_scene(SCENES / "suspended_wheelset.yaml", {f"wheel.{key}": value for key, value in changes.items()})
+    assert error.value.field.startswith(field)
+
+
+@pytest.mark.parametrize("rows", ["0,1e-4\n1,0\n", "0,x\n" * 9, "".join(f"{k},0\n" for k in range(9)), "0,0\n" * 9])
+def test_bad_tables_name_their_column(tmp_path, rows):
+    (tmp_path / "wheel.csv").write_text("angle_rad,deviation_m\n" + rows)
+    shape = {"table": str(tmp_path / "wheel.csv")}
+    with pytest.raises(InputError, match=r"angle_rad|deviation_m"):
+        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round": shape})
+
+
+def test_what_does_not_go_together_is_refused():
+    with pytest.raises(InputError, match="expected a round wheel on the right rail"):
+        load_scene(SCENES / "crossing.yaml", {"wheel.right.out_of_round": FLAT})
+    with pytest.raises(InputError, match="tables are of round wheels"):
+        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round": FLAT, "contact.patch": "tabulated"})

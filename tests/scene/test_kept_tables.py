@@ -1,0 +1,38 @@
+"""Tables of rails that change are kept, and made anew where what is kept is not whole."""
+
+import numpy as np
+import pytest
+
+from tests.dynamics.crossing_rails import write_rail
+from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.standards import named_profile
+from wrcore.scene import kept_tables
+from wrcore.scene.kept_tables import OWN, kept_table
+
+
+def numbers(table):
+    return [np.asarray(part) for part in (*(getattr(table, name) for name in OWN), *table.geometry)]
+
+
+def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
+    folder = tmp_path / "tables"
+    folder.mkdir()
+    monkeypatch.setattr(kept_tables, "table_folder", lambda: folder)
+    pair = WheelOnRail(named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail", 0.0))
+    rails = [read_slices(write_rail(tmp_path, [0.0, 0.02, 0.04], lambda s, f=f: f * s)) for f in (0.01, 0.02)]
+    rails = [rail.along(pair.rail) for rail in rails]
+    made = kept_table(pair, rails[0], False)
+    (path,) = folder.glob("seen_*.npz")
+    whole = path.read_bytes()
+    monkeypatch.setattr(kept_tables, "seen_table", lambda *more: pytest.fail("made anew"))
+    for one, other in zip(numbers(made), numbers(kept_table(pair, rails[0], False)), strict=True):
+        np.testing.assert_array_equal(one, other)
+    monkeypatch.undo()
+    monkeypatch.setattr(kept_tables, "table_folder", lambda: folder)
+    path.write_bytes(whole[: len(whole) // 2])
+    np.testing.assert_array_equal(kept_table(pair, rails[0], False).sections, made.sections)
+    assert path.read_bytes()[:4] == whole[:4] and path.stat().st_size == len(whole)
+    assert not np.array_equal(kept_table(pair, rails[1], False).sections, made.sections)
+    assert not np.array_equal(kept_table(pair, rails[0], True).sections, made.sections)
+    assert len(list(folder.glob("seen_*.npz"))) == 3

@@ -1,0 +1,1 @@
+"""What models of contact do on a crossing: height of the wheel, load on the nose, pressure, cost."""

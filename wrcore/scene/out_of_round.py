@@ -1,0 +1,81 @@
+"""Wheels out of round, from the keys ``out_of_round`` below a scene's ``wheel``."""
+
+import json
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.errors.checked_csv import read_csv_table
+from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
+from wrcore.geometry.slices import TURN
+from wrcore.geometry.track import SIDES
+from wrcore.scene.crossing import STEEPEST_ALONG, refuse_tables
+from wrcore.scene.pairs import find_file
+
+LARGEST = 0.01
+"""Deviations above this are taken for a mistake, m."""
+
+
+def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
+    """`OutOfRound` of each wheel, left and right of wheelset after wheelset, None of a round one, and the angle (rad)
+    that touches at the beginning; empty where all are round. ``pairs`` are the scene's."""
+    shapes, known = [], {}
+    for k, pair in enumerate(pairs):
+        side, name = list(SIDES)[k % 2], vehicle.wheelset_names[k // 2]
+        field, spec = f"wheel.{side}.out_of_round", data["wheel"].get(side, {}).get("out_of_round")
+        single = data["wheel"].get("wheelsets", {}).get(name, {}).get(side, {})
+        if "out_of_round" in single:
+            field, spec = f"wheel.wheelsets.{name}.{side}.out_of_round", single["out_of_round"]
+        shape, angle = None, 0.0
+        if spec:
+            key = json.dumps({**spec, "angle": 0.0, "radius": pair.rolling_radius}, sort_keys=True)
+            if key not in known:
+                known[key] = _shape(spec, pair.rolling_radius, field, folder, source)
+            shape, angle = known[key], float(spec["angle"])
+            if crossing is not None and crossing.rails[k % 2] is not None:
+                expected = f"expected a round wheel on the {side} rail, where track.crossing changes it"
+                raise InputError(source, field, expected)
+        shapes.append((shape, angle))
+    if not any(shape for shape, _ in shapes):
+        return ()
+    refuse_tables(data, "wheels out of round", source)
+    return tuple(shapes)
+
+
+def _shape(spec, radius, field, folder, source):
+    """`OutOfRound` of what a scene says of one wheel with a radius, m."""
+    flats = tuple(Flat(one["length"], one.get("depth"), one["at"]) for one in spec["flats"])
+    for k, flat in enumerate(flats):
+        if not flat.length < radius:
+            expected = f"expected less than the wheel's radius, {radius:g} m, got {flat.length:g}"
+            raise InputError(source, f"{field}.flats.{k}.length", expected)
+    waves = [Wave(one["order"], one["amplitude"], one["phase"]) for one in spec["polygon"]]
+    if "table" in spec:
+        waves.append(_measured(find_file(spec["table"], folder, source, f"{field}.table")))
+    if not flats and not waves:
+        raise InputError(source, field, "expected flats, polygon or table, got none")
+    shape = OutOfRound(radius, flats, tuple(waves))
+    around = np.linspace(0.0, TURN, 20001)
+    slope = np.abs(np.diff(shape.deviation(around))).max() / (radius * around[1])
+    if not slope < STEEPEST_ALONG:
+        expected = f"expected a surface that rises less than {STEEPEST_ALONG:g} along the wheel, got {slope:.3g}"
+        raise InputError(source, field, expected)
+    return shape
+
+
+def _measured(path):
+    """`Measured` of a CSV file."""
+    frame = read_csv_table(path, "")
+    for name in ("angle_rad", "deviation_m"):
+        if name not in frame:
+            raise InputError(path, name, f"expected this column; found {', '.join(map(str, frame.columns))}")
+        if frame[name].dtype.kind not in "if" or not np.isfinite(frame[name]).all():
+            raise InputError(path, name, "expected numbers in all rows")
+    angles, deviations = (frame[name].to_numpy(float) for name in ("angle_rad", "deviation_m"))
+    if angles.size < 8 or np.any(np.diff(angles) <= 0.0) or angles[-1] - angles[0] > TURN + 1e-9:
+        raise InputError(path, "angle_rad", "expected at least 8 angles that increase, within one turn")
+    if np.abs(deviations).max() > LARGEST:
+        expected = f"expected deviations within {LARGEST:g} m, got {np.abs(deviations).max():g}"
+        raise InputError(path, "deviation_m", expected)
+    once = slice(None, -1 if angles[-1] - angles[0] > TURN - 1e-6 else None)
+    return Measured(angles[once], deviations[once])
