@@ -40,7 +40,8 @@ def main():
     rolling = Rolling(SPEED, SPEED / geometry.rolling_radius * (1.0 + DRIFT), SPEED * DRIFT)
     for middle in np.linspace(-6e-3, 6e-3, chosen.stretches):
         places = middle + STEP * (np.arange(chosen.steps + 1) - 0.5 * chosen.steps)
-        lines.append({"y, mm": 1e3 * middle, **dict(zip(("N", "Fx", "Fy"), increments(wheels, places, rolling)))})
+        normal, along, across = increments(wheels, places, rolling)
+        lines.append({"y, mm": 1e3 * middle, "N": normal, "Fx": along, "Fy": across})
     print(pd.DataFrame(lines).to_markdown(index=False, floatfmt=".2g"))
 
 
