@@ -11,6 +11,8 @@ and the nondimensional creepages xi G a b/(mu N) change by xi' G a b/(mu N) and 
 
 import math
 
+import numpy as np
+
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import damping_factor
@@ -32,6 +34,13 @@ SAME = 1e-5
 """A patch that moves farther than this on the wheel's profile over a difference of the pose is another one, m."""
 
 _TABLE = LAWS["table"]
+
+
+def slope_scratch(wheelsets):
+    """Scratch arrays of the slopes of a number of wheelsets: patches as found and as moved, their counts, slopes of a
+    wheel, and of a law."""
+    patches = np.zeros((1 + MOVES, wheelsets, 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
+    return patches, np.zeros((wheelsets, 2), np.int64), np.zeros((SLOPES, 6)), np.zeros((8, 4))
 
 
 @jit(allocates=False)

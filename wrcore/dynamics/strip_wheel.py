@@ -407,10 +407,11 @@ def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters,
 def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, work, mode=FRESH):
     """As `wheel_wrenches`, with patches on strips; arguments as there. Ellipses stand in for what is solved, not for
     what a table has."""
-    rough, held, keep = mode & ELLIPSES > 0, mode & PATCHES_HELD > 0, KEEP if mode & PATCHES_KEPT else 0.0
+    rough = mode & ELLIPSES > 0
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
+    held, keep = rough and mode & PATCHES_HELD > 0, KEEP if rough and mode & PATCHES_KEPT else 0.0
     for i in range(motions.shape[0]):
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)

@@ -18,10 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.contact_blocks import DIRECTIONS, DISPLACEMENT, SPEED, SPIN, TURN, contacts_alone, renew_contacts
-from wrcore.dynamics.contact_slopes import MOVES, SLOPES
+from wrcore.dynamics.contact_slopes import slope_scratch
 from wrcore.dynamics.contract import turn_rate
 from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
 from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
@@ -144,8 +143,7 @@ def new_jacobian(model):
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
         np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
         np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)),
-        np.zeros(6 * n), np.zeros((1 + MOVES, k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64),
-        np.zeros((SLOPES, 6)), np.zeros((8, 4)),
+        np.zeros(6 * n), *slope_scratch(k),
     )  # fmt: skip
 
 
