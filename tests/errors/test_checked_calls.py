@@ -96,13 +96,16 @@ def test_every_public_function_is_checked_and_every_annotation_is_understood():
             assert kind_of(eval(text, space) if isinstance(text, str) else text).text, (name, part)
 
 
-def test_the_front_costs_microseconds():
+def test_the_front_costs_no_more_than_binding_a_signature():
     @checked
     def plain(a: float, b: Annotated[float, ABOVE_ZERO] = 1.0, c: Annotated[str, OneOf(("x",))] = "x"):
         return a
 
     plain.__module__ = __name__
-    assert min(timeit.repeat(lambda: plain(1.0, b=2.0, c="x"), number=1000, repeat=50)) / 1000 < 5e-6
+    bind = inspect.signature(inspect.unwrap(plain)).bind
+    calls = (lambda: plain(1.0, b=2.0, c="x"), lambda: bind(1.0, b=2.0, c="x"))
+    front, binding = np.min([[timeit.timeit(call, number=1000) for call in calls] for _ in range(50)], axis=0)
+    assert front < 3.0 * binding  # found: once to 1.3 times, 3 us
 
 
 def test_paths_that_cannot_be_are_one_line(tmp_path):
