@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,7 @@ import pytest
 from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
 from wrcore.kernels.handles import Kernel
-from wrcore.kernels.jit import jit
+from wrcore.kernels.jit import FUSED, jit
 
 
 @jit(allocates=False)
@@ -58,6 +59,19 @@ def test_a_kernel_called_by_its_address_has_no_wrapper():
     assert Kernel(kernel, np.zeros(2)).address > 0 and not kernel.overloads
     names, _ = symbols(kernel.in_form("addressed"))
     assert names and not any("cpython" in name or "cfunc" in name for name in names)
+
+
+@pytest.mark.parametrize("flags", [(False, FUSED), (FUSED, False)], ids=["plain first", "fused first"])
+def test_helpers_have_the_flags_of_their_kernel_whoever_came_first(flags):
+    number, helped = {}, lambda x, y: x**7 + y
+    for fastmath in flags:
+        kernel = jit(allocates=False, fastmath=fastmath)(helped)
+        kernel._cache.disable()
+        assert kernel(2.0, 1.0) == pytest.approx(helped(2.0, 1.0), rel=1e-15)
+        (compiled,) = kernel.overloads.values()
+        code = compiled.library.get_llvm_str()
+        number[bool(fastmath)] = code.count("fmul contract"), len(re.findall(r"fmul double", code))
+    assert number[True][0] > 0 == number[True][1] and number[False][1] > 0 == number[False][0]
 
 
 def test_python_gets_no_wrapper_for_c():

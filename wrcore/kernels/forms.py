@@ -49,17 +49,35 @@ class _Register(AnalysisPass):
         return False
 
 
-class _LinkedCompiler(CompilerBase):
-    """Numba's passes but for the last one, which makes machine code."""
+_helpers = {}
+
+
+class KernelCompiler(CompilerBase):
+    """Numba's passes, with the helpers (powers) of kernels that have the same fast-math flags.
+
+    Numba compiles a helper once in a process, with the flags of the kernel that needs it first: its last bits would
+    depend on which kernel that was."""
 
     def define_pipelines(self):
         state = self.state
+        flags = frozenset(state.flags.fastmath.flags), bool(state.flags.nrt)
+        state.targetctx.cached_internal_func = _helpers.setdefault(flags, {})
+        return [self._passes(state)]
+
+    def _passes(self, state):
+        return DefaultPassBuilder.define_nopython_pipeline(state)
+
+
+class _LinkedCompiler(KernelCompiler):
+    """The passes but for the last one, which makes machine code."""
+
+    def _passes(self, state):
         state.flags.no_compile = True
         state.library = _Intermediate(state.targetctx.codegen(), state.func_id.func_qualname)
-        passes = DefaultPassBuilder.define_nopython_pipeline(state)
+        passes = super()._passes(state)
         passes.add_pass_after(_Register, NativeLowering)
         passes.finalize()
-        return [passes]
+        return passes
 
 
 class _LinkedFile(CompileResultCacheImpl):
@@ -160,8 +178,8 @@ class KernelDispatcher(CPUDispatcher):
         forms = self.__dict__.setdefault("forms", {})
         if form not in forms:
             options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-            compiler = {"pipeline_class": _LinkedCompiler} if form == "linked" else {}
-            forms[form] = _Form(self.py_func, dict(self.locals), options, **compiler)
+            compiler = _LinkedCompiler if form == "linked" else KernelCompiler
+            forms[form] = _Form(self.py_func, dict(self.locals), options, pipeline_class=compiler)
             forms[form]._cache = KernelCache(self.py_func, form)
         return forms[form]
 

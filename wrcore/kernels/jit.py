@@ -12,7 +12,7 @@ from numba.core import types
 from numba.extending import intrinsic
 from numba.np import linalg
 
-from wrcore.kernels.forms import KernelCache, KernelDispatcher
+from wrcore.kernels.forms import KernelCache, KernelCompiler, KernelDispatcher
 
 with patch.object(linalg, "ensure_blas"):
     from numba.np import arraymath  # noqa: F401  it would import scipy.linalg, a tenth of every start, to see it is there
@@ -40,7 +40,7 @@ def jit(function=None, *, allocates=True, **options):
     settings = {"error_model": "numpy", "fastmath": False, "forceinline": False, "no_cfunc_wrapper": True, **options}
     if not allocates:
         settings["_nrt"] = False
-    dispatcher = numba.njit(function, **settings)
+    dispatcher = numba.njit(function, pipeline_class=KernelCompiler, **settings)
     dispatcher.__class__ = KernelDispatcher
     dispatcher._cache = KernelCache(function)
     return dispatcher
