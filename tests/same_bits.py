@@ -1,9 +1,10 @@
 """Digests of runs, tables and commands, to compare the code before and after a change that must not move a bit.
 
-Both on one machine: another processor's code rounds differently.
+Both on one machine: another processor's code rounds differently. ``backwards`` takes the runs in reverse: with another
+empty ``WRCORE_CACHE`` it shows whether bits depend on what was compiled before.
 
 python tests/same_bits.py write before.json
-python tests/same_bits.py compare before.json
+python tests/same_bits.py compare before.json [backwards]
 """
 
 import hashlib
@@ -31,6 +32,8 @@ RUNS = {
     "trailer_curve": ("trailer_vehicle", ["speed=16.7", "integration.duration=2",
                                           "track.path=[{tangent: 5}, {transition: 20}, {curve: 500, radius: 600}]"]),
     "metro_car": ("metro_car", ["integration.duration=0.1"]),
+    "tabulated": ("suspended_wheelset", ["integration.duration=0.5", "contact.patch=tabulated", "initial.y=0.002"]),
+    "crossing": ("crossing", ["integration.duration=0.05"]),
 }  # fmt: skip
 """Scene and changes of each run."""
 
@@ -51,10 +54,10 @@ def digest(arrays):
     return sha.hexdigest()[:16]
 
 
-def digests():
-    """Name and digest of everything that is compared."""
+def digests(order=1):
+    """Name and digest of everything that is compared; runs from the first or, with -1, from the last."""
     out = {}
-    for name, (scene, changes) in RUNS.items():
+    for name, (scene, changes) in list(RUNS.items())[::order]:
         run = wr.simulate(wr.load_scene(CONFIG / "scenes" / f"{scene}.yaml", changes), progress=False)
         channels = [array for group in sorted(run.keys()) for array in run[group].values()]
         out[f"run {name}: {run.status}"] = digest([run.t, *channels])
@@ -77,9 +80,9 @@ def _arrays(data):
     return [np.atleast_1d(data)]
 
 
-def main(action, path):
+def main(action, path, order="forwards"):
     """Write the digests, or compare them with those written before; exit status 1 where they differ."""
-    now = digests()
+    now = digests({"forwards": 1, "backwards": -1}[order])
     if action == "write":
         Path(path).write_text(json.dumps(now, indent=1))
         return 0
