@@ -19,7 +19,7 @@ from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulate import output_times, simulate, simulate_many
 from wrcore.scene.description import compile_scene, load_scene
 
-ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas4": 4, "ros34pw2": 3}
+ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas4": 4, "rodas4p2": 4, "ros34pw2": 3}
 WHEELSET = SCENES / "suspended_wheelset.yaml"
 CURVE = (
     "track={path: [{transition: 30}, {curve: 700, radius: 600, cant: 0.05}], irregularity: {fade_in: 10, fade_out: 10, "
@@ -188,19 +188,19 @@ def test_stiff_scenes_cost_rosenbrock_methods_little():
 
 def test_auto_takes_what_the_scene_needs(wheelset):
     """Creep makes low speed stiff; at high speed a rough track, or wheelsets that hunt, ask for short steps anyway."""
-    assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4"
+    assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4p2"
     rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 5}}"
     curve = "track.path=[{transition: 40}, {curve: 300, radius: 300}]"
     rails = "lateral: {stiffness: 1.8e+7, damping: 5e+4}, vertical: {stiffness: 8.1e+7, damping: 6e+4}"
     ballast = f"track.support={{rail: {{{rails}}}}}"
     for scene, overrides, expected in (
-        ("suspended_wheelset", ["speed=0.1"], "rodas4"),
+        ("suspended_wheelset", ["speed=0.1"], "rodas4p2"),
         ("suspended_wheelset", ["speed=60"], "tsit5"),
-        ("trailer_vehicle", ["speed=60"], "rodas4"),
+        ("trailer_vehicle", ["speed=60"], "rodas4p2"),
         ("trailer_vehicle", ["speed=60", rough], "tsit5"),
-        ("trailer_vehicle", ["speed=15", rough], "rodas4"),
-        ("trailer_vehicle", ["speed=15", curve], "rodas4"),
-        ("suspended_wheelset", ["speed=50", ballast], "rodas4"),
+        ("trailer_vehicle", ["speed=15", rough], "rodas4p2"),
+        ("trailer_vehicle", ["speed=15", curve], "rodas4p2"),
+        ("suspended_wheelset", ["speed=50", ballast], "rodas4p2"),
         ("suspended_wheelset", ["speed=50", ballast, rough], "tsit5"),  # a whole Jacobian, and that in each step
         ("metro_car", ["speed=60"], "tsit5"),
     ):
@@ -220,7 +220,7 @@ def test_auto_sees_a_stiff_damper(contact):  # noqa: F811
     assert fastest_rate(damped, Equations(damped), 0.0, start) == pytest.approx(
         16667.0 * 2.5, rel=0.1
     )  # the one of 4 kg
-    assert integrate(damped, start, [0.0, 1e-3]).method == "rodas4"
+    assert integrate(damped, start, [0.0, 1e-3]).method == "rodas4p2"
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -451,7 +451,7 @@ def test_many_runs_are_the_single_ones():
     many = simulate_many(scenes, progress=lambda items: (seen.append(item) or item for item in items))
     assert seen == scenes
     for runs in (many, simulate_many(scenes, threads=2)):
-        assert [run.settings["method_used"] for run in runs] == ["rodas4", "rodas4", "tsit5"]
+        assert [run.settings["method_used"] for run in runs] == ["rodas4p2", "rodas4p2", "tsit5"]
         assert all(map(same, runs, single))
     assert not same(single[0], single[1])
 

@@ -5,7 +5,9 @@ else follows from that. A velocity may err by `RATE` times as much; under wheels
 creepage: by what turns a wheelset off its course as the position's error at half the gauge does. The speed is that of
 the wheelsets in this very step. An angle may err by what moves a point at the body's radius of gyration as far, an
 angular velocity by what moves it as fast (so that their shares of the energy are alike). A step's error is that of the
-body that errs most: a train's wheelset is as accurate as one that runs alone.
+body that errs most: a train's wheelset is as accurate as one that runs alone. A body lighter than the lightest wheelset
+may err by more, so that its error has no greater energy than one of that wheelset: 1 kg that swings on a stiff bushing
+hardly moves a wheel, and shall not dictate the steps.
 
 No size of any component enters. In a curve the components along resting axes go through zero in turn, and weights by
 their size would bound the step there; and the travelled distance is no measure of what springs and contacts feel.
@@ -33,9 +35,9 @@ RATE = 30.0
 """Velocities' tolerance over that of positions, 1/s. Above 100 explicit methods at their stability bound let forces
 swing by per cents; much below 30 it is velocities alone that count."""
 
-SHARE = {"rodas4": 3.0, "ros34pw2": 0.1}
-"""What a method's estimate of its error is allowed, where that is no good measure of what the run errs by: Rodas4
-estimates the error of its embedded method and errs less itself; errors of ROS34PW2 with an old Jacobian pile up."""
+SHARE = {"rodas4": 3.0, "rodas4p2": 1.5, "ros34pw2": 0.1}
+"""What a method's estimate of its error is allowed, where that is no good measure of what the run errs by: Rodas4 and
+Rodas4P2 estimate the error of their embedded method and err less; those of ROS34PW2 with an old Jacobian pile up."""
 
 
 def step_tolerances(model, rtol, atol=0.0, method=""):
@@ -51,6 +53,7 @@ def step_tolerances(model, rtol, atol=0.0, method=""):
     fast, bodies = np.zeros(weights.shape, bool), weights[: STATE_SIZE * n].reshape(n, STATE_SIZE)
     bodies[:, EULER:VELOCITY] = 0.5 / lever  # a turn by theta changes p by theta/2
     bodies[:, OMEGA:] = 1.0 / lever
+    bodies *= lightness(model.bodies)[:, None]
     fast[: STATE_SIZE * n].reshape(n, STATE_SIZE)[:, VELOCITY:] = True
     for wheelset, state in model.bodies.independent:
         weights[STATE_SIZE * n + state] = 1.0 / lever[model.bodies.wheelsets[wheelset], 0]
@@ -80,6 +83,11 @@ def pace(model, old, new):
         speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), model.contact.least_speed)
         rate = min(rate, speed / HALF_GAUGE)
     return rate
+
+
+def lightness(bodies):
+    """Factor (n,) on what each body may err by: equal energy for those lighter than the lightest wheelset, else 1."""
+    return np.sqrt(np.maximum(1.0, min(bodies.mass[bodies.wheelsets], default=0.0) / bodies.mass))
 
 
 def gyration(bodies):

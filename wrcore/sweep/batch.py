@@ -100,9 +100,9 @@ def run_sweep(
     ...     "sampling": {"kind": "grid"}, "keys": {"speed": {"values": [20, 30]}}, "measures": ["y_max_m"],
     ... })
     >>> table
-       run  speed     status  method  y_max_m
-    0    0     20  completed  rodas4    0.002
-    1    1     30  completed   tsit5    0.002
+       run  speed     status    method  y_max_m
+    0    0     20  completed  rodas4p2    0.002
+    1    1     30  completed     tsit5    0.002
     """
     sweep = source if isinstance(source, Sweep) else load_sweep(source)
     return run_rows(sweep, sweep.runs, threads, progress)
