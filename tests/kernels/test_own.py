@@ -1,14 +1,20 @@
 """What decides on a function of a user's own: its digest."""
 
+import ctypes
+import gc
 import importlib
 import os
 import subprocess
 import sys
+import weakref
 
+import numba
+import numpy as np
 import pytest
 
 from tests.conftest import ROOT
 from wrcore.kernels import own
+from wrcore.kernels.handles import Kernel
 
 TEXT = """
 import math
@@ -59,3 +65,20 @@ def test_what_a_function_does_decides(module, name, tmp_path):
     (tmp_path / "own_digests.py").write_text(TEXT)
     importlib.reload(module)
     assert digest() == first
+
+
+def test_what_a_kernel_calls_lives_as_long_as_it():
+    """Plain Python behind a kernel was freed with the first sweep of unused objects: a crash some time later."""
+
+    def kernel_of(factor):
+        back = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: factor * x)
+        called = own.uncached(lambda values: fill(values, back(values[0])))
+        return Kernel(called, np.zeros(1)), weakref.ref(back)
+
+    @numba.njit
+    def fill(values, x):
+        values[0] = x
+
+    kernel, back = kernel_of(2.0)
+    gc.collect()
+    assert kernel.address and back() is not None

@@ -182,7 +182,7 @@ FOUR = types.UniTuple(types.float64, 4)
 
 class Kernel:
     """A kernel that returns nothing (or ``returns``), compiled (or loaded) for the types of example arguments, to be
-    called by its address."""
+    called by its address as long as this object lives."""
 
     def __init__(self, function, *examples, returns=types.none):
         signature = tuple(typeof(example) for example in examples)
@@ -193,6 +193,7 @@ class Kernel:
         self._numba_type_ = KernelType(signature)
         if compiled.signature.return_type != returns:
             raise TypeError(f"{function.__name__}: expected a kernel that returns {returns}, not {compiled.signature}")
+        self._function = function  # its code may call what lives with it: plain Python of a user's own
         self.address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 
 
