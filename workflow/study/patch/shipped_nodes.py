@@ -1,8 +1,9 @@
-"""Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--out FILE]``.
+"""Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--more] [--out FILE]``.
 
 Scenes run on an empty table: those of `study.patch.look_up`, and examples at speeds, on tracks and from starts that a
 user may well try. What they meet of the pair of profiles that they share is kept: nodes, and which cells may be looked
-up (``wrcore/dynamics/tables/nodes.h5``).
+up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they meet
+besides is added.
 """
 
 import argparse
@@ -29,12 +30,12 @@ MET = [
 """Examples and what is set in them."""
 
 
-def met(scenes):
-    """`Pair` with what scenes, (name, settings), meet on an empty table of their own."""
+def met(scenes, more=False):
+    """`Pair` with what scenes, (name, settings), meet on a table of their own, empty or with ``more`` as it ships."""
     pairs, shared = {}, (pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS)
     with tempfile.TemporaryDirectory() as folder:
-        pair_store.Pair._take_shipped, pair_store.table_folder = (lambda _: None), (lambda: Path(folder))
-        pair_store._PAIRS = pairs
+        pair_store.Pair._take_shipped = shared[0] if more else lambda _: None
+        pair_store.table_folder, pair_store._PAIRS = (lambda: Path(folder)), pairs
         try:
             for name, settings in scenes:
                 wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
@@ -46,13 +47,16 @@ def met(scenes):
 
 
 def write(pair, path):
-    """Keep a pair's nodes, and which of its cells may be looked up."""
+    """Keep a pair's nodes, and which of its cells may be looked up, with those that it began with."""
+    states = {key: state for key, (_, state) in pair._known.items()}
+    states |= {key: int(np.sign(state)) if state > 0 else state for key, state in pair.cells.items()}
+    misses = {key: miss for key, (miss, _) in pair._known.items()} | dict(pair.misses)
     data = {
         "nodes": np.array(sorted(pair._solved_at)),
         "numbers": np.array([pair._solved_at[node] for node in sorted(pair._solved_at)]),
         "parts": np.array(sorted(pair._parts.items())),
-        "cells": np.array([(key, np.sign(state) if state > 0 else state) for key, state in pair.cells.items()]),
-        "misses": np.array([pair.misses[key] for key in pair.cells], np.float32),
+        "cells": np.array(list(states.items())),
+        "misses": np.array([misses[key] for key in states], np.float32),
         "fingerprint": pair_store.fingerprint(pair.contact),
     }
     with new_hdf5(path) as file:
@@ -64,9 +68,11 @@ def main():
     """Run the scenes, write what they met, and say how much it is."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", default=str(pair_store.SHIPPED / "nodes.h5"))
-    path, pair = parser.parse_args().out, met(MET)
+    parser.add_argument("--more", action="store_true", help="begin with the nodes that come with the package")
+    arguments = parser.parse_args()
+    path, pair = arguments.out, met(MET, arguments.more)
     write(pair, path)
-    print(f"{len(pair.cells)} cells, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
+    print(f"{len(pair.cells)} cells met, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
 
 
 if __name__ == "__main__":
