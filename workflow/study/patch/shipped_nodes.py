@@ -2,8 +2,8 @@
 
 Scenes run on an empty table: those of `study.patch.look_up`, and examples at speeds, on tracks and from starts that a
 user may well try. What they meet of the pair of profiles that they share is kept: nodes, and which cells may be looked
-up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they meet
-besides is added.
+up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they
+meet besides is added.
 """
 
 import argparse
