@@ -18,7 +18,8 @@ def test_fast_impacts_keep_the_root_of_the_damping_factor():
 
 
 def test_impacts_follow_the_damping_law(vehicles, assert_passed):
-    found, curve = impacts(vehicles, "free wheelset", [0.001, 0.01, 0.5], ["spatial"], ["ros34pw2", "rodas4p2", "tsit5"])
+    methods = ["ros34pw2", "rodas4p2", "tsit5"]
+    found, curve = impacts(vehicles, "free wheelset", [0.001, 0.01, 0.5], ["spatial"], methods)
     assert_passed(found)
     assert len(curve) == 9
 
