@@ -7,7 +7,9 @@ linked     from other kernels: what LLVM links into them, no machine code
 Numba makes all of it for every kernel, with a wrapper for C besides. Most kernels are called by other kernels alone.
 """
 
+import gc
 import os
+from contextlib import contextmanager
 
 import numba
 from llvmlite import binding
@@ -24,7 +26,13 @@ _FOLDER = str(kernel_folder())
 
 
 class _Intermediate(JITCodeLibrary):
-    """A kernel's optimised code before any machine's, for others to link."""
+    """A kernel's code before any machine's, for others to link.
+
+    Who links it optimises it with its own: a kernel that is called over ten others would else be optimised ten times,
+    which was a fifth of a first run."""
+
+    def _optimize_final_module(self):
+        pass
 
     def _finalize_final_module(self):
         self._finalize_dynamic_globals()
@@ -150,8 +158,24 @@ def _set_environments(result):
         result.library.codegen.set_env(environment.env_name, environment)
 
 
+@contextmanager
+def _rarely_collected():
+    """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
+    and looking took it a tenth of its time."""
+    before = gc.get_threshold()
+    gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
 class _Form(CPUDispatcher):
     """A kernel in a form that Python cannot call: its table of calls gets nothing."""
+
+    def compile(self, sig):
+        with _rarely_collected():
+            return super().compile(sig)
 
     def add_overload(self, result):
         self.overloads[tuple(result.signature.args)] = result
@@ -161,6 +185,10 @@ class _Form(CPUDispatcher):
 
 class KernelDispatcher(CPUDispatcher):
     """A kernel as Python calls it; other kernels get it linked."""
+
+    def compile(self, sig):
+        with _rarely_collected():
+            return super().compile(sig)
 
     def get_call_template(self, args, kws):
         return self.in_form("linked").get_call_template(args, kws)
