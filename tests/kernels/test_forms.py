@@ -1,5 +1,6 @@
 """What of a kernel is compiled, and that what a process compiled and what it found in the cache are the same."""
 
+import gc
 import json
 import os
 import re
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.errors import TypingError
 
 from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
@@ -52,6 +55,30 @@ def test_a_kernel_that_only_kernels_call_has_no_machine_code_and_no_wrapper():
         result.library.enable_object_caching()
         result.library._get_compiled_object()
     assert inner(4.0) == 1.0 and len(inner.overloads) == 1  # compiled anew for Python
+
+
+def test_what_kernels_link_is_optimised_once_with_them_and_garbage_hardly_looked_for(monkeypatch):
+    seen, usual = [], gc.get_threshold()
+    optimise = CPUCodeLibrary._optimize_final_module
+
+    def watched(library):
+        if "lambda" in library.name:  # not numba's own
+            seen.append(gc.get_threshold()[0])
+        optimise(library)
+
+    monkeypatch.setattr(CPUCodeLibrary, "_optimize_final_module", watched)
+    inner = jit(allocates=False)(lambda x: 0.25 * x)
+    middle = jit(allocates=False)(lambda x: inner(x) + 1.0)
+    outer = jit(allocates=False)(lambda x: middle(x) * 2.0)
+    for each in (inner, middle, outer):
+        each._cache.disable()
+        each.in_form("linked")._cache.disable()
+    assert outer(4.0) == 4.0
+    assert len(seen) == 1 and seen[0] >= 100_000
+    assert gc.get_threshold() == usual
+    with pytest.raises(TypingError):
+        outer("four")
+    assert gc.get_threshold() == usual
 
 
 def test_a_kernel_called_by_its_address_has_no_wrapper():
