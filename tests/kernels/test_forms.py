@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,24 @@ def test_what_kernels_link_is_optimised_once_with_them_and_garbage_hardly_looked
     with pytest.raises(TypingError):
         outer("four")
     assert gc.get_threshold() == usual
+
+
+def test_threads_that_compile_leave_the_garbage_collector_as_it_was():
+    usual, met = gc.get_threshold(), []
+
+    def other():
+        with forms._rarely_collected():
+            met.append(True)
+            left.wait(5.0)
+
+    left, thread = threading.Event(), threading.Thread(target=other)
+    with forms._rarely_collected():
+        thread.start()
+        thread.join(0.2)
+        assert not met  # it waits
+    left.set()
+    thread.join()
+    assert met and gc.get_threshold() == usual
 
 
 def test_a_kernel_called_by_its_address_has_no_wrapper():

@@ -16,6 +16,7 @@ from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
@@ -161,13 +162,15 @@ def _set_environments(result):
 @contextmanager
 def _rarely_collected():
     """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
-    and looking took it a tenth of its time."""
-    before = gc.get_threshold()
-    gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
+    and looking took it a tenth of its time. One thread after the other, as they compile: else one would take for usual
+    what another one has set."""
+    with global_compiler_lock:
+        before = gc.get_threshold()
+        gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
+        try:
+            yield
+        finally:
+            gc.set_threshold(*before)
 
 
 class _Form(CPUDispatcher):
