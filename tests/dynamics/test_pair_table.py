@@ -15,7 +15,7 @@ from wrcore.contact.detection import find_patches
 from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, MODES, NO_TABLE, NODES, NUMBERS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics import pair_store, pair_table, patch_kernels, tabulated_wheel
+from wrcore.dynamics import coupled_lobes, pair_store, pair_table, patch_kernels
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, YAWS, look_up
@@ -205,7 +205,7 @@ def test_lobes_that_are_apart():
         exact, table = exact.row, table.row
         normal = exact[reduction.NORMAL]
         assert exact[reduction.SEMI_B] > 0.02  # of both lobes together
-        assert table[reduction.NORMAL] == pytest.approx(normal, rel=2e-3)
+        assert table[reduction.NORMAL] == pytest.approx(normal, rel=7e-4)
         limit, c = 0.3 * normal, math.sqrt(exact[reduction.SEMI_A] * exact[reduction.SEMI_B])
         assert math.hypot(*(table - exact)[[reduction.FX, reduction.FY]]) < 5e-3 * limit
         assert table[reduction.MZ] == pytest.approx(exact[reduction.MZ], abs=0.01 * limit * c)
@@ -266,36 +266,52 @@ def points_of_hertz(a, b, n=16):
     return np.stack([a * np.outer(radius, np.cos(angle)).ravel(), b * np.outer(radius, np.sin(angle)).ravel()], axis=1)
 
 
-def test_lobes_act_on_each_other_as_loads_on_a_half_space_do():
+def points_under_a_punch(a, b, n=16):
+    """The same for the pressure under a rigid punch."""
+    radius = np.sqrt(1.0 - (1.0 - (np.arange(n) + 0.5) / n) ** 2.0)
+    angle = 2.0 * math.pi * (np.arange(n) + 0.5) / n
+    return np.stack([a * np.outer(radius, np.cos(angle)).ravel(), b * np.outer(radius, np.sin(angle)).ravel()], axis=1)
+
+
+@pytest.mark.parametrize(("moment", "rtol"), [(0.0, 0.015), (12.0, 0.05)])
+def test_lobes_act_on_each_other_as_loads_on_a_half_space_do(moment, rtol):
     """Against Boussinesq's and Cerruti's displacements, wheel's less rail's, of spread loads, averaged over the other
     ellipse; a creepage of theirs is their fall over x, for material runs through the contact towards -x."""
     shear, nu, gap, step = 8.2e10, 0.28, 0.012, 1e-5
-    forces, sizes = {"n": 4e4, "x": 7e3, "s": -3e3}, ((4e-3, 2e-3), (3e-3, 2.5e-3))
+    forces, sizes = {"n": 4e4, "x": 7e3, "s": -3e3, "m": moment}, ((4e-3, 2e-3), (4e-3, 1e-3))
     numbers, lobes = np.zeros((2, NUMBERS)), np.zeros((2, LOBE_COLUMNS))
     for q, (a, b) in enumerate(sizes):
         numbers[q, [pair_table.LOG_A, pair_table.LOG_B]] = math.log(a), math.log(b)
     numbers[0, pair_table.PLACE_Y] = gap  # lobe 0 lies further out than the loaded lobe 1
-    lobes[0, tabulated_wheel.END] = 1.0
-    lobes[1] = forces["n"], 0.0, forces["x"], forces["s"], 2.0, 0.0
+    assert coupled_lobes.TURN + MAX_PATCHES == LOBE_COLUMNS
+    lobes[:, coupled_lobes.END] = 1.0, 2.0
+    places = [getattr(coupled_lobes, name) for name in ("NORMAL", "FORCE_X", "FORCE_S", "MOMENT")]
+    lobes[1, places] = list(forces.values())
     rows = np.zeros((2, PATCH_COLUMNS))
-    rows[:, reduction.U_WHEEL], rows[:, reduction.CURVATURE_Y] = (0.0, gap), 1.0
+    rows[:, reduction.U_WHEEL], rows[:, [reduction.CURVATURE_Y, reduction.COSINE]] = (0.0, gap), 1.0
     work = SimpleNamespace(lobes=lobes, numbers=numbers, rows=rows)
     model = SimpleNamespace(shear_modulus=shear, poisson_ratio=nu)
+    twisted = (sizes[1][0] ** 2 - sizes[1][1] ** 2) / (sizes[1][0] ** 2 + sizes[1][1] ** 2)
 
-    def displaced(moved):
-        """Mean (ux, us, un) of lobe 0, moved along x."""
-        apart = points_of_hertz(*sizes[0])[:, None] + [moved, gap] - points_of_hertz(*sizes[1])[None]
+    def displaced(moved, aside=0.0, own=points_of_hertz):
+        """Mean (ux, us, un) of lobe 0, moved along x and across, over points of its own."""
+        loaded = points_of_hertz(*sizes[1])[None]
+        apart = own(*sizes[0])[:, None] + [moved, gap + aside] - loaded
         (x, y), r = apart.transpose(2, 0, 1), np.hypot(*apart.transpose(2, 0, 1))
-        ux = forces["x"] * ((1.0 - nu) / r + nu * x * x / r**3) + forces["s"] * nu * x * y / r**3
-        us = forces["s"] * ((1.0 - nu) / r + nu * y * y / r**3) + forces["x"] * nu * x * y / r**3
+        across = forces["s"] + twisted * forces["m"] * loaded[..., 0] / (loaded[..., 0] ** 2).mean()
+        ux = forces["x"] * ((1.0 - nu) / r + nu * x * x / r**3) + across * nu * x * y / r**3
+        us = across * ((1.0 - nu) / r + nu * y * y / r**3) + forces["x"] * nu * x * y / r**3
         return np.array([ux.mean(), us.mean(), (forces["n"] * (1.0 - nu) / r).mean()]) / (math.pi * shear)
 
     slope = (displaced(step) - displaced(-step)) / (2.0 * step)
-    found = tabulated_wheel._slip_of_others.py_func(model, 0, 2, work)
-    np.testing.assert_allclose(found, -slope[:2], rtol=0.02)
+    found = coupled_lobes.slip_of_others.py_func(model, 0, 2, work)
+    np.testing.assert_allclose(found, -slope[:2], rtol=rtol)
     assert min(map(abs, found)) > 5e-6
-    tabulated_wheel._balance.py_func(model, 1e11, 0, 2, work)
-    assert lobes[0, tabulated_wheel.LIFT] == pytest.approx(displaced(0.0)[2], rel=0.005)
+    coupled_lobes.balance.py_func(model, 0.0, 0, 2, work)
+    punched = [displaced(0.0, aside, points_under_a_punch)[2] for aside in (-1e-5, 0.0, 1e-5)]
+    lift, tilt = (forces["n"] * lobes[0, column + 1] for column in (coupled_lobes.RISE, coupled_lobes.TURN))
+    assert lift == pytest.approx(punched[1], rel=0.001)
+    assert tilt == pytest.approx((punched[2] - punched[0]) / 2e-5, rel=0.03)
 
 
 def test_half_the_steps_where_a_cell_is_too_coarse():

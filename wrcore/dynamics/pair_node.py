@@ -54,7 +54,7 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows):
         group = group_end(geometry, rows, count, first)
         while first < group:
             last = lobe_end(geometry, pose, rows, first, group, limits)
-            depth, u = depth_of(rows, first, last, 0.0)
+            depth, u = depth_of(rows, first, last)
             if abs(u - place) < nearest:
                 low, high, found, at, nearest = first, last, depth, u, abs(u - place)
             first = last

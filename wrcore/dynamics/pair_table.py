@@ -109,16 +109,15 @@ def lobe_end(geometry, pose, rows, first, last, limits):
 
 
 @jit(allocates=False)
-def depth_of(rows, first, last, lift):
-    """D of the overlaps of a lobe that is lifted (m), and its place on the wheel's profile as if it were not, m."""
-    total = weight = mean = 0.0
+def depth_of(rows, first, last):
+    """D of the overlaps of a lobe, and its place on the wheel's profile, m."""
+    total = mean = 0.0
     for k in range(first, last):
         d, root = rows[k, reduction.PENETRATION], math.sqrt(rows[k, reduction.CURVATURE_Y])
-        left, share = max(d - lift, 0.0), d * d * math.sqrt(d) / root
-        total += left * left * math.sqrt(left) / root
-        weight += share
+        share = d * d * math.sqrt(d) / root
+        total += share
         mean += share * rows[k, reduction.U_WHEEL]
-    return (math.sqrt(CURVATURE) * total) ** 0.4, mean / weight
+    return (math.sqrt(CURVATURE) * total) ** 0.4, mean / total
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

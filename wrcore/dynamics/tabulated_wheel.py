@@ -1,12 +1,6 @@
 """Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer.
 
-Lobes that are apart are looked up one by one, and act on each other as points that load a half-space. The others'
-pressure presses a lobe's surfaces apart, by Boussinesq's formula and the ellipses' second moments, and their friction
-lets them slip, by Cerruti's and the displacement's slope over x (K. L. Johnson, Contact Mechanics, 3.2, 3.6):
-
-    w_i = sum of (1 - nu) N_j cos(delta_i - delta_j) / (pi G r) (1 + 0.2 b - 0.1 a),
-    dxi_i = -sum of nu Fy_j / (pi G r^2) (1 + 0.6 b - 0.9 a),   deta_i likewise with Fx_j,
-    a = (a_i^2 + a_j^2) / r^2,   b = (b_i^2 + b_j^2) / r^2,   both creepages with the sign of s_i - s_j.
+Lobes that are apart are looked up one by one, and act on each other (:mod:`wrcore.dynamics.coupled_lobes`).
 """
 
 import math
@@ -17,9 +11,24 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import Frame, add_force, frame_of_rows
-from wrcore.contact.patch.model import KERNEL, LOAD, LOBE_COLUMNS, MODEL, NUMBERS
+from wrcore.contact.patch.model import KERNEL, LOAD, MODEL, NUMBERS
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
+from wrcore.dynamics.coupled_lobes import (
+    CELL,
+    END,
+    FORCE_S,
+    FORCE_X,
+    MOMENT,
+    NORMAL,
+    TILT,
+    balance,
+    depth_left,
+    guess_lobes,
+    load_of,
+    slip_of_others,
+    tilt_back,
+)
 from wrcore.dynamics.pair_table import (
     APART,
     FAR,
@@ -50,12 +59,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 UNKNOWN = NOTHING._replace(load=-1.0)
 
-NORMAL, LIFT, FORCE_X, FORCE_S, END, CELL = range(LOBE_COLUMNS)
-"""Columns of a lobe: its load (N), what others lift it by (m), friction on it (N), the end of its overlaps, and the
-number of its cell."""
-
-TURNS, STEPS, ROLLS = 3, 6, 3
-"""Lobes are looked up so many times, with so many steps towards balance between, and rolled so many times."""
+TURNS, ROLLS = 2, 3
+"""Lobes are looked up so many times, balanced between, and rolled so many times."""
 
 
 KEPT, DEEPEST, LIFTED, DEPTH, DEEPER, FRAME = range(6)
@@ -71,11 +76,11 @@ FARTHER = 1e-9
 def _keep(model, m, frame, lift, low, high, kept, work):
     """Keep a wheel's only lobe, just looked up, and what it changes by the lift."""
     rows, one, other, ahead = work.rows, work.numbers[0], work.numbers[1], -1.0 if m.vx < 0.0 else 1.0
-    depth, u = depth_of(rows, low, high, 0.0)
+    depth, u = depth_of(rows, low, high)
     pose, low, high = lifted(model, m, frame, lift + FARTHER, True, u, rows)
     if high == low:
         return
-    further, u = depth_of(rows, low, high, 0.0)
+    further, u = depth_of(rows, low, high)
     t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
     cell, fx, fy, fz, gx, gy, gz, turn = locate(model.strips.table, u, False, t, m.ez, further, ahead * m.ex)
     if cell == 0 or further <= 0.0:
@@ -100,7 +105,7 @@ def _add_kept(model, m, kept, wrench, counters, work):
     numbers, modulus = work.numbers[0], contact_modulus(model.shear_modulus, model.poisson_ratio)
     for k in range(NUMBERS):
         numbers[k] = kept[KEPT_ROW + k] + more * kept[KEPT_ROW + NUMBERS + k]
-    work.lobes[0, NORMAL] = _load(modulus, numbers, kept[DEPTH] + more * kept[DEEPER])
+    work.lobes[0, NORMAL] = load_of(modulus, numbers, kept[DEPTH] + more * kept[DEEPER])
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z
     _roll_lobes(model, m, frame, y, z, -1.0 if m.vx < 0.0 else 1.0, 1, counters, work)
@@ -173,81 +178,37 @@ def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
         last = lobe_end(geometry, pose, rows, last, high, (APART, FAR, SADDLE))
         lobes[count, END] = last
         count += 1
-    left = TURNS if count > 1 else 1
+    left, axle_y = 1, geometry.half_distance * ey
+    if count > 1:
+        left = TURNS
+        guess_lobes(model, pose, axle_y, geometry.half_distance * slope, low, count, work)
     while left > 0:
         left -= 1
         first = low
         for q in range(count):
-            last = int(lobes[q, END])
-            depth, u = depth_of(rows, first, last, lobes[q, LIFT])
-            lobes[q, NORMAL] = 0.0
+            last, lobe, numbers, tilt, aside = int(lobes[q, END]), lobes[q], work.numbers[q], 0.0, 0.0
+            depth, u = depth_of(rows, first, last)
+            if count > 1:
+                tilt = lobe[TILT]
+                depth = depth_left(rows, first, last, lobe, pose.y + axle_y + numbers[columns.PLACE_Y])
+                aside = tilt * (geometry.rolling_radius - numbers[columns.PLACE_Z])
+            lobe[NORMAL] = 0.0
             if depth > 0.0:
-                cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, count > 1, t, slope, depth, yaw)
+                cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, count > 1, t - aside, slope + tilt, depth, yaw)
                 if cell == 0:
                     return 0
                 rows_of_cell = table.cells[cell]
                 weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
-                look_up(rows_of_cell, work.weights, work.numbers[q])
+                look_up(rows_of_cell, work.weights, numbers)
                 if left == 0:
-                    look_modes_up(rows_of_cell, work.weights, work.numbers[q])
-                lobes[q, NORMAL], lobes[q, CELL] = _load(modulus, work.numbers[q], depth), cell
+                    look_modes_up(rows_of_cell, work.weights, numbers)
+                lobe[NORMAL], lobe[CELL] = load_of(modulus, numbers, depth), cell
+                if count > 1:
+                    tilt_back(numbers, tilt, geometry.rolling_radius)
             first = last
-        if count > 1:
-            for _ in range(STEPS):
-                _balance(model, modulus, low, count, work)
+        if left > 0:
+            balance(model, pose.y + axle_y, low, count, work)
     return count
-
-
-@jit(allocates=False, forceinline=True)
-def _load(modulus, numbers, depth):
-    return modulus * depth * math.sqrt(depth) * math.exp(numbers[columns.LOG_NORMAL])
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _apart(one, other):
-    """r, a and b of the module's formulas from two lobes' numbers."""
-    dx, dy = one[columns.PLACE_X] - other[columns.PLACE_X], one[columns.PLACE_Y] - other[columns.PLACE_Y]
-    dz = one[columns.PLACE_Z] - other[columns.PLACE_Z]
-    square = dx * dx + dy * dy + dz * dz
-    long = math.exp(2.0 * one[columns.LOG_A]) + math.exp(2.0 * other[columns.LOG_A])
-    wide = math.exp(2.0 * one[columns.LOG_B]) + math.exp(2.0 * other[columns.LOG_B])
-    return math.sqrt(square), long / square, wide / square
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _balance(model, modulus, low, count, work):
-    """One step towards balance of the lobes' loads and of what they lift each other by."""
-    lobes, numbers = work.lobes, work.numbers
-    unit = (1.0 - model.poisson_ratio) / (math.pi * model.shear_modulus)
-    for i in range(count):
-        lift = 0.0
-        for j in range(count):
-            if j != i:
-                distance, a, b = _apart(numbers[i], numbers[j])
-                load = lobes[j, NORMAL] * math.cos(numbers[i, columns.ANGLE] - numbers[j, columns.ANGLE])
-                lift += unit * load / distance * (1.0 + 0.2 * b - 0.1 * a)
-        lobes[i, LIFT] = lift
-    first = low
-    for i in range(count):
-        last = int(lobes[i, END])
-        depth, _ = depth_of(work.rows, first, last, lobes[i, LIFT])
-        lobes[i, NORMAL] = _load(modulus, numbers[i], depth)
-        first = last
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _slip_of_others(model, i, count, work):
-    """Creepages of a lobe by the friction on the others."""
-    lobes, numbers, xi, eta = work.lobes, work.numbers, 0.0, 0.0
-    for j in range(count):
-        if j != i and lobes[j, NORMAL] > 0.0:
-            distance, a, b = _apart(numbers[i], numbers[j])
-            unit = -model.poisson_ratio / (math.pi * model.shear_modulus * distance * distance)
-            unit *= 1.0 + 0.6 * b - 0.9 * a
-            if numbers[i, columns.PLACE_Y] < numbers[j, columns.PLACE_Y]:
-                unit = -unit
-            xi, eta = xi + unit * lobes[j, FORCE_S], eta + unit * lobes[j, FORCE_X]
-    return xi, eta
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -258,7 +219,8 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
         for q in range(count):
             if work.lobes[q, NORMAL] > 0.0:
                 rolled = _roll_lobe(model, m, ahead, q, count, counters, work)
-                work.lobes[q, FORCE_X], work.lobes[q, FORCE_S] = ahead * rolled.f1, rolled.f2
+                lobe = work.lobes[q]
+                lobe[FORCE_X], lobe[FORCE_S], lobe[MOMENT] = ahead * rolled.f1, rolled.f2, ahead * rolled.m3
     extent, modulus = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio)
     load = x = s = xx = ss = xi = eta = phi = phi_x = peak = power = 0.0
     x_min = s_min = 1.0
@@ -321,7 +283,7 @@ def _roll_lobe(model, m, ahead, q, count, counters, work):
     xi, eta, phi, _ = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
     more_xi = more_eta = 0.0
     if count > 1:
-        more_xi, more_eta = _slip_of_others(model, q, count, work)
+        more_xi, more_eta = slip_of_others(model, q, count, work)
     limit = falling(model, m.friction, xi, eta, speed) * work.lobes[q, NORMAL]
     f1, f2, m3, missed = tabulated_force(
         model, model.strips.table.modes, numbers, ahead * xi + more_xi, eta + more_eta, ahead * phi, limit,

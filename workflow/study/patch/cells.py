@@ -153,9 +153,10 @@ def depths_of(contact, left, overlaps):
     while first < count:
         end = group_end(geometry, overlaps, count, first)
         lift = (1.0 - factor ** (2.0 / 3.0)) * overlaps[first:end, PENETRATION].max()
+        overlaps[first:end, PENETRATION] = np.maximum(overlaps[first:end, PENETRATION] - lift, 0.0)
         while first < end:
             last = lobe_end(geometry, pose, overlaps, first, end, (APART, FAR, SADDLE))
-            found.append(depth_of(overlaps, first, last, lift)[0])
+            found.append(depth_of(overlaps, first, last)[0])
             first = last
     return [depth for depth in found if depth > 0.0]
 

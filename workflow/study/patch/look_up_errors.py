@@ -38,17 +38,19 @@ PAIRS = {
     "hollow 1 mm / 60E1 1:40": lambda: WheelOnRail(worn(1e-3, 0.0, 0.015), named_profile("60E1", "rail", 1 / 40)),
 }
 POSES = {
-    "hunting": ((-4e-3, 4e-3), 2e-4, 4.5e-3, (3.5e4, 7.5e4)),
-    "rough track": ((-4e-3, 4e-3), 1e-3, 3e-3, (2e4, 1.1e5)),
-    "curve": ((4e-3, 7e-3), 3e-4, 1.2e-2, (2e4, 1.1e5)),
-    "edges of the hollow": ((3e-4, 7e-4), 0.0, 2e-3, (5.9e4, 6.1e4)),
+    "hunting": ((-4e-3, 4e-3), 2e-4, 4.5e-3, (3.5e4, 7.5e4), 3e-3, 0.0),
+    "rough track": ((-4e-3, 4e-3), 1e-3, 3e-3, (2e4, 1.1e5), 3e-3, 0.0),
+    "curve": ((4e-3, 7e-3), 3e-4, 1.2e-2, (2e4, 1.1e5), 3e-3, 0.0),
+    "tread and root": ((4.6e-3, 5.8e-3), 3e-4, 8e-3, (2e4, 8e4), 1e-3, -2.7e-3),
+    "edges of the hollow": ((3e-4, 7e-4), 0.0, 2e-3, (5.9e4, 6.1e4), 3e-3, 0.0),
 }
-"""Range of y (m), spread of roll beside that of balance and range of yaw (rad), and range of the load (N)."""
+"""Range of y (m), spread of roll beside that of balance and range of yaw (rad), range of the load (N), that of both
+creepages, and the middle of the one along the rail: where the tread hardly slips, beside the root."""
 
 
 def rolled(geometry, poses, count, seed):
     """Rows of both models (patches, columns), what of them was solved, and seconds that the table's nodes took."""
-    (low, high), spread, most, loads = POSES[poses]
+    (low, high), spread, most, loads, creepages, middle = POSES[poses]
     models = {name: LoadedWheels(geometry, name) for name in ("exact", "tabulated")}
     random, rows, solved, spent = np.random.default_rng(seed), {name: [] for name in models}, [], 0.0
     while len(solved) < count:
@@ -56,10 +58,10 @@ def rolled(geometry, poses, count, seed):
         roll, _ = models["exact"].settled(y, load)
         roll += random.normal(0.0, spread)
         z = models["exact"].height("left", y, load, roll, yaw)
-        drift, spin = random.uniform(-1.0, 1.0, 2) * 3e-3
+        drift, spin = random.uniform(-1.0, 1.0, 2) * creepages
         if math.isnan(z):
             continue
-        rolling = Rolling(SPEED, SPEED / geometry.rolling_radius * (1.0 + spin), SPEED * (yaw + drift))
+        rolling = Rolling(SPEED, SPEED / geometry.rolling_radius * (1.0 + middle + spin), SPEED * (yaw + drift))
         before, found = models["tabulated"]._counters[SOLVED], {}
         for name, wheels in models.items():
             begin = time.process_time()

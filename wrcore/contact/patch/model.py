@@ -46,8 +46,8 @@ NO_TABLE = PairTable(
 NODES, NUMBERS, MODES = 48, 64, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
-LOBE_COLUMNS = 6
-"""Of a lobe that is looked up, see `wrcore.dynamics.tabulated_wheel`."""
+LOBE_COLUMNS = 8 + 2 * MAX_PATCHES
+"""Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`."""
 
 KEPT_NUMBERS = 12 + 2 * NUMBERS
 """Of a wheel with one lobe, while its place stays: see `wrcore.dynamics.tabulated_wheel`."""
