@@ -124,7 +124,7 @@ def test_no_more_force_than_friction_bears(benchmark_pair, remainder):
     numbers[[pair_table.SLOPE_XI, pair_table.SLOPE_ETA, pair_table.LINEAR]] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 2] = remainder
     table, sums = creep_modes().values, np.zeros(3 * MODES)
-    force = pair_table.tabulated_force(contact, table, numbers, 0.0, 0.0, 0.0, 15e3, 0.0, sums)[:2]
+    force = pair_table.tabulated_force(contact, table, numbers, pair_table.Slip(*np.zeros(8)), 15e3, 0.0, sums)[:2]
     size = math.hypot(*remainder)
     assert force == pytest.approx(15e3 * np.array(remainder) / max(size, 1.0), rel=1e-6, abs=1e-3)
 

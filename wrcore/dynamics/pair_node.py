@@ -15,15 +15,14 @@ from wrcore.contact.reduction import MOMENT, PENETRATION
 from wrcore.contact.statics import height_of_zero
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.kalker import coefficients_at
-from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import PART, WIDE, depth_of, lobe_end, tabulated_force
+from wrcore.dynamics.pair_table import PART, WIDE, Slip, base_force, depth_of, lobe_end, root_share, tabulated_force
 from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
-SUMS = 12
-"""Of `press_lobe`."""
+SUMS = 33
+"""Of `press_lobe`, the last twelve scratch."""
 
 SLIPS = 12
 """Of a lobe that are solved at once."""
@@ -92,13 +91,45 @@ def lobe_of(geometry, place, rows):
 
 
 @jit(allocates=False, nogil=True)
+def _part_lobe(geometry, pose, frame, count, load, sums, work):
+    """Fill the places 6 to 8 of ``sums`` with the place of the slip, and those from 12 on with the load of the
+    flange root over N; that times its place, angle and ln of its semi-axes; and the rest's load times ln of its own."""
+    sums[:] = 0.0
+    for i in range(count):
+        s, x, length = work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i], work.strips[solve.HALF_LENGTH, i]
+        px, py, pz, cosine, sine = material_point(
+            geometry, pose, frame, s, x, work.strips[solve.WHEEL_HEIGHT, i], work.strips[solve.STRIP_TILT, i]
+        )
+        part, angle = work.strips[solve.STRIP_LOAD, i] / load, math.atan2(sine, cosine)
+        share = root_share(angle)
+        root = part * share
+        sums[6], sums[7], sums[8] = sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz
+        sums[12], sums[13], sums[14] = sums[12] + root, sums[13] + root * px, sums[14] + root * py
+        sums[15], sums[16] = sums[15] + root * pz, sums[16] + root * angle
+        for k in range(2):
+            at, share = 21 + 6 * k, (1.0 - share if k else share)
+            own = share * part
+            sums[at], sums[at + 1], sums[at + 2] = sums[at] + own, sums[at + 1] + own * x, sums[at + 2] + own * s
+            sums[at + 3] += own * (x * x + 0.25 * length * length)
+            sums[at + 4], sums[at + 5] = sums[at + 4] + own * s * s, sums[at + 5] + own * share
+    for k in range(2):
+        at = 21 + 6 * k
+        own = max(sums[at], columns.LEAST)
+        x, s, alone = sums[at + 1] / own, sums[at + 2] / own, max(sums[at + 5] / own, 1e-3)
+        xx, ss = sums[at + 3] / own - x * x, sums[at + 4] / own - s * s
+        sums[17 + 2 * k] = own * 0.5 * math.log(5.0 * max(xx, 1e-10))
+        # parts that share strips share their width
+        sums[18 + 2 * k] = own * (0.5 * math.log(5.0 * max(ss, 1e-10)) + math.log(alone))
+
+
+@jit(allocates=False, nogil=True)
 def press_lobe(model, y, z, axle, place, limits, velocity, more, sums, work):
     """Exact solution of a left wheel's lobe near a ``place`` on its profile (m), with ``more`` strips, for a velocity
     (6,) of its wheelset, linear and angular.
 
-    Fills ``sums`` (SUMS,): wrench of pressure about the wheelset's centre, place of the slip from there, semi-axes and
-    p_max. Returns the number of windows, 0 where strips find no solution, their frame, and the weight of the solution
-    with more strips.
+    Fills ``sums`` (SUMS,): wrench of pressure about the wheelset's centre, place of the slip from there, semi-axes
+    and p_max, and what `_part_lobe` says. Returns the number of windows, 0 where strips find no solution, their
+    frame, and the weight of the solution with more strips.
     """
     finer, geometry, (ex, ey, ez) = work.normal.more, model.geometry, axle
     first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, limits, work.rows)
@@ -116,14 +147,7 @@ def press_lobe(model, y, z, axle, place, limits, velocity, more, sums, work):
     for q in range(6):
         work.wrench[0, q] = 0.0
     found = roll_patch(model, m, pose, frame, windows, deepest, 1.0, model.friction, 1.0, work)
-    sums[:] = 0.0
-    for i in range(work.normal.start[windows]):
-        part = work.strips[solve.STRIP_LOAD, i] / found.load
-        px, py, pz, _, _ = material_point(
-            geometry, pose, frame, work.strips[solve.CENTRE, i], work.strips[solve.MIDDLE, i],
-            work.strips[solve.WHEEL_HEIGHT, i], work.strips[solve.STRIP_TILT, i],
-        )  # fmt: skip
-        sums[6], sums[7], sums[8] = sums[6] + part * px, sums[7] + part * py, sums[8] + part * pz
+    _part_lobe(geometry, pose, frame, work.normal.start[windows], found.load, sums, work)
     for q in range(6):
         sums[q] = work.wrench[0, q]
     sums[9], sums[10], sums[11] = found.a, found.b, found.p_max
@@ -195,24 +219,23 @@ def solve_place(contact, handle, works, place, points):
     numbers[columns.ANGLE] = math.atan2(sine, cosine)
     numbers[columns.PLACE_X : columns.PLACE_Z + 1] = slip - half * axle + [0.0, 0.0, radius]
     numbers[[columns.LOG_A, columns.LOG_B, columns.LOG_PEAK]] = np.log([a, b, sums[11] / modulus])
+    _part_numbers(numbers, sums)
     # what is added to rolling without slip in the mean, over the creepages of saturation
-    turning = axle / (axle[2] * slip[1] - axle[1] * slip[2])
-    drift = np.cross(turning, slip)
-    free = np.array([1.0, -(drift[1] * cosine + drift[2] * sine) / cosine, 0.0, *turning])
-    c, limit, spin = math.sqrt(a * b), contact.friction * normal, turning[2] * cosine - turning[1] * sine
+    free = rolling_slip(numbers, place[1], place[3], half, radius, 0.0, 0.0)
+    turning = np.array([free.wx, free.wy, free.wz])
+    c, limit = math.sqrt(a * b), contact.friction * normal
     kalker = coefficients_at(math.log(a / b), contact.creep.table.kalker)[:2]
     unit = contact.shear_modulus * c * c / limit
 
     def exact_and_table(points, factors):
         """Forces (n, 3) of both, over mu N and mu N c; the table's creepages are those times factors."""
         creepages = 3.0 * points / (kalker * factors)
-        velocities = np.tile(free, (len(points), 1))
+        velocities = np.tile([*([0.0, free.vy, free.vz] - np.cross(turning, slip)), *turning], (len(points), 1))
         velocities[:, :2] += creepages / (unit * np.array([1.0, cosine]))
         found = forces_at(velocities)
         moment, table = found[:, 3:] - np.cross(slip, found[:, :3]), np.zeros((len(points), 3))
         across, turn = found[:, 1] * cosine + found[:, 2] * sine, moment[:, 2] * cosine - moment[:, 1] * sine
-        scaled = np.column_stack([creepages * factors, np.full(len(points), spin * unit * c)])
-        creep_forces(LAWS["table"], contact.creep, np.full(len(points), a / b), np.zeros(len(points)), scaled, table)
+        base_forces(handle, numbers, place[1], place[3], creepages / unit, factors, limit, table)
         return np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
 
     exact, table = exact_and_table(AT_REST, np.ones(2))
@@ -227,10 +250,47 @@ def solve_place(contact, handle, works, place, points):
     return (numbers, exact - table) if np.isfinite(exact).all() else None
 
 
+def _part_numbers(numbers, sums):
+    """Fill in numbers of a lobe's parts, from what `press_lobe` found."""
+    root = sums[12]
+    if root > 1.0 - columns.LEAST:
+        numbers[columns.ROOT] = 1.0
+    if not columns.LEAST < root < 1.0 - columns.LEAST:
+        return
+    whole = [*sums[6:9], *numbers[[columns.ANGLE, columns.LOG_A, columns.LOG_B]]]
+    numbers[columns.ROOT : columns.ROOT_B + 1] = root, *(sums[13:19] - root * np.array(whole))
+    numbers[columns.REST_A : columns.REST_B + 1] = sums[19:21] - (1.0 - root) * np.array(whole[4:])
+    for load, turned, size in ((root, root, columns.ROOT_B), (1.0 - root, root - 1.0, columns.REST_B)):
+        numbers[size] -= load * math.log(math.cos(numbers[columns.ROOT_ANGLE] / turned))  # strips lie in one plane
+
+
+@jit(allocates=False)
+def rolling_slip(numbers, slope, yaw, half, radius, xi, eta):
+    """`Slip` of a wheel that rolls, but for creepages, at a lobe."""
+    across = math.sqrt(1.0 - yaw * yaw - slope * slope)
+    x, y = numbers[columns.PLACE_X] + half * yaw, numbers[columns.PLACE_Y] + half * across
+    rate = 1.0 / (slope * y - across * (numbers[columns.PLACE_Z] + half * slope - radius))
+    wx, wy, wz = rate * yaw, rate * across, rate * slope
+    cosine, sine, rise = math.cos(numbers[columns.ANGLE]), math.sin(numbers[columns.ANGLE]), wx * y - wy * x
+    return Slip(xi, eta, wz * cosine - wy * sine, (eta - rise * sine) / cosine, rise, wx, wy, wz)
+
+
 @jit(allocates=False, nogil=True)
-def unlike(model, modes, one, other, depth, spin, points, sums):
-    """Largest difference over mu N of the creep forces that two sets of numbers give a lobe at creepages ``points``
-    (n, 2) over those of saturation."""
+def base_forces(model, numbers, slope, yaw, creepages, factors, limit, forces):
+    """Fill ``forces`` (n, 3), over mu N and mu N c, with those of the creep table at ``creepages`` (n, 2)."""
+    half, radius = model.geometry.half_distance, model.geometry.rolling_radius
+    for k in range(len(creepages)):
+        xi, eta = creepages[k, 0], creepages[k, 1]
+        slip = rolling_slip(numbers, slope, yaw, half, radius, xi, eta)
+        f1, f2, m3, _, _ = base_force(model, numbers, slip, factors[0] * xi, factors[1] * eta, limit)
+        forces[k, 0], forces[k, 1], forces[k, 2] = f1, f2, m3
+
+
+@jit(allocates=False, nogil=True)
+def unlike(model, modes, one, other, depth, slope, yaw, points, sums):
+    """Largest difference over mu N of the creep forces that two sets of numbers give a lobe, of a wheel that rolls, at
+    creepages ``points`` (n, 2) over those of saturation."""
+    half, radius = model.geometry.half_distance, model.geometry.rolling_radius
     log_a, log_b, worst = one[columns.LOG_A], one[columns.LOG_B], 0.0
     limit = model.friction * contact_modulus(model.shear_modulus, model.poisson_ratio) * depth**1.5
     limit *= math.exp(one[columns.LOG_NORMAL])
@@ -238,8 +298,9 @@ def unlike(model, modes, one, other, depth, spin, points, sums):
     unit = 3.0 * limit / (model.shear_modulus * math.exp(log_a + log_b))
     for k in range(len(points)):
         xi, eta = unit * points[k, 0] / c11, unit * points[k, 1] / c22
-        f1, f2, _, _ = tabulated_force(model, modes, one, xi, eta, spin, limit, 0.0, sums)
-        g1, g2, _, _ = tabulated_force(model, modes, other, xi, eta, spin, limit, 0.0, sums)
+        slip = rolling_slip(one, slope, yaw, half, radius, xi, eta)
+        f1, f2, _, _ = tabulated_force(model, modes, one, slip, limit, 0.0, sums)
+        g1, g2, _, _ = tabulated_force(model, modes, other, slip, limit, 0.0, sums)
         worst = max(worst, abs(f1 - g1), abs(f2 - g2))
     return worst / limit
 

@@ -288,9 +288,8 @@ class Pair:
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
-        spin = -math.sin(exact[columns.ANGLE] - place[1]) / self.contact.geometry.rolling_radius
         points = np.vstack([modes.points, AT_REST])
-        creep = unlike(self._solvable, modes.values, exact, found, place[2], spin, points, sums)
+        creep = unlike(self._solvable, modes.values, exact, found, place[2], place[1], place[3], points, sums)
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
         return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 
@@ -451,7 +450,14 @@ def pair_of(contact):
 def fingerprint(contact):
     """Numbers that two contact models share, but for rounding, if their nodes are the same."""
     settings = contact.strips
-    numbers = [contact.friction, contact.shear_modulus, contact.poisson_ratio, settings.strips, settings.surfaces]
+    numbers = [
+        NUMBERS,
+        contact.friction,
+        contact.shear_modulus,
+        contact.poisson_ratio,
+        settings.strips,
+        settings.surfaces,
+    ]
     for part in _flat((contact.geometry, contact.creep.table, creep_modes())):
         size = np.abs(np.asarray(part, float)).ravel()
         numbers += [len(size), size.sum(), size @ (2.0 + np.cos(np.arange(len(size))))]

@@ -24,6 +24,7 @@ modes each, as what the table lacks differs: a tread's flat patches, a flange's 
 """
 
 import math
+from typing import NamedTuple
 
 from wrcore.contact import reduction
 from wrcore.contact.patch.model import MODES, NODES
@@ -66,13 +67,22 @@ CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
 
 LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, LINEAR, FORCE = range(12)
-MODE = 16
+ROOT, ROOT_X, ROOT_Y, ROOT_Z, ROOT_ANGLE, ROOT_A, ROOT_B, REST_A, REST_B = range(14, 23)
+MODE = 24
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
-plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make the
-slopes exact (1; 0 where spin rules); the remainder of Fx, Fy
-(over mu N) and Mz (over mu N c) at no creepage; two that are not used; and its coefficients of both families'
-modes. The rows of a cell are its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what
-yaw adds at the 8 corners of the cell with twice the steps in which it lies."""
+plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make
+the slopes exact (1; 0 where spin rules); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage;
+the load in its flange root over N, and, times that, the place (m), angle and ln of the semi-axes of this part less
+those of the whole; ln of the semi-axes of the rest less those of the whole, times its load over N; one that is not
+used; and its coefficients of both families' modes. The rows of a cell are its 8 corners; a corner more at either
+end of its 12 edges; and odd and even part of what yaw adds at the 8 corners of the cell with twice the steps in
+which it lies."""
+
+ROOTS = (0.15, 0.25), (0.6, 0.8)
+"""Contact angles between which what is pressed goes over from tread to flange root, and from there to the flange."""
+
+LEAST = 1e-6
+"""Load of a part, over N, below which the other part is the whole."""
 
 FLANKS = 0.2, 0.4
 """Contact angles up to which the first family of modes counts alone, and from which on the second one."""
@@ -249,10 +259,16 @@ def look_modes_up(rows, weights, numbers):
 
 
 @jit(allocates=False)
+def _smooth(value, ends):
+    """From 0 to 1 between two ends."""
+    part = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
+    return part * part * (3.0 - 2.0 * part)
+
+
+@jit(allocates=False)
 def flank_part(angle):
     """Weight of the second family of modes at a contact angle."""
-    part = min(max((abs(angle) - FLANKS[0]) / (FLANKS[1] - FLANKS[0]), 0.0), 1.0)
-    return part * part * (3.0 - 2.0 * part)
+    return _smooth(abs(angle), FLANKS)
 
 
 @jit(allocates=False, forceinline=True)
@@ -294,29 +310,88 @@ def remainder(modes, numbers, x, y, sums):
     )  # fmt: skip
 
 
-@jit(allocates=False, fastmath=FUSED)
-def base_force(model, log_a, log_b, limit, xi, eta, phi):
-    """Creep force of the table at an ellipse, over mu N and mu N c; creepages over those of saturation; look-ups
-    missed; c."""
+class Slip(NamedTuple):
+    """How a wheel slips on its rail at the place of a lobe, over V."""
+
+    xi: float
+    eta: float
+    phi: float
+    """Creepages and spin (1/m), with what friction on other lobes adds."""
+    vy: float
+    vz: float
+    """Of the wheel's point."""
+    wx: float
+    wy: float
+    wz: float
+    """Angular velocity, 1/m."""
+
+
+@jit(allocates=False)
+def root_share(angle):
+    """Of what is pressed at a contact angle, the share that belongs to the flange root."""
+    return _smooth(abs(angle), ROOTS[0]) * (1.0 - _smooth(abs(angle), ROOTS[1]))
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _at_ellipse(model, log_a, log_b, limit, xi, eta, phi):
+    """Creep force of the creep table, over mu N and mu N c; look-ups missed; c."""
     square, log_g = math.exp(log_a + log_b), log_a - log_b
     c, scale = math.sqrt(square), model.shear_modulus * square / limit
     f1, f2, m3, missed = creep_force_at(
         _TABLE, model.creep, log_g, math.exp(log_g), 0.0, xi * scale, eta * scale, phi * scale * c
     )
-    c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
-    return f1, f2, m3, xi * scale * c11 / 3.0, eta * scale * c22 / 3.0, missed, c
+    return f1, f2, m3, missed, c
 
 
 @jit(allocates=False, fastmath=FUSED)
-def tabulated_force(model, modes, numbers, xi, eta, phi, limit, turning, sums):
+def _of_part(model, numbers, slip, xi, eta, limit, load, weight, log_a, log_b):
+    """As `_at_ellipse`, of a part of a lobe with a ``load`` over N, for the creepages ``xi``, ``eta`` of the whole:
+    over mu N and m, about the place of the whole."""
+    dx, dy = weight * numbers[ROOT_X], weight * numbers[ROOT_Y]
+    dz, turned = weight * numbers[ROOT_Z], weight * numbers[ROOT_ANGLE]
+    cosine, sine = math.cos(numbers[ANGLE]), math.sin(numbers[ANGLE])
+    own_cosine, own_sine = math.cos(numbers[ANGLE] + turned), math.sin(numbers[ANGLE] + turned)
+    vy, vz = slip.vy + slip.wz * dx - slip.wx * dz, slip.vz + slip.wx * dy - slip.wy * dx
+    xi += slip.wy * dz - slip.wz * dy
+    eta += vy * own_cosine + vz * own_sine - slip.vy * cosine - slip.vz * sine
+    phi = slip.wz * own_cosine - slip.wy * own_sine
+    f1, f2, m3, missed, c = _at_ellipse(
+        model, numbers[LOG_A] + log_a / load, numbers[LOG_B] + log_b / load, load * limit, xi, eta, phi
+    )
+    f1, f2, m3 = load * f1, load * f2 * math.cos(turned), load * m3 * c * math.cos(turned)
+    return f1, f2, m3 - f1 * (dy * cosine + dz * sine) + f2 * dx, missed
+
+
+@jit(allocates=False, fastmath=FUSED)
+def base_force(model, numbers, slip, xi, eta, limit):
+    """Creep force of the creep table at a lobe's ellipse, or at those of its two parts, for creepages ``xi``, ``eta``
+    in place of the ``slip``'s, over mu N and mu N c; look-ups missed; c."""
+    root, log_a, log_b = numbers[ROOT], numbers[LOG_A], numbers[LOG_B]
+    if not LEAST < root < 1.0 - LEAST:
+        return _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
+    f1, f2, m3, missed = _of_part(
+        model, numbers, slip, xi, eta, limit, root, 1.0 / root, numbers[ROOT_A], numbers[ROOT_B]
+    )
+    rest, c = 1.0 - root, math.exp(0.5 * (log_a + log_b))
+    g1, g2, n3, more = _of_part(
+        model, numbers, slip, xi, eta, limit, rest, -1.0 / rest, numbers[REST_A], numbers[REST_B]
+    )
+    return f1 + g1, f2 + g2, (m3 + n3) / c, missed + more, c
+
+
+@jit(allocates=False, fastmath=FUSED)
+def tabulated_force(model, modes, numbers, slip, limit, turning, sums):
     """Creep force Fx, Fy (N), together no more than friction bears, Mz (N m) from a node's numbers, and look-ups
     missed. ``turning``: of the wheel's rate of rolling over that of free rolling, less 1."""
     part = turning / LOCKED
     fade = max(0.0, 1.0 - part * part)
     fade *= fade
-    lx, ly = 1.0 + fade * (numbers[SLOPE_XI] - 1.0), 1.0 + fade * (numbers[SLOPE_ETA] - 1.0)
-    f1, f2, m3, x, y, missed, c = base_force(model, numbers[LOG_A], numbers[LOG_B], limit, lx * xi, ly * eta, phi)
-    r1, r2, r3 = remainder(modes, numbers, x, y, sums)
+    xi = (1.0 + fade * (numbers[SLOPE_XI] - 1.0)) * slip.xi
+    eta = (1.0 + fade * (numbers[SLOPE_ETA] - 1.0)) * slip.eta
+    f1, f2, m3, missed, c = base_force(model, numbers, slip, xi, eta, limit)
+    scale = model.shear_modulus * c * c / (3.0 * limit)
+    c11, c22, _, _ = coefficients_at(numbers[LOG_A] - numbers[LOG_B], model.creep.table.kalker)
+    r1, r2, r3 = remainder(modes, numbers, xi * scale * c11, eta * scale * c22, sums)
     fx, fy, mz = f1 + fade * r1, f2 + fade * r2, m3 + fade * r3
     scale = limit / max(math.sqrt(fx * fx + fy * fy), 1.0)
     return scale * fx, scale * fy, limit * c * mz, missed

@@ -33,6 +33,7 @@ from wrcore.dynamics.pair_table import (
     APART,
     FAR,
     SADDLE,
+    Slip,
     depth_of,
     lobe_end,
     locate,
@@ -285,9 +286,12 @@ def _roll_lobe(model, m, ahead, q, count, counters, work):
     if count > 1:
         more_xi, more_eta = slip_of_others(model, q, count, work)
     limit = falling(model, m.friction, xi, eta, speed) * work.lobes[q, NORMAL]
-    f1, f2, m3, missed = tabulated_force(
-        model, model.strips.table.modes, numbers, ahead * xi + more_xi, eta + more_eta, ahead * phi, limit,
-        ahead * m.wy * radius / speed - 1.0, work.modes,
+    slowness = 1.0 / speed
+    slip = Slip(
+        ahead * xi + more_xi, eta + more_eta, ahead * phi, slowness * (m.vy + m.wz * px - m.wx * pz),
+        slowness * (m.vz + m.wx * py - m.wy * px), slowness * m.wx, ahead * slowness * m.wy, ahead * slowness * m.wz,
     )  # fmt: skip
+    turning = ahead * m.wy * radius / speed - 1.0
+    f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning, work.modes)
     counters[OUT_OF_RANGE] += missed
     return Rolled(px, py, pz, cosine, sine, xi, eta, phi, ahead * f1, f2, ahead * m3)

@@ -43,7 +43,7 @@ NO_TABLE = PairTable(
     np.zeros(0, np.int64), np.zeros(0, np.int32), np.zeros((0,) * 3, np.float32), np.zeros((0, 2), np.float32),
     np.zeros((0,) * 4, np.float32), 0,
 )  # fmt: skip
-NODES, NUMBERS, MODES = 48, 64, 24
+NODES, NUMBERS, MODES = 48, 72, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
 LOBE_COLUMNS = 8 + 2 * MAX_PATCHES
