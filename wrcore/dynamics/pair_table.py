@@ -81,8 +81,9 @@ which it lies."""
 ROOTS = (0.15, 0.25), (0.6, 0.8)
 """Contact angles between which what is pressed goes over from tread to flange root, and from there to the flange."""
 
-LEAST = 1e-6
-"""Load of a part, over N, below which the other part is the whole."""
+LEAST, LITTLE = 1e-6, 3e-3
+"""Load of a part, over N, below which the other part is the whole, and up to which its numbers go over to those of the
+whole: interpolated, they are differences of small numbers."""
 
 FLANKS = 0.2, 0.4
 """Contact angles up to which the first family of modes counts alone, and from which on the second one."""
@@ -344,20 +345,21 @@ def _at_ellipse(model, log_a, log_b, limit, xi, eta, phi):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _of_part(model, numbers, slip, xi, eta, limit, load, weight, log_a, log_b):
+def _of_part(model, numbers, slip, xi, eta, limit, load, side, sizes):
     """As `_at_ellipse`, of a part of a lobe with a ``load`` over N, for the creepages ``xi``, ``eta`` of the whole:
-    over mu N and m, about the place of the whole."""
-    dx, dy = weight * numbers[ROOT_X], weight * numbers[ROOT_Y]
-    dz, turned = weight * numbers[ROOT_Z], weight * numbers[ROOT_ANGLE]
-    cosine, sine = math.cos(numbers[ANGLE]), math.sin(numbers[ANGLE])
-    own_cosine, own_sine = math.cos(numbers[ANGLE] + turned), math.sin(numbers[ANGLE] + turned)
+    over mu N and m, about the place of the whole. ``side``: 1 in the flange root, -1 for the rest; ``sizes``: first of
+    the semi-axes' numbers."""
+    each = load / (load * load + LITTLE * LITTLE)
+    dx, dy, dz = side * each * numbers[ROOT_X], side * each * numbers[ROOT_Y], side * each * numbers[ROOT_Z]
+    turned, angle = side * each * numbers[ROOT_ANGLE], numbers[ANGLE]
+    log_a, log_b = numbers[LOG_A] + each * numbers[sizes], numbers[LOG_B] + each * numbers[sizes + 1]
+    cosine, sine = math.cos(angle), math.sin(angle)
+    own_cosine, own_sine = math.cos(angle + turned), math.sin(angle + turned)
     vy, vz = slip.vy + slip.wz * dx - slip.wx * dz, slip.vz + slip.wx * dy - slip.wy * dx
     xi += slip.wy * dz - slip.wz * dy
     eta += vy * own_cosine + vz * own_sine - slip.vy * cosine - slip.vz * sine
     phi = slip.wz * own_cosine - slip.wy * own_sine
-    f1, f2, m3, missed, c = _at_ellipse(
-        model, numbers[LOG_A] + log_a / load, numbers[LOG_B] + log_b / load, load * limit, xi, eta, phi
-    )
+    f1, f2, m3, missed, c = _at_ellipse(model, log_a, log_b, load * limit, xi, eta, phi)
     f1, f2, m3 = load * f1, load * f2 * math.cos(turned), load * m3 * c * math.cos(turned)
     return f1, f2, m3 - f1 * (dy * cosine + dz * sine) + f2 * dx, missed
 
@@ -369,13 +371,9 @@ def base_force(model, numbers, slip, xi, eta, limit):
     root, log_a, log_b = numbers[ROOT], numbers[LOG_A], numbers[LOG_B]
     if not LEAST < root < 1.0 - LEAST:
         return _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
-    f1, f2, m3, missed = _of_part(
-        model, numbers, slip, xi, eta, limit, root, 1.0 / root, numbers[ROOT_A], numbers[ROOT_B]
-    )
-    rest, c = 1.0 - root, math.exp(0.5 * (log_a + log_b))
-    g1, g2, n3, more = _of_part(
-        model, numbers, slip, xi, eta, limit, rest, -1.0 / rest, numbers[REST_A], numbers[REST_B]
-    )
+    c = math.exp(0.5 * (log_a + log_b))
+    f1, f2, m3, missed = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
+    g1, g2, n3, more = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
     return f1 + g1, f2 + g2, (m3 + n3) / c, missed + more, c
 
 
