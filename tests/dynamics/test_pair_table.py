@@ -11,11 +11,13 @@ import pytest
 import wrcore as wr
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
+from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import find_patches
 from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, MODES, NO_TABLE, NODES, NUMBERS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics import coupled_lobes, pair_store, pair_table, patch_kernels
+from wrcore.creep.laws import LAWS, creep_forces
+from wrcore.dynamics import coupled_lobes, pair_node, pair_store, pair_table, patch_kernels
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, YAWS, look_up
@@ -127,6 +129,64 @@ def test_no_more_force_than_friction_bears(benchmark_pair, remainder):
     force = pair_table.tabulated_force(contact, table, numbers, pair_table.Slip(*np.zeros(8)), 15e3, 0.0, sums)[:2]
     size = math.hypot(*remainder)
     assert force == pytest.approx(15e3 * np.array(remainder) / max(size, 1.0), rel=1e-6, abs=1e-3)
+
+
+def test_both_parts_of_a_lobe_roll_as_contacts_of_their_own(benchmark_pair):
+    """Each with the creepages of a rigid wheel at its own place, in its own plane, on its own ellipse."""
+    model = LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value
+    normal, place, angle, load = 6e4, np.array([1e-3, 0.72, -0.46]), 0.2, 0.4
+    apart, turned, sizes = np.array([1e-3, -8e-3, -1.5e-3]), 0.15, ((5e-3, 1.5e-3), (6e-3, 4e-3))
+    velocity, turning = np.array([20.02, -0.015, 0.003]), np.array([0.4, -43.2, 0.1])
+    turning[1] = (velocity[0] - turning[2] * place[1]) / -place[2]
+    whole, forces, moments = np.log([6e-3, 7e-3]), np.zeros(3), np.zeros(3)
+    rest = load / (1.0 - load)
+    for share, at, plane, (a, b) in zip(
+        (load, 1.0 - load),
+        (place + apart, place - rest * apart),
+        (angle + turned, angle - rest * turned),
+        sizes,
+        strict=True,
+    ):
+        cosine, sine, c, limit = math.cos(plane), math.sin(plane), math.sqrt(a * b), 0.3 * share * normal
+        xi, eta, phi, _ = creepages(*velocity, *turning, *at, cosine, sine, 20.0)
+        scaled = model.shear_modulus * a * b / limit * np.array([[xi, eta, c * phi]])
+        out = np.zeros((1, 3))
+        creep_forces(LAWS["table"], model.creep, np.array([a / b]), np.zeros(1), scaled, out)
+        force = limit * np.array([out[0, 0], out[0, 1] * cosine, out[0, 1] * sine])
+        forces += force
+        moments += limit * c * out[0, 2] * np.array([0.0, -sine, cosine]) + np.cross(at - place, force)
+    numbers, cosine, sine = np.zeros(NUMBERS), math.cos(angle), math.sin(angle)
+    numbers[[pair_table.ANGLE, pair_table.LOG_A, pair_table.LOG_B]] = angle, *whole
+    numbers[pair_table.ROOT : pair_table.ROOT_A] = load, *load * apart, load * turned
+    numbers[pair_table.ROOT_A : pair_table.REST_A] = load * (np.log(sizes[0]) - whole)
+    numbers[pair_table.REST_A : pair_table.REST_A + 2] = (1.0 - load) * (np.log(sizes[1]) - whole)
+    speed = (velocity + np.cross(turning, place)) / 20.0
+    xi, eta, phi, _ = creepages(*velocity, *turning, *place, cosine, sine, 20.0)
+    slip = pair_table.Slip(xi, eta, phi, *speed[1:], *turning / 20.0)
+    f1, f2, m3, _, c = pair_table.base_force(model, numbers, slip, xi, eta, 0.3 * normal)
+    expected = forces[0], forces[1] * cosine + forces[2] * sine, (moments[2] * cosine - moments[1] * sine) / c
+    np.testing.assert_allclose(np.array([f1, f2, m3]) * 0.3 * normal, expected, rtol=2e-3)
+    assert min(map(abs, expected)) > 200.0
+
+
+def test_two_ellipses_stand_for_tread_and_root(own_cache):
+    """Where both carry in one overlap the creep force at two ellipses is the exact one within some percent of mu N, all
+    over the disk of creepages; at one ellipse of equal moments it is far off."""
+    model, _ = compile_scene(load_scene(wr.example("trailer_vehicle"), {"contact.patch": "exact"}))
+    strips = model.contact.strips._replace(looked_up=model.contact.friction)
+    pair, points = pair_store.Pair(model.contact._replace(strips=strips), "two"), creep_modes().points
+    place = -5.65e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
+    numbers, remainder = pair.solve(place, points)
+    assert 0.4 < numbers[pair_table.ROOT] < 0.6
+    assert np.hypot(*remainder.T[:2]).max() < 0.06
+    one, forces = numbers.copy(), np.zeros((2, len(points), 3))
+    one[pair_table.ROOT] = 0.0
+    normal = pair_node.contact_modulus(model.contact.shear_modulus, model.contact.poisson_ratio) * 5e-5**1.5
+    normal *= math.exp(numbers[pair_table.LOG_NORMAL])
+    for row, force in zip((numbers, one), forces, strict=True):
+        creeps = 1e-3 * points
+        pair_node.base_forces(pair._solvable, row, place[1], 0.0, creeps, np.ones(2), 0.3 * normal, force)
+    assert np.hypot(*(forces[1] - forces[0]).T[:2]).max() > 0.1
 
 
 @pytest.fixture(scope="module")
