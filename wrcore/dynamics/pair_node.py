@@ -260,8 +260,9 @@ def _part_numbers(numbers, sums):
     whole = [*sums[6:9], *numbers[[columns.ANGLE, columns.LOG_A, columns.LOG_B]]]
     numbers[columns.ROOT : columns.ROOT_B + 1] = root, *(sums[13:19] - root * np.array(whole))
     numbers[columns.REST_A : columns.REST_B + 1] = sums[19:21] - (1.0 - root) * np.array(whole[4:])
-    for load, turned, size in ((root, root, columns.ROOT_B), (1.0 - root, root - 1.0, columns.REST_B)):
-        numbers[size] -= load * math.log(math.cos(numbers[columns.ROOT_ANGLE] / turned))  # strips lie in one plane
+    for load, size in ((root, columns.ROOT_B), (1.0 - root, columns.REST_B)):  # strips lie in one plane
+        turned = numbers[columns.ROOT_ANGLE] * columns.of_load(load)
+        numbers[size] -= load * math.log(max(math.cos(turned), 0.5))
 
 
 @jit(allocates=False)

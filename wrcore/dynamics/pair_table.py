@@ -344,12 +344,18 @@ def _at_ellipse(model, log_a, log_b, limit, xi, eta, phi):
     return f1, f2, m3, missed, c
 
 
+@jit(allocates=False, forceinline=True)
+def of_load(load):
+    """What a part's numbers are multiplied with: 1 over its load over N, unless that is little."""
+    return load / (load * load + LITTLE * LITTLE)
+
+
 @jit(allocates=False, fastmath=FUSED)
 def _of_part(model, numbers, slip, xi, eta, limit, load, side, sizes):
     """As `_at_ellipse`, of a part of a lobe with a ``load`` over N, for the creepages ``xi``, ``eta`` of the whole:
     over mu N and m, about the place of the whole. ``side``: 1 in the flange root, -1 for the rest; ``sizes``: first of
     the semi-axes' numbers."""
-    each = load / (load * load + LITTLE * LITTLE)
+    each = of_load(load)
     dx, dy, dz = side * each * numbers[ROOT_X], side * each * numbers[ROOT_Y], side * each * numbers[ROOT_Z]
     turned, angle = side * each * numbers[ROOT_ANGLE], numbers[ANGLE]
     log_a, log_b = numbers[LOG_A] + each * numbers[sizes], numbers[LOG_B] + each * numbers[sizes + 1]
