@@ -159,6 +159,7 @@ def test_both_parts_of_a_lobe_roll_as_contacts_of_their_own(benchmark_pair):
     numbers[[pair_table.ANGLE, pair_table.LOG_A, pair_table.LOG_B]] = angle, *whole
     numbers[pair_table.ROOT : pair_table.ROOT_A] = load, *load * apart, load * turned
     numbers[pair_table.ROOT_A : pair_table.REST_A] = load * (np.log(sizes[0]) - whole)
+    numbers[pair_table.PARTED] = load * (1.0 - load)
     numbers[pair_table.REST_A : pair_table.REST_A + 2] = (1.0 - load) * (np.log(sizes[1]) - whole)
     speed = (velocity + np.cross(turning, place)) / 20.0
     xi, eta, phi, _ = creepages(*velocity, *turning, *place, cosine, sine, 20.0)

@@ -260,9 +260,14 @@ def _part_numbers(numbers, sums):
     whole = [*sums[6:9], *numbers[[columns.ANGLE, columns.LOG_A, columns.LOG_B]]]
     numbers[columns.ROOT : columns.ROOT_B + 1] = root, *(sums[13:19] - root * np.array(whole))
     numbers[columns.REST_A : columns.REST_B + 1] = sums[19:21] - (1.0 - root) * np.array(whole[4:])
+    wide = 0.0
     for load, size in ((root, columns.ROOT_B), (1.0 - root, columns.REST_B)):  # strips lie in one plane
         turned = numbers[columns.ROOT_ANGLE] * columns.of_load(load)
         numbers[size] -= load * math.log(max(math.cos(turned), 0.5))
+        wide += math.exp(numbers[columns.LOG_B] + numbers[size] * columns.of_load(load))
+    both = root * (1.0 - root)
+    apart = math.hypot(numbers[columns.ROOT_Y], numbers[columns.ROOT_Z]) / both
+    numbers[columns.PARTED] = both * columns.smooth(apart / wide, columns.TWO)
 
 
 @jit(allocates=False)

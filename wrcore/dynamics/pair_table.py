@@ -67,19 +67,22 @@ CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
 
 LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, LINEAR, FORCE = range(12)
-ROOT, ROOT_X, ROOT_Y, ROOT_Z, ROOT_ANGLE, ROOT_A, ROOT_B, REST_A, REST_B = range(14, 23)
+ROOT, ROOT_X, ROOT_Y, ROOT_Z, ROOT_ANGLE, ROOT_A, ROOT_B, REST_A, REST_B, PARTED = range(14, 24)
 MODE = 24
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
 plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make
 the slopes exact (1; 0 where spin rules); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage;
 the load in its flange root over N, and, times that, the place (m), angle and ln of the semi-axes of this part less
-those of the whole; ln of the semi-axes of the rest less those of the whole, times its load over N; one that is not
-used; and its coefficients of both families' modes. The rows of a cell are its 8 corners; a corner more at either
-end of its 12 edges; and odd and even part of what yaw adds at the 8 corners of the cell with twice the steps in
-which it lies."""
+those of the whole; ln of the semi-axes of the rest less those of the whole, times its load over N; how far both
+parts are apart (0: one ellipse stands for both; 1: two do); and its coefficients of both families' modes. The rows
+of a cell are its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what yaw adds at
+the 8 corners of the cell with twice the steps in which it lies."""
 
 ROOTS = (0.15, 0.25), (0.6, 0.8)
 """Contact angles between which what is pressed goes over from tread to flange root, and from there to the flange."""
+
+TWO = 0.8, 1.0
+"""Distance of both parts' places, over the sum of their half widths, between which one ellipse goes over to two."""
 
 LEAST, LITTLE = 1e-6, 3e-3
 """Load of a part, over N, below which the other part is the whole, and up to which its numbers go over to those of the
@@ -260,7 +263,7 @@ def look_modes_up(rows, weights, numbers):
 
 
 @jit(allocates=False)
-def _smooth(value, ends):
+def smooth(value, ends):
     """From 0 to 1 between two ends."""
     part = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
     return part * part * (3.0 - 2.0 * part)
@@ -269,7 +272,7 @@ def _smooth(value, ends):
 @jit(allocates=False)
 def flank_part(angle):
     """Weight of the second family of modes at a contact angle."""
-    return _smooth(abs(angle), FLANKS)
+    return smooth(abs(angle), FLANKS)
 
 
 @jit(allocates=False, forceinline=True)
@@ -330,7 +333,7 @@ class Slip(NamedTuple):
 @jit(allocates=False)
 def root_share(angle):
     """Of what is pressed at a contact angle, the share that belongs to the flange root."""
-    return _smooth(abs(angle), ROOTS[0]) * (1.0 - _smooth(abs(angle), ROOTS[1]))
+    return smooth(abs(angle), ROOTS[0]) * (1.0 - smooth(abs(angle), ROOTS[1]))
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -375,12 +378,18 @@ def base_force(model, numbers, slip, xi, eta, limit):
     """Creep force of the creep table at a lobe's ellipse, or at those of its two parts, for creepages ``xi``, ``eta``
     in place of the ``slip``'s, over mu N and mu N c; look-ups missed; c."""
     root, log_a, log_b = numbers[ROOT], numbers[LOG_A], numbers[LOG_B]
-    if not LEAST < root < 1.0 - LEAST:
-        return _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
+    two = min(numbers[PARTED] / (root * (1.0 - root)), 1.0) if LEAST < root < 1.0 - LEAST else 0.0
+    f1 = f2 = m3 = missed = 0.0
     c = math.exp(0.5 * (log_a + log_b))
-    f1, f2, m3, missed = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
-    g1, g2, n3, more = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
-    return f1 + g1, f2 + g2, (m3 + n3) / c, missed + more, c
+    if two < 1.0:
+        f1, f2, m3, missed, c = _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
+        if two <= 0.0:
+            return f1, f2, m3, missed, c
+    g1, g2, n3, more = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
+    h1, h2, o3, most = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
+    one = 1.0 - two
+    f1, f2, m3 = one * f1 + two * (g1 + h1), one * f2 + two * (g2 + h2), one * m3 + two * (n3 + o3) / c
+    return f1, f2, m3, missed + more + most, c
 
 
 @jit(allocates=False, fastmath=FUSED)
