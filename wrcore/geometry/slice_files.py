@@ -214,7 +214,8 @@ def _assembled(path, heads, kind, told="", through=True):
         if kind == "wheel":
             return _wheel(path, stations, listed, through)
         sheets += sheets_of(stations, listed)
-        alike = alike and len({(one.curve.c.tobytes(), one.cuts.tobytes()) for one in slices.values()}) == 1
+        distinct = {(id(one.curve), one.cuts.tobytes()): one for one in slices.values()}.values()
+        alike = alike and len({(one.curve.c.tobytes(), one.cuts.tobytes()) for one in distinct}) == 1
     if not sheets:
         raise InputError(path, "features", "expected a part of the rail between two feature lines, got none")
     profiles = len({row[2] for _, rows in heads for row in rows})

@@ -208,7 +208,12 @@ def sheets_of(s, slices, through=True):
     cuts = np.array([one.cuts if one else np.full(size, np.nan) for one in slices])
     width = np.diff(cuts, axis=1)
     counts = [int(np.ceil(np.max(w[np.isfinite(w)], initial=0.0) / PATH_STEP - 1e-9)) for w in width.T]
-    sections = [_section(one, counts) if one else [None] * (size - 1) for one in slices]
+    known, sections = {}, []
+    for one in slices:  # slices of one profile share a section
+        key = one and (id(one.curve), one.cuts.tobytes())
+        if key not in known:
+            known[key] = _section(one, counts) if one else [None] * (size - 1)
+        sections.append(known[key])
     sheets = []
     for part in range(size - 1):
         for run in _runs(np.isfinite(width[:, part])):

@@ -16,6 +16,7 @@ from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WINDOW, WheelOnSlices
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
+from wrcore.geometry import slices
 from wrcore.geometry.crossing import Crossing, write_crossing
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile
@@ -46,6 +47,23 @@ def crown(u):
 def cylinder():
     """A wheel without flange and conicity."""
     return ProfileCurve("cylinder", "wheel", np.arange(-1000, 1201) * 5e-5, *np.zeros((3, 2201)))
+
+
+def test_slices_of_one_profile_share_a_section(tmp_path, monkeypatch):
+    """Whatever their number; those cut elsewhere have a section of their own."""
+    u, splined = np.linspace(-0.03, 0.03, 121), []
+    section = slices._section
+    monkeypatch.setattr(slices, "_section", lambda one, counts: splined.append(one) or section(one, counts))
+    for k in range(2):
+        points = np.column_stack([u, crown(u) - 1e-4 * k])
+        np.savetxt(tmp_path / f"{k}.csv", points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+    rows = [f"{0.1 * k:g},{k % 2}.csv,{0.04 if k == 7 else 0.03}" for k in range(30)]
+    (tmp_path / "rail.csv").write_text("\n".join(["s_m,profile,cut_1_m", *rows]))
+    found = read_slices(tmp_path / "rail.csv")
+    assert len(splined) == 3
+    for k in (0, 7, 29):
+        heights = found.heights(0.1 * k, u[5:-5])[0, 0]
+        np.testing.assert_allclose(heights, crown(u[5:-5]) - 1e-4 * (k % 2), atol=2e-9)
 
 
 @pytest.mark.parametrize("rise", [0.0, 0.05, 0.1, 0.2])
