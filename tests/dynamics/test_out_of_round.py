@@ -8,12 +8,16 @@ from scipy.integrate import solve_ivp
 
 from tests.conftest import SCENES
 from wrcore.contact import reduction as columns
+from wrcore.contact.out_of_round import SlicedWheel
+from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.seen_table import AHEAD, HEIGHT, PAD, ROWS, U_STEP, shape_table
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics.crossing import interpolate, laid_under
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
+from wrcore.geometry.slice_files import read_slices
+from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.standards import named_profile
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
@@ -22,6 +26,7 @@ MASS, LOAD, RADIUS = 906.5, 54546.0, 0.46  # half a wheelset
 STIFFNESS, DAMPING = 8.1e7, 6e4  # of the track, N/m and N s/m
 SOFT = {"rail": dict.fromkeys(("lateral", "vertical"), {"stiffness": STIFFNESS, "damping": DAMPING})}
 HALF_TURN = math.pi * RADIUS
+S1002 = {"wheel.profile": "S1002", "rail": {"profile": "60E1", "inclination": "1/40"}}
 
 
 def rolling(shape, speed, travel, **changes):
@@ -219,6 +224,60 @@ def test_a_table_is_the_wave_that_it_holds(tmp_path):
     assert other == pytest.approx(one, abs=0.01 * np.ptp(one))
 
 
+def sections_of(folder, wheel, deviation_at, count, part):
+    """File of slices all round of a wheel whose radius is longer by a deviation over angle and lateral coordinate."""
+    u = wheel.u[part][::10]
+    rows = ["angle_rad,profile"]
+    for k, angle in enumerate(np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)):
+        points = np.column_stack([u, wheel.f[part][::10] - deviation_at(angle, u)])
+        np.savetxt(folder / f"{k}.csv", points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+        rows.append(f"{angle:.12g},{k}.csv")
+    (folder / "wheel.csv").write_text("\n".join(rows))
+    return str(folder / "wheel.csv")
+
+
+def test_a_wheel_of_slices_is_the_wave_that_it_holds(tmp_path):
+    wheel = named_profile("S1002", "wheel")
+    part = (wheel.u > -0.02) & (wheel.u < 0.03)
+    wave = OutOfRound(RADIUS, (), (Wave(4, 1e-4, 0.3),))
+    file = sections_of(tmp_path, wheel, lambda a, u: wave.deviation(a) + 0.0 * u, 64, part)
+    one, other = ({"polygon": [{"order": 4, "amplitude": 1e-4, "phase": 0.3}]}, {"slices": file})
+    runs = [rolling(shape | {"angle": 1.0}, 20.0, 4.0, **S1002) for shape in (one, other)]
+    assert np.ptp(load_of(runs[0])) > 5000.0
+    np.testing.assert_allclose(load_of(runs[1]), load_of(runs[0]), atol=0.01 * np.ptp(load_of(runs[0])))
+
+
+def test_a_wheel_of_slices_is_seen_where_it_differs(tmp_path):
+    """A wave on the field side alone, over lateral coordinates as over angles."""
+    wheel = named_profile("S1002", "wheel")
+    pair = WheelOnRail(wheel, named_profile("60E1", "rail", 1 / 40))
+    part = (wheel.u > -0.02) & (wheel.u < 0.03)
+
+    def share(u):
+        return 0.5 * (1.0 + np.tanh((u - 0.01) / 0.008))
+
+    file = sections_of(tmp_path, wheel, lambda a, u: 2e-4 * np.cos(3.0 * a) * share(u), 60, part)
+    table = shape_table(pair, SlicedWheel(read_slices(file, "wheel"), RADIUS))
+    angles = table.begin + table.step * np.arange(len(table.sections))
+    inner = np.flatnonzero(np.abs(angles - math.pi) < 0.5)
+    at = U_STEP * np.arange(len(table.geometry.rail)) + table.geometry.rail_start
+    at += pair.rail_distance - pair.half_distance
+    rise = table.sections[:, 0, HEIGHT] - table.geometry.rail[:, 0]
+    for place in (-0.018, 0.0, 0.01, 0.02, 0.025):
+        k = int(np.argmin(np.abs(at - place)))
+        amplitude = 2e-4 * share(at[k])
+        path = lowest(lambda a, size=amplitude: size * np.cos(3.0 * (a + math.pi)), 0.3)
+        assert rise[inner, k] == pytest.approx(path(RADIUS * (angles[inner] - math.pi)), abs=1e-6)
+    some = inner[len(inner) // 3]
+    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance
+    still = WheelOnSlices(wheel, RailSlices.of(pair.rail), *sizes, read_slices(file, "wheel"))
+    section, _ = still.under("left", 0.0, 0.0, turned=angles[some])
+    u = section.rail_start + section.rail_step * np.arange(len(section.rail))
+    on = np.abs(at) < 0.018
+    found = np.interp(at[on] - pair.rail_distance + pair.half_distance, u, section.rail[:, 0])
+    np.testing.assert_allclose(table.sections[some, 0, HEIGHT, on], found, atol=5e-7)
+
+
 def test_wheels_begin_round():
     model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {
         "wheel.left.out_of_round": {"polygon": [{"order": 3, "amplitude": 1e-3}], "angle": 0.0}, "initial.y": 0.0,
@@ -234,13 +293,17 @@ def test_wheels_begin_round():
 @pytest.mark.parametrize(
     ("changes", "field", "expected"),
     [
-        ({"left": {"out_of_round": {"angle": 1.0}}}, "wheel.left.out_of_round", "flats, polygon or table"),
+        ({"left": {"out_of_round": {"angle": 1.0}}}, "wheel.left.out_of_round", "flats, polygon, table or slices"),
         ({"left": {"out_of_round": {"flats": [{"length": 0.02, "depth": 2e-3}]}}}, "wheel.left.out_of_round",
          "rises less than 0.2 along the wheel"),
         ({"left": {"out_of_round": {"polygon": [{"order": 60, "amplitude": 2e-3}]}}}, "wheel.left.out_of_round",
          "less than 0.2 along the wheel, got 0.261"),
         ({"left": {"out_of_round": {"flat": 1}}}, "wheel.left.out_of_round.flat", "unknown key"),
         ({"left": {"out_of_round": {"table": "no.csv"}}}, "wheel.left.out_of_round.table", "existing file"),
+        ({"left": {"out_of_round": {"slices": "no.slcw"}}}, "wheel.left.out_of_round.slices", "existing file"),
+        ({"left": {"out_of_round": {"slices": {"unit": "mm"}}}}, "wheel.left.out_of_round.slices", "a file of slices"),
+        ({"left": {"out_of_round": {"slices": "no.slcw", "flats": [{"length": 0.02}]}}},
+         "wheel.left.out_of_round.flats", "nothing beside slices"),
         ({"wheelsets": {"wheelset": {"right": {"out_of_round": {"polygon": [{"order": 0, "amplitude": 1e-4}]}}}}},
          "wheel.wheelsets.wheelset.right.out_of_round.polygon", "1 .eccentric. to 60"),
     ],

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from tests.dynamics.crossing_rails import write_rail
+from wrcore.contact.out_of_round import SlicedWheel
+from wrcore.contact.seen_table import shape_table
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.standards import named_profile
 from wrcore.scene import kept_tables
-from wrcore.scene.kept_tables import OWN, kept_table
+from wrcore.scene.kept_tables import OWN, kept_shape, kept_table
 
 
 def numbers(table):
@@ -36,3 +38,24 @@ def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
     assert not np.array_equal(kept_table(pair, rails[1], False).sections, made.sections)
     assert not np.array_equal(kept_table(pair, rails[0], True).sections, made.sections)
     assert len(list(folder.glob("seen_*.npz"))) == 3
+
+
+def test_so_is_that_of_a_wheel_of_slices(tmp_path, monkeypatch):
+    """Which hangs on its sections and their angles."""
+    monkeypatch.setattr(kept_tables, "table_folder", lambda: tmp_path)
+    wheel, rail = named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail", 0.0)
+    pair, made = WheelOnRail(wheel, rail), []
+    monkeypatch.setattr(kept_tables, "shape_table", lambda *given: made.append(given) or shape_table(*given))
+    u = np.linspace(-0.003, 0.003, 30)
+    for k, deep in enumerate((0.0, 1e-4, 2e-4)):
+        points = np.column_stack([u, wheel(u) + deep])
+        np.savetxt(tmp_path / f"{k}.csv", points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+    tables = []
+    for last, end in ((1, 0.2), (1, 0.2), (2, 0.2), (1, 0.3)):
+        rows = [f"{angle:g},{k}.csv" for angle, k in ((-0.2, 0), (0.0, last), (end, 0))]
+        (tmp_path / "wheel.csv").write_text("\n".join(["angle_rad,profile", *rows]))
+        shape = SlicedWheel(read_slices(tmp_path / "wheel.csv", "wheel"), pair.rolling_radius)
+        tables.append(kept_shape(pair, shape).sections)
+    assert len(made) == 3
+    np.testing.assert_array_equal(tables[0], tables[1])
+    assert not np.array_equal(tables[0], tables[2]) and not np.array_equal(tables[0], tables[3])

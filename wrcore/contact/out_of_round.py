@@ -7,10 +7,13 @@ track (`wrcore.contact.seen_rail`).
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from wrcore.geometry.out_of_round import whole_turn
 from wrcore.geometry.profile import SPACING
+from wrcore.geometry.slices import TURN, WheelSlices
 from wrcore.kernels.jit import jit
 
 STEP = 1e-3
@@ -38,16 +41,60 @@ def reach_beyond(slices, wheel, pose, turned, x, strips):
     angles = turned + STEP * np.arange(-math.ceil(reach / STEP), math.ceil(reach / STEP) + 1)
     f, _, rate = slices.heights(angles, across)
     found = np.empty((x.size, strips.size))
-    _reach(wheel, pose.ex, turned, x, strips, angles[0], f, rate, across[0], found)
+    _reach(wheel, pose.ex, turned, x, strips, angles[0], f, rate, across[0], SPACING, found)
     return found
 
 
+@dataclass(frozen=True, eq=False)
+class SlicedWheel:
+    """The shape of a wheel of slices, beside a wheel of revolution with a ``radius`` (m) at the tape circle."""
+
+    slices: WheelSlices
+    radius: float
+    level = True
+    """Whether patches stay level under it."""
+
+    @property
+    def shortest(self):
+        """Length (m) of the shortest wave that its slices resolve well."""
+        return 8.0 * self.radius * np.diff(self.slices.angles).min(initial=TURN)
+
+    def nodes(self, step, pad):
+        """As those of `OutOfRound`: all round."""
+        return whole_turn(step / self.radius, pad)
+
+    def within(self, strips):
+        """Those of its strips (m,), evenly apart, around the tape circle that all slices have: first and last."""
+        there = np.isfinite(self.slices.heights(self.slices.angles, strips)[0]).all(axis=0)
+        middle = int(np.argmin(np.abs(strips)))
+        if not there[middle]:
+            return middle, middle - 1
+        missing = np.flatnonzero(~there)
+        low, high = missing[missing < middle], missing[missing > middle]
+        return int(low[-1]) + 1 if low.size else 0, int(high[0]) - 1 if high.size else strips.size - 1
+
+    def reach_over(self, wheel, strips):
+        """`reach_beyond` of a wheelset in the middle, without roll and yaw, for the same ``strips``, evenly apart,
+        again and again: a function of the angle turned and the stations."""
+        count = math.ceil((0.5 * TURN + 0.5) / STEP)
+        angles = STEP * np.arange(-count, count + 1)
+        f, _, rate = self.slices.heights(angles, strips)
+        spacing = (strips[-1] - strips[0]) / (strips.size - 1)
+
+        def reach(turned, x):
+            found, turned = np.empty((x.size, strips.size)), math.remainder(turned, TURN)
+            _reach(wheel, 0.0, turned, x, strips, angles[0], f, rate, strips[0], spacing, found)
+            return found
+
+        return reach
+
+
 @jit
-def _reach(wheel, ex, turned, x, strips, first, f, rate, start, found):
-    """Fill ``found`` from heights of the wheel's sections and their rates over the angle."""
+def _reach(wheel, ex, turned, x, strips, first, f, rate, start, spacing, found):
+    """Fill ``found`` from heights of the wheel's sections, ``spacing`` apart, and their rates over the angle."""
     for k in range(strips.size):
         w = strips[k]
-        at = (w - start) / SPACING
+        at = (w - start) / spacing
         j = min(max(int(at), 0), f.shape[1] - 2)
         t = at - j
         node = (w - wheel.wheel_start) / wheel.wheel_step

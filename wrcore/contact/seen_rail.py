@@ -74,7 +74,7 @@ class WheelOnSlices:
     out_of_round: WheelSlices | None = None
 
     @cached_property
-    def _wheel_geometry(self):
+    def geometry_of_wheel(self):
         """Geometry of the wheel over a level rail: what the search for the seen section takes of it."""
         u = SPACING * np.arange(-400, 401)
         level = ProfileCurve("level", "rail", u, *np.zeros((3, u.size)))
@@ -85,7 +85,7 @@ class WheelOnSlices:
         """`ContactGeometry` of the section that the wheel of a ``side`` sees with the wheelset's centre at s, y (m), in
         a roll and yaw (rad), ``turned`` (rad) forward, and the height (m) of the centre at which it first touches; None
         and NaN where there is no rail under the wheel."""
-        sign, wheel = SIDES[side], self._wheel_geometry
+        sign, wheel = SIDES[side], self.geometry_of_wheel
         pose = make_pose(1.0, sign * y, 0.0, *axle_direction(sign * roll, sign * yaw), True)
         low, high = (strip_point(wheel, pose, u)[0] for u in self._ends)
         u = SPACING * np.arange(math.ceil(low / SPACING), math.floor(high / SPACING) + 1)
@@ -115,14 +115,14 @@ class WheelOnSlices:
             heights = rail[first : first + count]
             if abs(at + x[0] - every[first]) > _CLOSE:  # another part begins nearby
                 heights = self.rail.heights(self._where_parts_begin(at + x), u)[0]
-            _see(self._wheel_geometry, pose, x, heights, np.zeros((0, 0)), u, section)
+            _see(self.geometry_of_wheel, pose, x, heights, np.zeros((0, 0)), u, section)
         return seen
 
     def turned(self, places, u, beyond):
         """Sections (n, 4, m) over rail coordinates (m,) that the wheel of a wheelset in the middle sees of a level
         rail at places (n,), where it reaches ``beyond(place, x, strips)``, (stations, m), its round, or the rail is as
         much higher, at stations x and wheel coordinates ``strips``, m."""
-        geometry, pose, x = self._wheel_geometry, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
+        geometry, pose, x = self.geometry_of_wheel, make_pose(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, True), self._stations(0.0)
         strips, seen = _strips_over(geometry, pose, u), np.zeros((places.size, 4, u.size))
         for place, section in zip(places, seen, strict=True):
             reach = beyond(place, x, strips)
@@ -147,10 +147,10 @@ class WheelOnSlices:
         x, beyond, seen = self._stations(s), np.zeros((0, 0)), np.zeros((4, u.size))
         rail = self.rail.heights(self._where_parts_begin(s + x), u)[0]
         if self.out_of_round is not None:
-            wheel = self._wheel_geometry
+            wheel = self.geometry_of_wheel
             beyond = reach_beyond(self.out_of_round, wheel, pose, turned, x, _strips_over(wheel, pose, u))
             rail = rail + beyond
-        return seen, _see(self._wheel_geometry, pose, x, rail, beyond, u, seen), x, rail
+        return seen, _see(self.geometry_of_wheel, pose, x, rail, beyond, u, seen), x, rail
 
     def _where_parts_begin(self, s):
         """Arc lengths (n,), m, with those that miss the beginning of a part by rounding on it."""

@@ -26,10 +26,12 @@ from wrcore.contact.geometry import (
     zone_gaps,
     zone_planar_errors,
 )
+from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.contact.seen_rail import AHEAD as SEEN_AHEAD
 from wrcore.contact.seen_rail import BELOW, REACH, WheelOnSlices, filled
 from wrcore.contact.seen_rail import BEND as SEEN_BEND
 from wrcore.contact.seen_rail import HEIGHT as SEEN_HEIGHT
+from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve, averaged_second_derivative
 from wrcore.geometry.slices import RailSlices
 
@@ -45,6 +47,8 @@ beyond the ends of its profile, m."""
 
 COLUMNS = 9
 """Radii of the strips for which a wheel out of round is seen."""
+
+SEEN = [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]
 
 PAD = 16
 """Nodes of a wheel out of round before its turn, or before and behind what is not round of it: a wheel that yaws sees
@@ -110,9 +114,8 @@ def seen_table(pair, plain, backwards=False):
 
 
 def shape_table(pair, shape):
-    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound`, or the rail of a `Corrugation`."""
-    from scipy.interpolate import make_interp_spline
-
+    """`SeenTable` of a `WheelOnRail` whose wheel has the shape of an `OutOfRound` or a `SlicedWheel`, or the rail of a
+    `Corrugation`."""
     plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
     wide = _widened(WheelOnSlices(pair.wheel, RailSlices.of(plain), *sizes))
     u = _lateral(wide, plain)
@@ -120,14 +123,11 @@ def shape_table(pair, shape):
     curvatures, leads = wide.strips(u)
     at = u + pair.rail_distance - pair.half_distance
     own = np.flatnonzero((at >= pair.wheel.u[0]) & (at <= pair.wheel.u[-1]))
-    radii, some = np.unique(np.round(1.0 / curvatures[own], 6), return_index=True)
-    some = own[some[np.unique(np.searchsorted(radii, np.linspace(radii[0], radii[-1], COLUMNS)))]]
-    radii = 1.0 / curvatures[some]
     places = first + step * np.arange(count)
-    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(radii, place, x))
-    seen = make_interp_spline(radii, seen, k=min(3, radii.size - 1), axis=2)(
-        np.clip(1.0 / curvatures, radii[0], radii[-1])
-    )[:, [SEEN_HEIGHT, SEEN_AHEAD, SEEN_BEND]]
+    if isinstance(shape, SlicedWheel):
+        seen = _seen_of_slices(wide, shape, places, u, at, own)
+    else:
+        seen = _seen_of_radii(wide, shape, places, u, 1.0 / curvatures, own)
     sections = np.zeros((count, 2, ROWS, u.size))
     everywhere = _plain_section(plain, u, plain.f.min() - BELOW)
     sections[:, 0] = everywhere
@@ -143,6 +143,29 @@ def shape_table(pair, shape):
     strips = np.stack([curvatures, leads - at * shape.level])
     geometry = _plain_geometry(pair, plain, u, everywhere)
     return _with_bounds(SeenTable(first, step, sections, strips, geometry, np.zeros(0)), faded=True)
+
+
+def _seen_of_radii(wide, shape, places, u, radii, own):
+    """Height, ahead and bend (n, 3, m) of a shape that is the same for all strips of a radius."""
+    from scipy.interpolate import make_interp_spline
+
+    known, some = np.unique(np.round(radii[own], 6), return_index=True)
+    some = own[some[np.unique(np.searchsorted(known, np.linspace(known[0], known[-1], COLUMNS)))]]
+    at = radii[some]
+    seen = wide.turned(places, u[some], lambda place, x, strips: shape.reach(at, place, x))[:, SEEN]
+    return make_interp_spline(at, seen, k=min(3, at.size - 1), axis=2)(np.clip(radii, at[0], at[-1]))
+
+
+def _seen_of_slices(wide, shape, places, u, at, own):
+    """The same of a wheel of slices, strip by strip; beyond them as at their ends. ``at``: strips over ``u``, of which
+    the wheel has its ``own``."""
+    first, last = shape.within(at[own])
+    some = own[first : last + 1]
+    if some.size < 4:
+        raise InputError(shape.slices.name, "", "expected profiles around the tape circle, u = 0, at all angles")
+    reach = shape.reach_over(wide.geometry_of_wheel, at[some])
+    seen = wide.turned(places, u[some], lambda place, x, strips: reach(place, x))[:, SEEN]
+    return seen[:, :, np.clip(np.arange(u.size), some[0], some[-1]) - some[0]]
 
 
 def _plain_geometry(pair, plain, u, section):

@@ -15,6 +15,14 @@ BESIDE = 0.01
 """Length beside a flat over which a wheel sees it yet, m: more than half a window of `wrcore.contact.seen_rail`."""
 
 
+def whole_turn(step, pad, low=0.0):
+    """First angle (rad), step and number of nodes all round, a ``step`` (rad) apart at most, from ``low`` and ``pad``
+    before it on, to ``pad`` behind it."""
+    count = math.ceil(TURN / step)
+    step = TURN / count
+    return low - pad * step, step, count + 2 * pad + 1
+
+
 @dataclass(frozen=True)
 class Flat:
     """A flat: without a depth a fresh one, a chord of the wheel's circle; with one its ends are rounded."""
@@ -102,8 +110,7 @@ class OutOfRound:
         high = max((flat.at + reach for flat, reach in zip(self.flats, reaches, strict=True)), default=0.0)
         count = math.ceil((high - low) / step)
         if self.waves or (count + 2 * pad) * step > TURN:
-            count = math.ceil(TURN / step)
-            step = TURN / count
+            return whole_turn(step, pad, low)
         return low - pad * step, step, count + 2 * pad + 1
 
     def reach(self, radii, turned, x):

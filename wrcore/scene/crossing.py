@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from wrcore.contact.seen_rail import REACH
-from wrcore.contact.seen_table import BLEND, SeenTable, shape_table
+from wrcore.contact.seen_table import BLEND, SeenTable
 from wrcore.dynamics.crossing import LAID, crossing_of, laid_along, laid_at, laid_under
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
@@ -18,7 +18,7 @@ from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
-from wrcore.scene.kept_tables import kept_table
+from wrcore.scene.kept_tables import kept_shape, kept_table
 from wrcore.scene.pairs import find_file
 
 JOINED = 1e-4
@@ -159,7 +159,7 @@ def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
         if key not in known:
             known[key] = len(tables)
             tables.append(
-                kept_table(pair, slices, crossing.backwards) if slices is not None else shape_table(pair, shape or wave)
+                kept_table(pair, slices, crossing.backwards) if slices is not None else kept_shape(pair, shape or wave)
             )
         table = tables[known[key]]
         of_wheels.append(known[key])

@@ -1,6 +1,8 @@
-"""Tables of what wheels see of rails that change, kept in the cache: they take seconds, and one serves many runs."""
+"""Tables of what wheels see of rails that change, and wheels of slices of theirs, kept in the cache: they take seconds,
+and one serves many runs."""
 
 import hashlib
+import math
 import os
 from contextlib import suppress
 from zipfile import BadZipFile
@@ -8,8 +10,10 @@ from zipfile import BadZipFile
 import numpy as np
 
 from wrcore.contact.geometry import ContactGeometry
+from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.contact.seen_rail import WheelOnSlices
-from wrcore.contact.seen_table import SeenTable, seen_table
+from wrcore.contact.seen_table import SeenTable, seen_table, shape_table
+from wrcore.dynamics.pair_store import told_if_long
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder
 
@@ -19,13 +23,28 @@ OWN = "begin", "step", "sections", "strips", "bounds"
 def kept_table(pair, slices, backwards):
     """`SeenTable` of slices in place of a pair's rail, from the cache where it was made before."""
     wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-    path = table_folder() / f"seen_{_digest(pair, slices, backwards)}.npz"
+    digest = _digest(pair, slices.sheets, slices.s, backwards)
+    return _kept(digest, lambda: seen_table(wheel, pair.rail, backwards))
+
+
+def kept_shape(pair, shape):
+    """`shape_table`, of a wheel of slices from the cache where it was made before; others take no time."""
+    if not isinstance(shape, SlicedWheel):
+        return shape_table(pair, shape)
+    digest = _digest(pair, shape.slices.sheets, shape.slices.angles, math.nan)
+    return _kept(digest, lambda: shape_table(pair, shape))
+
+
+def _kept(digest, make):
+    """The table with a digest; `make` makes it where there is none."""
+    path = table_folder() / f"seen_{digest}.npz"
     try:
         with np.load(path) as found:
             table = _table_of(found)
         os.utime(path)
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # none yet, or no whole one
-        table = seen_table(wheel, pair.rail, backwards)
+        with told_if_long("what wheels see of slices is worked out, once"):
+            table = make()
         parts = {name: getattr(table, name) for name in OWN} | table.geometry._asdict()
         del parts["over"]
         with suppress(OSError), appearing(path) as file:
@@ -42,13 +61,13 @@ def _table_of(found):
     return SeenTable(**own, geometry=ContactGeometry(**parts))
 
 
-def _digest(pair, slices, backwards):
-    """Digest of all that a table depends on."""
+def _digest(pair, sheets_of_it, places, kind):
+    """Digest of all that a table depends on: a pair, sheets, the places of their slices, and a number."""
     digest = hashlib.sha256(source_digest().encode())
     curves = [array for curve in (pair.wheel, pair.rail) for array in (curve.u, curve.f, curve.df, curve.d2f)]
-    sheets = [array for sheet in slices.sheets for array in (sheet.s, sheet.points, (sheet.first, sheet.last))]
-    bends = [sheet.spline.c for sheet in slices.sheets if sheet.spline is not None]
-    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance, backwards
-    for part in (*curves, *sheets, *bends, slices.s, sizes):
+    sheets = [array for sheet in sheets_of_it for array in (sheet.s, sheet.points, (sheet.first, sheet.last))]
+    bends = [sheet.spline.c for sheet in sheets_of_it if sheet.spline is not None]
+    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance, kind
+    for part in (*curves, *sheets, *bends, places, sizes):
         digest.update(f"{np.shape(part)}".encode() + np.ascontiguousarray(part, float).tobytes())
     return digest.hexdigest()[:16]

@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 
+from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.errors import InputError
 from wrcore.errors.checked_csv import read_csv_table
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
+from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
 from wrcore.scene.crossing import STEEPEST_ALONG, refuse_tables
@@ -17,8 +19,8 @@ LARGEST = 0.01
 
 
 def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
-    """`OutOfRound` of each wheel, left and right of wheelset after wheelset, None of a round one, and the angle (rad)
-    that touches at the beginning; empty where all are round. ``pairs`` are the scene's."""
+    """`OutOfRound` or `SlicedWheel` of each wheel, left and right of wheelset after wheelset, None of a round one, and
+    the angle (rad) that touches at the beginning; empty where all are round. ``pairs`` are the scene's."""
     shapes, known = [], {}
     for k, pair in enumerate(pairs):
         side, name = list(SIDES)[k % 2], vehicle.wheelset_names[k // 2]
@@ -28,9 +30,9 @@ def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
             field, spec = f"wheel.wheelsets.{name}.{side}.out_of_round", single["out_of_round"]
         shape, angle = None, 0.0
         if spec:
-            key = json.dumps({**spec, "angle": 0.0, "radius": pair.rolling_radius}, sort_keys=True)
+            key = json.dumps({**spec, "angle": 0.0, "radius": pair.rolling_radius}, sort_keys=True), id(pair.wheel)
             if key not in known:
-                known[key] = _shape(spec, pair.rolling_radius, field, folder, source)
+                known[key] = _shape(spec, pair, field, folder, source)
             shape, angle = known[key], float(spec["angle"])
             if crossing is not None and crossing.rails[k % 2] is not None:
                 expected = f"expected a round wheel on the {side} rail, where track.crossing changes it"
@@ -42,8 +44,11 @@ def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
     return tuple(shapes)
 
 
-def _shape(spec, radius, field, folder, source):
-    """`OutOfRound` of what a scene says of one wheel with a radius, m."""
+def _shape(spec, pair, field, folder, source):
+    """Shape of what a scene says of one wheel of a pair."""
+    if "slices" in spec:
+        return _sliced(spec, pair, field, folder, source)
+    radius = pair.rolling_radius
     flats = tuple(Flat(one["length"], one.get("depth"), one["at"]) for one in spec["flats"])
     for k, flat in enumerate(flats):
         if not flat.length < radius:
@@ -53,13 +58,42 @@ def _shape(spec, radius, field, folder, source):
     if "table" in spec:
         waves.append(_measured(find_file(spec["table"], folder, source, f"{field}.table")))
     if not flats and not waves:
-        raise InputError(source, field, "expected flats, polygon or table, got none")
+        raise InputError(source, field, "expected flats, polygon, table or slices, got none")
     shape = OutOfRound(radius, flats, tuple(waves))
     around = np.linspace(0.0, TURN, 20001)
-    slope = np.abs(np.diff(shape.deviation(around))).max() / (radius * around[1])
+    _check_slope(np.diff(shape.deviation(around)) / (radius * around[1]), field, source)
+    return shape
+
+
+def _check_slope(slopes, field, source):
+    slope = np.abs(slopes).max()
     if not slope < STEEPEST_ALONG:
         expected = f"expected a surface that rises less than {STEEPEST_ALONG:g} along the wheel, got {slope:.3g}"
         raise InputError(source, field, expected)
+
+
+def _sliced(spec, pair, field, folder, source):
+    """`SlicedWheel` of a file of slices."""
+    others = [name for name in ("flats", "polygon", "table") if spec.get(name)]
+    if others:
+        raise InputError(source, f"{field}.{others[0]}", "expected nothing beside slices, which are the whole wheel")
+    how = spec["slices"] if isinstance(spec["slices"], dict) else {"slices": spec["slices"]}
+    if not isinstance(how.get("slices"), str):
+        expected = f"expected a file of slices, or {{slices: FILE, ...}}, got {spec['slices']!r}"
+        raise InputError(source, f"{field}.slices", expected)
+    path = find_file(how["slices"], folder, source, f"{field}.slices")
+    shape, wheel = SlicedWheel(read_slices({**how, "slices": str(path)}, "wheel"), pair.rolling_radius), pair.wheel
+    strips = wheel.u[:: max(round(1e-3 / wheel.spacing), 1)]
+    first, last = shape.within(strips)
+    if last - first < 10:
+        raise InputError(path, "", "expected profiles around the tape circle, u = 0, at all angles")
+    strips = strips[first : last + 1]
+    f, _, rates = shape.slices.heights(np.linspace(0.0, TURN, 3601), strips)
+    off = np.abs(f - wheel(strips))[:, np.abs(wheel(strips, 1)) < 1.0].max()
+    if off > LARGEST:
+        expected = f"expected sections within {LARGEST:g} m of the scene's wheel {wheel.name}, got {off:.3g} m"
+        raise InputError(path, "profile", expected)
+    _check_slope(rates / pair.rolling_radius, field, source)
     return shape
 
 
