@@ -1,6 +1,8 @@
 """Runs on wheels out of round: against linear oscillators, and the geometry of the wheel's path."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ MASS, LOAD, RADIUS = 906.5, 54546.0, 0.46  # half a wheelset
 STIFFNESS, DAMPING = 8.1e7, 6e4  # of the track, N/m and N s/m
 SOFT = {"rail": dict.fromkeys(("lateral", "vertical"), {"stiffness": STIFFNESS, "damping": DAMPING})}
 HALF_TURN = math.pi * RADIUS
+MEASURED = Path(os.environ.get("WRCORE_CONTACT", "")) / "examples" / "S1002_flat.slcw"
 S1002 = {"wheel.profile": "S1002", "rail": {"profile": "60E1", "inclination": "1/40"}}
 
 
@@ -276,6 +279,26 @@ def test_a_wheel_of_slices_is_seen_where_it_differs(tmp_path):
     on = np.abs(at) < 0.018
     found = np.interp(at[on] - pair.rail_distance + pair.half_distance, u, section.rail[:, 0])
     np.testing.assert_allclose(table.sections[some, 0, HEIGHT, on], found, atol=5e-7)
+
+
+@pytest.mark.skipif(not MEASURED.is_file(), reason="needs CONTACT's examples in the folder WRCORE_CONTACT")
+def test_a_measured_flat_leaves_the_rail():
+    """Sections as `wrcore contact` sees them, and a load of more than twice that at rest behind a lift-off."""
+    wheel = named_profile("S1002", "wheel")
+    pair, sections = WheelOnRail(wheel, named_profile("60E1", "rail", 1 / 40)), read_slices(MEASURED, "wheel")
+    table = shape_table(pair, SlicedWheel(sections, RADIUS))
+    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance
+    still = WheelOnSlices(wheel, RailSlices.of(pair.rail), *sizes, sections)
+    at = table.geometry.rail_start + U_STEP * np.arange(len(table.geometry.rail))
+    for angle in (-0.5, 0.6, 0.63, 0.66, 0.7):
+        k = round((angle - table.begin) / table.step)
+        section, _ = still.under("left", 0.0, 0.0, turned=table.begin + k * table.step)
+        u, on = section.rail_start + section.rail_step * np.arange(len(section.rail)), np.abs(at) < 0.018
+        found = np.interp(at[on], u, section.rail[:, 0])
+        np.testing.assert_allclose(table.sections[k, 0, HEIGHT, on], found, atol=5e-7)
+    load = load_of(rolling({"slices": str(MEASURED)}, 10.0, 3.0, **S1002))
+    assert load.min() == 0.0
+    assert load.max() == pytest.approx(1.25e5, rel=0.02)
 
 
 def test_wheels_begin_round():
