@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -13,6 +14,7 @@ import wrcore as wr
 from tests.conftest import ROOT, SCENES
 from tests.run.test_session import active, scene_of, stepped
 from wrcore.cli import main
+from wrcore.run.fmu import _pack_scene
 
 LACKING = [name for name in ("pythonfmu", "pythonfmu3", "fmpy") if find_spec(name) is None]
 NEEDS = pytest.mark.skipif(bool(LACKING), reason=f"pip install 'wrcore[fmi]' fmpy: {', '.join(LACKING)} not installed")
@@ -32,6 +34,37 @@ def unit(request, tmp_path_factory):
     assert main(["fmu", SCENE, *given, *outputs, "--fmi", str(request.param), "--out", str(path)]) == 0
     os.unlink(changes["vehicle.parameters"])
     return str(path), scene
+
+
+@pytest.mark.parametrize("name", ["wheel.csv", "wheel.slcw"])
+def test_a_scene_with_slices_takes_their_profiles_along(tmp_path, name):
+    """They are among its files, whose content is known, and a unit has them under names of its own."""
+    u, wheel = np.linspace(-0.02, 0.03, 60), wr.named_profile("S1002", "wheel")
+    (tmp_path / "sections").mkdir()
+    for k in range(2):
+        points = np.column_stack([u, wheel(u) + 1e-4 * k])
+        file = tmp_path / "sections" / f"{k}.csv"
+        np.savetxt(file, points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+    places = [(angle, f"sections/{k}.csv") for angle, k in ((-0.2, 0), (0.0, 1), (0.2, 0))]
+    lines = ["angle_rad,profile", *(f"{angle},{file}" for angle, file in places)]
+    if name.endswith("slcw"):
+        lines = ["% a wheel", "0.0 1.0", "3", "0 0 0", "1", *(f"{angle} '{file}'" for angle, file in places)]
+    (tmp_path / name).write_text("\n".join(lines))
+    how = {"slices": str(tmp_path / name), "unit": "m", "downwards": False}
+    scene = wr.load_scene(SCENE, {"wheel.left.out_of_round.slices": how})
+    sections = [str(tmp_path / "sections" / f"{k}.csv") for k in range(2)]
+    assert set(sections) < set(scene.files)
+    edited = tmp_path / "sections" / "1.csv"
+    edited.write_text(edited.read_text() + "0.0301,0.0\n")
+    again = wr.load_scene(SCENE, {"wheel.left.out_of_round.slices": how})
+    assert [scene.files[path] == again.files[path] for path in sections] == [True, False]
+    (tmp_path / "unit").mkdir()
+    _pack_scene(again, tmp_path / "unit")
+    shutil.rmtree(tmp_path / "sections")
+    packed = wr.load_scene(tmp_path / "unit" / "scene.yaml")
+    angles = np.linspace(-0.3, 0.3, 7)
+    one, other = (each.out_of_round[0][0].slices.heights(angles, u[1:-1]) for each in (again, packed))
+    np.testing.assert_array_equal(one, other)
 
 
 @NEEDS

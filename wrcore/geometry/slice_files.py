@@ -14,7 +14,9 @@ Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 """
 
 import csv
+import io
 import re
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +32,7 @@ PLACES = {"rail": "s_m", "wheel": "angle_rad"}
 """The ending of files of slices of a rail and of a wheel, and the column of a table that says where a slice is."""
 MOST_SLICES = 100_000
 
+_QUOTED = r"'([^']+)'|\"([^\"]+)\""
 _CLOSE = 1e-7  # m; as for profiles
 _MM = 1e-3
 _KEYS = {"slices", "unit", "mirrored", "downwards", "wavelength"}
@@ -62,6 +65,33 @@ def read_slices(spec, kind="rail"):
         check_number(how["wavelength"], 0.0, 0.1, kind, "wavelength", "m")
     read = _read_slcs if path.suffix.lower() in SLICE_FILES.values() else _read_table
     return read(path, how, kind)
+
+
+def with_profiles(path, renamed):
+    """The text of a file of slices with the names of its profiles as ``renamed`` has each; OSError or ValueError where
+    it cannot be read. It need not be a file of slices."""
+    check_regular(path)
+    text = Path(path).read_text(errors="replace")
+    if Path(path).suffix.lower() in SLICE_FILES.values():
+        return re.sub(_QUOTED, lambda name: f"'{renamed(name[1] or name[2])}'", text)
+    header, *rows = list(csv.reader(text.lstrip("\ufeff").splitlines())) or [[]]
+    names = [name.strip() for name in header]
+    if "profile" not in names:
+        return text
+    column, out = names.index("profile"), io.StringIO()
+    for row in rows:
+        if len(row) > column:
+            row[column] = renamed(row[column].strip())
+    csv.writer(out, lineterminator="\n").writerows([header, *rows])
+    return out.getvalue()
+
+
+def profiles_in(path):
+    """Paths of the profiles that a file lists if it is one of slices, each once."""
+    found = {}
+    with suppress(OSError, ValueError):
+        with_profiles(path, lambda name: found.setdefault(name, name))
+    return [Path(path).parent / name for name in found]
 
 
 def _lines(path):
@@ -138,7 +168,7 @@ def _read_slcs(path, how, kind):
 def _listed(lines):
     """Line, arc length (in the file's unit) and profile of a slice."""
     number, (value,), line = lines.take(1, "arc length and profile of a slice")
-    name = re.search(r"'([^']+)'|\"([^\"]+)\"", line)
+    name = re.search(_QUOTED, line)
     if name is None:
         raise InputError(lines.path, f"line {number}", f"expected s and a profile in quotes, got {line[:60]!r}")
     return number, value, name[1] or name[2]

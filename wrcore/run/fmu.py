@@ -24,6 +24,7 @@ import yaml
 import wrcore
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing
+from wrcore.geometry.slice_files import profiles_in, with_profiles
 from wrcore.run.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start
 from wrcore.scene.description import Scene
@@ -191,5 +192,9 @@ def _pack_scene(scene, folder):
     for number, path in enumerate(scene.files):
         names[path] = f"{number}_{Path(path).name}"
         shutil.copy(path, folder / names[path])
+    for path in scene.files:
+        if any(str(listed) in names for listed in profiles_in(path)):  # slices, whose profiles have other names now
+            text = with_profiles(path, lambda name, at=Path(path).parent: names.get(str(at / name), name))
+            (folder / names[path]).write_text(text)
     content = with_names(scene.data, Path(scene.source).parent, names)
     (folder / SCENE).write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")

@@ -10,6 +10,7 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.errors.input_files import digest_of_file
 from wrcore.geometry.profile_files import POINT_FILES
+from wrcore.geometry.slice_files import profiles_in
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.track import SIDES
 
@@ -41,14 +42,18 @@ def _found(path, folder):
 
 
 def digests_of_files(value, folder, key=""):
-    """SHA-256 of all files that a scene's content, or a part of it, names, by their paths."""
+    """SHA-256 of all files that a scene's content, or a part of it, names, and of profiles that slices name, by their
+    paths."""
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else ((key, item) for item in value)
         return {path: digest for name, item in items for path, digest in digests_of_files(item, folder, name).items()}
     if key in ("law", "model") and isinstance(value, str) and ":" in value:  # file.py:function
         value = value.rpartition(":")[0]
     found = _found(value, folder) if key in NAMED_BY and isinstance(value, str) else None
-    return {} if found is None else {str(found): digest_of_file(found)}
+    if found is None:
+        return {}
+    listed = [path for path in profiles_in(found) if os.path.isfile(path)] if key == "slices" else []
+    return {str(path): digest_of_file(path) for path in (found, *listed)}
 
 
 def with_names(value, folder, names, key=""):
