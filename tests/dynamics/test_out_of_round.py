@@ -345,6 +345,33 @@ def test_bad_tables_name_their_column(tmp_path, rows):
         load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round": shape})
 
 
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({5: lambda u, f: (u, f - 0.009)}, r"out_of_round: expected a surface that rises less than 0.2"),
+        ({5: lambda u, f: (u, f - 1e-3)}, r"out_of_round: expected a surface that rises less than 0.2"),  # as it closes
+        ({0: lambda u, f: (1e3 * u, 1e3 * f)}, r"0.csv: expected a profile within 0.5 m, got 56.*unit: mm"),
+        ({1: lambda u, f: (u, np.where(u == u[3], math.inf, f))}, r"1.csv"),
+        ({1: lambda u, f: (u, f - 0.012), 2: lambda u, f: (u, f - 0.012)}, r"sections within 0.01 m"),
+        ({"wavelength": 1.0}, r"out_of_round.slices: wavelength"),
+        ({"units": "mm"}, r"out_of_round.slices: units: "),
+    ],
+)
+def test_bad_slices_name_their_file(tmp_path, change, expected):
+    wheel = named_profile("S1002", "wheel")
+    u = wheel.u[(wheel.u > -0.037) & (wheel.u < 0.02)][::10]
+    rows = ["angle_rad,profile"]
+    for k, angle in enumerate((0.0, 0.5, 1.0, 1.5, 2.0, 2.5)):
+        points = np.column_stack(change.get(k, lambda u, f: (u, f))(u, wheel(u)))
+        np.savetxt(tmp_path / f"{k}.csv", points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+        rows.append(f"{angle},{k}.csv")
+    (tmp_path / "wheel.csv").write_text("\n".join(rows))
+    how = {"slices": str(tmp_path / "wheel.csv")}
+    how |= {key: value for key, value in change.items() if isinstance(key, str)}
+    with pytest.raises(InputError, match=expected):
+        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": how})
+
+
 def test_what_does_not_go_together_is_refused():
     with pytest.raises(InputError, match="expected a round wheel on the right rail"):
         load_scene(SCENES / "crossing.yaml", {"wheel.right.out_of_round": FLAT})

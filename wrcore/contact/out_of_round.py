@@ -65,7 +65,8 @@ class SlicedWheel:
 
     def within(self, strips):
         """Those of its strips (m,), evenly apart, around the tape circle that all slices have: first and last."""
-        there = np.isfinite(self.slices.heights(self.slices.angles, strips)[0]).all(axis=0)
+        angles = np.concatenate([self.slices.angles, np.arange(0.0, TURN, 1e-2)])
+        there = np.isfinite(self.slices.heights(angles, strips)[0]).all(axis=0)
         middle = int(np.argmin(np.abs(strips)))
         if not there[middle]:
             return middle, middle - 1

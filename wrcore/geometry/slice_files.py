@@ -31,6 +31,8 @@ SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
 PLACES = {"rail": "s_m", "wheel": "angle_rad"}
 """The ending of files of slices of a rail and of a wheel, and the column of a table that says where a slice is."""
 MOST_SLICES = 100_000
+WIDEST = 0.5
+"""Sections that are wider or higher than this, m, are taken for a mistake."""
 
 _QUOTED = r"'([^']+)'|\"([^\"]+)\""
 _CLOSE = 1e-7  # m; as for profiles
@@ -51,12 +53,21 @@ def is_slices(path, kind="rail"):
     return PLACES[kind] in names and "profile" in names
 
 
-def read_slices(spec, kind="rail"):
+def read_slices(spec, kind="rail", described_by=None):
     """`RailSlices`, of a wheel `WheelSlices`, from the path of a file of slices, or from a dict of ``slices`` (the
     path) and how to read profiles that are columns: ``unit``, ``mirrored``, ``downwards`` as for `read_profile`; and a
     ``wavelength`` (m): of waves so long half is left, shorter ones of measured sections are evened out. InputError
-    names file and line."""
+    names file and line, or where the dict comes from (``described_by``)."""
     spec = spec if isinstance(spec, dict) else {"slices": spec}
+    try:
+        return _read(spec, kind)
+    except InputError as error:
+        if described_by is None or error.source != kind:
+            raise
+        raise InputError(described_by, error.field, error.expected) from None
+
+
+def _read(spec, kind):
     for key in set(spec) - _KEYS:
         raise InputError(kind, str(key), one_of(sorted(_KEYS), key))
     path = Path(spec["slices"])
@@ -193,7 +204,7 @@ def _read_table(path, how, kind):
     place = PLACES[kind]
     for wanted in (place, "profile"):
         if wanted not in names:
-            raise InputError(path, wanted, f"expected this column; found {', '.join(names)}")
+            raise InputError(path, wanted, f"expected this column; found {', '.join(filter(None, names)) or 'none'}")
     cuts = [name for name in names if re.fullmatch(r"cut_\d+_m", name)]
     for name in names:
         if name not in (place, "profile", *cuts) and not (name == "head" and kind == "rail"):
@@ -204,6 +215,8 @@ def _read_table(path, how, kind):
         if len(words) != len(names):
             raise InputError(path, f"line {number}", f"expected {len(names)} fields, got {len(words)}")
         row = dict(zip(names, words, strict=True))
+        if not row["profile"]:
+            raise InputError(path, f"profile, line {number}", "expected the name of a file, got none")
         given = np.array([_number(path, number, name, row[name], optional=True) for name in cuts])
         places = given[np.isfinite(given)]
         if np.any(np.diff(places, prepend=0.0) <= 0.0):
@@ -234,7 +247,7 @@ def _assembled(path, heads, kind, told="", through=True):
         s = [row[1] for row in rows]
         if np.any(np.diff(s) <= 0.0):
             k = int(np.argmax(np.diff(s) <= 0.0)) + 1
-            expected = f"expected s that increases, got {s[k]:g} after {s[k - 1]:g} m"
+            expected = f"expected {PLACES[kind]} that increases, got {s[k]:g} after {s[k - 1]:g}"
             raise InputError(path, f"line {rows[k][0]}", expected)
         slices = {row[1]: _slice(path, row, kind, known) for row in rows}
         counts = sorted({one.cuts.size for one in slices.values()})
@@ -294,6 +307,11 @@ def _profile(path, row, kind):
     number, s, name, how, _ = row
     how, wavelength = {key: how[key] for key in how if key != "wavelength"}, how.get("wavelength", 0.0)
     u, f, *_ = read_points({"points": str(path.parent / name), **how}, kind)
+    if not np.isfinite([u, f]).all():
+        raise InputError(path.parent / name, "", f"expected finite numbers (line {number} of {path})")
+    if u.size and max(np.ptp(u), np.ptp(f)) > WIDEST:
+        expected = f"expected a profile within {WIDEST:g} m, got {max(np.ptp(u), np.ptp(f)):.3g} m (unit: mm?)"
+        raise InputError(path.parent / name, "", f"{expected} (line {number} of {path})")
     if u.size and u[-1] < u[0]:
         u, f = u[::-1], f[::-1]
     step = np.hypot(np.diff(u), np.diff(f))

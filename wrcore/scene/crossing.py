@@ -93,7 +93,8 @@ def _slices(spec, folder, source) -> RailSlices:
     how = spec if isinstance(spec, dict) else {"slices": spec}
     if not isinstance(how.get("slices"), str):
         raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
-    return read_slices({**how, "slices": str(find_file(how["slices"], folder, source, field))})
+    path = find_file(how["slices"], folder, source, field)
+    return read_slices({**how, "slices": str(path)}, described_by=f"{source}: {field}")
 
 
 def _check_joints(slices, plain, source):

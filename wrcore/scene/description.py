@@ -229,7 +229,7 @@ WHOLE = (".profile", ".friction", ".controller.speed", "vehicle.parameters")
 def _flat(changes, prefix=""):
     """Pairs of a key path and a plain value; mappings are entered, but for those at `WHOLE`."""
     for key, value in changes.items():
-        path = prefix + key.replace("__", ".")
+        path = prefix + str(key).replace("__", ".")
         if isinstance(value, Mapping) and not path.endswith(WHOLE):
             yield from _flat(value, f"{path}.")
         else:

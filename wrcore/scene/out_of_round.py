@@ -82,18 +82,21 @@ def _sliced(spec, pair, field, folder, source):
         expected = f"expected a file of slices, or {{slices: FILE, ...}}, got {spec['slices']!r}"
         raise InputError(source, f"{field}.slices", expected)
     path = find_file(how["slices"], folder, source, f"{field}.slices")
-    shape, wheel = SlicedWheel(read_slices({**how, "slices": str(path)}, "wheel"), pair.rolling_radius), pair.wheel
+    slices = read_slices({**how, "slices": str(path)}, "wheel", f"{source}: {field}.slices")
+    shape, wheel = SlicedWheel(slices, pair.rolling_radius), pair.wheel
     strips = wheel.u[:: max(round(1e-3 / wheel.spacing), 1)]
     first, last = shape.within(strips)
     if last - first < 10:
         raise InputError(path, "", "expected profiles around the tape circle, u = 0, at all angles")
     strips = strips[first : last + 1]
-    f, _, rates = shape.slices.heights(np.linspace(0.0, TURN, 3601), strips)
+    around = np.linspace(0.0, TURN, 3601)
+    f, _, rates = shape.slices.heights(around, strips)
     off = np.abs(f - wheel(strips))[:, np.abs(wheel(strips, 1)) < 1.0].max()
-    if off > LARGEST:
+    if not off <= LARGEST:
         expected = f"expected sections within {LARGEST:g} m of the scene's wheel {wheel.name}, got {off:.3g} m"
         raise InputError(path, "profile", expected)
     _check_slope(rates / pair.rolling_radius, field, source)
+    _check_slope(np.diff(f, axis=0) / (pair.rolling_radius * around[1]), field, source)  # where a turn closes, too
     return shape
 
 
