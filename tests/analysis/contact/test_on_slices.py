@@ -186,7 +186,7 @@ SLCS = """ 0.0 1.0 U_OFFSET, U_SCALE
 @pytest.mark.parametrize(
     ("change", "where", "what"),
     [
-        ({"second": "0.0"}, "line 6", "s that increases"),
+        ({"second": "0.0"}, "line 6", "s_m that increases"),
         ({"second": "x"}, "line 6", "arc length and profile"),
         ({"features": "1"}, "line 3", "at least 2 feature lines"),
         ({"features": "2"}, "s and 2 positions of feature lines", "truncated"),
