@@ -31,6 +31,8 @@ SLICE_FILES = {"rail": ".slcs", "wheel": ".slcw"}
 PLACES = {"rail": "s_m", "wheel": "angle_rad"}
 """The ending of files of slices of a rail and of a wheel, and the column of a table that says where a slice is."""
 MOST_SLICES = 100_000
+BEYOND = 8
+"""Slices added beyond either end of a wheel that they go round: what a spline's ends are free to do has died away."""
 WIDEST = 0.5
 """Sections that are wider or higher than this, m, are taken for a mistake."""
 
@@ -278,7 +280,8 @@ def _wheel(path, angles, slices, through):
         raise InputError(path, PLACES["wheel"], f"expected angles within one turn, got {turn:g} rad")
     gap = TURN - turn
     if angles.size > 3 and gap < 1.5 * np.diff(angles).max():  # once round: the neighbours beyond either end are known
-        more = slice(int(gap < 1e-9), 3), slice(-3, -1 if gap < 1e-9 else None)
+        count = min(BEYOND, angles.size - 1)
+        more = slice(int(gap < 1e-9), count), slice(-count, -1 if gap < 1e-9 else None)
         slices = [*slices[more[1]], *slices, *slices[more[0]]]
         angles = np.concatenate([angles[more[1]] - TURN, angles, angles[more[0]] + TURN])
     return WheelSlices(str(path), angles, tuple(sheets_of(angles, slices, through)))

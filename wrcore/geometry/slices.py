@@ -164,7 +164,7 @@ class WheelSlices:
 
     name: str
     angles: np.ndarray
-    """Of the slices, rad; of a wheel with slices all round with three more beyond either end."""
+    """Of the slices, rad; of a wheel with slices all round with some of them again beyond either end."""
     sheets: tuple
 
     def round(self):

@@ -60,6 +60,17 @@ def test_eccentric_wheel_touches_below_its_own_centre(tmp_path, turned):
     assert 0.5 / (RADIUS - radius) + bend == pytest.approx(0.5 / RADIUS, rel=1e-3)
 
 
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_turn_closes_without_a_step(tmp_path, closed):
+    """Whether the first slice is given once or again at the end; half a slice before it angles begin anew."""
+    around = np.linspace(0.0, 2.0 * math.pi, 17)[: None if closed else -1]
+    made = wheel(tmp_path, lambda a: 3e-4 * math.cos(3.0 * a), around)
+    seam = around[0] - 0.5 * (2.0 * math.pi - 15 * math.pi / 8) * (not closed)
+    places = seam + np.array([-1e-9, 1e-9])
+    before, behind = made.heights(places, np.array([-0.01, 0.01]))[0]
+    assert behind == pytest.approx(before, abs=5e-9)
+
+
 def test_slices_that_are_alike_are_a_round_wheel(tmp_path):
     s1002 = named_profile("S1002", "wheel")
     part = (s1002.u > -0.03) & (s1002.u < 0.05)
