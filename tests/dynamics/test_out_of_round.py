@@ -372,6 +372,12 @@ def test_bad_slices_name_their_file(tmp_path, change, expected):
         load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": how})
 
 
+def test_slices_that_are_no_table_name_their_file(tmp_path):
+    (tmp_path / "wheel.csv").write_text("angle_rad,profile\n0,'" + 200_000 * "a")
+    with pytest.raises(InputError, match=r"wheel.csv: expected a table: field larger than"):
+        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": str(tmp_path / "wheel.csv")})
+
+
 def test_what_does_not_go_together_is_refused():
     with pytest.raises(InputError, match="expected a round wheel on the right rail"):
         load_scene(SCENES / "crossing.yaml", {"wheel.right.out_of_round": FLAT})

@@ -77,7 +77,10 @@ def _read(spec, kind):
     if "wavelength" in how:
         check_number(how["wavelength"], 0.0, 0.1, kind, "wavelength", "m")
     read = _read_slcs if path.suffix.lower() in SLICE_FILES.values() else _read_table
-    return read(path, how, kind)
+    try:
+        return read(path, how, kind)
+    except csv.Error as error:
+        raise InputError(path, "", f"expected a table: {error}") from None
 
 
 def with_profiles(path, renamed):
@@ -102,7 +105,7 @@ def with_profiles(path, renamed):
 def profiles_in(path):
     """Paths of the profiles that a file lists if it is one of slices, each once."""
     found = {}
-    with suppress(OSError, ValueError):
+    with suppress(OSError, ValueError, csv.Error):
         with_profiles(path, lambda name: found.setdefault(name, name))
     return [Path(path).parent / name for name in found]
 
