@@ -14,7 +14,8 @@ import numpy as np
 from wrcore.balance.bodies import put_bodies
 from wrcore.balance.equilibrium import Equilibrium, solve_equilibrium, stand_on_rails
 from wrcore.balance.linear import cleared, steady_running
-from wrcore.contact.detection import detect
+from wrcore.contact import reduction
+from wrcore.contact.detection import axle_direction, find_patches
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.statics import settle
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY, angles, euler_of, euler_parameters, matrix_of
@@ -25,7 +26,6 @@ from wrcore.dynamics.system import frictionless, independent_at, internal_states
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
-from wrcore.geometry.track import rotation
 from wrcore.kernels.handles import Handle
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
@@ -79,7 +79,7 @@ def rest(scene, model):
 def _standing(scene, model, offset):
     """State of the bodies at their nominal places, moved to the left by an offset (m), wheels on their rails."""
     vehicle, wheelsets = scene.vehicle, scene.vehicle.bodies.wheelsets
-    state = np.zeros(state_size(model))
+    sides, state = _geometries(model), np.zeros(state_size(model))
     for body, (x, y, z) in enumerate(vehicle.positions):
         at = STATE_SIZE * body
         state[at : at + 8] = x, y + offset, z, 1.0, 0.0, 0.0, 0.0, REST_SPEED
@@ -89,9 +89,9 @@ def _standing(scene, model, offset):
                 got = f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 raise InputError(scene.source, "vehicle", got)
             k = int(np.flatnonzero(wheelsets == body)[0])
-            roll, state[at + 2] = _settled(scene, model, k, offset, 0.0, load, state)
+            roll, state[at + 2] = _settled(scene, model, k, sides[k], offset, 0.0, load, state)
             if model.contact.geometries:
-                state[at + EULER : at + VELOCITY] = euler_of(rotation(roll, 0.0))
+                state[at + EULER : at + VELOCITY] = euler_parameters(roll, 0.0, 0.0)
     return state
 
 
@@ -104,8 +104,8 @@ def static_equilibrium(scene, model, at_rest=None):
     """
     at_rest = at_rest or rest(scene, model)
     state = _moving(model, at_rest)
-    for k in range(len(model.bodies.wheelsets)):
-        _roll_as_it_stands(scene, model, k, state)
+    for k, sides in enumerate(_geometries(model)):
+        _roll_as_it_stands(scene, model, k, sides, state)
     return dataclasses.replace(at_rest, state=state)
 
 
@@ -121,45 +121,47 @@ def _moving(model, at_rest):
     return state
 
 
-def _roll_as_it_stands(scene, model, k, state):
+def _roll_as_it_stands(scene, model, k, sides, state):
     """Let the k-th wheelset roll without slip in its pose in the state, independent wheels each by itself."""
     body = model.bodies.wheelsets[k]
     part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
     roll, _, yaw = angles(part[EULER:VELOCITY])
-    left, right = _radii(scene, model, k, state, float(roll), float(yaw))
+    left, right = _radii(scene, model, k, sides, state, float(roll), float(yaw))
     radius = sum(left + right) / len(left + right)
-    part[OMEGA:] = rotation(float(roll), float(yaw))[:, 1] * model.speed / radius
+    part[OMEGA:] = axle_direction(roll, yaw)
+    part[OMEGA:] *= model.speed / radius
     for j in np.flatnonzero(model.bodies.independent[:, 0] == k):
         half = 0.5 * (len(left) / sum(left) - len(right) / sum(right)) if left and right else 0.0
         state[independent_at(model.bodies, j)] = model.speed * half
 
 
-def _geometries(model, k):
-    """`ContactGeometry` of the left and the right wheel of the k-th wheelset."""
-    return model.contact.geometries[2 * k : 2 * k + 2] or (model.contact.geometry,) * 2
+def _geometries(model):
+    """Handles of the `ContactGeometry` of the left and the right wheel of each wheelset."""
+    contact, count = model.contact, len(model.bodies.wheelsets)
+    geometries = contact.geometries or (contact.geometry,) * (2 * count)
+    handles = {number: Handle(one) for number, one in {id(one): one for one in geometries}.items()}
+    return [tuple(handles[id(one)] for one in geometries[2 * k : 2 * k + 2]) for k in range(count)]
 
 
-def _radii(scene, model, k, state, roll, yaw):
+def _radii(scene, model, k, sides, state, roll, yaw):
     """Rolling radii (m) of the left and the right wheel's patches, for the k-th wheelset in its place in a state."""
     y, z = state[STATE_SIZE * model.bodies.wheelsets[k] :][1:3]
-    detection = "planar" if scene.detection == "planar" else "spatial"
-    reduction = "maximum" if model.contact.reduction == 0 else "moment"
-    radii, found = [], {}
-    for side, one, (aside, up) in zip(("left", "right"), _geometries(model, k), rails_at(model, state, k), strict=True):
-        place = id(one), y - aside, z - up
-        if place not in found:
-            found[place] = detect(one, *place[1:], roll, yaw, detection, reduction)
-        radii.append([z - up - patch.z_m for patch in found[place] if patch.side == side])
+    axle, rows = axle_direction(roll, yaw), np.empty((reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
+    spatial, reduced, radii = scene.detection != "planar", min(model.contact.reduction, reduction.MOMENT), []
+    for one, sign, (aside, up) in zip(sides, (1.0, -1.0), rails_at(model, state, k), strict=True):
+        sided = (sign * c for c in axle)
+        count = find_patches(one, sign, y - aside, z - up, *sided, spatial, reduced, rows)
+        radii.append([z - up - float(row[reduction.Z]) for row in rows[:count]])
     return radii
 
 
-def _settled(scene, model, k, y, yaw, load, state):
-    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest. Rails
-    of a flexible track are where the state has them."""
+def _settled(scene, model, k, sides, y, yaw, load, state):
+    """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest; the
+    ``sides`` are its `_geometries`. Rails of a flexible track are where the state has them."""
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
-    spatial, nominal, sides = scene.detection != "planar", scene.vehicle.rolling_radius, _geometries(model, k)
-    roll, z = settle(*map(Handle, sides), contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
+    spatial, nominal = scene.detection != "planar", scene.vehicle.rolling_radius
+    roll, z = settle(*sides, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
     if not math.isfinite(z):
         raise InputError(
             scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
@@ -168,6 +170,14 @@ def _settled(scene, model, k, y, yaw, load, state):
     if len(model.flexible_track.mass):
         roll, z = roll + 0.5 * (left[1] - right[1]) / contact.geometry.rail_distance, z + 0.5 * (left[1] + right[1])
     return roll, z
+
+
+def _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state):
+    """Let the k-th wheelset stand on the rails at a place (m, rad) with its loads `at_rest`, and roll as it stands."""
+    body, load = model.bodies.wheelsets[k], float(0.5 * at_rest.wheel_loads[k].sum())
+    roll, z = _settled(scene, model, k, sides, y, yaw, load, state)
+    state[STATE_SIZE * body + 1 : STATE_SIZE * body + VELOCITY] = y, z, *euler_parameters(roll, 0.0, yaw)
+    _roll_as_it_stands(scene, model, k, sides, state)
 
 
 def initial_state(scene, model, at_rest=None, shared=None):
@@ -184,12 +194,11 @@ def initial_state(scene, model, at_rest=None, shared=None):
     y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
     state = _moving(model, at_rest)
     level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
-    for k, body in enumerate(vehicle.bodies.wheelsets):
-        part = state[STATE_SIZE * body : STATE_SIZE * (body + 1)]
+    for k, sides in enumerate(_geometries(model)):
         if y or yaw:
-            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
-            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
-        _roll_as_it_stands(scene, model, k, state)
+            _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state)
+        else:
+            _roll_as_it_stands(scene, model, k, sides, state)
     if y or yaw:
         for body, name in enumerate(vehicle.body_names):
             state[STATE_SIZE * body + 1] += y * (vehicle.data["bodies"][name]["kind"] == "body")
@@ -214,20 +223,18 @@ def initial_state(scene, model, at_rest=None, shared=None):
 
 def _move(scene, model, moved, at_rest, state):
     """Put bodies where the scene wants them; wheelsets that are moved stand on the rails, and all still roll."""
-    for k, body in enumerate(scene.vehicle.bodies.wheelsets):
+    for (k, body), sides in zip(enumerate(scene.vehicle.bodies.wheelsets), _geometries(model), strict=True):
         part, values = _parts(scene.vehicle, state)[body], moved.get(scene.vehicle.body_names[body], {})
         if values.keys() & {"y", "yaw"}:
             y, yaw = values.get("y", part[1]), values.get("yaw", float(angles(part[EULER:VELOCITY])[2]))
-            roll, z = _settled(scene, model, k, y, yaw, float(0.5 * at_rest.wheel_loads[k].sum()), state)
-            part[1:7] = y, z, *euler_of(rotation(roll, yaw))
-            _roll_as_it_stands(scene, model, k, state)
+            _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state)
         part[OMEGA:] *= values.get("vx", part[VELOCITY]) / part[VELOCITY]
     put_bodies(moved, scene.vehicle, state, model.track.path)
 
 
 def _parts(vehicle, state):
-    """The bodies' parts of a state, as views, shape (n, 13)."""
-    return state[: STATE_SIZE * len(vehicle.body_names)].reshape(-1, STATE_SIZE)
+    """The bodies' parts of states (..., size), as views, shape (..., n, 13)."""
+    return state[..., : STATE_SIZE * len(vehicle.body_names)].reshape(*state.shape[:-1], -1, STATE_SIZE)
 
 
 def _with_axle_boxes(vehicle, state):
@@ -273,43 +280,46 @@ def _balanced(vehicle, model, equations, state):
     boxes = any(described["kind"] == "axle_box" for described in vehicle.data["bodies"].values())
     parts = _parts(vehicle, state)[wheelsets]
     rolls, _, yaws = angles(parts[:, EULER:VELOCITY])
-    axles = np.array([matrix_of(part[EULER:VELOCITY])[:, 1] for part in parts])
-    stands = np.column_stack([parts[:, 2], rolls, np.sum(axles * parts[:, OMEGA:], axis=1)])
+    rolling = np.sum(np.transpose(axle_direction(rolls, yaws)) * parts[:, OMEGA:], axis=-1)
+    stands = np.column_stack([parts[:, 2], rolls, rolling])
 
     def standing(stands):
-        """The state with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
-        new = state.copy()
-        axes = [rotation(roll, yaw) for roll, yaw in zip(stands[:, 1], yaws, strict=True)]
-        for body, turned, (z, _, rate) in zip(wheelsets, axes, stands, strict=True):
-            part = new[STATE_SIZE * body : STATE_SIZE * (body + 1)]
-            part[2:7], part[OMEGA:] = (z, *euler_of(turned)), rate * turned[:, 1]
-        new = _with_axle_boxes(vehicle, new) if boxes else new
-        rates = _parts(vehicle, equations(0.0, new))[wheelsets]
-        about = [row[OMEGA:] @ turned[:, 1] for row, turned in zip(rates, axes, strict=True)]
-        return new, np.column_stack([rates[:, 9:11], about])
+        """States with wheelsets at heights (m), rolls (rad) and rolling rates (rad/s), and what is left there."""
+        new = np.tile(state, (len(stands), 1))
+        parts = _parts(vehicle, new)
+        z, roll, rate = (stands[..., i] for i in range(3))
+        axles = np.stack(axle_direction(roll, yaws), axis=-1)
+        parts[:, wheelsets, 2], parts[:, wheelsets, EULER:VELOCITY] = z, euler_parameters(roll, 0.0, yaws)
+        parts[:, wheelsets, OMEGA:] = rate[..., None] * axles
+        if boxes:
+            new = np.stack([_with_axle_boxes(vehicle, one) for one in new])
+        rates = _parts(vehicle, equations.at(0.0, new))[:, wheelsets]
+        about = np.sum(rates[..., OMEGA:] * axles, axis=-1)
+        return new, np.concatenate([rates[..., 9:11], about[..., None]], axis=-1)
 
     for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
         found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
         if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
-    return cleared(model, standing(found)[0])
+    return cleared(model, standing(found[None])[0][0])
 
 
 def _improved(standing, stands, steps):
     """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
     Slopes serve again for as long as a step leaves less than a tenth; what is left below ``ROUNDING`` is rounding."""
     unknown, slopes = slice(len(steps)), None
-    left = standing(stands)[1][:, unknown]
+    left = standing(stands[None])[1][0, :, unknown]
     for _ in range(20):
         if slopes is None:
-            ends = ((standing(stands + step)[1], standing(stands - step)[1], 2.0 * step.sum()) for step in steps)
-            slopes = np.stack([(high - low)[:, unknown] / width for high, low, width in ends], axis=-1)
+            ends = standing(stands + np.concatenate([steps, -steps])[:, None])[1]
+            high, low = ends[: len(steps), :, unknown], ends[len(steps) :, :, unknown]
+            slopes = np.moveaxis((high - low) / (2.0 * steps.sum(axis=1)[:, None, None]), 0, -1)
         new = stands.copy()
         try:
             new[:, unknown] -= np.linalg.solve(slopes, left[..., None])[..., 0]
         except np.linalg.LinAlgError:
             break
-        still_left = standing(new)[1][:, unknown]
+        still_left = standing(new[None])[1][0, :, unknown]
         part = np.max(np.abs(still_left)) / np.max(np.abs(left))
         if not part < 1.0:
             break

@@ -12,7 +12,6 @@ Ferreira, Flores, Marques, On the utilization of simplified methodologies for th
 Marques et al., Mechanism and Machine Theory 149 (2020) 103825 (spatial search by wheel strips).
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -297,7 +296,7 @@ class HertzPatch:
 
 def axle_direction(roll, yaw):
     """Direction of the axle, pointing left: (-sin yaw cos roll, cos yaw cos roll, sin roll)."""
-    return -math.sin(yaw) * math.cos(roll), math.cos(yaw) * math.cos(roll), math.sin(roll)
+    return -np.sin(yaw) * np.cos(roll), np.cos(yaw) * np.cos(roll), np.sin(roll)
 
 
 def detect(geometry, y, z, roll=0.0, yaw=0.0, detection="spatial", reduction="maximum"):

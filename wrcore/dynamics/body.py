@@ -23,14 +23,12 @@ POSITION, EULER, VELOCITY, OMEGA = 0, 3, 7, 10
 
 
 def euler_parameters(roll, pitch, yaw):
-    """Euler parameters of the rotation Rz(yaw) Rx(roll) Ry(pitch), shape (4,). Pitch comes first, about the body's own
-    lateral axis, so that it is the spin of a wheelset."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    """Euler parameters of the rotations Rz(yaw) Rx(roll) Ry(pitch), angles that broadcast: shape (..., 4). Pitch comes
+    first, about the body's own lateral axis, so that it is the spin of a wheelset."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(0.5 * angle), np.sin(0.5 * angle)) for angle in (roll, pitch, yaw))
     # quaternion product (cy, 0, 0, sy) (cr, sr, 0, 0) (cp, 0, sp, 0)
     e0, e1, e2, e3 = cy * cr, cy * sr, sy * sr, sy * cr
-    return np.array([e0 * cp - e2 * sp, e1 * cp - e3 * sp, e0 * sp + e2 * cp, e1 * sp + e3 * cp])
+    return np.stack([e0 * cp - e2 * sp, e1 * cp - e3 * sp, e0 * sp + e2 * cp, e1 * sp + e3 * cp], axis=-1)
 
 
 def euler_of(matrix):

@@ -8,6 +8,7 @@ from wrcore.dynamics.control import with_control_laws
 from wrcore.dynamics.suspension import with_laws
 from wrcore.dynamics.system import Equations, internal_states, looked_up, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
+from wrcore.elements.law import LAW
 from wrcore.kernels.handles import Kind
 
 
@@ -49,8 +50,15 @@ def with_kernels_of(model, other):
     names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides"
     kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
-    kept |= {"elements": with_laws(model.elements), "controls": with_control_laws(model.controls)}
+    kept |= {"elements": _with_laws_of(model.elements, other.elements), "controls": with_control_laws(model.controls)}
     return model._replace(contact=contact, **kept)
+
+
+def _with_laws_of(elements, other):
+    """The elements with the addresses of their laws, from others where these follow the same."""
+    if np.array_equal(elements.law[:, LAW], other.law[:, LAW]) and np.array_equal(elements.own, other.own):
+        return elements._replace(laws=other.laws, own_laws=other.own_laws)
+    return with_laws(elements)
 
 
 def _addresses(contact):

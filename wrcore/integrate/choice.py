@@ -40,10 +40,12 @@ def fastest_rate(model, equations, t, state):
     unit = unit[0] + pace(model, state, state) * unit[1]
     kept = [(array, array.copy()) for array in (*places(work), work.counters)]
     base, direction, growths = equations(t, state, ELLIPSES), np.random.default_rng(0).normal(size=len(state)), []
+    size = math.sqrt(direction.dot(direction) / len(state))
     for _ in range(PASSES):
-        direction /= math.sqrt(np.mean(direction**2)) or 1.0
-        direction = (equations(t, state + unit * direction, ELLIPSES) - base) / unit
-        growths.append(math.sqrt(np.mean(direction**2)))
+        direction *= unit / (size or 1.0)
+        direction = (equations(t, state + direction, ELLIPSES) - base) / unit
+        size = math.sqrt(direction.dot(direction) / len(state))
+        growths.append(size)
     for array, before in kept:
         array[:] = before
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
