@@ -232,6 +232,7 @@ def test_right_hand_sides_on_a_crossing_cost_at_most_five_times_those_beside_it(
     ("changes", "field", "expected"),
     [
         ({"slices": "no.csv"}, "track.crossing.slices", "existing file"),
+        ({"slices": {"slices": "no.csv", "unit": "mm"}}, "track.crossing.slices", "existing file"),
         ({"slices": "crossing:2"}, "track.crossing.slices", "from 1/30 to 1/5"),
         ({"at": 0.0}, "track.crossing.at", "no wheelset on it at the beginning"),
         ({"rail": "inner"}, "track.crossing.rail", "'left', 'right' or 'both'"),

@@ -182,3 +182,12 @@ def test_the_wheel_on_its_rail_of_a_side():
     for arguments, expected in wrong.items():
         with pytest.raises(InputError, match=expected):
             scene.pair(*arguments)
+
+
+def test_a_rail_that_ends_above_the_gauge_depth_is_named(tmp_path):
+    u = np.linspace(-0.03, 0.03, 61)
+    path = tmp_path / "narrow.csv"
+    np.savetxt(path, np.column_stack([u, -2.0 * u**2]), delimiter=",", header="u_m,f_m", comments="")
+    with pytest.raises(InputError, match="expected a rail down to 0.014 m") as error:
+        load_scene(SCENES / "wheelset.yaml", {"rail.profile": str(path), "rail.inclination": 0})
+    assert (error.value.source, error.value.field) == (str(path), "gauge")

@@ -72,10 +72,16 @@ class Track:
 
     def rail_distance(self, rail):
         """Distance (m) from the track's centre line to the origin (highest point) of a rail's ProfileCurve in track
-        pose.
+        pose; InputError for a rail that ends above the gauge depth.
 
         Its part of the widening, half unless the path says otherwise, and the irregularity come on top."""
-        return 0.5 * self.gauge + rail.gauge_offset(self.gauge_depth)
+        offset = rail.gauge_offset(self.gauge_depth)
+        if not np.isfinite(offset):
+            expected = (
+                f"expected a rail down to {self.gauge_depth:g} m (track.gauge_depth) below its top on the gauge side"
+            )
+            raise InputError(rail.name, "gauge", expected)
+        return 0.5 * self.gauge + offset
 
 
 def build_track(data, source, folder="."):

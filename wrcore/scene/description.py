@@ -222,7 +222,7 @@ def _pair(text):
     return key.strip(), parse_value(value)
 
 
-WHOLE = (".profile", ".friction", ".controller.speed", "vehicle.parameters")
+WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.parameters")
 """Ends of the key paths at which a mapping stands for one value."""
 
 
