@@ -114,35 +114,62 @@ def test_the_table_holds_what_a_wheel_sees(pair, table, y, yaw, bound):
     assert np.quantile(worst, 0.95) < bound
 
 
-KINK, STIFFNESS = 0.004, 8.1e7
+STIFFNESS = 8.1e7
 
 
-def dip(s):
-    """Two straights inclined by `KINK` against each other's mirror image, that level out over 2 m each."""
-    beyond = min(max(abs(s) - 1.0, 0.0), 2.0)
-    return KINK * (min(abs(s), 1.0) + beyond - 0.25 * beyond**2 - 2.0)
+def over_a_joint(folder, kink, speed, rail, rate):
+    """Times since a dipped joint (s), loads of a wheel beyond that before it (N), and the stiffness of its contact
+    (N/m) under the mean of both, of a wheelset whose half falls onto the rails' springs at 2 ``kink`` V."""
+
+    def dip(s):
+        """Two straights inclined by ``kink`` against each other's mirror image, that level out over 2 m each."""
+        beyond = min(max(abs(s) - 2.0, 0.0), 2.0)
+        return kink * (min(abs(s), 2.0) + beyond - 0.25 * beyond**2 - 3.0)
+
+    near = np.array([1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, *np.arange(0.1, 4.01, 0.1), 4.2])
+    path = write_rail(folder, np.concatenate([-near[::-1], [0.0], near]), dip)
+    changes = {
+        "track.crossing": {"slices": str(path), "at": 6.0, "rail": "both"}, "contact.normal.damping.c_e": 1.0,
+        "track.support.rail": rail, "speed": speed, "integration": {"duration": 6.5 / speed, "rtol": 1e-6},
+        "output": {"rate": rate, "channels": ["pose", "contact"]},
+    }  # fmt: skip
+    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
+    load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 6.0
+    load = load - np.mean(load[(s > -0.4) & (s < -0.05)])
+    k = [0, np.argmax(load)]
+    radius = np.mean([patch[name][k, 0] for name in ("a_m", "b_m")])
+    contact = 2.0 * 82e9 / (1.0 - 0.28) * radius  # dN/d(delta) of Hertz, of a circle: 2 G a/(1 - nu)
+    return (s[s > 0.0]) / speed, load[s > 0.0], contact
 
 
 def test_a_dipped_joint_is_a_blow_to_a_mass_on_a_spring(tmp_path):
-    # where the rails' direction changes by 2 KINK the wheelset's half falls onto the track's and the contact's springs,
-    # one behind the other, at 2 KINK V: the load grows by 2 KINK V sqrt(K M), with next to no damping
-    near = np.array([1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, *np.arange(0.1, 3.01, 0.1), 3.2])
-    path = write_rail(tmp_path, np.concatenate([-near[::-1], [0.0], near]), dip)
+    # half the wheelset on the track's and the contact's springs, one behind the other, with next to no damping: the
+    # load grows by 2 KINK V sqrt(K M)
     soft = {"stiffness": STIFFNESS, "damping": 1e3}
-    changes = {
-        "track.crossing": {"slices": str(path), "at": 5.0, "rail": "both"}, "contact.normal.damping.c_e": 1.0,
-        "track.support": {"rail": {"lateral": soft, "vertical": soft}},
-        "integration": {"duration": 0.27, "rtol": 1e-6}, "output": {"rate": 4000, "channels": ["pose", "contact"]},
-    }  # fmt: skip
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
-    load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 5.0
-    before = np.mean(load[(s > -0.5) & (s < -0.05)])
-    top = np.argmax(load)
-    assert 0.0 < s[top] < 0.2
-    radius = np.mean([patch[name][k, 0] for name in ("a_m", "b_m") for k in (0, top)])
-    contact = 2.0 * 82e9 / (1.0 - 0.28) * radius  # dN/d(delta) of Hertz, of a circle: 2 G a/(1 - nu)
+    t, load, contact = over_a_joint(tmp_path, 0.004, 20.0, {"lateral": soft, "vertical": soft}, 4000)
     springs = 1.0 / (1.0 / STIFFNESS + 1.0 / contact)
-    assert load[top] - before == pytest.approx(2.0 * KINK * 20.0 * math.sqrt(springs * 0.5 * MASS), rel=0.05)
+    assert t[np.argmax(load)] < 0.01
+    assert load.max() == pytest.approx(2.0 * 0.004 * 20.0 * math.sqrt(springs * 0.5 * MASS), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("mass", "stiffness", "damping"), [(79.0, 8.1e7, 3e4), (150.0, 8.1e7, 6e4), (40.0, 6e7, 4e4), (79.0, 4e7, 3e4)]
+)
+def test_the_peaks_at_a_dipped_joint_are_p1_and_p2(tmp_path, mass, stiffness, damping):
+    # Jenkins, Stephenson, Clayton, Morland and Lyon, Railway Engineering Journal 3 (1974) 2-16. P1: wheel and rail meet
+    # at 2 alpha V on the spring of their contact. P2: both together, slowed down by the rail's mass, on the track's
+    kink, speed, wheel = 0.001, 40.0, 0.5 * MASS
+    spring = {"stiffness": stiffness, "damping": damping}
+    rail = {"mass": mass, "lateral": spring, "vertical": spring}
+    t, load, contact = over_a_joint(tmp_path, kink, speed, rail, 20000)
+    blow, both = 2.0 * kink * speed, math.sqrt(stiffness * (wheel + mass))
+    first = blow * math.sqrt(contact * mass / (1.0 + mass / wheel))
+    second = blow * wheel / (wheel + mass) * both * (1.0 - 0.25 * math.pi * damping / both)
+    period = 2.0 * math.pi * math.sqrt(mass / (1.0 + mass / wheel) / contact)
+    assert load[t < period].max() == pytest.approx(first, rel=0.06)
+    count = round(period / (t[1] - t[0]))
+    evened = np.convolve(load, np.ones(count) / count, "same")  # of the contact's own vibration
+    assert evened[(t > 1.5 * period) & (t < 0.01)].max() == pytest.approx(second, rel=0.1)
 
 
 def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
