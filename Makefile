@@ -61,6 +61,7 @@ bench: $(STAMP)
 clean:
 	rm -rf results logs benchmarks .snakemake
 
+# Modules are compiled when they are first imported: most never are.
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c "import sys; sys.exit(0 if sys.version_info >= (3, 11) else \
 	    'wrcore needs Python 3.11 or newer; this is ' + sys.version.split()[0] + '. Try: make PYTHON=python3.11')"
