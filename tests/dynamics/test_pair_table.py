@@ -18,8 +18,8 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, creep_forces
 from wrcore.dynamics import coupled_lobes, pair_node, pair_store, pair_table, patch_kernels
+from wrcore.dynamics.creep_modes import creep_modes
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_store import creep_modes
 from wrcore.dynamics.pair_table import YAW, YAWS, look_up
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve

@@ -6,7 +6,6 @@ up on its nodes and on an exact solution in its middle: a run gives the same num
 one. Nodes and cells that the examples meet come with the package, for the pair of profiles of most of them.
 """
 
-import _thread
 import atexit
 import ctypes
 import hashlib
@@ -15,18 +14,16 @@ import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from functools import cache, cached_property
-from pathlib import Path
+from functools import cached_property
 from queue import LifoQueue
-from threading import Lock, Timer
-from typing import NamedTuple
+from threading import Lock
 from weakref import WeakValueDictionary
 
 import numpy as np
 
 from wrcore.contact.patch.model import MODES, NODES, NUMBERS, PairTable, strip_work, with_tables
 from wrcore.dynamics import pair_table as columns
+from wrcore.dynamics.creep_modes import SHIPPED, creep_modes
 from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
 from wrcore.dynamics.pair_table import (
     BESIDE,
@@ -50,10 +47,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
-
-SHIPPED = Path(__file__).parent / "tables"
-"""Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``, and nodes, by
-``python -m study.patch.shipped_nodes``."""
+from wrcore.kernels.told import PATIENCE, handed_on, told_if_long, warn_once
 
 WRONG = (3e-3, 0.01), (3e-3, 0.015), (4e-3, 0.02), (0.1, 0.3)
 """Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
@@ -70,48 +64,6 @@ CELLS, SLOTS = 50_000, 200_003
 """Room for cells that can be looked up, and for all."""
 
 WITHOUT = "contact.patch: moment does without"
-
-_AFTER = 0.02
-"""Ctrl-C in a call from a kernel is said again so much later, s."""
-
-_PATIENCE = 3.0
-"""Solving takes this long before it says so, and files are written this often, s."""
-
-
-class Modes(NamedTuple):
-    """Modes of the creep force's remainder, and how their coefficients are found."""
-
-    values: np.ndarray
-    """As in `PairTable`."""
-    points: np.ndarray
-    """(n, 2): creepages over those of saturation at which a node is solved."""
-    shapes: np.ndarray
-    """(3 n, 2 MODES): both families there."""
-    prior: np.ndarray
-    """(2 MODES,): size of their coefficients over a solution's error."""
-    weights: np.ndarray
-    """(n,): of the modes there, where slopes at rest are exact."""
-
-    def coefficients(self, numbers, remainder):
-        """Of all modes (2 MODES,), from a node's other numbers and its remainder (n, 3) at the points."""
-        own = mode_weights(self.weights, numbers[columns.LINEAR])[:, None]
-        seen = (remainder - (1.0 - own) * numbers[columns.FORCE : columns.FORCE + 3]) * self.weights[:, None] / own
-        part = columns.flank_part(numbers[columns.ANGLE])
-        shapes = self.shapes * np.repeat([1.0 - part, part], MODES)
-        return np.linalg.solve(shapes.T @ shapes + np.diag(self.prior**-2.0), shapes.T @ seen.ravel())
-
-
-def mode_weights(weights, linear):
-    """Weights of the modes for other values of `LINEAR`, from those for 1."""
-    square = weights / (1.0 - weights)
-    return square / (square + linear)
-
-
-@cache
-def creep_modes():
-    """The package's `Modes`."""
-    with checked_hdf5(SHIPPED / "creep_modes.h5", "modes of the creep force") as file:
-        return Modes(*(np.ascontiguousarray(file[name][...]) for name in Modes._fields))
 
 
 class Pair:
@@ -152,13 +104,13 @@ class Pair:
             if key in self.cells:
                 return
             if self._full():
-                _warn_once(f"{self.path}: no room for more cells; patches in others are solved")
+                warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
             begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path}); {WITHOUT}"
             with handed_on("patches are solved without a table"), told_if_long(text, self._spent):
                 self._keep(key, *self._solved(key))  # or the cell stays as if never met
             self._spent += time.monotonic() - begin
-            if time.monotonic() - self._written > _PATIENCE:
+            if time.monotonic() - self._written > PATIENCE:
                 self.write()
 
     def _solved(self, key):
@@ -384,36 +336,6 @@ def _side_by_side(solve, places):
         return [solve(place) for place in places]
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(solve, places))
-
-
-@contextmanager
-def handed_on(outcome):
-    """Around what a kernel calls, which can raise nothing: say later what went wrong, Ctrl-C once more, after the call,
-    all else in a line, with its ``outcome``."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        Timer(_AFTER, _thread.interrupt_main).start()
-    except BaseException as error:
-        first = str(error).strip().partition("\n")[0]
-        _warn_once(f"exact contact: {type(error).__name__}: {first}; {outcome}")
-
-
-@contextmanager
-def told_if_long(text, spent=0.0):
-    """Say a line once what is done takes long, with the time ``spent`` before (s)."""
-    timer = Timer(max(_PATIENCE - spent, 0.0), _warn_once, [text])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-
-
-@cache
-def _warn_once(text):
-    warn(text)
 
 
 def with_pair(contact):

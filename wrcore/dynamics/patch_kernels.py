@@ -11,11 +11,12 @@ from wrcore.contact.reduction import PATCH_COLUMNS
 from wrcore.contact.strip import Pose
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
-from wrcore.dynamics.pair_store import WITHOUT, handed_on, told_if_long, with_pair
+from wrcore.dynamics.pair_store import WITHOUT, with_pair
 from wrcore.dynamics.strip_wheel import add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind
+from wrcore.kernels.told import handed_on, told_if_long
 
 
 def with_fallback(contact):

@@ -13,9 +13,9 @@ from wrcore.contact.geometry import ContactGeometry
 from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.seen_table import SeenTable, seen_table, shape_table
-from wrcore.dynamics.pair_store import told_if_long
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder
+from wrcore.kernels.told import told_if_long
 
 OWN = "begin", "step", "sections", "strips", "bounds"
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from wrcore.contact.patch.model import MODES
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_store import SHIPPED, Modes, Pair, mode_weights
+from wrcore.dynamics.creep_modes import SHIPPED, Modes, mode_weights
+from wrcore.dynamics.pair_store import Pair
 from wrcore.dynamics.pair_table import WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
 from wrcore.scene.description import compile_scene, load_scene

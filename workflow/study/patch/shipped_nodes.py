@@ -14,7 +14,7 @@ import numpy as np
 
 import wrcore as wr
 from study.patch.look_up import ROUGH, SCENES
-from wrcore.dynamics import pair_store
+from wrcore.dynamics import creep_modes, pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
 
 WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
@@ -67,7 +67,7 @@ def write(pair, path):
 def main():
     """Run the scenes, write what they met, and say how much it is."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", default=str(pair_store.SHIPPED / "nodes.h5"))
+    parser.add_argument("--out", default=str(creep_modes.SHIPPED / "nodes.h5"))
     parser.add_argument("--more", action="store_true", help="begin with the nodes that come with the package")
     arguments = parser.parse_args()
     path, pair = arguments.out, met(MET, arguments.more)

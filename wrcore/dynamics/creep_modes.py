@@ -1,0 +1,51 @@
+"""Modes of the creep force: what exact contact adds to the creep table, told by few numbers a node."""
+
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.contact.patch.model import MODES
+from wrcore.dynamics import pair_table as columns
+from wrcore.errors.checked_hdf5 import checked_hdf5
+
+SHIPPED = Path(__file__).parent / "tables"
+"""Folder of what comes with the package: the modes, made by ``python -m study.patch.creep_modes``, and nodes, by
+``python -m study.patch.shipped_nodes``."""
+
+
+class Modes(NamedTuple):
+    """Modes of the creep force's remainder, and how their coefficients are found."""
+
+    values: np.ndarray
+    """As in `PairTable`."""
+    points: np.ndarray
+    """(n, 2): creepages over those of saturation at which a node is solved."""
+    shapes: np.ndarray
+    """(3 n, 2 MODES): both families there."""
+    prior: np.ndarray
+    """(2 MODES,): size of their coefficients over a solution's error."""
+    weights: np.ndarray
+    """(n,): of the modes there, where slopes at rest are exact."""
+
+    def coefficients(self, numbers, remainder):
+        """Of all modes (2 MODES,), from a node's other numbers and its remainder (n, 3) at the points."""
+        own = mode_weights(self.weights, numbers[columns.LINEAR])[:, None]
+        seen = (remainder - (1.0 - own) * numbers[columns.FORCE : columns.FORCE + 3]) * self.weights[:, None] / own
+        part = columns.flank_part(numbers[columns.ANGLE])
+        shapes = self.shapes * np.repeat([1.0 - part, part], MODES)
+        return np.linalg.solve(shapes.T @ shapes + np.diag(self.prior**-2.0), shapes.T @ seen.ravel())
+
+
+def mode_weights(weights, linear):
+    """Weights of the modes for other values of `LINEAR`, from those for 1."""
+    square = weights / (1.0 - weights)
+    return square / (square + linear)
+
+
+@cache
+def creep_modes():
+    """The package's `Modes`."""
+    with checked_hdf5(SHIPPED / "creep_modes.h5", "modes of the creep force") as file:
+        return Modes(*(np.ascontiguousarray(file[name][...]) for name in Modes._fields))

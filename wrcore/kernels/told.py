@@ -1,0 +1,45 @@
+"""What is said of work that takes long, and of what goes wrong where nothing can be raised."""
+
+import _thread
+from contextlib import contextmanager
+from functools import cache
+from threading import Timer
+
+from wrcore.kernels.cache import warn
+
+_AFTER = 0.02
+"""Ctrl-C in a call from a kernel is said again so much later, s."""
+
+PATIENCE = 3.0
+"""Work takes this long before it says so, s."""
+
+
+@contextmanager
+def handed_on(outcome):
+    """Around what a kernel calls, which can raise nothing: say later what went wrong, Ctrl-C once more, after the call,
+    all else in a line, with its ``outcome``."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        Timer(_AFTER, _thread.interrupt_main).start()
+    except BaseException as error:
+        first = str(error).strip().partition("\n")[0]
+        warn_once(f"exact contact: {type(error).__name__}: {first}; {outcome}")
+
+
+@contextmanager
+def told_if_long(text, spent=0.0):
+    """Say a line once what is done takes long, with the time ``spent`` before (s)."""
+    timer = Timer(max(PATIENCE - spent, 0.0), warn_once, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+@cache
+def warn_once(text):
+    """Say a line, once in a process."""
+    warn(text)
