@@ -250,6 +250,20 @@ def test_a_wheel_of_slices_is_the_wave_that_it_holds(tmp_path):
     np.testing.assert_allclose(load_of(runs[1]), load_of(runs[0]), atol=0.01 * np.ptp(load_of(runs[0])))
 
 
+def test_sections_that_are_narrower_than_the_wheel_are_told(tmp_path, capsys):
+    wheel = named_profile("S1002", "wheel")
+    for narrow in (True, False):
+        (folder := tmp_path / f"narrow_{narrow}").mkdir()
+        part = (wheel.u > -0.02) & (wheel.u < 0.03) if narrow else slice(None)
+        file = sections_of(folder, wheel, lambda a, u: 0.0 * u, 16, part)
+        load_scene(
+            SCENES / "suspended_wheelset.yaml", {"wheel.profile": "S1002", "wheel.left.out_of_round.slices": file}
+        )
+        told = capsys.readouterr().err
+        assert (f"{file}: sections reach from -20 to 29 mm, S1002 from " in told) == narrow, told
+        assert narrow or "sections reach from" not in told
+
+
 def test_a_wheel_of_slices_is_seen_where_it_differs(tmp_path):
     """A wave on the field side alone, over lateral coordinates as over angles."""
     wheel = named_profile("S1002", "wheel")

@@ -11,11 +11,15 @@ from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
+from wrcore.kernels.told import warn_once
 from wrcore.scene.crossing import STEEPEST_ALONG, refuse_tables
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01
 """Deviations above this are taken for a mistake, m."""
+
+NARROWER = 2e-3
+"""Sections that end so much before the wheel does are told, m."""
 
 
 def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
@@ -88,7 +92,12 @@ def _sliced(spec, pair, field, folder, source):
     first, last = shape.within(strips)
     if last - first < 10:
         raise InputError(path, "", "expected profiles around the tape circle, u = 0, at all angles")
-    strips = strips[first : last + 1]
+    ends, strips = strips[[0, -1]], strips[first : last + 1]
+    if max(strips[0] - ends[0], ends[1] - strips[-1]) > NARROWER:
+        spans = [f"{1e3 * low:.0f} to {1e3 * high:.0f} mm" for low, high in (strips[[0, -1]], ends)]
+        warn_once(
+            f"{path}: sections reach from {spans[0]}, {wheel.name} from {spans[1]}: beyond, it is as at their ends"
+        )
     around = np.linspace(0.0, TURN, 3601)
     f, _, rates = shape.slices.heights(around, strips)
     off = np.abs(f - wheel(strips))[:, np.abs(wheel(strips, 1)) < 1.0].max()
