@@ -63,7 +63,7 @@ def test_slopes_of_ellipses_are_those_of_differences(case):
     assert differentiable.py_func(equations.arguments[1].value.contact)
     equations(0.0, start, ELLIPSES)
     equations.work.counts[:] = 0
-    states, jacobian = random_states(model, start, "backwards" in case), new_jacobian(model)
+    states, jacobian = random_states(model, start, "backwards" in case), new_jacobian(equations)
     found, expected = np.zeros((2, len(states), 1, 12, 6))
     touching = np.zeros(len(states), np.int64)
     blocks_of(jacobian, equations.arguments[0], states, *equations.arguments[1:], found, expected, touching)

@@ -44,7 +44,7 @@ def moving(request):
 
 def refreshed(moving, jacobian=None, whole=True):
     model, t, state, rate, equations = moving
-    jacobian = jacobian or new_jacobian(model)
+    jacobian = jacobian or new_jacobian(equations)
     refresh_jacobian(
         plan_sweep(model), joined_bodies(model), whole, jacobian, t, state, rate, np.empty_like(state),
         np.empty_like(state), np.empty(99), *equations.arguments,
@@ -162,7 +162,7 @@ def test_refreshing_the_contacts_is_taking_the_whole_anew(moving):
 def test_refreshed_in_axes_that_have_turned(moving):
     """Where they have turned by 0.3 rad since the whole was taken, the blocks turn back by that."""
     model, n = moving[0], len(moving[0].bodies.mass)
-    straight, aside = refreshed(moving), new_jacobian(model)
+    straight, aside = refreshed(moving), new_jacobian(moving[-1])
     aside.turn[1] = 0.3
     refreshed(moving, aside)
     c, s = np.cos(0.3), np.sin(0.3)
@@ -215,6 +215,6 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
 
 def test_a_singular_system_is_reported(moving):
     model = moving[0]
-    jacobian = new_jacobian(model)  # of zeros: with sigma = 0 nothing is left
+    jacobian = new_jacobian(moving[-1])  # of zeros: with sigma = 0 nothing is left
     assert not factorise(jacobian, new_system(model), 0.0)
     assert factorise(jacobian, new_system(model), 1.0)

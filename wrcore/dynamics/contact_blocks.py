@@ -12,7 +12,7 @@ import math
 
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
-from wrcore.dynamics.contact_slopes import MOVES, SAME, SLOPES, differentiable, patch_slopes
+from wrcore.dynamics.contact_slopes import MOVES, SAME, SLOPES, patch_slopes
 from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
 from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD, PATCHES_KEPT, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, motion_of
@@ -34,6 +34,9 @@ MOVING = ACROSS, UP, ROLL, YAW
 
 UNIT = 1e3
 """Wrench whose accelerations are looked at, N and N m."""
+
+UNCOUNTED = -1
+"""Count of patches whose slopes have not been found."""
 
 
 @jit(allocates=False, inline="always")
@@ -145,11 +148,22 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
         for wheel in range(2):
             copy_into(base[k, wheel], work.motions[k, wheel])
     columns[:] = 0.0
-    if not (differentiable(model.contact) and _move_patches(jacobian, model, work)):
+    jacobian.counts[:] = UNCOUNTED
+    if model.slopes != 0:
+        call_address(model.slopes, jacobian, model, work, columns)
+    if jacobian.counts[0, 0] == UNCOUNTED:
         _difference_wrenches(jacobian, model, work, fine, columns)
+
+
+@jit(allocates=False)
+def blocks_of_patches(jacobian, model, work, columns):
+    """`contact_blocks` by the slopes of ellipses; ``jacobian.counts`` are `UNCOUNTED` where these are not enough."""
+    base = jacobian.motions
+    if not _move_patches(jacobian, model, work):
+        jacobian.counts[:] = UNCOUNTED
         return
     slopes = jacobian.slopes
-    for k in range(wheelsets.shape[0]):
+    for k in range(base.shape[0]):
         for wheel in range(2):
             slopes[:], m, found = 0.0, motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
             for patch in range(work.counts[k, wheel]):

@@ -21,11 +21,11 @@ from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.pair_table import CURVATURE, depth_of
 from wrcore.kernels.jit import FUSED, jit
 
-NORMAL, LIFT, FORCE_X, FORCE_S, MOMENT, END, CELL, TILT, RISE = range(9)
+NORMAL, LIFT, FORCE_X, FORCE_S, MOMENT, END, CELL, TILT, SLIP_XI, SLIP_ETA, RISE = range(11)
 TURN = RISE + MAX_PATCHES
 """Columns of a lobe: its load (N), what others lift it by (m), friction on it (N) and its moment (N m), the end of its
-overlaps, the number of its cell, the slope over s of what lifts it; what 1 N on each lobe lifts it by, and that
-slope."""
+overlaps, the number of its cell, the slope over s of what lifts it, its creepages by the others' friction; what 1 N on
+each lobe lifts it by, and that slope."""
 
 STEPS = 6
 """Steps towards balance of the lobes' loads and lifts."""

@@ -6,9 +6,10 @@ import ctypes
 import numpy as np
 
 from wrcore.contact.patch.gap import Frame
-from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, MODEL, strip_work, with_tables
+from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, LOBES, MODEL, strip_work, with_tables
 from wrcore.contact.reduction import PATCH_COLUMNS
 from wrcore.contact.strip import Pose
+from wrcore.dynamics.lobes_apart import look_apart_up
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
@@ -62,7 +63,7 @@ class LateKernels:
 
     def __init__(self, contact):
         self._contact, self._call = contact, ctypes.CFUNCTYPE(None, ctypes.c_int64)(self.find)
-        self._places = np.zeros(4, np.int64)
+        self._places = np.zeros(5, np.int64)
         self._places[LOAD] = ctypes.cast(self._call, ctypes.c_void_p).value
 
     @property
@@ -71,17 +72,25 @@ class LateKernels:
         return self._places.__array_interface__
 
     def find(self, which):
-        """Find the kernel with ellipses, or the solver and its model."""
-        text = f"the solver of exact contact is compiled, once: some minutes of one core; {WITHOUT}"
+        """Find the kernel with ellipses, that of lobes that are apart, or the solver and its model."""
+        what = {ELLIPSES: "ellipses", LOBES: "lobes that are apart"}.get(which, "the solver of exact contact")
+        text = f"{what}: compiled, once, for {'some minutes' if which == KERNEL else 'seconds'} of one core; {WITHOUT}"
         with handed_on("it has no solver"), told_if_long(text):
             if which == ELLIPSES:
                 self._places[ELLIPSES] = self._with_ellipses()
+            elif which == LOBES:
+                self._places[LOBES] = self._of_lobes()
             else:
                 strips = with_tables(self._contact.strips)
                 contact = with_fallback(self._contact._replace(strips=strips))
                 self._model = Handle(contact)
                 kernel = _of_patches(add_group, contact, strip_work(strips, 1))
                 self._places[[MODEL, KERNEL]] = self._model.address, kernel
+
+    def _of_lobes(self):
+        m, pose = WheelMotion(*np.zeros(len(WheelMotion._fields))), Pose(*np.zeros(len(Pose._fields)))
+        kind, work = Kind(self._contact._replace(geometries=(), wheels=())), Kind(strip_work(self._contact.strips, 1))
+        return Kernel(look_apart_up, kind, m, pose, 0.0, 0, 0, np.zeros(4, np.int64), work).address
 
     def _with_ellipses(self):
         work, counts = Kind(strip_work(self._contact.strips, 1)), np.zeros((1, 2), np.int64)

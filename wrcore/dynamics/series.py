@@ -47,7 +47,7 @@ def with_kernels_of(model, other):
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
-    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides"
+    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides", "slopes"
     kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
     kept |= {"elements": _with_laws_of(model.elements, other.elements), "controls": with_control_laws(model.controls)}

@@ -87,6 +87,7 @@ class Model(NamedTuple):
     crossing: Crossing = no_crossing()  # rails that change along the track
     sections: int = 0  # address of the kernel that lays what the wheels see of them
     strides: int = 0  # address of the kernel that keeps steps short on them
+    slopes: int = 0  # address of the kernel of what patches change, for methods with a Jacobian
 
 
 class Workspace(NamedTuple):

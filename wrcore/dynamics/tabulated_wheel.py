@@ -1,6 +1,6 @@
 """Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer.
 
-Lobes that are apart are looked up one by one, and act on each other (:mod:`wrcore.dynamics.coupled_lobes`).
+Most wheels have one lobe. Those that are apart are in :mod:`wrcore.dynamics.lobes_apart`, compiled when they are met.
 """
 
 import math
@@ -11,24 +11,10 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import Frame, add_force, frame_of_rows
-from wrcore.contact.patch.model import KERNEL, LOAD, MODEL, NUMBERS
+from wrcore.contact.patch.model import KERNEL, LOAD, LOBES, MODEL, NUMBERS
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.coupled_lobes import (
-    CELL,
-    END,
-    FORCE_S,
-    FORCE_X,
-    MOMENT,
-    NORMAL,
-    TILT,
-    balance,
-    depth_left,
-    guess_lobes,
-    load_of,
-    slip_of_others,
-    tilt_back,
-)
+from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI, load_of
 from wrcore.dynamics.pair_table import (
     APART,
     FAR,
@@ -60,8 +46,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 UNKNOWN = NOTHING._replace(load=-1.0)
 
-TURNS, ROLLS = 2, 3
-"""Lobes are looked up so many times, balanced between, and rolled so many times."""
+UNLISTED = -1.0
+"""Cell of the first of several lobes if one of them is in no lattice."""
 
 
 KEPT, DEEPEST, LIFTED, DEPTH, DEEPER, FRAME = range(6)
@@ -106,6 +92,7 @@ def _add_kept(model, m, kept, wrench, counters, work):
     numbers, modulus = work.numbers[0], contact_modulus(model.shear_modulus, model.poisson_ratio)
     for k in range(NUMBERS):
         numbers[k] = kept[KEPT_ROW + k] + more * kept[KEPT_ROW + NUMBERS + k]
+    work.lobes[:] = 0.0
     work.lobes[0, NORMAL] = load_of(modulus, numbers, kept[DEPTH] + more * kept[DEEPER])
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z
@@ -125,7 +112,7 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
         out[reduction.NORMAL] = 0.0
         return NOTHING
     ahead = -1.0 if m.vx < 0.0 else 1.0
-    lobes = _look_lobes_up(model, pose, m.ey, m.ez, ahead * m.ex, low, high, work) if spatial else 0
+    lobes = _look_lobes_up(model, m, pose, ahead, low, high, counters, work) if spatial else 0
     if lobes == 0:  # the lattices are of spatial detection
         counters[SOLVED] += 1
         return UNKNOWN
@@ -167,61 +154,51 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _look_lobes_up(model, pose, ey, slope, yaw, low, high, work):
+def _look_lobes_up(model, m, pose, ahead, low, high, counters, work):
     """Fill ``work.numbers`` and ``work.lobes`` of the lobes of overlaps; returns how many there are, 0 if one of them
     is in no lattice."""
-    geometry, table, lobes, rows = model.geometry, model.strips.table, work.lobes, work.rows
-    t = pose.y + geometry.half_distance * ey - geometry.rail_distance
-    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    lobes, late, count, last = work.lobes, model.strips.late, 0, low
     lobes[:] = 0.0
-    count, last = 0, low
     while last < high:
-        last = lobe_end(geometry, pose, rows, last, high, (APART, FAR, SADDLE))
+        last = lobe_end(model.geometry, pose, work.rows, last, high, (APART, FAR, SADDLE))
         lobes[count, END] = last
         count += 1
-    left, axle_y = 1, geometry.half_distance * ey
-    if count > 1:
-        left = TURNS
-        guess_lobes(model, pose, axle_y, geometry.half_distance * slope, low, count, work)
-    while left > 0:
-        left -= 1
-        first = low
-        for q in range(count):
-            last, lobe, numbers, tilt, aside = int(lobes[q, END]), lobes[q], work.numbers[q], 0.0, 0.0
-            depth, u = depth_of(rows, first, last)
-            if count > 1:
-                tilt = lobe[TILT]
-                depth = depth_left(rows, first, last, lobe, pose.y + axle_y + numbers[columns.PLACE_Y])
-                aside = tilt * (geometry.rolling_radius - numbers[columns.PLACE_Z])
-            lobe[NORMAL] = 0.0
-            if depth > 0.0:
-                cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, count > 1, t - aside, slope + tilt, depth, yaw)
-                if cell == 0:
-                    return 0
-                rows_of_cell = table.cells[cell]
-                weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
-                look_up(rows_of_cell, work.weights, numbers)
-                if left == 0:
-                    look_modes_up(rows_of_cell, work.weights, numbers)
-                lobe[NORMAL], lobe[CELL] = load_of(modulus, numbers, depth), cell
-                if count > 1:
-                    tilt_back(numbers, tilt, geometry.rolling_radius)
-            first = last
-        if left > 0:
-            balance(model, pose.y + axle_y, low, count, work)
-    return count
+    if count == 1:
+        depth, u = depth_of(work.rows, low, high)
+        t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
+        return (
+            1
+            if look_lobe_up(model, work.numbers[0], lobes[0], u, False, t, m.ez, depth, ahead * m.ex, True, work)
+            else 0
+        )
+    if late[LOBES] == 0:
+        call_c(late[LOAD], LOBES)
+    if late[LOBES] == 0:  # interrupted
+        return 0
+    call_address(late[LOBES], model, m, pose, ahead, low, count, counters, work)
+    return 0 if lobes[0, CELL] == UNLISTED else count
+
+
+@jit(allocates=False, fastmath=FUSED)
+def look_lobe_up(model, numbers, lobe, u, apart, t, slope, depth, yaw, modes, work):
+    """Look a lobe up, or only what is no coefficient of ``modes``; False if it is in no lattice."""
+    table = model.strips.table
+    cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, apart, t, slope, depth, yaw)
+    if cell == 0:
+        return False
+    weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
+    look_up(table.cells[cell], work.weights, numbers)
+    if modes:
+        look_modes_up(table.cells[cell], work.weights, numbers)
+    lobe[NORMAL] = load_of(contact_modulus(model.shear_modulus, model.poisson_ratio), numbers, depth)
+    lobe[CELL] = cell
+    return True
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
     """`Solution` of the lobes together; adds what acts on them to ``work.wrench``. ``y``, ``z``: of the frame's origin
     from the wheelset's centre. A wheel that rolls back is the mirror image, along x, of one that rolls ahead."""
-    for _ in range(ROLLS - 1 if count > 1 else 0):
-        for q in range(count):
-            if work.lobes[q, NORMAL] > 0.0:
-                rolled = _roll_lobe(model, m, ahead, q, count, counters, work)
-                lobe = work.lobes[q]
-                lobe[FORCE_X], lobe[FORCE_S], lobe[MOMENT] = ahead * rolled.f1, rolled.f2, ahead * rolled.m3
     extent, modulus = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio)
     load = x = s = xx = ss = xi = eta = phi = phi_x = peak = power = 0.0
     x_min = s_min = 1.0
@@ -230,7 +207,7 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
         normal, numbers = work.lobes[q, NORMAL], work.numbers[q]
         if normal <= 0.0:
             continue
-        r = _roll_lobe(model, m, ahead, q, count, counters, work)
+        r = roll_lobe(model, m, ahead, q, counters, work)
         add_force(r.px, r.py, r.pz, 0.0, -normal * r.sine, normal * r.cosine, work.wrench[0])
         add_force(r.px, r.py, r.pz, r.f1, r.f2 * r.cosine, r.f2 * r.sine, work.wrench[1])
         work.wrench[1, 4] -= r.m3 * r.sine
@@ -271,7 +248,7 @@ class Rolled(NamedTuple):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _roll_lobe(model, m, ahead, q, count, counters, work):
+def roll_lobe(model, m, ahead, q, counters, work):
     """`Rolled` of a lobe."""
     half, radius, numbers = model.geometry.half_distance, model.geometry.rolling_radius, work.numbers[q]
     speed, cosine, sine = (
@@ -282,14 +259,12 @@ def _roll_lobe(model, m, ahead, q, count, counters, work):
     px = ahead * numbers[columns.PLACE_X] + half * m.ex
     py, pz = numbers[columns.PLACE_Y] + half * m.ey, numbers[columns.PLACE_Z] + half * m.ez - radius
     xi, eta, phi, _ = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
-    more_xi = more_eta = 0.0
-    if count > 1:
-        more_xi, more_eta = slip_of_others(model, q, count, work)
     limit = falling(model, m.friction, xi, eta, speed) * work.lobes[q, NORMAL]
     slowness = 1.0 / speed
     slip = Slip(
-        ahead * xi + more_xi, eta + more_eta, ahead * phi, slowness * (m.vy + m.wz * px - m.wx * pz),
-        slowness * (m.vz + m.wx * py - m.wy * px), slowness * m.wx, ahead * slowness * m.wy, ahead * slowness * m.wz,
+        ahead * xi + work.lobes[q, SLIP_XI], eta + work.lobes[q, SLIP_ETA], ahead * phi,
+        slowness * (m.vy + m.wz * px - m.wx * pz), slowness * (m.vz + m.wx * py - m.wy * px), slowness * m.wx,
+        ahead * slowness * m.wy, ahead * slowness * m.wz,
     )  # fmt: skip
     turning = ahead * m.wy * radius / speed - 1.0
     f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning, work.modes)

@@ -120,7 +120,7 @@ class Integration:
         state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
         self.memory = memory = new_memory(state, t, len(tableau.nodes), first_step)
         stiff = method in ROSENBROCK
-        self.linear, self._system = (new_linear(model), new_system(model)) if stiff else (None, None)
+        self.linear, self._system = (new_linear(self.equations), new_system(model)) if stiff else (None, None)
         begin(self.equations.work)
         self.places = places(self.equations.work)
         self._tableau = tableau

@@ -19,8 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.contact_blocks import DIRECTIONS, DISPLACEMENT, SPEED, SPIN, TURN, contacts_alone, renew_contacts
-from wrcore.dynamics.contact_slopes import slope_scratch
+from wrcore.dynamics.contact_blocks import (
+    DIRECTIONS,
+    DISPLACEMENT,
+    SPEED,
+    SPIN,
+    TURN,
+    blocks_of_patches,
+    contacts_alone,
+    renew_contacts,
+)
+from wrcore.dynamics.contact_slopes import differentiable, slope_scratch
 from wrcore.dynamics.contract import turn_rate
 from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
 from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
@@ -29,6 +38,7 @@ from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import copy_into, cross, dot
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
+from wrcore.kernels.handles import Kernel
 from wrcore.kernels.jit import jit
 
 FINE_BELOW = 0.1
@@ -135,8 +145,17 @@ def joined_bodies(model):
     return Joined(*packed([sorted(joined[body]) for body in model.bodies.wheelsets]))
 
 
-def new_jacobian(model):
-    """Blocks of zeros for a model."""
+def new_jacobian(equations):
+    """Blocks of zeros for a model's equations, which get the kernel of what patches change where these are ellipses."""
+    _, model, work = equations.arguments
+    jacobian = _empty_jacobian(model.value)
+    if differentiable.py_func(model.value.contact) != (model.value.slopes != 0):
+        slopes = 0 if model.value.slopes else Kernel(blocks_of_patches, jacobian, model, work, jacobian.columns).address
+        model.lay(model.value._replace(slopes=slopes))
+    return jacobian
+
+
+def _empty_jacobian(model):
     n, size = len(model.bodies.mass), state_size(model)
     m, k = size - 7 * n, len(model.bodies.wheelsets)
     return Jacobian(

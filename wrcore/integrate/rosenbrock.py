@@ -39,10 +39,11 @@ class Linear(NamedTuple):
     differences: np.ndarray  # (p,): scratch of the Jacobian
 
 
-def new_linear(model):
-    """Plan the Jacobian of a model and allocate its arrays."""
+def new_linear(equations):
+    """Plan the Jacobian of a model's equations and allocate its arrays."""
+    model = equations.arguments[1].value
     sweep = plan_sweep(model)
-    return Linear(sweep, joined_bodies(model), new_jacobian(model), np.zeros(int(np.diff(sweep.starts).max())))
+    return Linear(sweep, joined_bodies(model), new_jacobian(equations), np.zeros(int(np.diff(sweep.starts).max())))
 
 
 @jit(allocates=False)

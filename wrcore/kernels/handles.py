@@ -134,11 +134,16 @@ class Handle:
         self.value = value
         self._numba_type_, size = _layout(value)
         self._memory = np.zeros(size, np.uint8)
-        _pack(self._numba_type_.target, value, 0, self._memory)
+        self.lay(value)
         self.address = self._memory.ctypes.data
 
+    def lay(self, value):
+        """Keep another value of the same type."""
+        self.value = value
+        _pack(self._numba_type_.target, value, 0, self._memory)
+
     def renew(self, value):
-        """Keep another value of the same type: nothing is looked up."""
+        """As `lay`, in a tenth of the time, by a kernel that takes two seconds to compile."""
         self.value = value
         _write(value, self._memory)
 

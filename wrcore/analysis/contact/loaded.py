@@ -29,8 +29,7 @@ from wrcore.contact.strip import make_pose
 from wrcore.creep.laws import LAWS, creep_data
 from wrcore.creep.table import ensure_table
 from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
-from wrcore.dynamics.pair_store import with_pair
-from wrcore.dynamics.patch_kernels import with_fallback
+from wrcore.dynamics.patch_kernels import with_fallback, with_late
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
 from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
 from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
@@ -148,7 +147,7 @@ class LoadedWheels:
             if looked_up or not contact.strips.strips:
                 contact = contact._replace(law=LAWS["table"], creep=_table(self.poisson_ratio))
             if looked_up:
-                contact = with_pair(contact._replace(strips=contact.strips._replace(looked_up=float(looked_up))))
+                contact = with_late(contact._replace(strips=contact.strips._replace(looked_up=float(looked_up))))
             self._rolling[looked_up] = Handle(contact)
         return self._rolling[looked_up]
 

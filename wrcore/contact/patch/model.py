@@ -46,15 +46,15 @@ NO_TABLE = PairTable(
 NODES, NUMBERS, MODES = 48, 72, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
-LOBE_COLUMNS = 8 + 2 * MAX_PATCHES
+LOBE_COLUMNS = 10 + 2 * MAX_PATCHES
 """Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`."""
 
 KEPT_NUMBERS = 12 + 2 * NUMBERS
 """Of a wheel with one lobe, while its place stays: see `wrcore.dynamics.tabulated_wheel`."""
 
 
-KERNEL, MODEL, ELLIPSES, LOAD = range(4)
-"""Addresses in `StripModel.solver`."""
+KERNEL, MODEL, ELLIPSES, LOBES, LOAD = range(5)
+"""Addresses in `StripModel.late`."""
 
 
 class StripModel(NamedTuple):
@@ -80,9 +80,10 @@ class StripModel(NamedTuple):
     table: PairTable = NO_TABLE
     group: int = 0
     """Address of the kernel that adds what acts on a patch: looked up in the table or solved."""
-    late: np.ndarray = np.zeros(4, np.int64)
-    """Addresses of the kernel that solves a patch where it is looked up, of the model that it takes, and of the kernel
-    with ellipses in its place, all 0 until they are needed, and of what then finds them."""
+    late: np.ndarray = np.zeros(5, np.int64)
+    """Addresses of the kernel that solves a patch where it is looked up, of the model that it takes, of the kernel with
+    ellipses in its place, and of that of lobes that are apart, all 0 until they are needed, and of what then finds
+    them."""
 
 
 class StripWork(NamedTuple):
