@@ -13,7 +13,7 @@ from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import find_patches
-from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, MODES, NO_TABLE, NODES, NUMBERS
+from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, LOBES, MODES, NO_TABLE, NODES, NUMBERS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, creep_forces
@@ -275,6 +275,11 @@ def test_lobes_that_are_apart():
         for column, unit in ((reduction.XI, 2e-5), (reduction.ETA, 2e-5), (reduction.PHI, 3e-3)):
             assert table[column] == pytest.approx(exact[column], abs=unit)
     assert models["tabulated"]._counters[3] == 0
+    assert models["tabulated"]._rolling[0.3].value.strips.late[LOBES] != 0
+
+
+def test_lobes_that_are_apart_are_compiled_where_there_are_some(rolling_wheels):
+    assert rolling_wheels[0]["tabulated"]._rolling[0.3].value.strips.late[LOBES] == 0
 
 
 @pytest.mark.parametrize(("y", "load", "yaw", "spin", "drift", "most"), [
