@@ -17,6 +17,7 @@ from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics.crossing import interpolate, laid_under
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml
 from wrcore.geometry.out_of_round import Flat, OutOfRound, Wave
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
@@ -248,6 +249,34 @@ def test_a_wheel_of_slices_is_the_wave_that_it_holds(tmp_path):
     runs = [rolling(shape | {"angle": 1.0}, 20.0, 4.0, **S1002) for shape in (one, other)]
     assert np.ptp(load_of(runs[0])) > 5000.0
     np.testing.assert_allclose(load_of(runs[1]), load_of(runs[0]), atol=0.01 * np.ptp(load_of(runs[0])))
+
+
+def test_a_wheel_that_rolls_back_is_out_of_round_too():
+    """The vehicle is its own mirror image: backwards its last wheelset does what the first one does ahead."""
+    scene = SCENES / "trailer_vehicle.yaml"
+    vehicle = read_yaml(SCENES.parent / "vehicles" / "trailer_vehicle.yaml")
+    vehicle = vehicle | {"elements": [one for one in vehicle["elements"] if one["name"] != "coupler"]}
+    shape = {"polygon": [{"order": 3, "amplitude": 3e-4}]}
+    shapes = {f"wheel.wheelsets.wheelset_{k}.left.out_of_round": shape for k in (1, 4)}
+    ranges = []
+    for first, speed in ((1, 10.0), (4, -10.0)):
+        bodies = {name: {"vx": speed} for name in vehicle["bodies"] if not name.startswith("axle_box")}
+        run = simulate(load_scene(scene, shapes | {
+            "vehicle.parameters": vehicle, "speed": 10.0, "initial.y": 0.0, "initial.bodies": bodies,
+            "track.support": SOFT, "integration.duration": 0.7, "output.rate": 1000.0,
+        }))  # fmt: skip
+        ranges.append(np.ptp(run[f"wheelset_{first}/left"]["Q_N"][400:]))
+    assert ranges[0] > 2000.0
+    assert ranges[1] == pytest.approx(ranges[0], rel=0.02)
+
+
+def test_tables_whose_spline_swings_out_are_refused(tmp_path):
+    angles = np.linspace(-0.05, 0.05, 33)
+    flat = np.column_stack([angles, -2.5e-4 * (1.0 + np.cos(2.0 * np.pi * 0.46 * angles / 0.06))])
+    np.savetxt(tmp_path / "flat.csv", flat, delimiter=",", header="angle_rad,deviation_m", comments="")
+    with pytest.raises(InputError, match="spline swings out by") as error:
+        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.table": str(tmp_path / "flat.csv")})
+    assert error.value.field == "angle_rad"
 
 
 def test_sections_that_are_narrower_than_the_wheel_are_told(tmp_path, capsys):

@@ -184,6 +184,14 @@ def test_the_wheel_on_its_rail_of_a_side():
             scene.pair(*arguments)
 
 
+@pytest.mark.parametrize("patch", ["exact", "tabulated"])
+@pytest.mark.parametrize("law", ["polach", "linear", "fastsim"])
+def test_creep_laws_are_refused_where_contact_has_forces_of_its_own(patch, law):
+    with pytest.raises(InputError, match="expected 'table' with contact.patch") as error:
+        load_scene(SCENES / "wheelset.yaml", {"contact.patch": patch, "contact.creep.model": law})
+    assert error.value.field == "contact.creep.model"
+
+
 def test_a_rail_that_ends_above_the_gauge_depth_is_named(tmp_path):
     u = np.linspace(-0.03, 0.03, 61)
     path = tmp_path / "narrow.csv"

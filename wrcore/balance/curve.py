@@ -211,7 +211,11 @@ class Turning:
         left = self.left(state[None], np.array([acceleration]))[0]
         for _ in range(MOST_STEPS):
             fresh = self.slopes is None
-            slopes = self._fresh_slopes(state, acceleration, left) if fresh else self.slopes
+            try:
+                slopes = self._fresh_slopes(state, acceleration, left) if fresh else self.slopes
+            except np.linalg.LinAlgError:  # it has gone astray, where nothing is finite
+                left = np.full_like(left, np.inf)
+                break
             step, size, part = -slopes.inverse @ left, slopes.size(left), 2.0
             for _ in range(HALVINGS if fresh else 1):
                 part *= 0.5

@@ -78,7 +78,7 @@ def laid_under(table, start, angle, radius, shortest):
     """How the `SeenTable` of a wheel out of round is laid: at the arc length ``start`` (m) the ``angle`` (rad) of a
     wheelset with a mean ``radius`` (m) touches; what is not round is no shorter than ``shortest`` (m)."""
     begin, step = start + (table.begin - angle) * radius, table.step * radius
-    turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)
+    turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)  # without end, either way
     last, fade = len(table.sections) - 1, 0.5 * turn * radius
     return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]
 
@@ -119,7 +119,9 @@ def lay_sections(model, state, work):
             yaw = row[MOTION.side] * row[MOTION.ex]
             place, share = _place_of(laid, s + laid[LEAD] * yaw), 1.0
             if laid[PERIOD] > 0.0:
-                share = min(s - laid[START], laid[END] - s) / laid[FADE]
+                share = abs(s - laid[START]) / laid[FADE]
+                if laid[END] < math.inf:
+                    share = min(s - laid[START], laid[END] - s) / laid[FADE]
                 if share <= 0.0:
                     place = last
             if not place > 0.0:  # a stage that is not finite, too
@@ -267,6 +269,7 @@ def shorten_step(model, state, work, clock, at):
                 place, left = _place_of(laid, s), laid[STRIDE]
                 if place > laid[LAST]:
                     left = max((PAD + laid[PERIOD] - place) * laid[STEP], left)
-                left = max(left, laid[START] - s, s - laid[END])
+                if laid[END] < math.inf:
+                    left = max(left, laid[START] - s, s - laid[END])
             if speed * clock[at] > left:
                 clock[at] = left / speed

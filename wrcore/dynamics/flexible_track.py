@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.reduction import Y, Z
+from wrcore.contact.reduction import COSINE, ETA, FX, FY, NORMAL, SINE, Y, Z
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
 from wrcore.dynamics.motion import MOTION
@@ -44,6 +44,9 @@ is a small part of it), and most steps."""
 
 LEAST_GAIN, LARGEST_LEFT = 0.1, 0.5
 """Part of what is left that a full step has to take off, and largest part left with which derivatives are kept."""
+
+SLIDING = 0.9
+"""Part of friction beyond which a wheel slides."""
 
 UNBALANCED = 1e-4
 """Part of the forces on a rail that is left where there is no balance."""
@@ -125,6 +128,8 @@ def flexible_wrenches(model, state, work, rate, mode):
     missed, on_grid = work.counters[OUT_OF_RANGE], work.counters[ON_GRID]
     _press(model, work, -1, mode)
     if massless:
+        if _follow_where_sliding(model, work):
+            _press(model, work, -1, mode | PATCHES_HELD)
         _give_way(model, state, work, first, missed, on_grid, mode)
     scratch.power[0] = 0.0
     for k in range(scratch.speeds.shape[0]):
@@ -155,6 +160,28 @@ def _press(model, work, faster, mode):
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
             scratch.forces[k, i] = -work.rail_wrenches[k, i // 2, 1 + i % 2]
+
+
+@jit(allocates=False)
+def _follow_where_sliding(model, work):
+    """Let rails whose wheels slide begin at the speed at which these would not: where friction saturates it does not
+    tell the way, from where it is steep Newton's steps stay short of the balance. Returns whether one slides."""
+    scratch, contact, sliding = work.flexible_track, model.contact, False
+    for k in range(scratch.speeds.shape[0]):
+        for wheel in range(2):
+            motion, load, slip, cosine, sine = work.motions[k, wheel], 0.0, 0.0, 0.0, 0.0
+            for patch in range(work.counts[k, wheel]):
+                row = work.patches[k, wheel, patch]
+                normal, tangential = row[NORMAL], math.hypot(row[FX], row[FY])
+                if tangential > SLIDING * motion[MOTION.friction] * normal:
+                    load, slip = load + normal, slip + normal * row[ETA]
+                    cosine, sine = cosine + normal * row[COSINE], sine + normal * row[SINE]
+            if load > 0.0:
+                sliding = True
+                speed = max(abs(motion[MOTION.vx]), contact.least_speed) * slip / (load * load)
+                scratch.speeds[k, 2 * wheel] += speed * cosine
+                scratch.speeds[k, 2 * wheel + 1] += speed * sine
+    return sliding
 
 
 @jit(allocates=False)

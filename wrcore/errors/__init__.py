@@ -74,4 +74,6 @@ def similar(word, known):
 def one_of(known, word):
     """What to say of a word that is none of the known ones: these, and the closest."""
     known = [str(name) for name in known]
+    if not known:
+        return f"expected none, as there is nothing of the kind, got {short(word)}"
     return f"expected one of {', '.join(known)}, got {short(word)}{similar(word, known)}"

@@ -275,6 +275,9 @@ def _check_creep(contact, source, folder):
         if contact["patch"] not in REDUCTIONS:
             expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}"
             raise InputError(source, "contact.patch", expected)
+    elif creep["model"] != "table" and contact["patch"] not in REDUCTIONS:
+        expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
+        raise InputError(source, "contact.creep.model", f"{expected}, got {creep['model']}")
     if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     for key in ("k_A", "k_S"):

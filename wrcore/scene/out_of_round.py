@@ -18,6 +18,9 @@ from wrcore.scene.pairs import find_file
 LARGEST = 0.01
 """Deviations above this are taken for a mistake, m."""
 
+SWING = 0.5
+"""Part of its range by which a spline may leave what was measured; a tenth of it over gaps."""
+
 NARROWER = 2e-3
 """Sections that end so much before the wheel does are told, m."""
 
@@ -124,4 +127,11 @@ def _measured(path):
         expected = f"expected deviations within {LARGEST:g} m, got {np.abs(deviations).max():g}"
         raise InputError(path, "deviation_m", expected)
     once = slice(None, -1 if angles[-1] - angles[0] > TURN - 1e-6 else None)
-    return Measured(angles[once], deviations[once])
+    measured = Measured(angles[once], deviations[once])
+    gaps, span = np.diff(np.append(measured.angles, measured.angles[0] + TURN)), np.ptp(deviations)
+    between = measured.deviation(np.linspace(0.0, TURN, 20001), 0.0)
+    swing = max(between.max() - deviations.max(), deviations.min() - between.min())
+    if swing > (SWING if gaps.max() < 5.0 * np.median(gaps) else 0.1 * SWING) * span:
+        expected = f"expected angles all round, as close as deviations need ({gaps.max():.3g} rad have none)"
+        raise InputError(path, "angle_rad", f"{expected}: a spline swings out by {1e3 * swing:.3g} mm between them")
+    return measured

@@ -264,3 +264,11 @@ def test_bad_arguments_of_a_patch(benchmark_pair, s1002, uic60):
         with pytest.raises(wr.InputError):
             wr.patch(pair, **changes)
     assert wr.patch(pair, z=0.47) == []
+
+
+def test_a_pose_without_friction_has_patches_without_creep_forces(tmp_path):
+    poses = {"pose_id": ["a", "b"], "y_m": 0.001, "yaw_rad": 0.0, "V_m_per_s": 10.0, "mu": [0.0, 0.3]}
+    table = command(tmp_path, poses).set_index("pose_id")
+    assert len(table.loc["a"]) == len(table.loc["b"])
+    assert (abs(table.loc["a", "Fx_N"]) < 1e-3).all() and (abs(table.loc["a", "Fy_N"]) < 1e-3).all()
+    np.testing.assert_allclose(table.loc["a", "N_N"], table.loc["b", "N_N"], rtol=0.02)

@@ -187,6 +187,12 @@ def test_bad_input_is_named(scene, arguments, says):
         wr.quasi_static_curving(scene, **arguments)
 
 
+def test_friction_along_the_track_is_refused():
+    along = {"arc_length": [0.0, 5.0, 5.1], "mu": [0.1, 0.1, 0.5]}
+    with pytest.raises(InputError, match="contact.friction: expected a coefficient that is the same all along"):
+        wr.quasi_static_curving(wr.load_scene(TRAILER, {"contact.friction": along}), [700.0])
+
+
 def test_the_command_writes_the_table(tmp_path):
     out = tmp_path / "curves.csv"
     words = ["--radius", "1000", "-500", "--cant", "0.1", "--set", "contact.friction=0.4", "--out", str(out)]

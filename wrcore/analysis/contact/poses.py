@@ -4,7 +4,7 @@ import math
 
 import pandas as pd
 
-from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import SMOOTH, LoadedWheels, Rolling
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WheelOnSlices
@@ -50,13 +50,15 @@ def loaded_poses(
         if speed > 0.0:
             rolling = Rolling(speed, _given(pose, "omega_rad_per_s", math.nan), _given(pose, "vy_m_per_s", 0.0),
                               _given(pose, "yaw_rate_rad_per_s", 0.0))  # fmt: skip
-        how = {"rolling": rolling, "friction": mu}
+        how = {"rolling": rolling, "friction": max(mu, SMOOTH)}
         to_load = how | {"vertical": load_by == "vertical"}
         roll, heights = wheels.placed(SIDES, y, yaw, (pose.roll_rad, pose.z_m), wheel_load, to_load, ("contact", "z_m"))
         for side, z in heights.items():
             found = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
             for number, one in enumerate(found, start=1):
                 on_grid += one.on_grid
+                if mu == 0.0:
+                    one.row[columns.FX : columns.MZ + 1] = 0.0
                 rows.append([
                     pose.pose_id, side, number, *(one.row[columns.CHANNELS[name]] for name in STILL),
                     one.row[columns.P_MAX], roll, z, *one.extent,

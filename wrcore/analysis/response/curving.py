@@ -116,6 +116,9 @@ class Curving:
             raise InputError(scene.source, "vehicle", "expected one without joints to the moving frame")
         self.scene = observable(scene)
         model, state = straight_ahead(self.scene)
+        if np.any(np.diff(model.friction.starts) > 1):
+            expected = "expected a coefficient that is the same all along each rail: a circle has no arc length"
+            raise InputError(scene.source, "contact.friction", expected)
         self.turning = Turning(model, WIDENED[scene.data["track"]["widened"]])
         self.limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
         self.straight = at_rest(model, state)
