@@ -10,13 +10,15 @@ from tests.conftest import SCENES
 from tests.dynamics.giving_track import EXAMPLES
 from tests.integrate import test_jacobian as jacobian_tests
 from wrcore.analysis.stability.stability import modes
-from wrcore.contact.reduction import Y, Z
+from wrcore.contact.reduction import ETA, Y, Z
+from wrcore.dynamics import flexible_track
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.energy import energy_balance
 from wrcore.dynamics.flexible_track import RAILS, track_places
 from wrcore.dynamics.system import Equations, internal_states
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import integrate
+from wrcore.kernels.jit import jit
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
 
@@ -214,6 +216,28 @@ def test_rails_without_mass_are_in_balance(patch):
         rate, forces = equations(0.0, moved), equations.work.flexible_track.forces[0].ravel()
         left = model.flexible_track.damping @ rate[places] + model.flexible_track.stiffness @ moved[places] - forces
         assert np.abs(left).max() < 1e-6 * np.abs(forces).max() and np.abs(rate[places]).max() > 1e-3
+
+
+@jit(allocates=False)
+def _slip_before_and_after(model, work, slips):
+    for k in range(2):
+        flexible_track._press(model, work, -1, 0)
+        for wheel in range(2):
+            slips[k, wheel] = work.patches[0, wheel, 0, ETA]
+        if k == 0:
+            flexible_track._follow_where_sliding(model, work)
+
+
+@pytest.mark.parametrize("drift", [0.02, -0.02])
+def test_rails_follow_wheels_that_slide(drift):
+    """Left and right, either way: at the speed where Newton's method begins neither slips."""
+    model, state = compile_scene(scene_on(MASSLESS, speed=1.0, initial__y=0.003))
+    equations, slips = Equations(model), np.zeros((2, 2))
+    state[8] += drift
+    equations(0.0, state)
+    equations.work.flexible_track.speeds[:] = 0.0
+    _slip_before_and_after(*equations.arguments[1:], slips)
+    np.testing.assert_allclose(slips, [[drift, drift], [0.0, 0.0]], atol=1e-4)
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.1])

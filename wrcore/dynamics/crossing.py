@@ -78,9 +78,9 @@ def laid_under(table, start, angle, radius, shortest):
     """How the `SeenTable` of a wheel out of round is laid: at the arc length ``start`` (m) the ``angle`` (rad) of a
     wheelset with a mean ``radius`` (m) touches; what is not round is no shorter than ``shortest`` (m)."""
     begin, step = start + (table.begin - angle) * radius, table.step * radius
-    turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)  # without end, either way
+    turn, stride = 2.0 * math.pi, max(min(TRAVEL, 0.25 * shortest), 1e-3)
     last, fade = len(table.sections) - 1, 0.5 * turn * radius
-    return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]
+    return [begin, step, last, turn / table.step, 0.0, 0.0, start, math.inf, fade, stride]  # without end, either way
 
 
 def laid_along(table, corrugation, lead):
