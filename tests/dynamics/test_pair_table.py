@@ -17,10 +17,11 @@ from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, LOBES, MO
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, creep_forces
-from wrcore.dynamics import coupled_lobes, pair_node, pair_store, pair_table, patch_kernels
+from wrcore.dynamics import coupled_lobes, modes, pair_node, pair_store, pair_table, patch_kernels
 from wrcore.dynamics.creep_modes import creep_modes
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_table import YAW, YAWS, look_up
+from wrcore.dynamics.system import Equations
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -78,11 +79,11 @@ def test_what_a_cell_gives_exactly(first):
 
 def test_modes_leave_the_slopes_at_rest():
     """Near no creepage the remainder is the one stored there, to second order."""
-    numbers, sums = np.zeros(NUMBERS), np.zeros(3 * MODES)
+    numbers = np.zeros(NUMBERS)
     numbers[pair_table.LINEAR] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
     numbers[pair_table.MODE :][:MODES] = 1.0
-    near, far = (pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums) for x in (1e-4, 0.5))
+    near, far = (pair_table.remainder(creep_modes().values, numbers, x, 0.0) for x in (1e-4, 0.5))
     np.testing.assert_allclose(near, [0.1, 0.2, 0.3], atol=1e-5)
     assert max(map(abs, np.subtract(far, near))) > 1e-3
 
@@ -91,11 +92,11 @@ def test_each_family_of_modes_has_its_contact_angles():
     """Of little spin up to 0.2 rad, of much from 0.4 rad on, half of both in between, on either side."""
     little, much = np.zeros(NUMBERS), np.zeros(NUMBERS)
     little[pair_table.MODE :][:MODES], much[pair_table.MODE :][MODES : 2 * MODES] = 0.1, 0.1
-    table, sums = creep_modes().values, np.zeros(3 * MODES)
+    table = creep_modes().values
 
     def at(numbers, angle):
         numbers[pair_table.ANGLE] = angle
-        return np.array(pair_table.remainder(table, numbers, 0.7, -0.4, sums))
+        return np.array(pair_table.remainder(table, numbers, 0.7, -0.4))
 
     for numbers, whole, none in ((little, 0.1, 0.5), (much, 0.5, 0.1)):
         assert abs(at(numbers, whole)).max() > 1e-3
@@ -106,14 +107,14 @@ def test_each_family_of_modes_has_its_contact_angles():
 
 def test_a_remainder_has_no_poles():
     """Between nodes the number that tells how exact slopes are falls below 0."""
-    numbers, sums = np.zeros(NUMBERS), np.zeros(3 * MODES)
+    numbers = np.zeros(NUMBERS)
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.1, 0.2, 0.3
     numbers[pair_table.MODE :][:MODES] = 0.1
 
     def largest(linear):
         numbers[pair_table.LINEAR] = linear
         places = np.geomspace(1e-3, 1.0, 3000)
-        return max(max(map(abs, pair_table.remainder(creep_modes().values, numbers, x, 0.0, sums))) for x in places)
+        return max(max(map(abs, pair_table.remainder(creep_modes().values, numbers, x, 0.0))) for x in places)
 
     assert largest(-0.04) == pytest.approx(largest(0.0), rel=1e-12)
 
@@ -125,8 +126,8 @@ def test_no_more_force_than_friction_bears(benchmark_pair, remainder):
     numbers[[pair_table.LOG_A, pair_table.LOG_B]] = np.log([6e-3, 4e-3])
     numbers[[pair_table.SLOPE_XI, pair_table.SLOPE_ETA, pair_table.LINEAR]] = 1.0
     numbers[pair_table.FORCE : pair_table.FORCE + 2] = remainder
-    table, sums = creep_modes().values, np.zeros(3 * MODES)
-    force = pair_table.tabulated_force(contact, table, numbers, pair_table.Slip(*np.zeros(8)), 15e3, 0.0, sums)[:2]
+    table = creep_modes().values
+    force = pair_table.tabulated_force(contact, table, numbers, pair_table.Slip(*np.zeros(8)), 15e3, 0.0)[:2]
     size = math.hypot(*remainder)
     assert force == pytest.approx(15e3 * np.array(remainder) / max(size, 1.0), rel=1e-6, abs=1e-3)
 
@@ -542,6 +543,31 @@ def test_implicit_steps_are_those_of_ellipses():
         run = wr.simulate(wr.example("suspended_wheelset"), **settings, **{"contact.patch": patch, "speed": 40.0})
         steps[patch] = run.counters["steps"]
     assert steps["tabulated"] < 1.2 * steps["moment"]
+
+
+def test_what_is_solved_has_the_jacobian_of_the_exact_solver():
+    """Where ellipses stand in, they do so for the rate that the derivative by time starts from, too."""
+    settings = {"integration.method": "rodas4p2", "contact.detection": "planar", "integration.duration": 0.02}
+    table, exact = (
+        wr.simulate(wr.example("suspended_wheelset"), **settings, **{"contact.patch": patch})
+        for patch in ("tabulated", "exact")
+    )
+    np.testing.assert_array_equal(table["wheelset"].y_m, exact["wheelset"].y_m)
+    assert table.counters["steps"] == exact.counters["steps"] > 2
+
+
+@pytest.mark.parametrize("y", [0.0, 5e-3, 6.2e-3])  # the last one runs on tread and flange
+def test_within_a_step_wrenches_are_those_of_outputs(y):
+    """No rows are filled there: wrenches and counts are the same bits, and rows are what they were."""
+    model, state = compile_scene(
+        load_scene(wr.example("suspended_wheelset"), **{"contact.patch": "tabulated", "initial.y": y})
+    )
+    whole, bare = Equations(model), Equations(model)
+    whole(0.0, state), bare(0.0, state, modes.STAGE)
+    assert whole.work.counts.sum() >= 2 and whole.work.rail_wrenches.any()
+    for name in ("rail_wrenches", "counts"):
+        np.testing.assert_array_equal(getattr(bare.work, name), getattr(whole.work, name))
+    assert whole.work.patches[..., reduction.SEMI_A].any() and not bare.work.patches[..., reduction.SEMI_A].any()
 
 
 def shipped_pair(**changes):

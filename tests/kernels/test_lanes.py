@@ -14,7 +14,9 @@ from wrcore.kernels.lanes import (
     load4,
     load8,
     lowest_bit,
+    put8,
     ramp8,
+    take8,
     total,
     where_below,
 )
@@ -66,6 +68,22 @@ def test_not_a_number_is_not_below():
     rows = np.zeros((2, 8))
     rows[0, 3] = np.nan
     assert compared(rows, 1.0)[:2] == (0b11110111, 7)
+
+
+@jit
+def added(rows, values, out, start):
+    """Write eight columns of row 1 and as many values, added, to ``out``."""
+    at = np.uint64(start)
+    put8(out, at, load8(rows, 1, at) + take8(values, at))
+
+
+@pytest.mark.parametrize("kinds", [(np.float64, np.float32), (np.float32, np.float64)])
+def test_single_precision_is_widened_and_lanes_are_written(kinds):
+    random, out = np.random.default_rng(2), np.zeros(21)
+    rows, values = random.normal(size=(2, 21)).astype(kinds[0]), random.normal(size=21).astype(kinds[1])
+    added(rows, values, out, 7)
+    np.testing.assert_array_equal(out[7:15], rows[1, 7:15].astype(float) + values[7:15].astype(float))
+    assert not out[:7].any() and not out[15:].any()
 
 
 def test_single_precision_is_widened():

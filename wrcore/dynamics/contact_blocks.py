@@ -14,7 +14,7 @@ from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.dynamics.contact_slopes import MOVES, SAME, SLOPES, patch_slopes
 from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
-from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD, PATCHES_KEPT, PATCHES_ONLY
+from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_KEPT, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
 from wrcore.dynamics.vector import copy_into
@@ -211,13 +211,13 @@ def _difference_wrenches(jacobian, model, work, fine, columns):
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(work.motions[k, wheel], base[k, wheel])
-    press_wheels(model, work, ELLIPSES | PATCHES_KEPT)
+    press_wheels(model, work, BARE | ELLIPSES | PATCHES_KEPT)
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     for step in range(DIRECTIONS):
         direction = (step + 6) % DIRECTIONS  # velocities first: the patches are those of the pose
-        mode = ELLIPSES | PATCHES_HELD if direction >= 6 else ELLIPSES
+        mode = BARE | ELLIPSES | PATCHES_HELD if direction >= 6 else BARE | ELLIPSES
         if direction == ALONG or direction == PITCH:
             continue
         difference = DISPLACEMENT if direction < 3 else TURN

@@ -29,7 +29,7 @@ import numpy as np
 
 from wrcore.contact.reduction import COSINE, ETA, FX, FY, NORMAL, SINE, Y, Z
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.modes import ELLIPSES, PATCHES_HELD
+from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, press_wheels
@@ -115,7 +115,7 @@ def rails_at(model, state, k):
 def flexible_wrenches(model, state, work, rate, mode):
     """Wrenches of the rails on all wheels, as by the kernel of the wheels, and the rates of the track's states, written
     into ``rate``; the motions in ``work``, over rails at rest, become those over the rails as they move."""
-    track, scratch = model.flexible_track, work.flexible_track
+    track, scratch, mode = model.flexible_track, work.flexible_track, mode & ~BARE
     d, massless = track.mass.shape[0], track.mass[0] == 0.0
     size = d if massless else 2 * d
     first = STATE_SIZE * model.bodies.mass.shape[0] + track.first

@@ -21,3 +21,9 @@ PATCHES_ONLY = 16
 
 PATCHES_KEPT = 32
 """Patches that are looked up are kept for `PATCHES_HELD`."""
+
+BARE = 64
+"""Wrenches and counts alone: of patches that are looked up no rows are filled, which nobody reads within a step."""
+
+STAGE = WARM | BARE
+"""What integrators ask for."""

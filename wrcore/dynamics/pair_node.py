@@ -293,7 +293,7 @@ def base_forces(model, numbers, slope, yaw, creepages, factors, limit, forces):
 
 
 @jit(allocates=False, nogil=True)
-def unlike(model, modes, one, other, depth, slope, yaw, points, sums):
+def unlike(model, modes, one, other, depth, slope, yaw, points):
     """Largest difference over mu N of the creep forces that two sets of numbers give a lobe, of a wheel that rolls, at
     creepages ``points`` (n, 2) over those of saturation."""
     half, radius = model.geometry.half_distance, model.geometry.rolling_radius
@@ -305,8 +305,8 @@ def unlike(model, modes, one, other, depth, slope, yaw, points, sums):
     for k in range(len(points)):
         xi, eta = unit * points[k, 0] / c11, unit * points[k, 1] / c22
         slip = rolling_slip(one, slope, yaw, half, radius, xi, eta)
-        f1, f2, _, _ = tabulated_force(model, modes, one, slip, limit, 0.0, sums)
-        g1, g2, _, _ = tabulated_force(model, modes, other, slip, limit, 0.0, sums)
+        f1, f2, _, _ = tabulated_force(model, modes, one, slip, limit, 0.0)
+        g1, g2, _, _ = tabulated_force(model, modes, other, slip, limit, 0.0)
         worst = max(worst, abs(f1 - g1), abs(f2 - g2))
     return worst / limit
 

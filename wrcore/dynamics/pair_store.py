@@ -21,7 +21,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from wrcore.contact.patch.model import MODES, NODES, NUMBERS, PairTable, strip_work, with_tables
+from wrcore.contact.patch.model import NODES, NUMBERS, PairTable, strip_work, with_tables
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.creep_modes import SHIPPED, creep_modes
 from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
@@ -229,19 +229,19 @@ class Pair:
         at rest; see `LIGHT`. Where the middle has no solution the finest lattice's is held against a corner."""
         level, part, at, *first = corner_of(key)
         node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
-        place, found, weights, sums = _place(*node), np.zeros(NUMBERS, np.float32), np.empty(NODES), np.empty(3 * MODES)
-        exact = self._at_place(place)
+        place, found, weights = _place(*node), np.zeros(NUMBERS), np.empty(NODES)
+        exact = self._at_place(place).astype(float)
         if np.isnan(exact[0]):
             if level + 1 < LEVELS:
                 return math.nan, math.nan
-            exact = rows[0]
+            exact = rows[0].astype(float)
         double = [0.5 * (0.5 + n % 2) for n in first]
         columns.weigh(0.5, 0.5, 0.5, *double, turn, weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
         points = np.vstack([modes.points, AT_REST])
-        creep = unlike(self._solvable, modes.values, exact, found, place[2], place[1], place[3], points, sums)
+        creep = unlike(self._solvable, modes.values, exact, found, place[2], place[1], place[3], points)
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
         return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 

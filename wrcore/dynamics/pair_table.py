@@ -26,13 +26,17 @@ modes each, as what the table lacks differs: a tread's flat patches, a flange's 
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from wrcore.contact import reduction
+from wrcore.contact.geometry import LANES
 from wrcore.contact.patch.model import MODES, NODES
 from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
 from wrcore.kernels.handles import call_c
 from wrcore.kernels.jit import FAST, FUSED, jit
+from wrcore.kernels.lanes import lanes8, load8, put8, take8, total
 
 STEPS = 2e-4, 5e-4, 0.25
 """Of the coarsest lattice in t (m), slope of the axle and ln D."""
@@ -68,7 +72,7 @@ CURVATURE = 2.0
 
 LOG_NORMAL, ANGLE, PLACE_X, PLACE_Y, PLACE_Z, LOG_A, LOG_B, LOG_PEAK, SLOPE_XI, SLOPE_ETA, LINEAR, FORCE = range(12)
 ROOT, ROOT_X, ROOT_Y, ROOT_Z, ROOT_ANGLE, ROOT_A, ROOT_B, REST_A, REST_B, PARTED = range(14, 24)
-MODE = 24
+PARTED_FROM, MODE = 16, 24
 """A node: ln(N / (E* D^1.5)); contact angle; place of the slip from the axle's point over the tape circle (m, the last
 plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make
 the slopes exact (1; 0 where spin rules); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage;
@@ -233,33 +237,38 @@ def weigh(fx, fy, fz, gx, gy, gz, turn, weights):
             weights[n + 34], weights[n + 35] = w * gz * odd, w * gz * even
 
 
-@jit(allocates=False, forceinline=True, fastmath=FAST)
-def _sum_rows(rows, weights, first, count, numbers):
-    """Fill some of the ``numbers`` with the weighted sum of rows."""
-    found = numbers[first : first + count]
-    for m in range(count):
-        found[m] = 0.0
-    for n in range(0, NODES, 4):
-        one, two = rows[n, first : first + count], rows[n + 1, first : first + count]
-        three, four = rows[n + 2, first : first + count], rows[n + 3, first : first + count]
-        w0, w1, w2, w3 = weights[n], weights[n + 1], weights[n + 2], weights[n + 3]
-        for m in range(count):
-            found[m] += w0 * one[m] + w1 * two[m] + w2 * three[m] + w3 * four[m]
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _sum_rows(rows, weights, first, end, numbers):
+    """Fill the ``numbers`` from ``first`` to before ``end`` with the weighted sum of rows: eight at a time."""
+    for column in range(first, end, LANES):
+        start = np.uint64(column)
+        one = two = three = four = lanes8(0.0)
+        for n in range(0, NODES, 4):
+            one = one + weights[n] * load8(rows, n, start)
+            two = two + weights[n + 1] * load8(rows, n + 1, start)
+            three = three + weights[n + 2] * load8(rows, n + 2, start)
+            four = four + weights[n + 3] * load8(rows, n + 3, start)
+        put8(numbers, start, (one + two) + (three + four))
 
 
-@jit(allocates=False, fastmath=FAST)
+@jit(allocates=False, fastmath=FUSED)
 def look_up(rows, weights, numbers):
     """Fill ``numbers`` (NUMBERS,), but for coefficients of modes, from a cell's ``rows`` (NODES, NUMBERS)."""
-    _sum_rows(rows, weights, 0, MODE, numbers)
+    _sum_rows(rows, weights, 0, PARTED_FROM, numbers)
+    if LEAST < numbers[ROOT] < 1.0 - LEAST:
+        _sum_rows(rows, weights, PARTED_FROM, MODE, numbers)
+    else:
+        numbers[PARTED_FROM:MODE] = 0.0
 
 
-@jit(allocates=False, fastmath=FAST)
+@jit(allocates=False, fastmath=FUSED)
 def look_modes_up(rows, weights, numbers):
     """As `look_up`, after it: the coefficients of modes that count."""
     part = flank_part(numbers[ANGLE])
     for family in range(2):
         if (part if family else 1.0 - part) > 0.0:
-            _sum_rows(rows, weights, MODE + MODES * family, MODES, numbers)
+            first = MODE + MODES * family
+            _sum_rows(rows, weights, first, first + MODES, numbers)
 
 
 @jit(allocates=False)
@@ -281,9 +290,9 @@ def round_part(square, linear):
     return square / (square + max(linear, 0.0) * ROUND * ROUND + 1e-12)  # which a cubic takes below its nodes
 
 
-@jit(allocates=False, fastmath=FAST)
-def remainder(modes, numbers, x, y, sums):
-    """Remainder of Fx, Fy, Mz at creepages over those of saturation; ``sums`` is scratch."""
+@jit(allocates=False, fastmath=FUSED)
+def remainder(modes, numbers, x, y):
+    """Remainder of Fx, Fy, Mz at creepages over those of saturation."""
     cells, root = modes.shape[1] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
     p, q = x * root, y * root
     weight, part = round_part(p * p + q * q, numbers[LINEAR]), flank_part(numbers[ANGLE])
@@ -296,17 +305,18 @@ def remainder(modes, numbers, x, y, sums):
         share, first = (part, MODE + MODES) if family else (1.0 - part, MODE)
         if share == 0.0:
             continue
-        for m in range(3 * MODES):
-            sums[m] = 0.0
+        x_sum = y_sum = z_sum = lanes8(0.0)
         for r in range(3):
             a = 0.5 * (1.0 - f) * (1.0 - f) if r == 0 else 0.5 + f * (1.0 - f) if r == 1 else 0.5 * f * f
-            one, two, three = modes[family, i + r, j], modes[family, i + r, j + 1], modes[family, i + r, j + 2]
-            a0, a1, a2 = share * a * b0, share * a * b1, share * a * b2
-            for m in range(3 * MODES):
-                sums[m] += a0 * one[m] + a1 * two[m] + a2 * three[m]
-        for m in range(MODES):
-            c = numbers[first + m]
-            fx, fy, mz = fx + c * sums[m], fy + c * sums[MODES + m], mz + c * sums[2 * MODES + m]
+            line = modes[family, i + r]
+            for s in range(3):
+                b = share * a * (b0 if s == 0 else b1 if s == 1 else b2)
+                for m in range(0, MODES, LANES):
+                    c, at = b * take8(numbers, np.uint64(first + m)), np.uint64(m)
+                    x_sum = x_sum + c * load8(line, j + s, at)
+                    y_sum = y_sum + c * load8(line, j + s, at + np.uint64(MODES))
+                    z_sum = z_sum + c * load8(line, j + s, at + np.uint64(2 * MODES))
+        fx, fy, mz = fx + total(x_sum), fy + total(y_sum), mz + total(z_sum)
     rest = 1.0 - weight
     return (
         rest * numbers[FORCE] + weight * fx, rest * numbers[FORCE + 1] + weight * fy,
@@ -393,7 +403,7 @@ def base_force(model, numbers, slip, xi, eta, limit):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def tabulated_force(model, modes, numbers, slip, limit, turning, sums):
+def tabulated_force(model, modes, numbers, slip, limit, turning):
     """Creep force Fx, Fy (N), together no more than friction bears, Mz (N m) from a node's numbers, and look-ups
     missed. ``turning``: of the wheel's rate of rolling over that of free rolling, less 1."""
     part = turning / LOCKED
@@ -404,7 +414,7 @@ def tabulated_force(model, modes, numbers, slip, limit, turning, sums):
     f1, f2, m3, missed, c = base_force(model, numbers, slip, xi, eta, limit)
     scale = model.shear_modulus * c * c / (3.0 * limit)
     c11, c22, _, _ = coefficients_at(numbers[LOG_A] - numbers[LOG_B], model.creep.table.kalker)
-    r1, r2, r3 = remainder(modes, numbers, xi * scale * c11, eta * scale * c22, sums)
+    r1, r2, r3 = remainder(modes, numbers, xi * scale * c11, eta * scale * c22)
     fx, fy, mz = f1 + fade * r1, f2 + fade * r2, m3 + fade * r3
     scale = limit / max(math.sqrt(fx * fx + fy * fy), 1.0)
     return scale * fx, scale * fy, limit * c * mz, missed

@@ -31,7 +31,7 @@ from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
-from wrcore.dynamics.modes import ELLIPSES, FRESH, PATCHES_HELD, PATCHES_KEPT, WARM
+from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, PATCHES_HELD, PATCHES_KEPT, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, leaning_motion
@@ -43,6 +43,9 @@ SLENDER = 3.0
 
 UNSOLVED = 1
 """Place in a spare memory: not 0 where what a table does not have is not to be solved."""
+
+STOOD_IN, ROWLESS = 3, 4
+"""Others: not 0 once ellipses have stood in; not 0 where no rows are wanted (`BARE`)."""
 
 HOLD, KEEP, USE = 2, 1.0, 2.0
 """Another one: whether a wheel's only lobe is to be kept, or used as it was kept, see `StripWork.kept`."""
@@ -394,7 +397,7 @@ def mirror(rows, count, wrench):
 @jit(allocates=False)
 def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode):
     """`wheel_wrenches`, called by its address: few runs need it."""
-    late = model.strips.late
+    late, work.spare[STOOD_IN] = model.strips.late, 1.0
     if late[WITH_ELLIPSES] == 0:
         call_c(late[LOAD], WITH_ELLIPSES)
     if late[WITH_ELLIPSES] == 0:  # interrupted
@@ -411,6 +414,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
+    work.spare[ROWLESS] = 1.0 if mode & BARE else 0.0
     held, keep = rough and mode & PATCHES_HELD > 0, KEEP if rough and mode & PATCHES_KEPT else 0.0
     for i in range(motions.shape[0]):
         for wheel in range(2):

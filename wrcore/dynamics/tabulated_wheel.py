@@ -32,6 +32,7 @@ from wrcore.dynamics.strip_wheel import (
     HOLD,
     KEEP,
     NOTHING,
+    ROWLESS,
     UNSOLVED,
     USE,
     Solution,
@@ -122,12 +123,14 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
-    fill_row(model.geometry, (1.0, 0.0), frame, y, z, found, work.wrench, out)
-    out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
-    heaviest = 0
-    for q in range(1, lobes):
-        heaviest = q if work.lobes[q, NORMAL] > work.lobes[heaviest, NORMAL] else heaviest
-    out[reduction.CELL] = work.lobes[heaviest, CELL]
+    out[reduction.NORMAL] = found.load
+    if work.spare[ROWLESS] == 0.0:
+        fill_row(model.geometry, (1.0, 0.0), frame, y, z, found, work.wrench, out)
+        out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
+        heaviest = 0
+        for q in range(1, lobes):
+            heaviest = q if work.lobes[q, NORMAL] > work.lobes[heaviest, NORMAL] else heaviest
+        out[reduction.CELL] = work.lobes[heaviest, CELL]
     for k in range(6):
         wrench[k] += work.wrench[0, k] + work.wrench[1, k]
     return found
@@ -197,9 +200,10 @@ def look_lobe_up(model, numbers, lobe, u, apart, t, slope, depth, yaw, modes, wo
 
 @jit(allocates=False, fastmath=FUSED)
 def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
-    """`Solution` of the lobes together; adds what acts on them to ``work.wrench``. ``y``, ``z``: of the frame's origin
-    from the wheelset's centre. A wheel that rolls back is the mirror image, along x, of one that rolls ahead."""
-    extent, modulus = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio)
+    """`Solution` of the lobes together, their load alone where no rows are wanted; adds what acts on them to
+    ``work.wrench``. ``y``, ``z``: of the frame's origin from the wheelset's centre. A wheel that rolls back is the
+    mirror image, along x, of one that rolls ahead."""
+    extent, modulus, bare = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio), work.spare[ROWLESS]
     load = x = s = xx = ss = xi = eta = phi = phi_x = peak = power = 0.0
     x_min = s_min = 1.0
     x_max = s_max = -1.0
@@ -212,6 +216,9 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
         add_force(r.px, r.py, r.pz, r.f1, r.f2 * r.cosine, r.f2 * r.sine, work.wrench[1])
         work.wrench[1, 4] -= r.m3 * r.sine
         work.wrench[1, 5] += r.m3 * r.cosine
+        if bare > 0.0:
+            load += normal
+            continue
         at_x, at_s = r.px - frame.x, (r.py - y) * frame.cosine + (r.pz - z) * frame.sine
         a, b = math.exp(numbers[columns.LOG_A]), math.exp(numbers[columns.LOG_B])
         load, x, s = load + normal, x + normal * at_x, s + normal * at_s
@@ -221,6 +228,8 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
         peak = max(peak, modulus * math.exp(numbers[columns.LOG_PEAK]))
         x_min, x_max = min(x_min, at_x - a), max(x_max, at_x + a)
         s_min, s_max = min(s_min, at_s - b), max(s_max, at_s + b)
+    if bare > 0.0:
+        return Solution(0.0, 0.0, 0.0, load, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     x, s, xi, phi = x / load, s / load, xi / load, phi / load
     eta = (eta - phi_x) / load + phi * x
     a, b = math.sqrt(5.0 * max(xx / load - x * x, 1e-14)), math.sqrt(5.0 * max(ss / load - s * s, 1e-14))
@@ -267,6 +276,6 @@ def roll_lobe(model, m, ahead, q, counters, work):
         ahead * slowness * m.wy, ahead * slowness * m.wz,
     )  # fmt: skip
     turning = ahead * m.wy * radius / speed - 1.0
-    f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning, work.modes)
+    f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning)
     counters[OUT_OF_RANGE] += missed
     return Rolled(px, py, pz, cosine, sine, xi, eta, phi, ahead * f1, f2, ahead * m3)

@@ -15,7 +15,7 @@ import numpy as np
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.contract import after_rejection, before_attempt, outside
 from wrcore.dynamics.control import DUE, NEXT_SAMPLE
-from wrcore.dynamics.modes import WARM
+from wrcore.dynamics.modes import STAGE, WARM
 from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry
@@ -265,7 +265,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
                 if weight != 0.0:
                     for k in range(n):
                         trial[k] += weight * stages[j, k]
-            derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, stage, WARM)
+            derivatives_at(equations, clock[T] + tableau.nodes[i] * step, trial, model, work, stage, STAGE)
             counters[EVALUATIONS] += 1
             if i == 0:
                 copy_into(memory.rate, stage)

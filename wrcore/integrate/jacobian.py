@@ -32,8 +32,9 @@ from wrcore.dynamics.contact_blocks import (
 from wrcore.dynamics.contact_slopes import differentiable, slope_scratch
 from wrcore.dynamics.contract import turn_rate
 from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
-from wrcore.dynamics.modes import ELLIPSES, WRENCHES_HELD
+from wrcore.dynamics.modes import BARE, ELLIPSES, WRENCHES_HELD
 from wrcore.dynamics.motion import MOTION
+from wrcore.dynamics.strip_wheel import STOOD_IN
 from wrcore.dynamics.system import derivatives_at, state_size
 from wrcore.dynamics.vector import copy_into, cross, dot
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
@@ -281,21 +282,27 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
     fine = min(1.0, pace(model, state, state) * HALF_GAUGE / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
-    strips, wheels = model.contact.strips.strips > 0, contacts_alone(model)
+    strips, wheels = model.contact.strips, contacts_alone(model)
+    rough = strips.strips > 0 and strips.looked_up == 0.0
     copy_into(base, rate)
-    if strips or whole:  # of a smooth neighbour of the model
-        derivatives_at(equations, t, state, model, work, base, ELLIPSES)
+    if rough or whole:  # of a smooth neighbour of the model
+        derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
     rates_of_increments(n, axes, drift, 0.0, state, state, base)
     _take_axes(jacobian, state, base)
     _take_turning(jacobian, model.bodies.spins, state)
     last = sweep.starts.shape[0] - 1
     for i in range(0 if whole else last, last + 1):
         in_time = i == last
-        mode = ELLIPSES | WRENCHES_HELD if wheels and not in_time else ELLIPSES
+        mode = BARE | ELLIPSES | WRENCHES_HELD if wheels and not in_time else BARE | ELLIPSES
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time
+            work.strips.spare[STOOD_IN] = 0.0
             renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, model, work, fine)
+            if not (rough or whole) and work.strips.spare[STOOD_IN] > 0.0:
+                rough = True
+                derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
+                rates_of_increments(n, axes, drift, 0.0, state, state, base)
         trial[:] = 0.0
         for k in range(first, end):
             differences[k - first] = _perturb(trial, sweep.columns[k], jacobian.axes, fine)
@@ -309,4 +316,4 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
                 jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT
         for k in range(first, end):
             _take_column(sweep, jacobian, k, differences[k - first], n, base, slope)
-    return sweep.starts.shape[0] + 1 if whole else 1 + strips
+    return sweep.starts.shape[0] + 1 if whole else 1 + rough

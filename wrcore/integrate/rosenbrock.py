@@ -11,7 +11,7 @@ import numpy as np
 
 from wrcore.dynamics.contact_blocks import contacts_alone
 from wrcore.dynamics.contract import after_rejection, before_attempt, touching
-from wrcore.dynamics.modes import WARM
+from wrcore.dynamics.modes import STAGE
 from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate import engine
@@ -127,7 +127,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
             moment = tableau.nodes[i] * step
             carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
             if i > 0 or not counters[engine.HAS_RATE]:
-                derivatives_at(equations, clock[engine.T] + moment, trial, model, work, slope, WARM)
+                derivatives_at(equations, clock[engine.T] + moment, trial, model, work, slope, STAGE)
                 counters[engine.EVALUATIONS] += 1
             if i == 0:
                 if not counters[engine.HAS_RATE]:
@@ -155,7 +155,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
         fresh, contacts = error <= 1.0, 0
         if fresh:  # the next step's first rate
-            derivatives_at(equations, clock[engine.T] + step, trial, model, work, slope, WARM)
+            derivatives_at(equations, clock[engine.T] + step, trial, model, work, slope, STAGE)
             counters[engine.EVALUATIONS] += 1
             contacts = touching(work)
             if contacts > counters[engine.TOUCHING]:

@@ -74,22 +74,51 @@ for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), 
     _define(_function, _instruction)
 
 
-def _load(builder, array, offset, kind, lanes):
-    place = builder.bitcast(builder.gep(array.data, [offset]), ir.VectorType(kind, lanes.count).as_pointer())
-    return builder.load(place, align=4 if kind == ir.FloatType() else 8)
+def _load(builder, array, kind, offset, lanes):
+    """Lanes from an ``array`` of a numba type ``kind``."""
+    single = kind.dtype == types.float32
+    vector = ir.VectorType(ir.FloatType() if single else _DOUBLE, lanes.count)
+    found = builder.load(
+        builder.bitcast(builder.gep(array.data, [offset]), vector.as_pointer()), align=4 + 4 * (not single)
+    )
+    return builder.fpext(found, lanes.vector) if single else found
 
 
 @intrinsic
 def load8(_, rows, row, start):
-    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64; ``start`` unsigned."""
+    """``rows[row, start : start + 8]`` of a contiguous (m, n) array of float64 or float32; ``start`` unsigned."""
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
         length = cgutils.unpack_tuple(builder, array.shape, 2)[1]
         offset = builder.add(builder.mul(arguments[1], length), arguments[2])
-        return _load(builder, array, offset, _DOUBLE, EIGHT)
+        return _load(builder, array, call.args[0], offset, EIGHT)
 
     return EIGHT(rows, row, start), generate
+
+
+@intrinsic
+def take8(_, values, start):
+    """``values[start : start + 8]`` of a contiguous array of float64 or float32; ``start`` unsigned."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        return _load(builder, array, call.args[0], arguments[1], EIGHT)
+
+    return EIGHT(values, start), generate
+
+
+@intrinsic
+def put8(_, values, start, lanes):
+    """Write lanes to ``values[start : start + 8]`` of a contiguous array of float64; ``start`` unsigned."""
+
+    def generate(context, builder, call, arguments):
+        array = context.make_array(call.args[0])(context, builder, arguments[0])
+        place = builder.bitcast(builder.gep(array.data, [arguments[1]]), EIGHT.vector.as_pointer())
+        builder.store(arguments[2], place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(values, start, EIGHT), generate
 
 
 @intrinsic
@@ -98,7 +127,7 @@ def load4(_, values, start):
 
     def generate(context, builder, call, arguments):
         array = context.make_array(call.args[0])(context, builder, arguments[0])
-        return builder.fpext(_load(builder, array, arguments[1], ir.FloatType(), FOUR), FOUR.vector)
+        return _load(builder, array, call.args[0], arguments[1], FOUR)
 
     return FOUR(values, start), generate
 

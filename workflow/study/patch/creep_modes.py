@@ -121,9 +121,9 @@ def _most_telling(families, allowed):
 
 def errors(modes, numbers, remainder, points):
     """Error (n, 3) of a node's remainder at ``points``, of which the first are those where it is solved."""
-    row, sums = numbers.copy(), np.empty(3 * MODES)
+    row = numbers.copy()
     row[columns.MODE :] = modes.coefficients(numbers, remainder[: len(modes.points)])
-    return np.array([columns.remainder(modes.values, row, *point, sums) for point in points]) - remainder
+    return np.array([columns.remainder(modes.values, row, *point) for point in points]) - remainder
 
 
 def main():

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.reduction import ANGLE, CURVATURE_Y, PENETRATION, U_RAIL, U_WHEEL, X, Y, Z
+from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, SINE, U_RAIL, U_WHEEL, X, Y, Z
 from wrcore.contact.strip import (
     AHEAD,
     BEND,
@@ -111,6 +111,9 @@ def frame_of_overlaps(geometry, pose, patches, first, last):
 @jit(allocates=False)
 def frame_of_rows(patches, first, last):
     """As `frame_of_overlaps`, from the rows alone: means over g^2.5 of what they have at their deepest points."""
+    if last == first + 1:
+        one = patches[first]
+        return Frame(one[COSINE], one[SINE], one[X], one[U_RAIL], one[Z], one[U_WHEEL])
     weight = angle = x = ur = z = u = 0.0
     for k in range(first, last):
         row = patches[k]

@@ -108,8 +108,7 @@ class StripWork(NamedTuple):
     lobes: np.ndarray
     numbers: np.ndarray
     weights: np.ndarray
-    modes: np.ndarray
-    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and (3 MODES,): of a patch that is looked up."""
+    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS) and (NODES,): of a patch that is looked up."""
     kept: np.ndarray
     """(wheelsets, 2, KEPT_NUMBERS): wheels of which one lobe is kept while their places stay."""
     normal: NormalWork
@@ -164,7 +163,7 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
-        np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES), np.zeros(3 * MODES),
+        np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES),
         np.zeros((wheelsets if model.looked_up else 0, 2, KEPT_NUMBERS)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip
