@@ -46,6 +46,13 @@ def fresh(function):
     return kernel
 
 
+def test_numbers_that_a_caller_knows_share_one_copy():
+    inner = jit(allocates=False)(lambda x, place, deep: x + place if deep else x)
+    outer = jit(allocates=False)(lambda x: inner(x, 1, True) + inner(x, 2, True) + inner(x, place=3, deep=False))
+    assert outer(1.0) == 6.0
+    assert len(inner.in_form("linked").overloads) == 1
+
+
 def test_a_kernel_that_only_kernels_call_has_no_machine_code_and_no_wrapper():
     inner = jit(allocates=False)(lambda x: 0.25 * x)
     outer = jit(allocates=False)(lambda x: inner(x) + 1.0)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 
 import numba
 from llvmlite import binding
+from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
@@ -173,8 +174,17 @@ def _rarely_collected():
             gc.set_threshold(*before)
 
 
+def _number(kind):
+    """The type of an argument; of a number that the caller knows, that of all such numbers."""
+    return types.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
+
+
 class _Form(CPUDispatcher):
-    """A kernel in a form that Python cannot call: its table of calls gets nothing."""
+    """A kernel in a form that Python cannot call: its table of calls gets nothing. One copy serves for all values of a
+    number that callers may know; numba would compile one for each."""
+
+    def get_call_template(self, args, kws):
+        return super().get_call_template(tuple(map(_number, args)), {name: _number(kws[name]) for name in kws})
 
     def compile(self, sig):
         with _rarely_collected():
