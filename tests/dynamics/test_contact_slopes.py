@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.dynamics.contact_blocks import _difference_wrenches, contact_blocks
+from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, contact_blocks
 from wrcore.dynamics.contact_slopes import differentiable
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.dynamics.system import Equations
@@ -36,6 +36,7 @@ def blocks_of(jacobian, equations, states, model, work, found, expected, touchin
         contact_blocks(jacobian, 0.0, state, model, work, 1.0, found[i])
         touching[i] = work.counts.sum()
         expected[i] = 0.0
+        jacobian.counts[:] = UNCOUNTED
         _difference_wrenches(jacobian, model, work, 1.0, expected[i])
         work.counts[:] = 0
 

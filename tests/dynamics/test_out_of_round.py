@@ -206,7 +206,8 @@ def test_exact_patches_and_stiff_methods_agree_on_it():
 
 def test_a_flat_on_one_wheel_comes_again_with_each_turn():
     changes = {"wheel.wheelsets.wheelset_2.left.out_of_round": FLAT | {"angle": 1.0}, "integration.duration": 0.4}
-    changes |= {"integration.method": "tsit5", "output.rate": 4000, "track.support": SOFT}
+    # at 1e-4 explicit steps are as long as is stable, and one output in some thousand is off by kilonewtons
+    changes |= {"integration.method": "tsit5", "integration.rtol": 1e-5, "output.rate": 4000, "track.support": SOFT}
     run = simulate(load_scene(SCENES / "trailer_vehicle.yaml", changes))
     load = {name: np.nansum(run[name]["N_N"], axis=1) for name in ("wheelset_2/left", "wheelset_1/left")}
     s = run["wheelset_2"]["x_m"] - run["wheelset_2"]["x_m"][0]

@@ -70,7 +70,7 @@ def test_what_a_cell_gives_exactly(first):
     assert pair_store.Pair._add_yaw(pair, key, rows)
     part = np.array([0.3, 0.6, 0.9])
     weights = np.empty(NODES)
-    pair_table.weigh(*part, *0.5 * (part + np.array(first) % 2), 0.4, weights)
+    pair_table.weigh(pair_table.Place(1, *part, *0.5 * (part + np.array(first) % 2), 0.4, 1.0, 1.0), weights)
     look_up(rows, weights, numbers)
     x, y, z = part + first - (300, 200, 9)
     expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z
@@ -241,8 +241,7 @@ def test_power_of_the_wrench_is_that_of_the_patch(rolling_wheels, vx):
     m = WheelMotion(1.0, -1.5e-3, z, ex, math.sqrt(1.0 - ex * ex - ez * ez), ez, *velocity, 0.0, 0.0, 0.3)
     rows, row, wrench = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS), np.zeros(6)
     count = find_patches(wheels.geometry, *m[:6], True, reduction.MOMENT, rows)
-    work = wheels._work
-    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, work.spare, wheels._work_handle)
+    tabulated_wrench(contact, m, True, rows, 0, count, row, wrench, wheels._counters, wheels._work_handle)
     place = row[[reduction.X, reduction.Y, reduction.Z]] - [0.0, m.y, m.z]
     drift = velocity[:3] + np.cross(velocity[3:], place)
     approach = drift[1] * row[reduction.SINE] - drift[2] * row[reduction.COSINE]
@@ -393,8 +392,8 @@ def test_half_the_steps_where_a_cell_is_too_coarse():
         key = pair_table.key_of(level, part, turn, *corner)
         keys[key % 1009], states[key % 1009] = key, state
     table = NO_TABLE._replace(keys=keys, states=states)
-    state, *parts, turn = pair_table.locate(table, u, False, t, slope, math.exp(log_depth), 0.375 * YAW)
-    assert state == 5
+    state, *parts, turn, scale, half = pair_table.locate(table, u, False, t, slope, log_depth, 0.375 * YAW)
+    assert (state, scale, half) == (5, 2.0, YAW / 3.0)
     expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
     np.testing.assert_allclose(parts, expected, atol=1e-9)
     assert turn == pytest.approx(0.375 * 3.0 - 2.0)

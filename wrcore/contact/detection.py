@@ -18,10 +18,12 @@ import numpy as np
 
 from wrcore.contact.geometry import RADIUS, RAIL_COSINE, RAIL_RESERVE, SCAN_STEP, SECOND_BOUND, WHEEL_RESERVE, YAW_LIMIT
 from wrcore.contact.reduction import (
+    BEYOND,
     CURVATURE_Y,
     MAX_PATCHES,
     MAXIMUM,
     MOMENT,
+    OUTSIDE,
     PATCH_COLUMNS,
     PENETRATION,
     REDUCTIONS,
@@ -102,6 +104,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
                 m0, m1, m2 = overlap_moments(geometry, pose, start, end)
+        row[OUTSIDE], row[BEYOND] = outside, beyond
         return count + patch_from_moments(geometry, pose, middle, m0, m1, m2, row)
     return count + patch_at_maximum(geometry, pose, deepest, outside, beyond, row)
 
@@ -229,6 +232,7 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
         m0, m1, m2, start, nodes = fine_sums(geometry, pose, shift, outside, beyond)
         if nodes < _WIDE:
             return -1
+    patch[OUTSIDE], patch[BEYOND] = outside, beyond
     return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patch))
 
 

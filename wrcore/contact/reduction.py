@@ -44,6 +44,7 @@ interpenetrate more at the sides, the curvature at one point says nothing about 
 # Columns of the patch array: geometry first, then what the forces add (wrcore.dynamics.wheel).
 U_WHEEL, S_WHEEL, U_RAIL, X, Y, Z, ANGLE, PENETRATION, CURVATURE_X, CURVATURE_Y = range(10)
 SEMI_A, SEMI_B, NORMAL, FX, FY, MZ, XI, ETA, PHI = range(10, 19)
+OUTSIDE, BEYOND = 10, 11  # of a patch by moments, until it has a force: points without overlap next to its own, m
 COSINE, SINE = 19, 20  # of the contact angle
 P_MAX = 21  # filled where patches are no ellipses
 PSI = 22  # shape number, filled where the creep table asks for it
@@ -97,7 +98,7 @@ def deepest_point(geometry, pose, u, tolerance, outside, beyond):
 
 
 @jit(allocates=False)
-def _edge_by_newton(geometry, pose, u, low, high):
+def edge_by_newton(geometry, pose, u, low, high):
     """Zero of the gap from a good guess by a few Newton steps; NaN if that does not settle in (low, high)."""
     for _ in range(6):
         if not low <= u <= high:
@@ -152,8 +153,8 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
     start = end = np.nan
     if gap < 0.0 < rate:
         half = math.sqrt(-2.0 * gap / rate)
-        start = _edge_by_newton(geometry, pose, u - half, outside, u)
-        end = _edge_by_newton(geometry, pose, u + half, u, beyond)
+        start = edge_by_newton(geometry, pose, u - half, outside, u)
+        end = edge_by_newton(geometry, pose, u + half, u, beyond)
     if not start == start:
         start = _edge_by_bracket(geometry, pose, outside, first)
     if not end == end:

@@ -179,7 +179,7 @@ def strip_gap(grid, wheel, rail, k):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _gaps(grid, wheel, rail, k):
+def gaps_of_eight(grid, wheel, rail, k):
     """Gaps of eight strips from the k-th on, as `strip_gap`."""
     square, node = grid.tilt_square, np.uint64(grid.node + k)
     down = square * (lanes.load8(wheel, DOWN_4, node) + square * lanes.load8(wheel, DOWN_6, node))
@@ -214,7 +214,7 @@ def scan(window, wheel, rail, begin, end):
     m0, m1, m2 = zero, zero, zero
     overlap_low = overlap_high = close_low = close_high = np.uint64(0)
     for i in range(0, end - begin, LANES):
-        index, gap = float(i) + lanes.ramp8(), _gaps(grid, wheel, rail, begin + i)
+        index, gap = float(i) + lanes.ramp8(), gaps_of_eight(grid, wheel, rail, begin + i)
         negative = lanes.where_below(gap, zero, gap, zero)
         weight = negative * negative
         first_moment = weight * index
@@ -235,7 +235,7 @@ def deepest_strip(grid, wheel, rail, first, last):
     """The strip that overlaps most along the rail's normal, if the only overlap reaches from ``first`` to ``last``."""
     best, chosen = lanes.lanes8(0.0), lanes.lanes8(0.0)
     for k in range(first // LANES * LANES, last + 1, LANES):
-        depth = -1.0 * _gaps(grid, wheel, rail, k) * lanes.load8(rail, RAIL_COSINE, np.uint64(k))
+        depth = -1.0 * gaps_of_eight(grid, wheel, rail, k) * lanes.load8(rail, RAIL_COSINE, np.uint64(k))
         chosen = lanes.where_below(best, depth, float(k) + lanes.ramp8(), chosen)
         best = lanes.where_below(best, depth, depth, best)
     shallower = lanes.below(best, lanes.lanes8(lanes.greatest(best)))
@@ -249,23 +249,32 @@ def fine_cell_shift(geometry, u, ur):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
+def fine_grid(geometry, pose, shift, first, last):
+    """`Grid` of the strips at the wheel profile's own nodes between ``first`` and ``last``, where the first one lies on
+    the wheel (m), the first one's number, and that after the last one. ``shift``: see `fine_cell_shift`, for the middle
+    of an overlap."""
+    step = geometry.wheel_step
+    density = 1.0 / step
+    begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -shift)
+    end = min(int((last - geometry.wheel_start) * density) + 1, geometry.fine_wheel.shape[1] - LANES)
+    end = min(end, geometry.fine_rail.shape[1] - LANES - shift)
+    origin, cell = geometry.wheel_start + begin * step, begin + shift
+    offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
+    return _grid(pose, begin, cell, geometry.half_distance + origin, offset, step), origin, begin, end
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def fine_sums(geometry, pose, shift, first, last):
     """Integrals of g^2, g^2 e, g^2 e^2 over the strips at the wheel profile's own nodes between ``first`` and ``last``,
     the position (m) from which e counts, and the number of nodes in overlap, 0 where those of wheel and rail do not go
-    together. ``shift``: see `fine_cell_shift`, for the middle of the overlap."""
+    together."""
     wheel, rail, step = geometry.fine_wheel, geometry.fine_rail, geometry.wheel_step
-    density = 1.0 / step
-    begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -shift)
-    end = min(int((last - geometry.wheel_start) * density) + 1, wheel.shape[1] - LANES)
-    end = min(end, rail.shape[1] - LANES - shift)
-    origin, cell = geometry.wheel_start + begin * step, begin + shift
-    offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
-    grid = _grid(pose, begin, cell, geometry.half_distance + origin, offset, step)
+    grid, origin, begin, end = fine_grid(geometry, pose, shift, first, last)
     zero, size = lanes.lanes8(0.0), lanes.lanes8(float(end - begin))
     m0, m1, m2 = zero, zero, zero
     nodes = 0
     for k in range(0, end - begin, LANES):
-        index, gap = float(k) + lanes.ramp8(), _gaps(grid, wheel, rail, k)
+        index, gap = float(k) + lanes.ramp8(), gaps_of_eight(grid, wheel, rail, k)
         negative = lanes.where_below(index, size, lanes.where_below(gap, zero, gap, zero), zero)
         weight = negative * negative
         first_moment = weight * index

@@ -1,20 +1,24 @@
-"""What the contacts add to the Jacobian: differences of the rails' wrenches alone, one call for all wheels.
+"""What the contacts add to the Jacobian: what the rails' wrenches change by the wheels' poses and velocities.
 
 Of all parts of the Jacobian those of the contacts change fastest. Between two Jacobians in full they are brought up to
 date without an evaluation of the whole vehicle: for each wheelset the wrench's derivatives C by its pose and velocity
 are found in the rails' own frames, and to the accelerations of the wheelset and of bodies joined to it they add A C,
 where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along
-the rail and a turn about the axle change nothing. Where patches are ellipses, differences of the pose are of the
-search alone, and `patch_slopes` does the rest; else they are of the wrenches, and those of velocities need no search.
+the rail and a turn about the axle change nothing. Where patches are ellipses or lobes that are looked up, C is found by
+hand (`patch_slopes`, :mod:`wrcore.dynamics.lobe_slopes`), of patches that moments move (:mod:`wrcore.contact.moved`);
+elsewhere by differences: of the search alone, or of the wrenches.
 """
 
 import math
 
 from wrcore.contact import reduction
+from wrcore.contact.detection import SPATIAL
+from wrcore.contact.moved import MOVES, move_patch
+from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
-from wrcore.dynamics.contact_slopes import MOVES, SAME, SLOPES, patch_slopes
+from wrcore.dynamics.contact_slopes import SAME, SLOPES, patch_slopes
 from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
-from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_KEPT, PATCHES_ONLY
+from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
 from wrcore.dynamics.vector import copy_into
@@ -107,13 +111,15 @@ def _add_column(rail, direction, slope, scale, columns):
     mx, my, mz = slope[3] * scale, slope[4] * scale, slope[5] * scale
     for axis in range(3):
         share, column = rail[axis, i], columns[first + axis]
+        if share == 0.0:
+            continue
         for j in range(3):
             column[j] += share * (rail[j, 0] * fx + rail[j, 1] * fy + rail[j, 2] * fz)
             column[3 + j] += share * (rail[j, 0] * mx + rail[j, 1] * my + rail[j, 2] * mz)
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_slope(jacobian, k, wheel, direction, slope, columns):
+def add_slope(jacobian, k, wheel, direction, slope, columns):
     """Add a derivative of a wheel's wrench in a direction to the ``columns`` of its wheelset; a turn about the axle
     changes nothing."""
     rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
@@ -151,8 +157,10 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     jacobian.counts[:] = UNCOUNTED
     if model.slopes != 0:
         call_address(model.slopes, jacobian, model, work, columns)
-    if jacobian.counts[0, 0] == UNCOUNTED:
-        _difference_wrenches(jacobian, model, work, fine, columns)
+    for k in range(wheelsets.shape[0]):
+        if jacobian.counts[k, 0] == UNCOUNTED or jacobian.counts[k, 1] == UNCOUNTED:
+            _difference_wrenches(jacobian, model, work, fine, columns)
+            break
 
 
 @jit(allocates=False)
@@ -166,14 +174,14 @@ def blocks_of_patches(jacobian, model, work, columns):
     for k in range(base.shape[0]):
         for wheel in range(2):
             slopes[:], m, found = 0.0, motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
-            for patch in range(work.counts[k, wheel]):
+            for patch in range(jacobian.counts[k, wheel]):
                 patch_slopes(
                     contact_of(model.contact, k, wheel), m, found[0, patch], found, patch, (DISPLACEMENT, TURN),
                     jacobian.law, slopes,
                 )  # fmt: skip
             for j in range(SLOPES):
                 direction = MOVING[j] if j < MOVES else j + 2
-                _add_slope(jacobian, k, wheel, direction, slopes[j], columns[k])
+                add_slope(jacobian, k, wheel, direction, slopes[j], columns[k])
 
 
 @jit(allocates=False)
@@ -182,36 +190,50 @@ def _move_patches(jacobian, model, work):
     difference makes others of them."""
     base, found = jacobian.motions, jacobian.patches
     press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
-    for move in range(1 + MOVES):
-        if move > 0:
-            direction = MOVING[move - 1]
-            for k in range(base.shape[0]):
-                for wheel in range(2):
-                    difference = DISPLACEMENT if direction < 3 else TURN
-                    _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
-                    jacobian.counts[k, wheel] = work.counts[k, wheel]
-            press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
+    known = model.contact.reduction == reduction.MOMENT and model.contact.detection == SPATIAL
+    for k in range(base.shape[0]):
+        for wheel in range(2):
+            m, geometry = motion_of(base[k, wheel]), contact_of(model.contact, k, wheel).geometry
+            pose = make_pose(m.side, m.y, m.z, m.side * m.ex, m.side * m.ey, m.side * m.ez, True)
+            jacobian.counts[k, wheel] = work.counts[k, wheel]
+            for patch in range(work.counts[k, wheel]):
+                row, moved = found[0, k, wheel, patch], found[:, k, wheel]
+                copy_into(row, work.patches[k, wheel, patch])
+                known = known and move_patch(geometry, pose, DISPLACEMENT, row, patch, jacobian.law[:3], moved)
+    return known or _search_moved(jacobian, model, work)
+
+
+@jit(allocates=False)
+def _search_moved(jacobian, model, work):
+    """`_move_patches` by searches."""
+    base, found = jacobian.motions, jacobian.patches
+    for move in range(MOVES):
+        direction = MOVING[move]
         for k in range(base.shape[0]):
             for wheel in range(2):
-                count = work.counts[k, wheel]
-                if move > 0 and count != jacobian.counts[k, wheel]:
+                difference = DISPLACEMENT if direction < 3 else TURN
+                _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
+        press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
+        for k in range(base.shape[0]):
+            for wheel in range(2):
+                if work.counts[k, wheel] != jacobian.counts[k, wheel]:
                     return False
-                for patch in range(count):
-                    copy_into(found[move, k, wheel, patch], work.patches[k, wheel, patch])
-                    place = found[0, k, wheel, patch, reduction.U_WHEEL]
-                    if abs(found[move, k, wheel, patch, reduction.U_WHEEL] - place) > SAME:
+                for patch in range(work.counts[k, wheel]):
+                    row = found[1 + move, k, wheel, patch]
+                    copy_into(row, work.patches[k, wheel, patch])
+                    if abs(row[reduction.U_WHEEL] - found[0, k, wheel, patch, reduction.U_WHEEL]) > SAME:
                         return False
     return True
 
 
 @jit(allocates=False)
 def _difference_wrenches(jacobian, model, work, fine, columns):
-    """`contact_blocks` by differences of the wrenches."""
+    """`contact_blocks` by differences of the wrenches, of the wheels that are `UNCOUNTED`."""
     base, found, slope = jacobian.motions, jacobian.wrenches, jacobian.slopes[0]
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(work.motions[k, wheel], base[k, wheel])
-    press_wheels(model, work, BARE | ELLIPSES | PATCHES_KEPT)
+    press_wheels(model, work, BARE | ELLIPSES)
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
@@ -229,9 +251,11 @@ def _difference_wrenches(jacobian, model, work, fine, columns):
         press_wheels(model, work, mode)
         for k in range(base.shape[0]):
             for wheel in range(2):
+                if jacobian.counts[k, wheel] != UNCOUNTED:
+                    continue
                 for i in range(6):
                     slope[i] = (work.rail_wrenches[k, wheel, i] - found[k, wheel, i]) / difference
-                _add_slope(jacobian, k, wheel, direction, slope, columns[k])
+                add_slope(jacobian, k, wheel, direction, slope, columns[k])
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -40,7 +40,7 @@ PUNCHED, PUNCHED_PART = np.array([-1.0, 0.0, 1.0]) * math.sqrt(0.6), np.array([5
 
 @jit(allocates=False, forceinline=True)
 def load_of(modulus, numbers, depth):
-    """Load of a lobe, N."""
+    """Load of a lobe of a ``depth`` D, N."""
     return modulus * depth * math.sqrt(depth) * math.exp(numbers[columns.LOG_NORMAL])
 
 

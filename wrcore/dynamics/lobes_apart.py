@@ -3,6 +3,8 @@
 Few wheels stand so: the kernel is compiled when the first one does.
 """
 
+import math
+
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.coupled_lobes import (
     CELL,
@@ -20,8 +22,9 @@ from wrcore.dynamics.coupled_lobes import (
     slip_of_others,
     tilt_back,
 )
-from wrcore.dynamics.pair_table import depth_of
-from wrcore.dynamics.tabulated_wheel import UNLISTED, look_lobe_up, roll_lobe
+from wrcore.dynamics.pair_table import APART, FAR, SADDLE, depth_of, lobe_end
+from wrcore.dynamics.strip_wheel import lifted
+from wrcore.dynamics.tabulated_wheel import UNLISTED, look_lobe_up, look_only_lobe_up, roll_lobe
 from wrcore.kernels.jit import FUSED, jit
 
 TURNS, ROLLS = 2, 3
@@ -29,9 +32,27 @@ TURNS, ROLLS = 2, 3
 
 
 @jit(allocates=False, fastmath=FUSED)
-def look_apart_up(model, m, pose, ahead, low, count, counters, work):
-    """Fill ``work.numbers`` and ``work.lobes`` of ``count`` lobes, whose ends are there; the first one's cell is
+def look_lobes_up(model, m, frame, lift, u, ahead, counters, work):
+    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a wheel that is lifted along the normal of a ``frame``,
+    m, near the place ``u`` on its profile. None has an end where it hangs in the air; the first one's cell is
     `UNLISTED` if one of them is in no lattice."""
+    pose, low, high = lifted(model, m, frame, lift, True, u, work.rows)
+    count, last = 0, low
+    while last < high:
+        last = lobe_end(model.geometry, pose, work.rows, last, high, (APART, FAR, SADDLE))
+        work.lobes[count, END] = last
+        count += 1
+    if count == 1:
+        depth, u = depth_of(work.rows, low, high)
+        if not look_only_lobe_up(model, m, pose, ahead, math.log(depth), u, work):
+            work.lobes[0, CELL] = UNLISTED
+    elif count > 1:
+        _look_apart_up(model, m, pose, ahead, low, count, counters, work)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _look_apart_up(model, m, pose, ahead, low, count, counters, work):
+    """Fill in several lobes, whose ends are there."""
     geometry, lobes = model.geometry, work.lobes
     axle_y = geometry.half_distance * m.ey
     t = pose.y + axle_y - geometry.rail_distance
@@ -45,8 +66,8 @@ def look_apart_up(model, m, pose, ahead, low, count, counters, work):
             aside = tilt * (geometry.rolling_radius - numbers[columns.PLACE_Z])
             lobe[NORMAL] = 0.0
             if depth > 0.0:
-                yaw, last_time = ahead * m.ex, left == 0
-                if not look_lobe_up(model, numbers, lobe, u, True, t - aside, m.ez + tilt, depth, yaw, last_time, work):
+                place = t - aside, m.ez + tilt, math.log(depth), ahead * m.ex
+                if not look_lobe_up(model, numbers, lobe, u, True, *place, left == 0, work):
                     lobes[0, CELL] = UNLISTED
                     return
                 tilt_back(numbers, tilt, geometry.rolling_radius)

@@ -11,7 +11,7 @@ ELLIPSES = 2
 the model."""
 
 PATCHES_HELD = 4
-"""Patches are those kept, or found, last: only velocities have changed."""
+"""Patches are those found last: only velocities have changed. Where they are looked up, they are looked up again."""
 
 WRENCHES_HELD = 8
 """The rails' wrenches are those found last."""
@@ -19,10 +19,7 @@ WRENCHES_HELD = 8
 PATCHES_ONLY = 16
 """Ellipses: patches are found, no wrenches."""
 
-PATCHES_KEPT = 32
-"""Patches that are looked up are kept for `PATCHES_HELD`."""
-
-BARE = 64
+BARE = 32
 """Wrenches and counts alone: of patches that are looked up no rows are filled, which nobody reads within a step."""
 
 STAGE = WARM | BARE

@@ -235,8 +235,7 @@ class Pair:
             if level + 1 < LEVELS:
                 return math.nan, math.nan
             exact = rows[0].astype(float)
-        double = [0.5 * (0.5 + n % 2) for n in first]
-        columns.weigh(0.5, 0.5, 0.5, *double, turn, weights)
+        columns.weigh(columns.Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()

@@ -30,8 +30,9 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.geometry import LANES
+from wrcore.contact.moved import overlap_at
 from wrcore.contact.patch.model import MODES, NODES
-from wrcore.contact.strip import gap_at
+from wrcore.contact.strip import cubic_at, gap_at, strip_point, wheel_slope
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
 from wrcore.kernels.handles import call_c
@@ -138,6 +139,23 @@ def depth_of(rows, first, last):
     return (math.sqrt(CURVATURE) * total) ** 0.4, mean / total
 
 
+@jit(allocates=False, fastmath=FUSED)
+def log_depth_at(geometry, pose, rows, first, last):
+    """ln D of a lobe at a ``pose`` and its place on the wheel's profile, m, whose overlaps have been found at one
+    nearby; minus infinity without overlap. See `depth_of`."""
+    total = mean = 0.0
+    for k in range(first, last):
+        square, u = overlap_at(geometry, pose, rows[k])
+        if square > 0.0:
+            ur, _, _, slope, _, along = strip_point(geometry, pose, u)
+            _, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+            slope = 0.5 * (wheel_slope(pose, slope, along) + df)
+            share = 0.9375 * square / math.sqrt(1.0 + slope * slope)
+            total += share
+            mean += share * u
+    return 0.4 * math.log(math.sqrt(CURVATURE) * total), mean / total
+
+
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _weights(f):
     """Catmull-Rom's weights of four nodes at f, 0 to 1 between the middle two."""
@@ -189,15 +207,37 @@ def state_of(keys, states, key):
     return states[slot]
 
 
+class Place(NamedTuple):
+    """Where a lobe lies in a cell."""
+
+    cell: int
+    """Number of the cell; 0 if the lobe is to be solved."""
+    fx: float
+    fy: float
+    fz: float
+    """Parts of a step of t, slope and ln D beyond the first corner."""
+    gx: float
+    gy: float
+    gz: float
+    """Parts of two steps beyond the first corner of the cell with twice the steps."""
+    turn: float
+    """Yaw from the cell's middle over half of the cell."""
+    scale: float
+    """Steps of the coarsest lattice over those of this one."""
+    half: float
+    """Half of the cell in yaw, rad."""
+
+
+NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW)
+
+
 @jit(allocates=False)
-def locate(table, u, beside, t, slope, depth, yaw):
-    """Number of the cell where a lobe lies, 0 if it is to be solved; its parts of a step beyond the first corner, and
-    of two steps beyond that of the cell with twice the steps; and its yaw from the cell's middle over half of the cell.
-    A lobe that only just touches is looked up at the least depth."""
+def locate(table, u, beside, t, slope, log_depth, yaw):
+    """`Place` of a lobe with ln D. One that only just touches is looked up at the least depth."""
     part, scale, half = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW
     for level in range(LEVELS):
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z, w = max(scale * (math.log(depth) - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
+        z, w = max(scale * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
         if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
             break
         if not 0.0 <= w < YAWS * YAW / half:
@@ -210,31 +250,44 @@ def locate(table, u, beside, t, slope, depth, yaw):
             state = state_of(table.keys, table.states, key)
         if state > 0:
             gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
-            return state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0
+            return Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half)
         if state != FINER:
             break
         scale, half = 2.0 * scale, half / 3.0
-    return 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return NOWHERE
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def along_axis(f, g):
+    """Factors along one axis of the lattice: Catmull-Rom's four, and the two each of a straight line in the cell and in
+    that with twice the steps."""
+    return (*_weights(f), 1.0 - f, f, 1.0 - g, g)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FAST)
+def spread_weights(x, y, z, odd, even, weights):
+    """Fill the weights (NODES,) of a cell's rows from the factors along its axes, see `along_axis`, and from yaw's odd
+    and even part. Each weight has one factor of each axis."""
+    for a in range(2):
+        lx, cx = (x[5], x[2]) if a else (x[4], x[1])
+        for b in range(2):
+            ly, cy, n = (y[5], y[2], 4 * (2 * a + b)) if b else (y[4], y[1], 8 * a)
+            along = cx * ly + lx * cy - 2.0 * lx * ly
+            weights[n], weights[n + 1] = along * z[4] + lx * ly * z[1], along * z[5] + lx * ly * z[2]
+            weights[n + 2], weights[n + 3] = lx * ly * z[0], lx * ly * z[3]
+            my, lz = (y[5] if a else y[4]), (z[5] if b else z[4])
+            weights[n + 16], weights[n + 17] = my * lz * x[0], my * lz * x[3]
+            weights[n + 18], weights[n + 19] = lx * lz * y[0], lx * lz * y[3]
+            w = (x[7] if a else x[6]) * (y[7] if b else y[6])
+            weights[n + 32], weights[n + 33] = w * z[6] * odd, w * z[6] * even
+            weights[n + 34], weights[n + 35] = w * z[7] * odd, w * z[7] * even
 
 
 @jit(allocates=False, fastmath=FAST)
-def weigh(fx, fy, fz, gx, gy, gz, turn, weights):
-    """Fill the weights (NODES,) of a cell's rows at a place in it, see `locate`."""
-    (x0, x1, x2, x3), (y0, y1, y2, y3), (z0, z1, z2, z3) = _weights(fx), _weights(fy), _weights(fz)
-    odd, even = 0.5 * turn, 0.5 * turn * turn
-    for a in range(2):
-        lx, cx = (fx, x2) if a else (1.0 - fx, x1)
-        for b in range(2):
-            ly, cy, n = (fy, y2, 4 * (2 * a + b)) if b else (1.0 - fy, y1, 8 * a)
-            along = cx * ly + lx * cy - 2.0 * lx * ly
-            weights[n], weights[n + 1] = along * (1.0 - fz) + lx * ly * z1, along * fz + lx * ly * z2
-            weights[n + 2], weights[n + 3] = lx * ly * z0, lx * ly * z3
-            mx, my, lz = (fx if a else 1.0 - fx), (fy if a else 1.0 - fy), (fz if b else 1.0 - fz)
-            weights[n + 16], weights[n + 17] = my * lz * x0, my * lz * x3
-            weights[n + 18], weights[n + 19] = mx * lz * y0, mx * lz * y3
-            w = (gx if a else 1.0 - gx) * (gy if b else 1.0 - gy)
-            weights[n + 32], weights[n + 33] = w * (1.0 - gz) * odd, w * (1.0 - gz) * even
-            weights[n + 34], weights[n + 35] = w * gz * odd, w * gz * even
+def weigh(at, weights):
+    """Fill the weights (NODES,) of a cell's rows at a `Place` in it."""
+    x, y, z = along_axis(at.fx, at.gx), along_axis(at.fy, at.gy), along_axis(at.fz, at.gz)
+    spread_weights(x, y, z, 0.5 * at.turn, 0.5 * at.turn * at.turn, weights)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -383,12 +436,18 @@ def _of_part(model, numbers, slip, xi, eta, limit, load, side, sizes):
     return f1, f2, m3 - f1 * (dy * cosine + dz * sine) + f2 * dx, missed
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def of_two(numbers):
+    """Share that two ellipses have in the creep force of a lobe; the rest is one's."""
+    root = numbers[ROOT]
+    return min(numbers[PARTED] / (root * (1.0 - root)), 1.0) if LEAST < root < 1.0 - LEAST else 0.0
+
+
 @jit(allocates=False, fastmath=FUSED)
 def base_force(model, numbers, slip, xi, eta, limit):
     """Creep force of the creep table at a lobe's ellipse, or at those of its two parts, for creepages ``xi``, ``eta``
     in place of the ``slip``'s, over mu N and mu N c; look-ups missed; c."""
-    root, log_a, log_b = numbers[ROOT], numbers[LOG_A], numbers[LOG_B]
-    two = min(numbers[PARTED] / (root * (1.0 - root)), 1.0) if LEAST < root < 1.0 - LEAST else 0.0
+    root, log_a, log_b, two = numbers[ROOT], numbers[LOG_A], numbers[LOG_B], of_two(numbers)
     f1 = f2 = m3 = missed = 0.0
     c = math.exp(0.5 * (log_a + log_b))
     if two < 1.0:

@@ -9,7 +9,7 @@ from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, LOBES, MODEL, strip_work, with_tables
 from wrcore.contact.reduction import PATCH_COLUMNS
 from wrcore.contact.strip import Pose
-from wrcore.dynamics.lobes_apart import look_apart_up
+from wrcore.dynamics.lobes_apart import look_lobes_up
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
@@ -88,9 +88,9 @@ class LateKernels:
                 self._places[[MODEL, KERNEL]] = self._model.address, kernel
 
     def _of_lobes(self):
-        m, pose = WheelMotion(*np.zeros(len(WheelMotion._fields))), Pose(*np.zeros(len(Pose._fields)))
+        m, frame = WheelMotion(*np.zeros(len(WheelMotion._fields))), Frame(*np.zeros(len(Frame._fields)))
         kind, work = Kind(self._contact._replace(geometries=(), wheels=())), Kind(strip_work(self._contact.strips, 1))
-        return Kernel(look_apart_up, kind, m, pose, 0.0, 0, 0, np.zeros(4, np.int64), work).address
+        return Kernel(look_lobes_up, kind, m, frame, 0.0, 0.0, 0.0, np.zeros(4, np.int64), work).address
 
     def _with_ellipses(self):
         work, counts = Kind(strip_work(self._contact.strips, 1)), np.zeros((1, 2), np.int64)

@@ -31,7 +31,7 @@ from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
-from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, PATCHES_HELD, PATCHES_KEPT, WARM
+from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, leaning_motion
@@ -44,11 +44,8 @@ SLENDER = 3.0
 UNSOLVED = 1
 """Place in a spare memory: not 0 where what a table does not have is not to be solved."""
 
-STOOD_IN, ROWLESS = 3, 4
+STOOD_IN, ROWLESS = 2, 3
 """Others: not 0 once ellipses have stood in; not 0 where no rows are wanted (`BARE`)."""
-
-HOLD, KEEP, USE = 2, 1.0, 2.0
-"""Another one: whether a wheel's only lobe is to be kept, or used as it was kept, see `StripWork.kept`."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
 """Elements along and across the patch of the grid, and the tolerance of its tractions."""
@@ -256,35 +253,45 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
     return Solution(xi, eta, phi, load, x, s, a, b, p_max, power)
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lift_share(model, approach):
+    """Share of its depth by which the damping lifts a wheel."""
+    factor = damping_factor(approach, model.damping, model.damping_speed)
+    return 1.0 - factor * inverse_cube_root(factor)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def deepest_place(model, m, pose, frame, depth):
+    """Place of a patch's deepest material point from the wheelset's centre, in axes that lean as the patch does."""
+    py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
+    pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
+    px, pz = leaning(model.geometry, lean_of(model.geometry, pose, frame), frame.x, pz)
+    return px, py, pz
+
+
 @jit(allocates=False, fastmath=FUSED)
 def lift_of(model, m, pose, frame, depth):
     """What the damping lifts a left wheel by along the normal of a frame, of a ``depth``, m; creepages and coefficient
     of friction. The motion ``m`` is in axes that lean as the patch does."""
     speed = max(abs(m.vx), model.least_speed)
     # a material point of the undeformed wheel, as the surfaces' slip has it
-    py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
-    pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
-    px, pz = leaning(model.geometry, lean_of(model.geometry, pose, frame), frame.x, pz)
+    px, py, pz = deepest_place(model, m, pose, frame, depth)
     xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, speed)
     friction = falling(model, m.friction, xi, eta, speed)
-    factor = damping_factor(approach, model.damping, model.damping_speed)
-    return (1.0 - factor * inverse_cube_root(factor)) * depth, (xi, eta, phi), friction
+    return lift_share(model, approach) * depth, (xi, eta, phi), friction
 
 
-@jit(allocates=False, fastmath=FUSED)
-def lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work):
-    """Overlaps in ``work.rows`` of a left wheel, with a pose and a frame, that the damping lifts: its pose then, their
-    first and end, the depth that is left, creepages and coefficient of friction. ``out`` gets the deepest row. The
-    motion ``m`` is in axes that lean as the patch does."""
-    depth, u, low, high = 0.0, 0.0, first, first
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lift_of_overlaps(model, m, pose, frame, rows, first, last, out):
+    """What the damping lifts a left wheel by, see `lift_of`; the depth and the place of its deepest row, which fills
+    ``out``; creepages and coefficient of friction."""
+    depth, u = 0.0, 0.0
     for k in range(first, last):
         if rows[k, reduction.PENETRATION] > depth:
             depth, u = rows[k, reduction.PENETRATION], rows[k, reduction.U_WHEEL]
             copy_into(out, rows[k])
     lift, creepage, friction = lift_of(model, m, pose, frame, depth)
-    if lift < depth:
-        pose, low, high = lifted(model, m, frame, lift, spatial, u, work.rows)
-    return pose, low, high, depth - lift, creepage, friction
+    return lift, depth, u, creepage, friction
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -295,10 +302,10 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
     frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
     m = leaning_motion(model.geometry, m, lean_of(model.geometry, pose, frame))
-    pose, low, high, depth, creepage, friction = lifted_overlaps(
-        model, m, pose, frame, spatial, rows, first, last, out, work
-    )
+    lift, depth, u, creepage, friction = lift_of_overlaps(model, m, pose, frame, rows, first, last, out)
+    depth -= lift
     if depth > 0.0:
+        pose, low, high = lifted(model, m, frame, lift, spatial, u, work.rows)
         if high == low:
             out[reduction.NORMAL] = 0.0
             return NOTHING
@@ -415,7 +422,6 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
     work.spare[ROWLESS] = 1.0 if mode & BARE else 0.0
-    held, keep = rough and mode & PATCHES_HELD > 0, KEEP if rough and mode & PATCHES_KEPT else 0.0
     for i in range(motions.shape[0]):
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
@@ -423,26 +429,12 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             m = as_left(seen)
             for k in range(6):
                 wrench[k] = 0.0
-            if held and work.kept[i, wheel, 0] > 0.0:
-                work.spare[HOLD] = USE
-                call_address(
-                    contact.strips.group, contact, m, True, rows, 0, 0, work.out, wrench, counters, work.kept[i, wheel],
-                    work,
-                )  # fmt: skip
-                if seen.side < 0.0:
-                    mirror(rows, 0, wrench)
-                continue
-            if keep > 0.0:
-                work.kept[i, wheel, 0] = 0.0
             count, bound, spatial = detect_patches(contact, m, rows)
             first = kept = group = 0
             while first < count:
                 last = group_end(contact.geometry, rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
-                if keep > 0.0:
-                    memory = work.kept[i, wheel]
                 work.spare[0], work.spare[UNSOLVED] = 0.0, 1.0 if rough else 0.0
-                work.spare[HOLD] = keep if last - first == count else 0.0
                 call_address(
                     contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
                     work,

@@ -10,36 +10,32 @@ from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import Frame, add_force, frame_of_rows
-from wrcore.contact.patch.model import KERNEL, LOAD, LOBES, MODEL, NUMBERS
+from wrcore.contact.patch.gap import add_force, frame_of_rows
+from wrcore.contact.patch.model import KERNEL, LOAD, LOBES, MODEL
+from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI, load_of
+from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI
 from wrcore.dynamics.pair_table import (
     APART,
     FAR,
     SADDLE,
     Slip,
-    depth_of,
     lobe_end,
     locate,
+    log_depth_at,
     look_modes_up,
     look_up,
     tabulated_force,
     weigh,
 )
 from wrcore.dynamics.strip_wheel import (
-    HOLD,
-    KEEP,
     NOTHING,
     ROWLESS,
     UNSOLVED,
-    USE,
     Solution,
     fill_row,
-    lift_of,
-    lifted,
-    lifted_overlaps,
+    lift_of_overlaps,
 )
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address, call_c
@@ -51,75 +47,22 @@ UNLISTED = -1.0
 """Cell of the first of several lobes if one of them is in no lattice."""
 
 
-KEPT, DEEPEST, LIFTED, DEPTH, DEEPER, FRAME = range(6)
-KEPT_ROW = 12
-"""Places in what is kept of a wheel: whether it is, its deepest overlap, what the damping lifts it by and its depth D
-(m), what D changes by that; the six numbers of its frame; its row, and what that changes by the lift."""
-
-FARTHER = 1e-9
-"""Difference of the lift, m."""
-
-
 @jit(allocates=False, fastmath=FUSED)
-def _keep(model, m, frame, lift, low, high, kept, work):
-    """Keep a wheel's only lobe, just looked up, and what it changes by the lift."""
-    rows, one, other, ahead = work.rows, work.numbers[0], work.numbers[1], -1.0 if m.vx < 0.0 else 1.0
-    depth, u = depth_of(rows, low, high)
-    pose, low, high = lifted(model, m, frame, lift + FARTHER, True, u, rows)
-    if high == low:
-        return
-    further, u = depth_of(rows, low, high)
-    t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
-    cell, fx, fy, fz, gx, gy, gz, turn = locate(model.strips.table, u, False, t, m.ez, further, ahead * m.ex)
-    if cell == 0 or further <= 0.0:
-        return
-    weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
-    look_up(model.strips.table.cells[cell], work.weights, other)
-    look_modes_up(model.strips.table.cells[cell], work.weights, other)
-    kept[LIFTED], kept[DEPTH], kept[DEEPER] = lift, depth, (further - depth) / FARTHER
-    kept[FRAME], kept[FRAME + 1], kept[FRAME + 2] = frame.cosine, frame.sine, frame.x
-    kept[FRAME + 3], kept[FRAME + 4], kept[FRAME + 5] = frame.ur, frame.z, frame.u
-    for k in range(NUMBERS):
-        kept[KEPT_ROW + k], kept[KEPT_ROW + NUMBERS + k] = one[k], (other[k] - one[k]) / FARTHER
-    kept[KEPT] = 1.0
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _add_kept(model, m, kept, wrench, counters, work):
-    """Add the wrench of a wheel whose only lobe was kept, for other velocities."""
-    frame = Frame(kept[FRAME], kept[FRAME + 1], kept[FRAME + 2], kept[FRAME + 3], kept[FRAME + 4], kept[FRAME + 5])
-    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True)
-    more = lift_of(model, m, pose, frame, kept[DEEPEST])[0] - kept[LIFTED]
-    numbers, modulus = work.numbers[0], contact_modulus(model.shear_modulus, model.poisson_ratio)
-    for k in range(NUMBERS):
-        numbers[k] = kept[KEPT_ROW + k] + more * kept[KEPT_ROW + NUMBERS + k]
-    work.lobes[:] = 0.0
-    work.lobes[0, NORMAL] = load_of(modulus, numbers, kept[DEPTH] + more * kept[DEEPER])
-    work.wrench[:] = 0.0
-    y, z = frame.ur + model.geometry.rail_distance - m.y, frame.z - m.z
-    _roll_lobes(model, m, frame, y, z, -1.0 if m.vx < 0.0 else 1.0, 1, counters, work)
-    for k in range(6):
-        wrench[k] += work.wrench[0, k] + work.wrench[1, k]
-
-
-@jit(allocates=False, fastmath=FUSED)
-def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
-    """As `group_wrench`, looked up; UNKNOWN where the table has no answer. Keeps a wheel's only lobe in ``memory`` if
-    ``work.spare`` asks for it."""
-    frame = frame_of_rows(rows, first, last)
+def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
+    """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
+    frame, ahead = frame_of_rows(rows, first, last), -1.0 if m.vx < 0.0 else 1.0
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
-    pose, low, high, left, _, _ = lifted_overlaps(model, m, pose, frame, spatial, rows, first, last, out, work)
-    if high == low or left <= 0.0:
+    lift, depth, u, _, _ = lift_of_overlaps(model, m, pose, frame, rows, first, last, out)
+    pose = make_pose(1.0, m.y - lift * frame.sine, m.z + lift * frame.cosine, m.ex, m.ey, m.ez, spatial)
+    lobes = 0
+    if lift < depth and spatial:  # the lattices are of spatial detection
+        lobes = _look_lobes_up(model, m, pose, frame, (lift, u), ahead, rows, first, last, counters, work)
+    if lift >= depth or lobes < 0:
         out[reduction.NORMAL] = 0.0
         return NOTHING
-    ahead = -1.0 if m.vx < 0.0 else 1.0
-    lobes = _look_lobes_up(model, m, pose, ahead, low, high, counters, work) if spatial else 0
-    if lobes == 0:  # the lattices are of spatial detection
+    if lobes == 0:
         counters[SOLVED] += 1
         return UNKNOWN
-    if work.spare[HOLD] == KEEP and lobes == 1:
-        memory[DEEPEST] = out[reduction.PENETRATION]
-        _keep(model, m, frame, memory[DEEPEST] - left, low, high, memory, work)
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
@@ -140,10 +83,7 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
 def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """`tabulated_wrench`, or what the solver finds, for who calls it by its address; a normal force below 0 where that
     is not wanted."""
-    if work.spare[HOLD] == USE:
-        _add_kept(model, m, memory, wrench, counters, work)
-        return
-    found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work)
+    found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work)
     if found.load < 0.0 and work.spare[UNSOLVED] > 0.0:
         out[reduction.NORMAL] = -1.0
     elif found.load < 0.0:
@@ -157,44 +97,51 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _look_lobes_up(model, m, pose, ahead, low, high, counters, work):
-    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of overlaps; returns how many there are, 0 if one of them
-    is in no lattice."""
-    lobes, late, count, last = work.lobes, model.strips.late, 0, low
+def _look_lobes_up(model, m, pose, frame, lift, ahead, rows, first, last, counters, work):
+    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a lifted wheel at a ``pose``; ``rows`` are its overlaps
+    where it is not lifted. Returns how many there are, 0 if one of them is in no lattice, -1 if it hangs in the air.
+    ``lift``: along the frame's normal, and place on the wheel's profile of what is lifted, m."""
+    lobes, late = work.lobes, model.strips.late
     lobes[:] = 0.0
-    while last < high:
-        last = lobe_end(model.geometry, pose, work.rows, last, high, (APART, FAR, SADDLE))
-        lobes[count, END] = last
-        count += 1
-    if count == 1:
-        depth, u = depth_of(work.rows, low, high)
-        t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
-        return (
-            1
-            if look_lobe_up(model, work.numbers[0], lobes[0], u, False, t, m.ez, depth, ahead * m.ex, True, work)
-            else 0
-        )
+    if lobe_end(model.geometry, pose, rows, first, last, (APART, FAR, SADDLE)) == last:
+        log_depth, u = log_depth_at(model.geometry, pose, rows, first, last)
+        if log_depth == -math.inf:
+            return -1
+        return 1 if look_only_lobe_up(model, m, pose, ahead, log_depth, u, work) else 0
     if late[LOBES] == 0:
         call_c(late[LOAD], LOBES)
     if late[LOBES] == 0:  # interrupted
         return 0
-    call_address(late[LOBES], model, m, pose, ahead, low, count, counters, work)
-    return 0 if lobes[0, CELL] == UNLISTED else count
+    call_address(late[LOBES], model, m, frame, lift[0], lift[1], ahead, counters, work)
+    if lobes[0, CELL] == UNLISTED:
+        return 0
+    count = 0
+    while count < MAX_PATCHES and lobes[count, END] > 0.0:
+        count += 1
+    return count if count > 0 else -1
 
 
 @jit(allocates=False, fastmath=FUSED)
-def look_lobe_up(model, numbers, lobe, u, apart, t, slope, depth, yaw, modes, work):
-    """Look a lobe up, or only what is no coefficient of ``modes``; False if it is in no lattice."""
+def look_only_lobe_up(model, m, pose, ahead, log_depth, u, work):
+    """Look up the only lobe of a wheel; False if it is in no lattice."""
+    t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
+    return look_lobe_up(model, work.numbers[0], work.lobes[0], u, False, t, m.ez, log_depth, ahead * m.ex, True, work)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def look_lobe_up(model, numbers, lobe, u, apart, t, slope, log_depth, yaw, modes, work):
+    """Look a lobe with ln D up, or only what is no coefficient of ``modes``; False if it is in no lattice."""
     table = model.strips.table
-    cell, fx, fy, fz, gx, gy, gz, turn = locate(table, u, apart, t, slope, depth, yaw)
-    if cell == 0:
+    at = locate(table, u, apart, t, slope, log_depth, yaw)
+    if at.cell == 0:
         return False
-    weigh(fx, fy, fz, gx, gy, gz, turn, work.weights)
-    look_up(table.cells[cell], work.weights, numbers)
+    weigh(at, work.weights)
+    look_up(table.cells[at.cell], work.weights, numbers)
     if modes:
-        look_modes_up(table.cells[cell], work.weights, numbers)
-    lobe[NORMAL] = load_of(contact_modulus(model.shear_modulus, model.poisson_ratio), numbers, depth)
-    lobe[CELL] = cell
+        look_modes_up(table.cells[at.cell], work.weights, numbers)
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    lobe[NORMAL] = modulus * math.exp(numbers[columns.LOG_NORMAL] + 1.5 * log_depth)
+    lobe[CELL] = at.cell
     return True
 
 

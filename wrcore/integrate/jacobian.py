@@ -150,10 +150,22 @@ def new_jacobian(equations):
     """Blocks of zeros for a model's equations, which get the kernel of what patches change where these are ellipses."""
     _, model, work = equations.arguments
     jacobian = _empty_jacobian(model.value)
-    if differentiable.py_func(model.value.contact) != (model.value.slopes != 0):
-        slopes = 0 if model.value.slopes else Kernel(blocks_of_patches, jacobian, model, work, jacobian.columns).address
+    blocks = _blocks_by_hand(model.value.contact)
+    if (blocks is not None) != (model.value.slopes != 0):
+        slopes = Kernel(blocks, jacobian, model, work, jacobian.columns).address if blocks else 0
         model.lay(model.value._replace(slopes=slopes))
     return jacobian
+
+
+def _blocks_by_hand(contact):
+    """Kernel of what a contact model's patches change by, None where there is none."""
+    if differentiable.py_func(contact):
+        return blocks_of_patches
+    if not contact.strips.looked_up:
+        return None
+    from wrcore.dynamics.lobe_slopes import blocks_of_lobes
+
+    return blocks_of_lobes
 
 
 def _empty_jacobian(model):

@@ -193,7 +193,7 @@ class LoadedWheels:
             found = UNKNOWN
             if contact.value.strips.looked_up:
                 found = tabulated_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
-                                         self._counters, work.spare, self._work_handle)  # fmt: skip
+                                         self._counters, self._work_handle)  # fmt: skip
             if found.load < 0.0:
                 found = group_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
                                      self._counters, work.spare, self._work_handle)  # fmt: skip

@@ -49,9 +49,6 @@ NODES, NUMBERS, MODES = 48, 72, 24
 LOBE_COLUMNS = 10 + 2 * MAX_PATCHES
 """Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`."""
 
-KEPT_NUMBERS = 12 + 2 * NUMBERS
-"""Of a wheel with one lobe, while its place stays: see `wrcore.dynamics.tabulated_wheel`."""
-
 
 KERNEL, MODEL, ELLIPSES, LOBES, LOAD = range(5)
 """Addresses in `StripModel.late`."""
@@ -109,8 +106,11 @@ class StripWork(NamedTuple):
     numbers: np.ndarray
     weights: np.ndarray
     """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS) and (NODES,): of a patch that is looked up."""
-    kept: np.ndarray
-    """(wheelsets, 2, KEPT_NUMBERS): wheels of which one lobe is kept while their places stay."""
+    spread: np.ndarray
+    along: np.ndarray
+    rest: np.ndarray
+    lattice: np.ndarray
+    """(5, NODES), (4, NUMBERS), (8, 3) and (11, 4): of its slopes, see `wrcore.dynamics.lobe_slopes`."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -164,6 +164,6 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES),
-        np.zeros((wheelsets if model.looked_up else 0, 2, KEPT_NUMBERS)), normal,
+        np.zeros((5, NODES)), np.zeros((4, NUMBERS)), np.zeros((8, 3)), np.zeros((11, 4)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip

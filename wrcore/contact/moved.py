@@ -1,0 +1,262 @@
+"""What a patch by moments becomes when its wheel moves a little, without another search.
+
+The strips of an overlap are fixed in the wheel, and the gap g of one changes by the displacement of its point normal
+to the rail, dp_z - f' dp_y with the rail's slope f'; yaw moves the point along the strip's circle, too. So
+
+    dM_k = 2 sum of g dg u^k
+
+over the nodes from which the search has M_k, and the moved patch follows from the moved moments.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS, SCAN_STEP
+from wrcore.contact.reduction import (
+    BEYOND,
+    COSINE,
+    CURVATURE_Y,
+    GAUSS_POINTS,
+    GAUSS_WEIGHTS,
+    OUTSIDE,
+    PENETRATION,
+    U_RAIL,
+    U_WHEEL,
+    edge_by_newton,
+    patch_from_moments,
+)
+from wrcore.contact.scan import Grid, fine_cell_shift, fine_grid, gaps_of_eight, leaves_cells, make_window
+from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
+from wrcore.kernels import lanes
+from wrcore.kernels.jit import FUSED, jit
+
+ACROSS, UP, ROLL, YAW = range(4)
+MOVES = 4
+"""Moves of a wheel that move its patches."""
+
+FEWEST = 10
+"""Nodes in overlap that the search takes for its moments."""
+
+ROUNDING = 1e-6
+"""Of places among nodes, in steps."""
+
+
+class Nodes(NamedTuple):
+    """Strips at some nodes over an overlap."""
+
+    grid: Grid
+    u: float
+    ur: float
+    """Wheel coordinate of the first one, and where the cell below it begins on the rail, m."""
+    step: float
+    first: int
+    end: int
+    """Those that count, from the first one."""
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _put(sums, row, scale, square, across, up, rolled, yawed):
+    """Write a row of sums of g^2 and g dg."""
+    sums[row, 0], scale = scale * lanes.total(square), 2.0 * scale
+    sums[row, 1 + ACROSS], sums[row, 1 + UP] = scale * lanes.total(across), scale * lanes.total(up)
+    sums[row, 1 + ROLL], sums[row, 1 + YAW] = scale * lanes.total(rolled), scale * lanes.total(yawed)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _moment_slopes(geometry, pose, nodes, wheel, rail, sums):
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; returns the
+    number of nodes in overlap."""
+    grid, zero, reach = nodes.grid, lanes.lanes8(0.0), geometry.half_distance + nodes.u
+    begin, end = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end))
+    ahead, aside = pose.tilt * pose.q, nodes.ur + geometry.rail_distance - pose.side * pose.y
+    tilted = -pose.ey / (pose.q * pose.q * pose.q)
+    sink, along_y, along_z = -2.0 * tilted * pose.tilt, tilted * pose.side * pose.y_along, tilted * pose.z_along
+    m0 = m1 = m2 = y0 = y1 = y2 = z0 = z1 = z2 = r0 = r1 = r2 = w0 = w1 = w2 = zero
+    count = 0
+    for k in range(0, nodes.end, LANES):
+        node, cell, index = np.uint64(grid.node + k), np.uint64(grid.cell + k), float(k) + lanes.ramp8()
+        square, along = grid.tilt_square, lanes.load8(wheel, ALONG, node)
+        second, fourth = lanes.load8(wheel, DOWN_2, node), lanes.load8(wheel, DOWN_4, node)
+        down = square * (fourth + square * lanes.load8(wheel, DOWN_6, node))
+        down = lanes.load8(wheel, RADIUS, node) - square * (second + down)
+        d = grid.lateral + index * grid.lateral_rate + down * grid.y_down + along * grid.y_along
+        height = grid.height + index * grid.height_rate + down * grid.z_down + along * grid.z_along
+        c1, c2, c3 = lanes.load8(rail, 1, cell), lanes.load8(rail, 2, cell), lanes.load8(rail, 3, cell)
+        gap = height - (lanes.load8(rail, 0, cell) + d * (c1 + d * (c2 + d * c3)))
+        slope = c1 + d * (2.0 * c2 + d * (3.0 * c3))
+        lower = sink * (second + (2.0 * square) * fourth)
+        circled = lower * grid.z_down + along * along_z - slope * (lower * grid.y_down + along * along_y)
+        slope = pose.side * slope
+        gap = lanes.where_below(index, begin, zero, lanes.where_below(index, end, gap, zero))
+        gap = lanes.where_below(gap, zero, gap, zero)
+        count += lanes.count_bits(lanes.below(gap, zero))
+        px, py = ahead * along + (reach + nodes.step * index) * pose.ex, pose.side * (aside + nodes.step * index + d)
+        one = gap * index
+        two = one * index
+        across, rolled, yawed = zero - slope, py + slope * (height - pose.z), circled - slope * px
+        m0, m1, m2 = m0 + gap * gap, m1 + one * gap, m2 + two * gap
+        y0, y1, y2 = y0 + gap * across, y1 + one * across, y2 + two * across
+        z0, z1, z2 = z0 + gap, z1 + one, z2 + two
+        r0, r1, r2 = r0 + gap * rolled, r1 + one * rolled, r2 + two * rolled
+        w0, w1, w2 = w0 + gap * yawed, w1 + one * yawed, w2 + two * yawed
+    step = nodes.step
+    _put(sums, 0, step, m0, y0, z0, r0, w0)
+    _put(sums, 1, step * step, m1, y1, z1, r1, w1)
+    _put(sums, 2, step * step * step, m2, y2, z2, r2, w2)
+    return count
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _scan_nodes(geometry, pose, row):
+    """The scan's nodes over the overlap of a patch."""
+    grid, inverse = make_window(geometry, pose).grid, 1.0 / SCAN_STEP
+    start = geometry.scan_wheel_start + grid.node * SCAN_STEP
+    first = max(int((row[OUTSIDE] - start) * inverse + ROUNDING) + 1, 0)
+    end = min(int(math.ceil((row[BEYOND] - start) * inverse - ROUNDING)), geometry.scan_rail.shape[1])
+    skipped = first - first % LANES
+    moved = Grid(
+        grid.node + skipped, skipped, grid.lateral + skipped * grid.lateral_rate, grid.lateral_rate,
+        grid.height + skipped * grid.height_rate, grid.height_rate, grid.y_down, grid.y_along, grid.z_down,
+        grid.z_along, grid.tilt_square,
+    )  # fmt: skip
+    u, ur = start + skipped * SCAN_STEP, geometry.scan_rail_start + skipped * SCAN_STEP
+    return Nodes(moved, u, ur, SCAN_STEP, first - skipped, end - skipped)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _fine_nodes(geometry, pose, row):
+    """The wheel profile's own nodes there."""
+    shift, step = fine_cell_shift(geometry, row[U_WHEEL], row[U_RAIL]), geometry.wheel_step
+    grid, u, begin, end = fine_grid(geometry, pose, shift, row[OUTSIDE], row[BEYOND])
+    return Nodes(grid, u, geometry.rail_start + grid.cell * step, step, 0, end - begin)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def moved_axle(ex, ey, ez, move, turn):
+    """An axle's direction after a ``turn`` (rad) if the ``move`` is one."""
+    if move == ROLL:
+        return ex, ey - turn * ez, ez + turn * ey
+    if move == YAW:
+        return ex - turn * ey, ey + turn * ex, ez
+    return ex, ey, ez
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _narrow(geometry, pose, row):
+    """Middle and half width of an overlap that holds few nodes; NaN where its edges are not found."""
+    width = row[COSINE] * math.sqrt(row[PENETRATION] / row[CURVATURE_Y])
+    low = edge_by_newton(geometry, pose, row[U_WHEEL] - width, row[OUTSIDE], row[BEYOND])
+    high = edge_by_newton(geometry, pose, row[U_WHEEL] + width, row[OUTSIDE], row[BEYOND])
+    return 0.5 * (low + high), 0.5 * (high - low)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _narrow_slopes(geometry, pose, row, sums):
+    """As `_moment_slopes`, of an overlap that holds few nodes, by Gauss's points between its edges; returns where its
+    middle is, NaN without."""
+    (place, width), tilted = _narrow(geometry, pose, row), -pose.ey / (pose.q * pose.q * pose.q)
+    if not width > 0.0:
+        return math.nan
+    sums[:] = 0.0
+    for i in range(len(GAUSS_POINTS)):
+        e = width * GAUSS_POINTS[i]
+        ur, height, radius, bend, _, along = strip_point(geometry, pose, place + e)
+        f, slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+        lower = -bend * along / math.sqrt(1.0 - along * along)
+        circled = lower * pose.z_down + bend * pose.z_along
+        circled = tilted * radius * (circled - slope * pose.side * (lower * pose.y_down + bend * pose.y_along))
+        gap, slope = min(height - f, 0.0), pose.side * slope
+        px = radius * along * pose.q + (geometry.half_distance + place + e) * pose.ex
+        py, share = pose.side * (ur + geometry.rail_distance) - pose.y, 2.0 * gap * width * GAUSS_WEIGHTS[i]
+        for n in range(3):
+            sums[n, 0] += 0.5 * share * gap
+            sums[n, 1 + ACROSS] -= share * slope
+            sums[n, 1 + UP] += share
+            sums[n, 1 + ROLL] += share * (py + slope * (height - pose.z))
+            sums[n, 1 + YAW] += share * (circled - slope * px)
+            share *= e
+    return place
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _moments(nodes, wheel, rail):
+    """Number of nodes in overlap, M0, and M1 / M0 about the first node."""
+    begin, end, zero = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end)), lanes.lanes8(0.0)
+    m0, m1, count = zero, zero, 0
+    for k in range(0, nodes.end, LANES):
+        index, gap = float(k) + lanes.ramp8(), gaps_of_eight(nodes.grid, wheel, rail, k)
+        gap = lanes.where_below(index, begin, zero, lanes.where_below(index, end, gap, zero))
+        gap = lanes.where_below(gap, zero, gap, zero)
+        count += lanes.count_bits(lanes.below(gap, zero))
+        m0, m1 = m0 + gap * gap, m1 + gap * gap * index
+    square = lanes.total(m0)
+    return count, square * nodes.step, nodes.step * lanes.total(m1) / square
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _looked_up(geometry, pose, nodes):
+    """The same where strips leave their rail cells."""
+    m0, m1, count = 0.0, 0.0, 0
+    for k in range(nodes.first, nodes.end):
+        gap = gap_at(geometry, pose, nodes.u + k * nodes.step)[0]
+        if gap < 0.0:
+            m0, m1, count = m0 + gap * gap, m1 + gap * gap * k, count + 1
+    return count, m0 * nodes.step, nodes.step * m1 / m0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def overlap_at(geometry, pose, row):
+    """M0 (m^3) of the overlap of a ``row``, found by moments at a pose nearby, at this ``pose``, and its place on the
+    wheel's profile, m; M0 is 0 without overlap."""
+    nodes = _scan_nodes(geometry, pose, row)
+    if leaves_cells(pose):
+        count, square, place = _looked_up(geometry, pose, nodes)
+    else:
+        count, square, place = _moments(nodes, geometry.scan_wheel, geometry.scan_rail)
+        if count < FEWEST:
+            nodes = _fine_nodes(geometry, pose, row)
+            count, square, place = _moments(nodes, geometry.fine_wheel, geometry.fine_rail)
+    if count >= FEWEST:
+        return square, nodes.u + place
+    (place, width), square, moment = _narrow(geometry, pose, row), 0.0, 0.0
+    if not width > 0.0:
+        return 0.0, row[U_WHEEL]
+    for i in range(len(GAUSS_POINTS)):
+        e = width * GAUSS_POINTS[i]
+        gap = min(gap_at(geometry, pose, place + e)[0], 0.0)
+        share = width * GAUSS_WEIGHTS[i] * gap * gap
+        square, moment = square + share, moment + share * e
+    return square, place + (moment / square if square > 0.0 else 0.0)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def move_patch(geometry, pose, difference, row, patch, sums, moved):
+    """Fill ``moved[0, patch]`` with a ``row``, found by moments and spatially, and ``moved[1 + k, patch]`` with what it
+    is after each move by a ``difference`` (m, rad); False where only a search tells. ``sums`` (3, 1 + MOVES) is
+    scratch."""
+    if leaves_cells(pose):
+        return False
+    nodes = _scan_nodes(geometry, pose, row)
+    middle = nodes.u
+    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) < FEWEST:
+        nodes = _fine_nodes(geometry, pose, row)
+        middle = nodes.u
+        if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) < FEWEST:
+            middle = _narrow_slopes(geometry, pose, row, sums)
+            if math.isnan(middle):
+                return False
+    if not patch_from_moments(geometry, pose, middle, sums[0, 0], sums[1, 0], sums[2, 0], moved[0, patch]):
+        return False
+    for k in range(MOVES):
+        m0, m1 = sums[0, 0] + difference * sums[0, 1 + k], sums[1, 0] + difference * sums[1, 1 + k]
+        m2, (ex, ey, ez) = (
+            sums[2, 0] + difference * sums[2, 1 + k],
+            moved_axle(pose.ex, pose.ey, pose.ez, k, difference),
+        )
+        y, z = pose.y + (difference if k == ACROSS else 0.0), pose.z + (difference if k == UP else 0.0)
+        there = make_pose(pose.side, y, z, ex, ey, ez, True)
+        if not patch_from_moments(geometry, there, middle, m0, m1, m2, moved[1 + k, patch]):
+            return False
+    return True

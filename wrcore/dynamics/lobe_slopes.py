@@ -1,0 +1,330 @@
+"""What the wrench on a wheel changes by its pose and velocity where its patch is one lobe, looked up.
+
+All is chain rule: over the pose by moved patches (:mod:`wrcore.contact.moved`), of the wheel and of the wheel that the
+damping lifts; along the lattice (:mod:`wrcore.dynamics.table_slopes`); over the creepages. Only the creep table is
+differenced. What the damping lifts the wheel by changes with its approach speed, and so with all velocities.
+"""
+
+import math
+
+import numpy as np
+
+from wrcore.contact import reduction
+from wrcore.contact.creepage import creepages
+from wrcore.contact.detection import SPATIAL
+from wrcore.contact.moved import ACROSS, MOVES, ROLL, UP, YAW, move_patch
+from wrcore.contact.normal import contact_modulus
+from wrcore.contact.patch.gap import Frame, frame_of_rows, group_end
+from wrcore.contact.strip import changes_along, make_pose
+from wrcore.creep.kalker import coefficients_at
+from wrcore.dynamics.contact_blocks import MOVING, UNCOUNTED, add_slope
+from wrcore.dynamics.contact_slopes import (
+    SLOPES,
+    TABLE,
+    add_wrench_slope,
+    law_slopes,
+    slip_slope,
+    slope_of_falling,
+)
+from wrcore.dynamics.motion import as_left, motion_of
+from wrcore.dynamics.pair_table import (
+    ANGLE,
+    APART,
+    FAR,
+    FIRST,
+    LOCKED,
+    LOG_A,
+    LOG_B,
+    LOG_NORMAL,
+    MODE,
+    PLACE_X,
+    PLACE_Y,
+    PLACE_Z,
+    SADDLE,
+    SLOPE_ETA,
+    SLOPE_XI,
+    STEPS,
+    Slip,
+    base_force,
+    depth_of,
+    lobe_end,
+    locate,
+    log_depth_at,
+    of_two,
+)
+from wrcore.dynamics.strip_wheel import deepest_place, lift_of_overlaps, lift_share
+from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes, weigh_slopes
+from wrcore.dynamics.wheel import contact_of, detect_patches, falling
+from wrcore.kernels.jit import FUSED, jit
+
+DIFFERENCE, SMALL, SMALL_SLIP = 1e-8, 1e-6, 1e-8
+"""Differences of the pose (m, rad); of velocities, where the lift's slope is wanted (m/s, rad/s), and of ln(a/b); and
+of velocities over V where two ellipses are differenced."""
+
+T, TILT, DEPTH, TURN = range(AXES)
+
+BASE = 3 + AXES
+"""Row of what remains where the base force is."""
+
+MIRRORED = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+"""Signs of the directions of the slopes on a right wheel, the mirror image of a left one."""
+
+
+@jit(allocates=False)
+def blocks_of_lobes(jacobian, model, work, columns):
+    """`contact_blocks` by the slopes of lobes; wheels with others are `UNCOUNTED` in ``jacobian.counts``."""
+    base, slopes = jacobian.motions, jacobian.slopes
+    for k in range(base.shape[0]):
+        for wheel in range(2):
+            contact, seen = contact_of(model.contact, k, wheel), motion_of(base[k, wheel])
+            slopes[:], jacobian.counts[k, wheel] = 0.0, 0
+            if not lobe_slopes(
+                contact, as_left(seen), jacobian.patches[:, k, wheel], jacobian.law, slopes, work.strips
+            ):
+                jacobian.counts[k, wheel] = UNCOUNTED
+                continue
+            for j in range(SLOPES):
+                if seen.side < 0.0:
+                    for i in range(6):
+                        slopes[j, i] *= MIRRORED[j] * (-1.0 if i % 2 else 1.0)
+                add_slope(jacobian, k, wheel, MOVING[j] if j < MOVES else j + 2, slopes[j], columns[k])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def lobe_slopes(model, m, found, scratch, out, work):
+    """Fill ``out`` (SLOPES, 6) with the slopes of a left wheel's wrench about the wheelset's centre; False where its
+    patch is not one lobe that the table has. ``found`` (1 + MOVES, MAX_PATCHES, PATCH_COLUMNS) and ``scratch`` (8, 1 +
+    MOVES) are overwritten."""
+    geometry, half, rows, table = model.geometry, model.geometry.half_distance, found[0], model.strips.table
+    if model.detection != SPATIAL or changes_along(geometry):
+        return False
+    count, _, _ = detect_patches(model, m, rows)
+    if count == 0:
+        return True
+    if group_end(geometry, rows, count, 0) < count:
+        return False
+    pose, ahead = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True), -1.0 if m.vx < 0.0 else 1.0
+    for patch in range(count):
+        if not move_patch(geometry, pose, DIFFERENCE, rows[patch], patch, scratch, found):
+            return False
+    frame = frame_of_rows(rows, 0, count)
+    lift, depth, _, _, _ = lift_of_overlaps(model, m, pose, frame, rows, 0, count, work.out)
+    if lift >= depth:
+        return True
+    _lift_slopes(model, m, pose, frame, found, count, work)
+    pose = make_pose(1.0, m.y - lift * frame.sine, m.z + lift * frame.cosine, m.ex, m.ey, m.ez, True)
+    if lobe_end(geometry, pose, rows, 0, count, (APART, FAR, SADDLE)) < count:
+        return False
+    log_depth, u = log_depth_at(geometry, pose, rows, 0, count)
+    if log_depth == -math.inf:
+        return True
+    for patch in range(count):
+        if not move_patch(geometry, pose, DIFFERENCE, rows[patch], patch, scratch, found):
+            return False
+    _along_lattice(m, half, found, count, ahead, work.lattice)
+    at = locate(table, u, False, pose.y + half * m.ey - geometry.rail_distance, m.ez, log_depth, ahead * m.ex)
+    if at.cell == 0:
+        return False
+    weigh_slopes(at, work.spread)
+    look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
+    if at.scale * (log_depth - FIRST[2]) < STEPS[2]:  # looked up at the least depth
+        work.along[DEPTH] = 0.0
+    _force_slopes(model, m, log_depth, ahead, scratch[3:, :3], out, work)
+    return True
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _approach(model, m, pose, frame, depth):
+    """How fast a patch of a ``depth`` gets deeper, m/s, and where it is from the wheelset's centre."""
+    px, py, pz = deepest_place(model, m, pose, frame, depth)
+    _, _, _, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, 1.0)
+    return approach, px, py, pz
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _lift_slopes(model, m, pose, frame, found, count, work):
+    """Fill the columns T and DEPTH of ``work.lattice`` (SLOPES, AXES) with what y and z of the lifted wheel's centre
+    change by, for patches and moved patches ``found`` of the wheel as it is."""
+    rates, deepest = work.lattice, 0
+    for patch in range(count):
+        if found[0, patch, reduction.PENETRATION] > found[0, deepest, reduction.PENETRATION]:
+            deepest = patch
+    depth, cosine, sine = found[0, deepest, reduction.PENETRATION], frame.cosine, frame.sine
+    approach, px, py, pz = _approach(model, m, pose, frame, depth)
+    share = lift_share(model, approach)
+    rate = (lift_share(model, approach + SMALL) - share) / SMALL
+    for k in range(MOVES):
+        its, deeper = frame_of_rows(found[1 + k], 0, count), found[1 + k, deepest, reduction.PENETRATION]
+        across, up = (DIFFERENCE if k == ACROSS else 0.0), (DIFFERENCE if k == UP else 0.0)
+        moved = Frame(its.cosine, its.sine, its.x, its.ur - across, its.z - up, its.u)  # from where the centre was
+        faster, _, _, _ = _approach(model, m, pose, moved, deeper)
+        lift = (share + rate * (faster - approach)) * deeper
+        rates[k, T] = (across - (lift * its.sine - share * depth * sine)) / DIFFERENCE
+        rates[k, DEPTH] = (up + lift * its.cosine - share * depth * cosine) / DIFFERENCE
+    rate *= depth
+    _put_lift(rates[MOVES], 0.0, cosine, sine)
+    _put_lift(rates[MOVES + 1], rate * sine, cosine, sine)
+    _put_lift(rates[MOVES + 2], -rate * cosine, cosine, sine)
+    _put_lift(rates[MOVES + 3], -rate * (pz * sine + py * cosine), cosine, sine)
+    _put_lift(rates[MOVES + 4], rate * px * cosine, cosine, sine)
+    _put_lift(rates[MOVES + 5], rate * px * sine, cosine, sine)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _put_lift(rates, lift, cosine, sine):
+    """Write what a lift moves."""
+    rates[T], rates[DEPTH] = -lift * sine, lift * cosine
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _turned(m, j):
+    """What the axle's direction changes by in a direction."""
+    if j == ROLL:
+        return 0.0, -m.ez, m.ey
+    if j == YAW:
+        return -m.ey, m.ex, 0.0
+    return 0.0, 0.0, 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _along_lattice(m, half, found, count, ahead, rates):
+    """Turn the ``rates`` of `_lift_slopes` into those of a lobe's place on the lattice, for moved overlaps ``found`` of
+    the lifted wheel."""
+    deeper, (depth, _) = rates[SLOPES], depth_of(found[0], 0, count)
+    for k in range(MOVES):
+        deeper[k] = (depth_of(found[1 + k], 0, count)[0] / depth - 1.0) / DIFFERENCE
+    for j in range(SLOPES):
+        own, (ex, ey, ez) = rates[j], _turned(m, j)
+        across, up = own[T], own[DEPTH]
+        own[T], own[TILT], own[TURN] = across + half * ey, ez, ahead * ex
+        own[DEPTH] = deeper[ACROSS] * across + deeper[UP] * up + (deeper[j] if j == ROLL or j == YAW else 0.0)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _sum_along(along, column, rates):
+    """What a number changes by, from what the places on the lattice's axes do."""
+    return (
+        along[T, column] * rates[T] + along[TILT, column] * rates[TILT] + along[DEPTH, column] * rates[DEPTH]
+        + along[TURN, column] * rates[TURN]
+    )  # fmt: skip
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _sum_axes(rest, k, rates):
+    """The same of the remainder, see `remainder_slopes`."""
+    return (
+        rest[3 + T, k] * rates[T] + rest[3 + TILT, k] * rates[TILT] + rest[3 + DEPTH, k] * rates[DEPTH]
+        + rest[3 + TURN, k] * rates[TURN]
+    )  # fmt: skip
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _difference_two(model, numbers, slip, args, own, rates, d_args, step, work):
+    """What two ellipses' creep force (`base_force`) changes by in a direction, by a ``step`` in it. ``own``: what the
+    place on the lattice changes by; ``rates``, ``d_args``: what the ``slip`` does, and ``args``, both creepages and
+    ln(mu N)."""
+    moved, along, base = work.numbers[1], work.along, work.rest
+    for column in range(MODE):
+        moved[column] = numbers[column] + step * _sum_along(along, column, own)
+    there = Slip(
+        slip.xi + step * rates.xi, slip.eta + step * rates.eta, slip.phi + step * rates.phi, slip.vy + step * rates.vy,
+        slip.vz + step * rates.vz, slip.wx + step * rates.wx, slip.wy + step * rates.wy, slip.wz + step * rates.wz,
+    )  # fmt: skip
+    f1, f2, m3, _, _ = base_force(
+        model, moved, there, args[0] + step * d_args[0], args[1] + step * d_args[1], args[2] * (1.0 + step * d_args[2])
+    )
+    return (f1 - base[BASE, 0]) / step, (f2 - base[BASE, 1]) / step, (m3 - base[BASE, 2]) / step
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _force_slopes(model, m, log_depth, ahead, law, out, work):
+    """Fill ``out`` with what the rates in ``work.lattice`` and those of the wheel's motion change of the wrench; see
+    `roll_lobe` and `tabulated_force`. ``law`` (5, 3) is scratch."""
+    numbers, along, rest, half = work.numbers[0], work.along, work.rest, model.geometry.half_distance
+    radius, angle, log_g = model.geometry.rolling_radius, numbers[ANGLE], numbers[LOG_A] - numbers[LOG_B]
+    cosine, sine, square = math.cos(angle), math.sin(angle), math.exp(numbers[LOG_A] + numbers[LOG_B])
+    modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
+    normal = modulus * math.exp(numbers[LOG_NORMAL] + 1.5 * log_depth)
+    px = ahead * numbers[PLACE_X] + half * m.ex
+    py, pz = numbers[PLACE_Y] + half * m.ey, numbers[PLACE_Z] + half * m.ez - radius
+    speed = max(abs(m.vx), model.least_speed)
+    slow, rolling = 1.0 / speed, (math.copysign(1.0, m.vx) if abs(m.vx) > model.least_speed else 0.0)
+    xi, eta, phi, _ = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, cosine, sine, speed)
+    uy, uz = m.vy + m.wz * px - m.wx * pz, m.vz + m.wx * py - m.wy * px
+    limit = falling(model, m.friction, xi, eta, speed) * normal
+    fall = slope_of_falling(model, m.friction, xi, eta, speed)
+    part = (ahead * m.wy * radius * slow - 1.0) / LOCKED
+    left = max(0.0, 1.0 - part * part)
+    fade, more_xi, more_eta = left * left, numbers[SLOPE_XI] - 1.0, numbers[SLOPE_ETA] - 1.0
+    slip = Slip(
+        ahead * xi, eta, ahead * phi, slow * uy, slow * uz, slow * m.wx, ahead * slow * m.wy, ahead * slow * m.wz
+    )  # fmt: skip
+    one, other = (1.0 + fade * more_xi) * slip.xi, (1.0 + fade * more_eta) * eta
+    c, scale = math.sqrt(square), model.shear_modulus * square / limit
+    x1, x2, x3, two = one * scale, other * scale, slip.phi * scale * c, of_two(numbers) > 0.0
+    if two:
+        law[0, 0], law[0, 1], law[0, 2], _, _ = base_force(model, numbers, slip, one, other, limit)
+    else:
+        law_slopes(TABLE, model.creep, log_g, math.exp(log_g), (x1, x2, x3), law)
+    c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
+    c11_more, c22_more, _, _ = coefficients_at(log_g + SMALL, model.creep.table.kalker)
+    remainder_slopes(model.strips.table.modes, numbers, along, x1 * c11 / 3.0, x2 * c22 / 3.0, rest)
+    for k in range(3):
+        rest[BASE, k] = law[0, k]
+    fx, fy, mz = law[0, 0] + fade * rest[0, 0], law[0, 1] + fade * rest[0, 1], law[0, 2] + fade * rest[0, 2]
+    bound = 1.0 / max(math.sqrt(fx * fx + fy * fy), 1.0)
+    fx, fy = bound * fx, bound * fy
+    f1, f2, m3 = ahead * limit * fx, limit * fy, ahead * limit * c * mz
+    for j in range(SLOPES):
+        own, (ex, ey, ez) = work.lattice[j], _turned(m, j)
+        dp = (
+            ahead * _sum_along(along, PLACE_X, own) + half * ex, _sum_along(along, PLACE_Y, own) + half * ey,
+            _sum_along(along, PLACE_Z, own) + half * ez,
+        )  # fmt: skip
+        turned = _sum_along(along, ANGLE, own)
+        d = slip_slope(
+            m, j, (px, py, pz), dp, (cosine, sine), (-sine * turned, cosine * turned), (xi, eta, phi, uy, uz), slow,
+            rolling,
+        )  # fmt: skip
+        da, db = _sum_along(along, LOG_A, own), _sum_along(along, LOG_B, own)
+        wider, rounder = da + db, da - db
+        harder = _sum_along(along, LOG_NORMAL, own) + 1.5 * own[DEPTH]
+        d_limit = harder + fall * (slow * (xi * xi + eta * eta) * d.speed + xi * d.xi + eta * d.eta)
+        locked = ahead * radius * slow * ((1.0 if j == MOVES + 4 else 0.0) - m.wy * slow * d.speed) / LOCKED
+        faded = -4.0 * left * part * locked
+        d_one = (1.0 + fade * more_xi) * ahead * d.xi
+        d_one += slip.xi * (faded * more_xi + fade * _sum_along(along, SLOPE_XI, own))
+        d_other = (1.0 + fade * more_eta) * d.eta + eta * (faded * more_eta + fade * _sum_along(along, SLOPE_ETA, own))
+        dx1, dx2 = d_one * scale + x1 * (wider - d_limit), d_other * scale + x2 * (wider - d_limit)
+        if two:
+            rates = Slip(
+                ahead * d.xi, d.eta, ahead * d.phi,
+                slow * (d.uy - slip.vy * d.speed), slow * (d.uz - slip.vz * d.speed),
+                slow * ((1.0 if j == MOVES + 3 else 0.0) - slip.wx * d.speed),
+                slow * (ahead * (1.0 if j == MOVES + 4 else 0.0) - slip.wy * d.speed),
+                slow * (ahead * (1.0 if j == MOVES + 5 else 0.0) - slip.wz * d.speed),
+            )  # fmt: skip
+            d1, d2, d3 = _difference_two(
+                model, numbers, slip, (one, other, limit), own, rates, (d_one, d_other, d_limit),
+                DIFFERENCE if j < MOVES else SMALL_SLIP * speed, work,
+            )  # fmt: skip
+        else:
+            dx3 = ahead * d.phi * scale * c + x3 * (1.5 * wider - d_limit)
+            d1 = law[1, 0] * rounder + law[2, 0] * dx1 + law[3, 0] * dx2 + law[4, 0] * dx3
+            d2 = law[1, 1] * rounder + law[2, 1] * dx1 + law[3, 1] * dx2 + law[4, 1] * dx3
+            d3 = law[1, 2] * rounder + law[2, 2] * dx1 + law[3, 2] * dx2 + law[4, 2] * dx3
+        dx = (dx1 * c11 + x1 * rounder * (c11_more - c11) / SMALL) / 3.0
+        dy = (dx2 * c22 + x2 * rounder * (c22_more - c22) / SMALL) / 3.0
+        d1 += faded * rest[0, 0] + fade * (rest[1, 0] * dx + rest[2, 0] * dy + _sum_axes(rest, 0, own))
+        d2 += faded * rest[0, 1] + fade * (rest[1, 1] * dx + rest[2, 1] * dy + _sum_axes(rest, 1, own))
+        d3 += faded * rest[0, 2] + fade * (rest[1, 2] * dx + rest[2, 2] * dy + _sum_axes(rest, 2, own))
+        if bound < 1.0:
+            across = fx * d1 + fy * d2
+            d1, d2 = bound * (d1 - across * fx), bound * (d2 - across * fy)
+        add_wrench_slope(
+            (px, py, pz), dp, (cosine, sine), (-sine * turned, cosine * turned), (f1, f2, normal, m3),
+            (
+                ahead * limit * (d1 + fx * d_limit), limit * (d2 + fy * d_limit), normal * harder,
+                ahead * limit * c * (d3 + mz * (d_limit + 0.5 * wider)),
+            ), out[j],
+        )  # fmt: skip
