@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrcore.contact.detection import find_patches
-from wrcore.contact.moved import ACROSS, MOVES, UP, move_patch, moved_axle, overlap_at
+from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, UP, move_patch, moved_axle, overlap_at
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -22,7 +22,7 @@ from wrcore.contact.reduction import (
 from wrcore.contact.strip import make_pose
 from wrcore.kernels.jit import jit
 
-DIFFERENCE, COUNT = 1e-8, 300
+SEARCHED, COUNT = 1e-8, 300
 COLUMNS = U_WHEEL, X, Y, Z, COSINE, SINE, PENETRATION, CURVATURE_X, CURVATURE_Y
 
 
@@ -35,7 +35,7 @@ def search(geometry, side, y, z, ex, ey, ez, rows):
 def move(geometry, side, y, z, ex, ey, ez, rows, count, sums, moved):
     pose, known = make_pose(side, y, z, side * ex, side * ey, side * ez, True), 0
     for patch in range(count):
-        known += move_patch(geometry, pose, DIFFERENCE, rows[patch], patch, sums, moved)
+        known += move_patch(geometry, pose, rows[patch], patch, sums, moved)
     return known
 
 
@@ -69,13 +69,13 @@ def test_moved_patches_are_those_of_a_search(benchmark_pair, poses):
         known += 1
         np.testing.assert_allclose(moved[0, :count][:, COLUMNS], rows[:count][:, COLUMNS], rtol=2e-3, atol=1e-6)
         for k in range(MOVES):
-            other, across, up = np.zeros_like(rows), DIFFERENCE * (k == ACROSS), DIFFERENCE * (k == UP)
-            turned = moved_axle(*axle, k, DIFFERENCE)
+            other, across, up = np.zeros_like(rows), SEARCHED * (k == ACROSS), SEARCHED * (k == UP)
+            turned = moved_axle(*axle, k, SEARCHED)
             if search(benchmark_pair, side, y + across, z + up, *turned, other) != count:
                 continue
             for patch in range(count):
                 slope = (moved[1 + k, patch] - moved[0, patch])[list(COLUMNS)] / DIFFERENCE
-                expected = (other[patch] - rows[patch])[list(COLUMNS)] / DIFFERENCE
+                expected = (other[patch] - rows[patch])[list(COLUMNS)] / SEARCHED
                 sizes = np.array([1.0, 1.0, 1.0, 1.0, 30.0, 30.0, 0.5, 30.0, 1e5])
                 errors.append(abs(slope - expected) / (abs(expected) + sizes))
     assert known > 0.98 * COUNT

@@ -566,7 +566,7 @@ def test_within_a_step_wrenches_are_those_of_outputs(y):
     assert whole.work.counts.sum() >= 2 and whole.work.rail_wrenches.any()
     for name in ("rail_wrenches", "counts"):
         np.testing.assert_array_equal(getattr(bare.work, name), getattr(whole.work, name))
-    assert whole.work.patches[..., reduction.SEMI_A].any() and not bare.work.patches[..., reduction.SEMI_A].any()
+    assert whole.work.patches[..., reduction.P_MAX].any() and not bare.work.patches[..., reduction.P_MAX].any()
 
 
 def shipped_pair(**changes):

@@ -36,6 +36,9 @@ ACROSS, UP, ROLL, YAW = range(4)
 MOVES = 4
 """Moves of a wheel that move its patches."""
 
+DIFFERENCE = 1e-9
+"""Of moves, m and rad: no search rounds what they lead to."""
+
 FEWEST = 10
 """Nodes in overlap that the search takes for its moments."""
 
@@ -232,10 +235,9 @@ def overlap_at(geometry, pose, row):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def move_patch(geometry, pose, difference, row, patch, sums, moved):
+def move_patch(geometry, pose, row, patch, sums, moved):
     """Fill ``moved[0, patch]`` with a ``row``, found by moments and spatially, and ``moved[1 + k, patch]`` with what it
-    is after each move by a ``difference`` (m, rad); False where only a search tells. ``sums`` (3, 1 + MOVES) is
-    scratch."""
+    is after each move by `DIFFERENCE`; False where only a search tells. ``sums`` (3, 1 + MOVES) is scratch."""
     if leaves_cells(pose):
         return False
     nodes = _scan_nodes(geometry, pose, row)
@@ -250,12 +252,12 @@ def move_patch(geometry, pose, difference, row, patch, sums, moved):
     if not patch_from_moments(geometry, pose, middle, sums[0, 0], sums[1, 0], sums[2, 0], moved[0, patch]):
         return False
     for k in range(MOVES):
-        m0, m1 = sums[0, 0] + difference * sums[0, 1 + k], sums[1, 0] + difference * sums[1, 1 + k]
+        m0, m1 = sums[0, 0] + DIFFERENCE * sums[0, 1 + k], sums[1, 0] + DIFFERENCE * sums[1, 1 + k]
         m2, (ex, ey, ez) = (
-            sums[2, 0] + difference * sums[2, 1 + k],
-            moved_axle(pose.ex, pose.ey, pose.ez, k, difference),
+            sums[2, 0] + DIFFERENCE * sums[2, 1 + k],
+            moved_axle(pose.ex, pose.ey, pose.ez, k, DIFFERENCE),
         )
-        y, z = pose.y + (difference if k == ACROSS else 0.0), pose.z + (difference if k == UP else 0.0)
+        y, z = pose.y + (DIFFERENCE if k == ACROSS else 0.0), pose.z + (DIFFERENCE if k == UP else 0.0)
         there = make_pose(pose.side, y, z, ex, ey, ez, True)
         if not patch_from_moments(geometry, there, middle, m0, m1, m2, moved[1 + k, patch]):
             return False

@@ -13,7 +13,7 @@ import math
 
 from wrcore.contact import reduction
 from wrcore.contact.detection import SPATIAL
-from wrcore.contact.moved import MOVES, move_patch
+from wrcore.contact.moved import DIFFERENCE, MOVES, move_patch
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE, rotation_matrix
 from wrcore.dynamics.contact_slopes import SAME, SLOPES, patch_slopes
@@ -166,8 +166,8 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
 @jit(allocates=False)
 def blocks_of_patches(jacobian, model, work, columns):
     """`contact_blocks` by the slopes of ellipses; ``jacobian.counts`` are `UNCOUNTED` where these are not enough."""
-    base = jacobian.motions
-    if not _move_patches(jacobian, model, work):
+    base, difference = jacobian.motions, _move_patches(jacobian, model, work)
+    if difference == 0.0:
         jacobian.counts[:] = UNCOUNTED
         return
     slopes = jacobian.slopes
@@ -176,7 +176,7 @@ def blocks_of_patches(jacobian, model, work, columns):
             slopes[:], m, found = 0.0, motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
             for patch in range(jacobian.counts[k, wheel]):
                 patch_slopes(
-                    contact_of(model.contact, k, wheel), m, found[0, patch], found, patch, (DISPLACEMENT, TURN),
+                    contact_of(model.contact, k, wheel), m, found[0, patch], found, patch, difference,
                     jacobian.law, slopes,
                 )  # fmt: skip
             for j in range(SLOPES):
@@ -186,8 +186,8 @@ def blocks_of_patches(jacobian, model, work, columns):
 
 @jit(allocates=False)
 def _move_patches(jacobian, model, work):
-    """Fill ``jacobian.patches`` with all patches as they are and after differences of the pose; False where a
-    difference makes others of them."""
+    """Fill ``jacobian.patches`` with all patches as they are and after differences of the pose; returns the difference
+    (m, rad), 0 where it makes others of them."""
     base, found = jacobian.motions, jacobian.patches
     press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
     known = model.contact.reduction == reduction.MOMENT and model.contact.detection == SPATIAL
@@ -199,20 +199,21 @@ def _move_patches(jacobian, model, work):
             for patch in range(work.counts[k, wheel]):
                 row, moved = found[0, k, wheel, patch], found[:, k, wheel]
                 copy_into(row, work.patches[k, wheel, patch])
-                known = known and move_patch(geometry, pose, DISPLACEMENT, row, patch, jacobian.law[:3], moved)
-    return known or _search_moved(jacobian, model, work)
+                known = known and move_patch(geometry, pose, row, patch, jacobian.law[:3], moved)
+    if known:
+        return DIFFERENCE
+    return DISPLACEMENT if _search_moved(jacobian, model, work) else 0.0
 
 
 @jit(allocates=False)
 def _search_moved(jacobian, model, work):
-    """`_move_patches` by searches."""
+    """The same by searches; False where a difference makes other patches."""
     base, found = jacobian.motions, jacobian.patches
     for move in range(MOVES):
         direction = MOVING[move]
         for k in range(base.shape[0]):
             for wheel in range(2):
-                difference = DISPLACEMENT if direction < 3 else TURN
-                _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
+                _moved(base[k, wheel], direction, DISPLACEMENT, work.motions[k, wheel])
         press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
         for k in range(base.shape[0]):
             for wheel in range(2):

@@ -145,11 +145,11 @@ def _shape_slopes(contact, penetration, A, B, approach, table):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def patch_slopes(contact, m, row, moved, patch, steps, scratch, out):
+def patch_slopes(contact, m, row, moved, patch, difference, scratch, out):
     """Add the slopes of one patch's wrench about the wheelset's centre to ``out`` (SLOPES, 6).
 
-    ``row`` is the patch as it was found, ``moved[1 + k, patch]`` the same after a difference of the pose, of
-    displacement or turn in ``steps``; ``scratch`` (8, 4 or more).
+    ``row`` is the patch as it was found, ``moved[1 + k, patch]`` the same after a ``difference`` of the pose (m, rad);
+    ``scratch`` (8, 4 or more).
     """
     px, py, pz = row[reduction.X], row[reduction.Y] - m.y, row[reduction.Z] - m.z
     cosine, sine, depth = row[reduction.COSINE], row[reduction.SINE], row[reduction.PENETRATION]
@@ -174,7 +174,7 @@ def patch_slopes(contact, m, row, moved, patch, steps, scratch, out):
     for j in range(SLOPES):
         dpx = dpy = dpz = dcosine = dsine = ddepth = dA = dB = 0.0
         if j < MOVES:
-            new, inverse = moved[1 + j, patch], 1.0 / steps[j // 2]
+            new, inverse = moved[1 + j, patch], 1.0 / difference
             dpx = (new[reduction.X] - row[reduction.X]) * inverse
             dpy = (new[reduction.Y] - row[reduction.Y]) * inverse - (1.0 if j == 0 else 0.0)
             dpz = (new[reduction.Z] - row[reduction.Z]) * inverse - (1.0 if j == 1 else 0.0)

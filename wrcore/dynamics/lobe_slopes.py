@@ -12,7 +12,7 @@ import numpy as np
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL
-from wrcore.contact.moved import ACROSS, MOVES, ROLL, UP, YAW, move_patch
+from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, move_patch
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch.gap import Frame, frame_of_rows, group_end
 from wrcore.contact.strip import changes_along, make_pose
@@ -57,9 +57,9 @@ from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes,
 from wrcore.dynamics.wheel import contact_of, detect_patches, falling
 from wrcore.kernels.jit import FUSED, jit
 
-DIFFERENCE, SMALL, SMALL_SLIP = 1e-8, 1e-6, 1e-8
-"""Differences of the pose (m, rad); of velocities, where the lift's slope is wanted (m/s, rad/s), and of ln(a/b); and
-of velocities over V where two ellipses are differenced."""
+SMALL, SMALL_SLIP = 1e-6, 1e-8
+"""Differences of velocities, where the lift's slope is wanted (m/s, rad/s), and of ln(a/b); and of velocities over V
+where two ellipses are differenced."""
 
 T, TILT, DEPTH, TURN = range(AXES)
 
@@ -105,7 +105,7 @@ def lobe_slopes(model, m, found, scratch, out, work):
         return False
     pose, ahead = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True), -1.0 if m.vx < 0.0 else 1.0
     for patch in range(count):
-        if not move_patch(geometry, pose, DIFFERENCE, rows[patch], patch, scratch, found):
+        if not move_patch(geometry, pose, rows[patch], patch, scratch, found):
             return False
     frame = frame_of_rows(rows, 0, count)
     lift, depth, _, _, _ = lift_of_overlaps(model, m, pose, frame, rows, 0, count, work.out)
@@ -119,7 +119,7 @@ def lobe_slopes(model, m, found, scratch, out, work):
     if log_depth == -math.inf:
         return True
     for patch in range(count):
-        if not move_patch(geometry, pose, DIFFERENCE, rows[patch], patch, scratch, found):
+        if not move_patch(geometry, pose, rows[patch], patch, scratch, found):
             return False
     _along_lattice(m, half, found, count, ahead, work.lattice)
     at = locate(table, u, False, pose.y + half * m.ey - geometry.rail_distance, m.ez, log_depth, ahead * m.ex)

@@ -164,6 +164,7 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES),
-        np.zeros((5, NODES)), np.zeros((4, NUMBERS)), np.zeros((8, 3)), np.zeros((11, 4)), normal,
+        *(np.zeros(shape if model.looked_up else (0, 0)) for shape in ((5, NODES), (4, NUMBERS), (8, 3), (11, 4))),
+        normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip

@@ -1,0 +1,90 @@
+"""How far contact that is looked up is from the exact solver where runs pass: ``python -m study.patch.visited_errors``.
+
+Each scene runs with ``tabulated``; at equally spaced times both models are evaluated at the run's state, so that wheels
+have the same place and motion. Errors of each wheel's heaviest patch, at 50, 95 and 100 %: of N (%), of the creep force
+over mu N (%), of its moment over mu N c (%) and of p_max (%). ``solved``: share of wheels that the table left to the
+solver.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import wrcore as wr
+from study.patch.look_up import CURVE, ROUGH
+from study.patch.look_up_errors import errors, worn
+from wrcore.contact import reduction
+from wrcore.dynamics.system import Equations
+from wrcore.dynamics.wheel import SOLVED
+from wrcore.integrate.integrator import integrate
+from wrcore.scene.description import compile_scene, load_scene
+
+SCENES = {
+    "hunting": ("suspended_wheelset", {"speed": 60.0, "initial.y": 4e-3}, 2.0),
+    "rough track": ("trailer_vehicle", {"speed": 60.0, **ROUGH}, 1.0),
+    "R 300 m, cant": ("trailer_vehicle", {"speed": 16.7, **CURVE}, 5.0),
+}
+PAIRS = {
+    "S1002, UIC60 1:40": {},
+    "S1002, UIC60 1:20": {"rail.inclination": "1/20"},
+    "S1002, 54E1 1:40": {"rail.profile": "54E1"},
+    "hollow of 1 mm, UIC60 1:40": {"wheel.profile": "hollow"},
+}
+"""Changes of the scenes; the hollow wheel is that of `look_up_errors`."""
+
+
+def with_hollow(changes, folder):
+    """The changes with the hollow wheel as a file of points."""
+    if changes.get("wheel.profile") != "hollow":
+        return changes
+    path, curve = Path(folder) / "hollow.csv", worn(1e-3, 0.0, 0.015)
+    pd.DataFrame({"u_m": curve.u, "f_m": curve.f}).to_csv(path, index=False)
+    return changes | {"wheel.profile": {"points": str(path)}}
+
+
+def visited(scene, changes, duration, count):
+    """Rows of both models, and which of them were solved, of a run at ``count`` times."""
+    models = {}
+    for patch in ("tabulated", "exact"):
+        models[patch], start = compile_scene(load_scene(wr.example(scene), **{"contact.patch": patch, **changes}))
+    times = np.linspace(0.0, duration, count)
+    states = integrate(models["tabulated"], start, times, "rodas4p2", 1e-4, 1e-7).states
+    equations = {patch: Equations(model) for patch, model in models.items()}
+    rows, solved = {patch: [] for patch in models}, []
+    for t, state in zip(times, states, strict=False):
+        before = equations["tabulated"].work.counters[SOLVED]
+        for one in equations.values():
+            one(t, state)
+        works = [equations[patch].work for patch in models]
+        touching = (works[0].counts > 0) & (works[1].counts > 0)
+        for k, wheel in np.argwhere(touching):
+            for patch, work in zip(models, works, strict=True):
+                own = work.patches[k, wheel, : work.counts[k, wheel]]
+                rows[patch].append(own[own[:, reduction.NORMAL].argmax()].copy())
+        solved += [works[0].counters[SOLVED] > before] * int(touching.sum())
+    return {patch: np.array(found) for patch, found in rows.items()}, np.array(solved)
+
+
+def main():
+    """Print a table of the scenes and pairs that are asked for, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("scenes", nargs="*", default=list(SCENES), help="some of: " + ", ".join(SCENES))
+    parser.add_argument("--pairs", nargs="*", default=list(PAIRS), help="some of: " + "; ".join(PAIRS))
+    parser.add_argument("--count", type=int, default=100, help="of times in a run")
+    chosen = parser.parse_args()
+    for pair in chosen.pairs:
+        for name in chosen.scenes:
+            scene, settings, duration = SCENES[name]
+            with tempfile.TemporaryDirectory() as folder:
+                rows, solved = visited(scene, settings | with_hollow(PAIRS[pair], folder), duration, chosen.count)
+            found = errors(rows["exact"][~solved], rows["tabulated"][~solved])
+            told = {name: "/".join(f"{q:.2g}" for q in np.percentile(e, [50, 95, 100])) for name, e in found.items()}
+            line = {"pair": pair, "run": name, "wheels": len(solved), "solved, %": 100.0 * solved.mean(), **told}
+            print(pd.DataFrame([line]).to_markdown(index=False, floatfmt=".3g"), flush=True)
+
+
+if __name__ == "__main__":
+    main()
