@@ -66,7 +66,7 @@ whose strips on a curved flange lie up to four times as far apart along the rail
 _FLANK = 2
 """Close strips on either side of an overlap that are taken for its own flanks."""
 
-_WIDE = 10
+WIDE = 10
 """Overlaps of at least this many scan nodes are integrated over them, narrower ones over the profiles' own nodes, and
 those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
 
@@ -92,7 +92,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
                 patches[k, column] = patches[k + 1, column]
     row = patches[count]
     if reduction == MOMENT:
-        if nodes >= _WIDE:
+        if nodes >= WIDE:
             middle = first
             m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP, m2 * SCAN_STEP
         else:
@@ -100,7 +100,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
             if not leaves_cells(pose):
                 shift = fine_cell_shift(geometry, middle, strip_point(geometry, pose, middle)[0])
                 m0, m1, m2, middle, fine_nodes = fine_sums(geometry, pose, shift, outside, beyond)
-            if fine_nodes < _WIDE:
+            if fine_nodes < WIDE:
                 start, end = edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest)
                 middle = 0.5 * (start + end)
                 m0, m1, m2 = overlap_moments(geometry, pose, start, end)
@@ -223,14 +223,14 @@ def _reduce_one(geometry, pose, grid, reduction, begin, overlap, m0, m1, m2, pat
         strip = deepest_strip(grid, wheel, geometry.scan_rail, begin + overlap.first, begin + overlap.last)
         deepest = start + (strip - begin) * SCAN_STEP
         return int(patch_at_maximum(geometry, pose, deepest, outside, beyond, patch))
-    if overlap.count >= _WIDE:
+    if overlap.count >= WIDE:
         m0, m1, m2 = m0 * SCAN_STEP, m1 * SCAN_STEP**2, m2 * SCAN_STEP**3
     else:
         middle = (overlap.first + overlap.last) // 2
         ur = geometry.scan_rail_start + (begin + middle) * SCAN_STEP + strip_place(grid, wheel, begin + middle)[0]
         shift = fine_cell_shift(geometry, start + middle * SCAN_STEP, ur)
         m0, m1, m2, start, nodes = fine_sums(geometry, pose, shift, outside, beyond)
-        if nodes < _WIDE:
+        if nodes < WIDE:
             return -1
     patch[OUTSIDE], patch[BEYOND] = outside, beyond
     return int(patch_from_moments(geometry, pose, start, m0, m1, m2, patch))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wrcore.contact.detection import WIDE
 from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS, SCAN_STEP
 from wrcore.contact.reduction import (
     BEYOND,
@@ -38,9 +39,6 @@ MOVES = 4
 
 DIFFERENCE = 1e-9
 """Of moves, m and rad: no search rounds what they lead to."""
-
-FEWEST = 10
-"""Nodes in overlap that the search takes for its moments."""
 
 ROUNDING = 1e-6
 """Of places among nodes, in steps."""
@@ -218,10 +216,10 @@ def overlap_at(geometry, pose, row):
         count, square, place = _looked_up(geometry, pose, nodes)
     else:
         count, square, place = _moments(nodes, geometry.scan_wheel, geometry.scan_rail)
-        if count < FEWEST:
+        if count < WIDE:
             nodes = _fine_nodes(geometry, pose, row)
             count, square, place = _moments(nodes, geometry.fine_wheel, geometry.fine_rail)
-    if count >= FEWEST:
+    if count >= WIDE:
         return square, nodes.u + place
     (place, width), square, moment = _narrow(geometry, pose, row), 0.0, 0.0
     if not width > 0.0:
@@ -242,10 +240,10 @@ def move_patch(geometry, pose, row, patch, sums, moved):
         return False
     nodes = _scan_nodes(geometry, pose, row)
     middle = nodes.u
-    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) < FEWEST:
+    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) < WIDE:
         nodes = _fine_nodes(geometry, pose, row)
         middle = nodes.u
-        if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) < FEWEST:
+        if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) < WIDE:
             middle = _narrow_slopes(geometry, pose, row, sums)
             if math.isnan(middle):
                 return False
@@ -253,10 +251,8 @@ def move_patch(geometry, pose, row, patch, sums, moved):
         return False
     for k in range(MOVES):
         m0, m1 = sums[0, 0] + DIFFERENCE * sums[0, 1 + k], sums[1, 0] + DIFFERENCE * sums[1, 1 + k]
-        m2, (ex, ey, ez) = (
-            sums[2, 0] + DIFFERENCE * sums[2, 1 + k],
-            moved_axle(pose.ex, pose.ey, pose.ez, k, DIFFERENCE),
-        )
+        m2 = sums[2, 0] + DIFFERENCE * sums[2, 1 + k]
+        ex, ey, ez = moved_axle(pose.ex, pose.ey, pose.ez, k, DIFFERENCE)
         y, z = pose.y + (DIFFERENCE if k == ACROSS else 0.0), pose.z + (DIFFERENCE if k == UP else 0.0)
         there = make_pose(pose.side, y, z, ex, ey, ez, True)
         if not patch_from_moments(geometry, there, middle, m0, m1, m2, moved[1 + k, patch]):
