@@ -1,6 +1,8 @@
 """Windows from fixed strips over the overlaps: slower than a guess, and safe."""
 
-from wrcore.contact.patch.gap import CREST, GAP, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
+import math
+
+from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
 from wrcore.contact.patch.strips import BEND, assemble, place_strips
 from wrcore.contact.patch.windows import active_runs, take_fresh
@@ -13,16 +15,16 @@ _SWEEPS = 4
 
 
 @jit(allocates=False, fastmath=FUSED)
-def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
-    """Windows from fixed strips: over all overlaps, then finer ones about the runs that carry load. Returns their
-    number and leaves c and Q of the fixed strips at the nodes as the next guesses."""
+def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
+    """Fixed strips over all overlaps, then finer ones about the runs that carry load, and their loads. Returns the
+    number of windows (0 where no loads were found) and of runs, and the largest c."""
     nodes, count = work.nodes, work.ends[stretches - 1]
-    low, high = 1e9, -1e9
+    low, high, found, largest = 1e9, -1e9, 0, 0.0
     for i in range(count):
         if nodes[NODE_GAP, i] < 0.0:
             low, high = min(low, nodes[S, i]), max(high, nodes[S, i])
     if not high > low:
-        return 0
+        return 0, found, largest
     work.low[0], work.high[0], windows = low, high, 1
     for refined in range(2):
         work.start[0] = 0
@@ -30,11 +32,22 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
             work.start[k + 1] = work.start[k] + FIXED // windows
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
         place_strips(geometry, pose, frame, work, windows)
-        if not _carry(values, work, windows):
-            return 0
+        if not _carry(values, work, windows, kinds):
+            return 0, found, largest
         found, largest = active_runs(work, windows)
         if refined == 0:
             windows = _widened(work, found, low, high, work.width[0])
+    return windows, found, largest
+
+
+@jit(allocates=False, fastmath=FUSED)
+def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution, kinds):
+    """Windows from fixed strips. Returns their number and leaves c and Q of the fixed strips at the nodes as the next
+    guesses."""
+    nodes, count = work.nodes, work.ends[stretches - 1]
+    windows, found, largest = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
+    if windows == 0:
+        return 0
     total, squares = 0.0, 1e-300
     for i in range(work.start[windows]):
         if work.active[i]:
@@ -49,8 +62,30 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _carry(values, work, windows):
-    """Loads of fixed strips by an active set at given half lengths, these from the loads; whether it was found."""
+def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
+    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
+    number of windows."""
+    windows, _, _ = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
+    kept = first = 0
+    for k in range(windows):
+        end = work.start[k + 1]
+        for i in range(first, end):
+            if not work.active[i]:
+                continue
+            work.centre[kept], work.width[kept], work.window[kept] = work.centre[i], work.width[i], k
+            work.share[kept], work.square[kept] = work.load[i] / work.square[i], work.square[i]
+            work.middle[kept] = work.middle[i]
+            for q in range(GAP_ROWS):
+                work.gap[kept, q] = work.gap[i, q]
+            kept += 1
+        first, work.start[k + 1] = end, kept
+    return windows if kept > 2 else 0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _carry(values, work, windows, kinds):
+    """Loads of fixed strips by an active set at given half lengths and, with yaw (``kinds`` 3), middles, these from the
+    loads; whether it was found."""
     strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
     for i in range(strips):
         active[i] = work.gap[i, GAP] < 0.0
@@ -73,6 +108,36 @@ def _carry(values, work, windows):
         for i in range(strips):
             new = max(matrix[offset, i], 0.02 * largest, 0.02 * work.width[i] ** 2)
             work.square[i] = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
+        if kinds == 3 and not _shift_middles(values, work, windows):
+            return False
+    return True
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _shift_middles(values, work, windows):
+    """One step of the middles of the strips that carry; whether there is one."""
+    strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
+    for i in range(strips):
+        work.share[i] = load[i] / work.square[i]
+    n = assemble(values, work, windows, 3)
+    used = 0
+    for i in range(strips):
+        if active[i]:
+            column = 0
+            for j in range(strips):
+                if active[j]:
+                    matrix[used, column] = matrix[3 * i + 2, 3 * j + 2]
+                    column += 1
+            matrix[used, column] = matrix[3 * i + 2, n]
+            used += 1
+    if not solve_linear(matrix, used):
+        return False
+    used = 0
+    for i in range(strips):
+        if active[i]:
+            most = 0.5 * math.sqrt(work.square[i])
+            work.middle[i] += min(max(matrix[used, column], -most), most)
+            used += 1
     return True
 
 

@@ -87,8 +87,8 @@ def _tips_too_fast(work, windows, kinds, bold):
     tips, cut = kinds * work.start[windows], False
     n = tips + 2 * windows
     for k in range(windows):
-        w = work.width[work.start[k]]
         for side in range(2):
+            w = work.width[work.start[k]] if side == 0 else work.width[work.start[k + 1] - 1]
             step, before = work.matrix[tips + 2 * k + side, n], work.stride[side, k]
             limit = min(w, 0.5 * abs(before)) if step * before < 0.0 else w
             work.stride[side, k] = min(max(step, -limit), limit)
@@ -172,8 +172,8 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
         starved_for = starved_for + 1 if starved else 0
         crossed = False
         for k in range(windows):
-            w = work.width[work.start[k]]
-            change = max(change, abs(work.stride[0, k]) / w, abs(work.stride[1, k]) / w)
+            w, last_w = work.width[work.start[k]], work.width[work.start[k + 1] - 1]
+            change = max(change, abs(work.stride[0, k]) / w, abs(work.stride[1, k]) / last_w)
             work.low[k] += work.stride[0, k]
             work.high[k] += work.stride[1, k]
             if k > 0 and work.low[k] <= work.high[k - 1]:

@@ -168,21 +168,27 @@ def second_window(centre, width):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _centroid_shift(before, here, after, first, last):
-    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola); at a tip it
-    falls to zero at the strip's outer edge: exact for an ellipse."""
+def _shift_at_tip(here, inner, ratio):
+    """How far the load's centroid in the strip at a tip lies inside its middle, over its width: a parabola through the
+    loads per width of this strip and the next, ``ratio`` times as wide, that is zero at the tip: exact for ellipses."""
+    bend = 3.0 * (inner - (2.0 + ratio) * here) / (1.0 + ratio) ** 2
+    slope = 2.0 * here - bend * (2 / 3)
+    return (slope / 3 + bend / 4) / here - 0.5
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _centroid_shift(strip, j, first, last):
+    """Centroid of the load in a strip over its width, from the loads per width of three strips (parabola)."""
     if first and last:
         return 0.0
+    here = max(strip.density[j], 1e-30)
     if first:
-        bend = 0.75 * (after - 3.0 * here)
-        slope = 2.0 * here - bend * (2 / 3)
-        shift = (slope / 3 + bend / 4) / here - 0.5
+        shift = _shift_at_tip(here, strip.density[j + 1], strip.width[j + 1] / strip.width[j])
     elif last:
-        bend = 0.75 * (before - 3.0 * here)
-        slope = 2.0 * here - bend * (2 / 3)
-        shift = 0.5 - (slope / 3 + bend / 4) / here
+        shift = -_shift_at_tip(here, strip.density[j - 1], strip.width[j - 1] / strip.width[j])
     else:
-        shift = (after - before) / (24.0 * here)
+        change = strip.density[j + 1] - strip.density[j - 1]
+        shift = change * strip.width[j] / (12.0 * here * (strip.centre[j + 1] - strip.centre[j - 1]))
     return min(max(shift, -0.2), 0.2)
 
 
@@ -203,9 +209,7 @@ def lay_out(centre, width, half_length, middle, peak, split, strip):
         strip.density[j] = peak[j] * half_length[j]
     for j in range(count):
         first, last = j == 0 or j == split, j == count - 1 or j == split - 1
-        before, after = strip.density[max(j - 1, 0)], strip.density[min(j + 1, count - 1)]
-        shift = _centroid_shift(before, max(strip.density[j], 1e-30), after, first, last)
-        strip.line[j] = strip.centre[j] + shift * strip.width[j]
+        strip.line[j] = strip.centre[j] + _centroid_shift(strip, j, first, last) * strip.width[j]
     return c, load
 
 

@@ -18,10 +18,11 @@ import math
 
 import numpy as np
 
-from wrcore.contact.patch.fixed import windows_from_fixed
+from wrcore.contact.patch.fixed import solve_fixed, windows_from_fixed
 from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps, unroll
+from wrcore.contact.patch.grading import grade
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
-from wrcore.contact.patch.strips import MAX_WINDOWS, place_strips
+from wrcore.contact.patch.strips import MAX_WINDOWS, WEIGHT, place_strips
 from wrcore.contact.patch.windows import drop_starved, guess_squares, guess_windows, merge_close, newborn, start_strips
 from wrcore.contact.strip import changes_along
 from wrcore.kernels.jit import FUSED, jit
@@ -68,6 +69,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
     guess_squares(hertz, patches, first, work, stretches)
+    grade(work, stretches)
     windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     if _resume(frame, memory, work, windows):
@@ -88,7 +90,8 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                     _remember(frame, work, found, memory)
                 return found, frame
             windows = work.guessed[0] = 0
-    return 0, frame
+    work.more[WEIGHT] = 0.0
+    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
 
 
 @jit(allocates=False)
@@ -98,7 +101,7 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if attempt == 1 or again:
-            windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution)
+            windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution, kinds)
         if windows == 0:
             if attempt == 0:
                 continue
@@ -165,17 +168,33 @@ def _resume(frame, memory, work, windows):
 
 
 @jit(allocates=False)
-def tip(strips, end, step):
-    """Zero of the parabola through a^2 of a window's last three strips, in strips inwards from the window's end."""
-    length = strips[HALF_LENGTH]
+def _tip_of(strips, end, step):
+    """Zero of the parabola through a^2 of a window's last three strips, m inwards from the window's end."""
+    length, width = strips[HALF_LENGTH], strips[WIDTH]
+    t1 = 0.5 * width[end]
+    t2 = t1 + 0.5 * (width[end] + width[end + step])
+    t3 = t2 + 0.5 * (width[end + step] + width[end + 2 * step])
     c1, c2, c3 = length[end] ** 2, length[end + step] ** 2, length[end + 2 * step] ** 2
-    slope, bend, t = c2 - c1, 0.5 * (c3 - 2.0 * c2 + c1), 0.0
+    slope, t = (c2 - c1) / (t2 - t1), 0.0
+    bend = ((c3 - c2) / (t3 - t2) - slope) / (t3 - t1)
     for _ in range(3):
-        rate = slope + bend * (2.0 * t - 2.0)
+        rate = slope + bend * (2.0 * t - t1 - t2)
         if not rate > 0.0:
             return 0.0
-        t -= (c1 + (t - 0.5) * (slope + bend * (t - 1.5))) / rate
-    return min(max(t, -0.4), 0.4)
+        t -= (c1 + (t - t1) * (slope + bend * (t - t2))) / rate
+    return min(max(t, -0.4 * width[end]), 0.4 * width[end])
+
+
+@jit(allocates=False)
+def _largest_pressure(strips, best):
+    """Greatest pressure, Pa: from the ``best`` strip half of the way to the top of a parabola over it and its
+    neighbours, which p0^2 is for an ellipse: pressures may have a kink."""
+    place, square = strips[CENTRE], strips[PEAK, best] ** 2
+    before, after = place[best] - place[best - 1], place[best + 1] - place[best]
+    fall, rise = (square - strips[PEAK, best - 1] ** 2) / before, (strips[PEAK, best + 1] ** 2 - square) / after
+    bend = (rise - fall) / (before + after)
+    slope = rise - bend * after
+    return math.sqrt(square + 0.125 * slope * slope / max(-bend, 1e-6 * square / (before * after)))
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -206,15 +225,10 @@ def publish(modulus, work, windows, strips, sums):
     unroll(strips[CENTRE, :count], strips[WIDTH], strips[STRIP_TILT], strips[OWN_PLACE], strips[OWN_WIDTH])
     for q in range(MEAN_X, MEAN_SS + 1):
         sums[q] /= sums[LOAD]
-    low, high = tip(strips, 0, 1), tip(strips, count - 1, -1)
-    sums[S_MIN] = strips[CENTRE, 0] - (0.5 - low) * strips[WIDTH, 0]
-    sums[S_MAX] = strips[CENTRE, count - 1] + (0.5 - high) * strips[WIDTH, count - 1]
-    square = strips[PEAK, best] ** 2
-    if 0 < best < count - 1 and strips[WINDOW, best - 1] == strips[WINDOW, best + 1]:
-        # half of the way to the top of a parabola, which p0^2 is for an ellipse: pressures may have a kink
-        low, high = strips[PEAK, best - 1] ** 2, strips[PEAK, best + 1] ** 2
-        square += 0.0625 * (high - low) ** 2 / max(2.0 * square - low - high, 1e-6 * square)
-    sums[LARGEST] = math.sqrt(square)
+    sums[S_MIN] = strips[CENTRE, 0] - 0.5 * strips[WIDTH, 0] + _tip_of(strips, 0, 1)
+    sums[S_MAX] = strips[CENTRE, count - 1] + 0.5 * strips[WIDTH, count - 1] - _tip_of(strips, count - 1, -1)
+    inside = 0 < best < count - 1 and strips[WINDOW, best - 1] == strips[WINDOW, best + 1]
+    sums[LARGEST] = _largest_pressure(strips, best) if inside else strips[PEAK, best]
     return count
 
 

@@ -19,7 +19,9 @@ from wrcore.contact.patch.gap import (
     UR,
     U,
     strip_gap,
+    unroll,
 )
+from wrcore.contact.patch.grading import spread
 from wrcore.contact.patch.normal_influence import edges_of, influence_of
 from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.kernels.jit import FUSED, jit
@@ -37,8 +39,6 @@ to 16 strips then errs least, from round to slender patches (without it by +0.25
 
 SMOOTHING = 0.006
 """Weight that holds down third differences of c along slender patches."""
-
-THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 
 BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 """What the second of Galerkin's conditions makes of a parabola t^2."""
@@ -71,8 +71,10 @@ class NormalWork(NamedTuple):
     """(2, MAX_WINDOWS + 1): tips of windows to be, m."""
     tops: np.ndarray
     """(MAX_WINDOWS,): largest c of each window, m^2."""
-    stretch: np.ndarray
-    """(MAX_WINDOWS,): mean width of each window's strips along their own planes, over that in the frame."""
+    measure: np.ndarray
+    """(n,): integral over the nodes of what widths are inverse to, see `grading`."""
+    looked: np.ndarray
+    """(1,): number of nodes."""
     stride: np.ndarray
     """(2, MAX_WINDOWS): last step of the tips, m."""
     window: np.ndarray
@@ -80,6 +82,11 @@ class NormalWork(NamedTuple):
     centre: np.ndarray
     width: np.ndarray
     """Place and width of the strips, m."""
+    rates: np.ndarray
+    """(4, MAX_STRIPS): rates of centre and width by the lower and upper tip of the strip's window."""
+    place: np.ndarray
+    own: np.ndarray
+    """Place and width along the strips' own planes, m."""
     share: np.ndarray
     """Q: p = pi E* Q sqrt(c - (x - X)^2), 1/m."""
     square: np.ndarray
@@ -89,7 +96,7 @@ class NormalWork(NamedTuple):
     gap: np.ndarray
     """(MAX_STRIPS, GAP_ROWS), see `strip_gap`."""
     logs: np.ndarray
-    """(3, MAX_STRIPS): ln(k + 1/2), and ln c and 1/a of the strips."""
+    """(2, MAX_STRIPS): ln c and 1/a of the strips."""
     sums: np.ndarray
     """(4, 4): what the points of one strip gather."""
     matrix: np.ndarray
@@ -109,10 +116,10 @@ def normal_work():
     n, m = MAX_STRIPS, MAX_WINDOWS
     return NormalWork(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
-        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), *np.zeros((2, m)), np.zeros((2, m)),
-        np.zeros(n, np.int64),
-        *(np.zeros(n) for _ in range(5)), np.zeros((n, GAP_ROWS)),
-        np.stack([np.log(np.arange(n) + 0.5), np.zeros(n), np.zeros(n)]), np.zeros((4, 4)),
+        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), np.zeros(m),
+        np.zeros(MAX_PATCHES * NODES), np.zeros(1, np.int64), np.zeros((2, m)), np.zeros(n, np.int64),
+        *np.zeros((2, n)), np.zeros((4, n)), *np.zeros((2, n)), *np.zeros((3, n)), np.zeros((n, GAP_ROWS)),
+        np.zeros((2, n)), np.zeros((4, 4)),
         *(np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)) for _ in range(2)), np.zeros(n, np.bool_), np.zeros(n),
         np.array([1.0, 0.0, 0.0]),
     )  # fmt: skip
@@ -124,31 +131,33 @@ def place_strips(geometry, pose, frame, work, windows):
     u, ur = work.gap[0, U], work.gap[0, UR]
     for k in range(windows):
         first, last = work.start[k], work.start[k + 1]
-        w, stretch = (work.high[k] - work.low[k]) / (last - first), 0.0
+        spread(work, k)
         for i in range(first, last):
-            s = work.low[k] + (i - first + 0.5) * w
-            work.centre[i], work.width[i], work.window[i] = s, w, k
             row = work.gap[i]
-            found = strip_gap(geometry, pose, frame, s, u, ur)
+            found = strip_gap(geometry, pose, frame, work.centre[i], u, ur)
             for q in range(GAP_ROWS):
                 row[q] = found[q]
-            u, ur, stretch = row[U], row[UR], stretch + math.sqrt(1.0 + row[TILT] * row[TILT])
-        work.stretch[k] = stretch / (last - first)
+            u, ur = row[U], row[UR]
         for column in (GAP, GAP_SLOPE):
-            _compensate(work.gap, column, first, last)
+            _compensate(work, column, first, last)
+    unroll(work.centre[: work.start[windows]], work.width, work.gap[:, TILT], work.place, work.own)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _compensate(gap, column, first, last):
+def _compensate(work, column, first, last):
     """Add a share of the second difference over the strips: what pressures constant across a strip leave in u."""
+    gap, centre, width = work.gap, work.centre, work.width
     before, here = gap[first, column], gap[first + 1, column]
-    bend = gap[first + 2, column] - 2.0 * here + before
-    gap[first, column] += COMPENSATION * bend
-    for i in range(first + 1, last):
-        if i < last - 1:
-            bend = gap[i + 1, column] - 2.0 * here + before
-        before, here = here, gap[min(i + 1, last - 1), column]
-        gap[i, column] += COMPENSATION * bend
+    bend = 0.0
+    for i in range(first + 1, last - 1):
+        after = gap[i + 1, column]
+        behind, ahead = centre[i] - centre[i - 1], centre[i + 1] - centre[i]
+        bend = 2.0 * ((after - here) / ahead - (here - before) / behind) / (ahead + behind)
+        if i == first + 1:
+            gap[first, column] += COMPENSATION * bend * width[first] * width[first]
+        before, here = here, after
+        gap[i, column] += COMPENSATION * bend * width[i] * width[i]
+    gap[last - 1, column] += COMPENSATION * bend * width[last - 1] * width[last - 1]
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -162,75 +171,62 @@ def assemble(values, work, windows, kinds):
         for j in range(n + 1):
             matrix[i, j] = 0.0
     for j in range(strips):
-        work.logs[1, j], work.logs[2, j] = math.log(work.square[j]), 1.0 / math.sqrt(work.square[j])
+        work.logs[0, j], work.logs[1, j] = math.log(work.square[j]), 1.0 / math.sqrt(work.square[j])
     for i in range(strips):
-        own, k, row = work.window[i], kinds * i, work.gap[i]
-        a, log_w = math.sqrt(work.square[i]), math.log(work.width[i] * work.stretch[own])
+        k, row, a = kinds * i, work.gap[i], math.sqrt(work.square[i])
         for m in range(points):
             d = work.middle[i] + a * POINTS[m] - row[CREST]
             sums[0, m], sums[1, m] = row[GAP] + row[SHAPE] * d * d, 2.0 * row[SHAPE] * d
-            sums[2, m] = sums[3, m] = 0.0
+            sums[2, m] = 0.0
         for j in range(strips):
             c, p = work.square[j], work.share[j]
-            inverse, load = work.logs[2, j], p * c
-            together, stretch = work.window[j] == own, work.stretch[work.window[j]]
-            distance, half = abs(work.centre[i] - work.centre[j]), 0.5 * work.width[j] * stretch
-            if together:
-                distance *= stretch
+            inverse, load, toward = work.logs[1, j], p * c, 1.0 if i > j else -1.0
+            distance, half = toward * (work.place[i] - work.place[j]), 0.5 * work.own[j]
             low, high = (distance - half) * inverse, (distance + half) * inverse
-            offset_s = aside = part = part_w = 0.0
-            if together:
-                apart, shift = abs(i - j), log_w - 0.5 * work.logs[1, j]
-                log_low, log_high = work.logs[0, max(apart - 1, 0)] + shift, work.logs[0, apart] + shift
-            else:
-                log_low, log_high = math.log(max(low, 1e-9)), math.log(high)
-                offset_s = work.centre[i] - work.centre[j]
-                aside = inverse if offset_s > 0.0 else -inverse
-                begin, end = work.start[work.window[j]], work.start[work.window[j] + 1]
-                part_w = 1.0 / ((end - begin) * work.width[j])
-                part = (j - begin + 0.5) / (end - begin)
+            log_low, log_high = math.log(max(low, 1e-9)), math.log(high)
             if i == j:
                 low = -1.0
             edges = edges_of(low, high, log_low, log_high)
             b00 = b01 = b02 = b10 = b11 = b12 = b20 = b21 = b22 = 0.0
+            s0 = s1 = s2 = w0 = w1 = w2 = 0.0
             for m in range(points):
                 t = POINTS[m]
                 offset = work.middle[i] + a * t - work.middle[j]
                 xi = abs(offset) * inverse
                 value, along, over, shear = influence_of(values, xi, low, high, edges)
                 turn = load * along * (inverse if offset > 0.0 else -inverse)
+                shear *= inverse * load
                 sums[0, m] += load * value
                 sums[1, m] += turn
-                if together:
-                    sums[2, m] += load * over
-                else:
-                    shear *= load * aside
-                    sums[3, m] += shear
-                    wider = (load * over - shear * offset_s) * part_w
-                    q0, q1 = 1.0 - t * t, 4.0 * t * t - 2.0
-                    tip = tips + 2 * work.window[j]
-                    low_tip, high_tip = -shear * (1.0 - part) - wider, -shear * part + wider
-                    matrix[k, tip] += q0 * low_tip
-                    matrix[k, tip + 1] += q0 * high_tip
-                    matrix[k + 1, tip] += q1 * low_tip
-                    matrix[k + 1, tip + 1] += q1 * high_tip
-                    if kinds == 3:
-                        matrix[k + 2, tip] += t * low_tip
-                        matrix[k + 2, tip + 1] += t * high_tip
+                sums[2, m] += toward * shear
                 over_q, over_c = c * value, p * (value - 0.5 * (xi * along + over))
+                wider = load * over - shear * distance
                 q0, q1 = 1.0 - t * t, 4.0 * t * t - 2.0
                 b00 += q0 * over_q
                 b01 += q0 * over_c
                 b10 += q1 * over_q
                 b11 += q1 * over_c
+                s0 += q0 * shear
+                s1 += q1 * shear
+                w0 += q0 * wider
+                w1 += q1 * wider
                 if kinds == 3:
                     b02 -= q0 * turn
                     b12 -= q1 * turn
                     b20 += t * over_q
                     b21 += t * over_c
                     b22 -= t * turn
-            at = kinds * j
+                    s2 += t * shear
+                    w2 += t * wider
+            at, tip = kinds * j, tips + 2 * work.window[j]
             matrix[k, at], matrix[k, at + 1], matrix[k + 1, at], matrix[k + 1, at + 1] = b00, b01, b10, b11
+            moved, widened = -toward * work.own[j] / work.width[j], 1.0 / work.width[j]
+            for side in range(2):
+                by_place, by_width = moved * work.rates[side, j], widened * work.rates[2 + side, j]
+                matrix[k, tip + side] += s0 * by_place + w0 * by_width
+                matrix[k + 1, tip + side] += s1 * by_place + w1 * by_width
+                if kinds == 3:
+                    matrix[k + 2, tip + side] += s2 * by_place + w2 * by_width
             if kinds == 3:
                 matrix[k, at + 2], matrix[k + 1, at + 2] = b02, b12
                 matrix[k + 2, at], matrix[k + 2, at + 1], matrix[k + 2, at + 2] = b20, b21, b22
@@ -241,8 +237,9 @@ def assemble(values, work, windows, kinds):
         for side in range(2):
             k = tips + 2 * own + side
             end, inner = (first, first + 1) if side == 0 else (last - 1, last - 2)
-            matrix[k, kinds * end + 1], matrix[k, kinds * inner + 1] = 3.0, -1.0
-            matrix[k, n] = work.square[inner] - 3.0 * work.square[end]
+            ratio = 2.0 + work.width[inner] / work.width[end]
+            matrix[k, kinds * end + 1], matrix[k, kinds * inner + 1] = ratio, -1.0
+            matrix[k, n] = work.square[inner] - ratio * work.square[end]
     return n
 
 
@@ -250,22 +247,31 @@ def assemble(values, work, windows, kinds):
 def _close_strip(work, i, kinds, points, tips, n):
     """Residual of strip i and what its own half length, middle and place do to it."""
     own, k, row, matrix, sums = work.window[i], kinds * i, work.gap[i], work.matrix, work.sums
-    first, last = work.start[own], work.start[own + 1]
-    a, w = math.sqrt(work.square[i]), work.width[i]
-    part, inverse = (i - first + 0.5) / (last - first), 1.0 / (last - first)
+    a, stretch = math.sqrt(work.square[i]), work.own[i] / work.width[i]
     for m in range(points):
         t = POINTS[m]
         d = work.middle[i] + a * t - row[CREST]
-        over_s = sums[3, m] + row[GAP_SLOPE] + row[SHAPE_RATE] * d * d - 2.0 * row[SHAPE] * d * row[CREST_RATE]
-        stretch = sums[2, m] * inverse / w
+        over_s = stretch * sums[2, m] + row[GAP_SLOPE]
+        over_s += row[SHAPE_RATE] * d * d - 2.0 * row[SHAPE] * d * row[CREST_RATE]
         for q in range(kinds):
             weight = 1.0 - t * t if q == 0 else (4.0 * t * t - 2.0 if q == 1 else t)
             matrix[k + q, n] -= weight * sums[0, m]
             matrix[k + q, k + 1] += weight * sums[1, m] * t * 0.5 / a
-            matrix[k + q, tips + 2 * own] += weight * (over_s * (1.0 - part) - stretch)
-            matrix[k + q, tips + 2 * own + 1] += weight * (over_s * part + stretch)
+            matrix[k + q, tips + 2 * own] += weight * over_s * work.rates[0, i]
+            matrix[k + q, tips + 2 * own + 1] += weight * over_s * work.rates[1, i]
             if kinds == 3:
                 matrix[k + q, k + 2] += weight * sums[1, m]
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _third(work, i, r):
+    """Weight of the r-th of four strips from i on in their third difference, over the cube of their mean distance."""
+    s, product = work.centre, 1.0
+    for q in range(4):
+        if q != r:
+            product *= s[i + r] - s[i + q]
+    mean = (s[i + 3] - s[i]) / 3.0
+    return 6.0 * mean * mean * mean / product
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -276,12 +282,12 @@ def _smooth(work, own, kinds, points, n):
     for i in range(first, last):
         largest = max(largest, work.square[i])
     a = math.sqrt(largest)
-    slender = 10.0 * work.width[first] / a
+    slender = 10.0 * (work.high[own] - work.low[own]) / ((last - first) * a)
     factor = SMOOTHING * 0.25 * points * work.gap[(first + last) // 2, SHAPE] / (1.0 + slender * slender)
     for i in range(first, last - 3):
         for r in range(4):
             for c in range(4):
-                f = factor * THIRD[r] * THIRD[c]
+                f = factor * _third(work, i, r) * _third(work, i, c)
                 row, column = kinds * (i + r), kinds * (i + c)
                 matrix[row + 1, column + 1] += f
                 matrix[row + 1, n] -= f * work.square[i + c]
@@ -295,8 +301,8 @@ def gap_under_load(values, work, windows, s, x, gap):
     """Gap (m) between the loaded surfaces at (x, s) where the undeformed one is ``gap``."""
     for j in range(work.start[windows]):
         inverse = 1.0 / math.sqrt(work.square[j])
-        stretch = work.stretch[work.window[j]]
-        distance, w = abs(s - work.centre[j]) * stretch, work.width[j] * stretch
+        stretch = work.own[j] / work.width[j]
+        distance, w = abs(s - work.centre[j]) * stretch, work.own[j]
         low, high = (distance - 0.5 * w) * inverse, (distance + 0.5 * w) * inverse
         xi = abs(x - work.middle[j]) * inverse
         if low > 1e-9:

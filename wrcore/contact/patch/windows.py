@@ -203,7 +203,7 @@ def merge_close(work, windows, resolution):
     for k in range(windows):
         w = work.width[work.start[k]]
         if k > 0:
-            w = max(w, work.width[work.start[k - 1]])
+            w = max(w, work.width[work.start[k] - 1])
         if k > 0 and work.low[k] - work.high[k - 1] < _MERGE * w:
             highs[found - 1] = work.high[k]
         else:
@@ -242,8 +242,8 @@ def newborn(values, work, windows, stretches, resolution, least):
         s, gap = nodes[S, i], nodes[NODE_GAP, i]
         free = gap < 0.0
         for k in range(windows):
-            w = work.width[work.start[k]]
-            free = free and not work.low[k] - 0.7 * w < s < work.high[k] + 0.7 * w
+            before, after = 0.7 * work.width[work.start[k]], 0.7 * work.width[work.start[k + 1] - 1]
+            free = free and not work.low[k] - before < s < work.high[k] + after
         inside = free and gap_under_load(values, work, windows, s, nodes[NODE_CREST, i], gap) < -least * depth
         if inside and open_at < 0 and found < MAX_WINDOWS:
             open_at = i
