@@ -22,7 +22,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL, find_patches
 from wrcore.contact.normal import damping_factor, inverse_cube_root
 from wrcore.contact.patch import rolling, solve
-from wrcore.contact.patch.gap import frame_of_overlaps, group_end, lean_of, rigid_slip
+from wrcore.contact.patch.gap import frame_of_rows, group_end, lean_of, rigid_slip
 from wrcore.contact.patch.gap import strip_wrenches as wrenches_of_strips
 from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
@@ -300,7 +300,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
     speed, windows = max(abs(m.vx), model.least_speed), 0
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
-    frame = frame_of_overlaps(model.geometry, pose, rows, first, last)
+    frame = frame_of_rows(rows, first, last)  # the surfaces' own: through a mean plane a sliding wheel comes nearer
     m = leaning_motion(model.geometry, m, lean_of(model.geometry, pose, frame))
     lift, depth, u, creepage, friction = lift_of_overlaps(model, m, pose, frame, rows, first, last, out)
     depth -= lift
