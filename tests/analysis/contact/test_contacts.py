@@ -131,3 +131,14 @@ def test_a_batch_is_one_call_and_a_second_call_makes_nothing_anew(pair, monkeypa
 def test_what_cannot_be_is_refused(pair, arguments, message):
     with pytest.raises(wr.InputError, match=message.replace("(", r"\(")):
         wr.contacts(pair, **arguments)
+
+
+def test_looked_up_contact_under_a_load_has_creep_forces(pair):
+    # the height is sought with the solver, whose memory told the table that no rows are wanted: no creep forces at all
+    poses = pd.DataFrame(table_of([1e-3], [0.0], V_m_per_s=20.0, omega_rad_per_s=1.001 * 20.0 / RADIUS))
+    exact, table = (
+        loaded_poses(poses, pair.left.geometry, 5e4, patch)[["Fx_N", "Fy_N", "N_N"]].to_numpy()
+        for patch in ("exact", "tabulated")
+    )
+    assert np.abs(exact[:, 0]).min() > 3e3 and exact.shape == table.shape
+    np.testing.assert_allclose(table, exact, atol=0.005 * 0.3 * 5e4)

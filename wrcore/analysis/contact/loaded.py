@@ -189,7 +189,7 @@ class LoadedWheels:
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
             last, before = group_end(self.geometry, overlaps, count, first), self._counters[ON_GRID]
-            work.spare[0] = 0.0
+            work.spare[:] = 0.0  # of the last solution, and what runs ask for
             found = UNKNOWN
             if contact.value.strips.looked_up:
                 found = tabulated_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
