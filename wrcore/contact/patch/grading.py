@@ -6,7 +6,7 @@ Strips of a window are equally wide by a measure of the lateral coordinate whose
 
 g the undeformed gap, d and L the depth and width of the overlap: 1/rho is there what the half width of a contact with
 this curvature would be. Under an ellipse all strips are as wide. Where a flange root and a gauge corner lie in each
-other the gap is flat and ends within a millimetre; N of 12 equal strips is then off by 2 %, of these by 0.1 %.
+other the gap is flat and ends within a millimetre; N of 12 equal strips is then off by 2 %, of these by 0.2 %.
 """
 
 from wrcore.contact.patch.gap import NODE_GAP, S
