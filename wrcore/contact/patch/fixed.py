@@ -1,7 +1,5 @@
 """Windows from fixed strips over the overlaps: slower than a guess, and safe."""
 
-import math
-
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
 from wrcore.contact.patch.strips import BEND, assemble, place_strips
@@ -11,20 +9,23 @@ from wrcore.kernels.jit import FUSED, jit
 FIXED = 32
 """Fixed strips, where the first guess of the windows has failed."""
 
-_SWEEPS = 4
+_SWEEPS = 10
+
+_SETTLED = 0.02
+"""A solution stands if no c moves by more than this share of the largest in the end."""
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
+def _fixed_strips(geometry, pose, frame, values, work, stretches):
     """Fixed strips over all overlaps, then finer ones about the runs that carry load, and their loads. Returns the
-    number of windows (0 where no loads were found) and of runs, and the largest c."""
+    number of windows (0 where no loads were found) and of runs, the largest c, and by what share of it c moved last."""
     nodes, count = work.nodes, work.ends[stretches - 1]
-    low, high, found, largest = 1e9, -1e9, 0, 0.0
+    low, high, found, largest, moved = 1e9, -1e9, 0, 0.0, -1.0
     for i in range(count):
         if nodes[NODE_GAP, i] < 0.0:
             low, high = min(low, nodes[S, i]), max(high, nodes[S, i])
     if not high > low:
-        return 0, found, largest
+        return 0, found, largest, moved
     work.low[0], work.high[0], windows = low, high, 1
     for refined in range(2):
         work.start[0] = 0
@@ -32,20 +33,21 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
             work.start[k + 1] = work.start[k] + FIXED // windows
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
         place_strips(geometry, pose, frame, work, windows)
-        if not _carry(values, work, windows, kinds):
-            return 0, found, largest
+        moved = _carry(values, work, windows)
+        if moved < 0.0:
+            return 0, found, largest, moved
         found, largest = active_runs(work, windows)
         if refined == 0:
             windows = _widened(work, found, low, high, work.width[0])
-    return windows, found, largest
+    return windows, found, largest, moved
 
 
 @jit(allocates=False, fastmath=FUSED)
-def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution, kinds):
+def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
     """Windows from fixed strips. Returns their number and leaves c and Q of the fixed strips at the nodes as the next
     guesses."""
     nodes, count = work.nodes, work.ends[stretches - 1]
-    windows, found, largest = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
+    windows, found, largest, _ = _fixed_strips(geometry, pose, frame, values, work, stretches)
     if windows == 0:
         return 0
     total, squares = 0.0, 1e-300
@@ -62,10 +64,12 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
 
 
 @jit(allocates=False, fastmath=FUSED)
-def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
-    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
-    number of windows."""
-    windows, _, _ = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
+def solve_fixed(geometry, pose, frame, values, work, stretches):
+    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips, and without the
+    shift of their middles by yaw. Returns the number of windows; 0 where c does not come to rest."""
+    windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches)
+    if moved > _SETTLED:
+        return 0
     kept = first = 0
     for k in range(windows):
         end = work.start[k + 1]
@@ -83,22 +87,24 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _carry(values, work, windows, kinds):
-    """Loads of fixed strips by an active set at given half lengths and, with yaw (``kinds`` 3), middles, these from the
-    loads; whether it was found."""
+def _carry(values, work, windows):
+    """Loads of fixed strips by an active set at given half lengths, these from the loads; by which share of the largest
+    c one moved last, -1 without loads."""
     strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
     for i in range(strips):
         active[i] = work.gap[i, GAP] < 0.0
         work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * work.width[i] ** 2)
         work.middle[i] = work.gap[i, CREST]
-    offset = 2 * strips + 2 * windows
-    for _ in range(_SWEEPS):
+    offset, moved = 2 * strips + 2 * windows, 0.0
+    for sweep in range(_SWEEPS):
         for i in range(strips):
             work.share[i] = 0.0
         n = assemble(values, work, windows, 2)
         if not _active_set(work, strips, n, offset):
-            return False
-        largest = 0.0
+            return -1.0
+        if sweep + 1 == _SWEEPS:  # c and the loads belong together
+            break
+        largest, moved = 0.0, 0.0
         for i in range(strips):
             bend = 0.0
             for j in range(strips):
@@ -107,38 +113,9 @@ def _carry(values, work, windows, kinds):
             largest = max(largest, matrix[offset, i])
         for i in range(strips):
             new = max(matrix[offset, i], 0.02 * largest, 0.02 * work.width[i] ** 2)
-            work.square[i] = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
-        if kinds == 3 and not _shift_middles(values, work, windows):
-            return False
-    return True
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _shift_middles(values, work, windows):
-    """One step of the middles of the strips that carry; whether there is one."""
-    strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
-    for i in range(strips):
-        work.share[i] = load[i] / work.square[i]
-    n = assemble(values, work, windows, 3)
-    used = 0
-    for i in range(strips):
-        if active[i]:
-            column = 0
-            for j in range(strips):
-                if active[j]:
-                    matrix[used, column] = matrix[3 * i + 2, 3 * j + 2]
-                    column += 1
-            matrix[used, column] = matrix[3 * i + 2, n]
-            used += 1
-    if not solve_linear(matrix, used):
-        return False
-    used = 0
-    for i in range(strips):
-        if active[i]:
-            most = 0.5 * math.sqrt(work.square[i])
-            work.middle[i] += min(max(matrix[used, column], -most), most)
-            used += 1
-    return True
+            new = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
+            moved, work.square[i] = max(moved, abs(new - work.square[i]) / largest), new
+    return moved
 
 
 @jit(allocates=False, fastmath=FUSED)

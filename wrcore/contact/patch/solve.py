@@ -91,7 +91,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 return found, frame
             windows = work.guessed[0] = 0
     work.more[WEIGHT] = 0.0
-    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
+    return solve_fixed(geometry, pose, frame, values, work, stretches), frame
 
 
 @jit(allocates=False)
@@ -101,7 +101,7 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if attempt == 1 or again:
-            windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution, kinds)
+            windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution)
         if windows == 0:
             if attempt == 0:
                 continue

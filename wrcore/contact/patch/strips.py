@@ -282,9 +282,9 @@ def _smooth(work, own, kinds, points, n):
     for i in range(first, last):
         largest = max(largest, work.square[i])
     a = math.sqrt(largest)
-    slender = 10.0 * (work.high[own] - work.low[own]) / ((last - first) * a)
-    factor = SMOOTHING * 0.25 * points * work.gap[(first + last) // 2, SHAPE] / (1.0 + slender * slender)
     for i in range(first, last - 3):
+        slender = 10.0 * (work.centre[i + 3] - work.centre[i]) / (3.0 * a)
+        factor = SMOOTHING * 0.25 * points * work.gap[(first + last) // 2, SHAPE] / (1.0 + slender * slender)
         for r in range(4):
             for c in range(4):
                 f = factor * _third(work, i, r) * _third(work, i, c)

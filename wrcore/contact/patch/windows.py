@@ -217,12 +217,15 @@ def take_fresh(work, found, largest, resolution):
     """Windows from their tips in ``work.fresh``: as many strips as guessed if they are as many as were guessed."""
     known, length = found == work.guessed[0], 2.0 * math.sqrt(largest)
     work.more[WEIGHT] = work.more[GUESS] if known else 0.0
+    kept = 0
     for k in range(found):
-        work.low[k], work.high[k] = work.fresh[0, k], work.fresh[1, k]
-        width = work.high[k] - work.low[k]
-        work.start[k + 1] = work.guessed[k + 1] if known else count_strips(width, length, resolution, work.more)
-    _number(work, found)
-    return found
+        width = work.fresh[1, k] - work.fresh[0, k]
+        if width > 0.0:  # not turned inside out by an iteration that failed
+            work.low[kept], work.high[kept] = work.fresh[0, k], work.fresh[1, k]
+            kept += 1
+            work.start[kept] = work.guessed[k + 1] if known else count_strips(width, length, resolution, work.more)
+    _number(work, kept)
+    return kept
 
 
 @jit(allocates=False, fastmath=FUSED)
