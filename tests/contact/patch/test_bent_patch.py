@@ -67,13 +67,14 @@ def test_twelve_strips_carry_what_many_do(benchmark_pair, y, yaw):
     assert few.mean_s == pytest.approx(many.mean_s, abs=0.01 * (many.s_max - many.s_min))
 
 
-@pytest.mark.parametrize("strips", [8, 12, 16])
-def test_the_most_bent_patch_has_a_solution(benchmark_pair, strips):
-    # on strips of equal width, with distances in one plane, 12 carried 1.9 % too little; the grid 2 to 8 % too much
-    _, z = at_load(benchmark_pair, 12, *BENT)
-    found, _ = at_height(benchmark_pair, strips, *BENT, z)
-    assert found.converged and np.ptp(np.arctan(found.tilt)) > 0.75
-    assert found.normal_force == pytest.approx(72e3, rel=8e-3)
+@pytest.mark.parametrize(("higher", "bound"), [(0.0, 5e-3), (4e-6, 0.02)])
+def test_the_most_bent_patch_has_a_solution(benchmark_pair, higher, bound):
+    # on strips of equal width, with distances in one plane, 12 carried 1.9 % too little; the grid 2 to 8 % too much.
+    # 4 um higher Newton's iteration finds nothing on 8 and 12 strips: fixed ones carry 1.8 % less
+    found = [at_height(benchmark_pair, strips, *BENT, 0.460223147 + higher)[0] for strips in (8, 12, 16)]
+    assert all(patch.converged and np.ptp(np.arctan(patch.tilt)) > 0.75 for patch in found)
+    force = np.array([patch.normal_force for patch in found])
+    assert 7e4 < force.min() and np.ptp(force) < bound * force.mean()
 
 
 def test_strips_act_along_the_bent_patch(benchmark_pair):
@@ -140,3 +141,24 @@ def test_fixed_strips_are_hertz_to_within_a_strip_at_the_tips(yaw):
     (exact,) = contact.at_height("left", 0.0, z, 0.0, yaw)
     assert sums[LOAD] == pytest.approx(exact.normal_force, rel=3e-3)
     assert yaw != 0.0 or exact.normal_force == pytest.approx(force, rel=1.5e-3)
+
+
+@pytest.mark.parametrize(
+    ("rail", "y", "z", "roll", "yaw"),
+    [
+        ("60E1", 5.6707821e-3, 0.4602770917, 0.0, -5.4441774e-3),
+        ("60E1", 5.4496390e-3, 0.4600653940, 3.217943e-4, 3.1049739e-3),
+        ("60E1", 4.8604411e-3, 0.4600231391, 1.418861e-4, -4.6222694e-3),
+        ("54E1", 7.0634141e-3, 0.4616439362, 0.0, -1.6332598e-3),
+        ("60E2", 7.6376511e-3, 0.4623032273, 0.0, 2.3663528e-3),
+    ],
+)
+def test_single_poses_are_as_their_neighbours(rail, y, z, roll, yaw):
+    # without the smoothing of narrow strips no solution was found there, and fixed ones were 1 to 5 % off in N, with
+    # 1.3 to 6 times the pressure
+    pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile(rail, "rail", 1 / 40)).geometry
+    found = [NormalContact(pair, MODULUS).at_height("left", y + 1e-6 * k, z, roll, yaw) for k in range(-2, 3)]
+    force = np.array([sum(patch.normal_force for patch in patches) for patches in found])
+    peak = np.array([max(patch.p_max for patch in patches) for patches in found])
+    assert np.abs(np.diff(force, 2)).max() < 5e-4 * force.mean() and np.ptp(force) > 1e-3 * force.mean()
+    assert peak == pytest.approx(peak.mean(), rel=0.01)
