@@ -165,29 +165,36 @@ def test_both_parts_of_a_lobe_roll_as_contacts_of_their_own(benchmark_pair):
     speed = (velocity + np.cross(turning, place)) / 20.0
     xi, eta, phi, _ = creepages(*velocity, *turning, *place, cosine, sine, 20.0)
     slip = pair_table.Slip(xi, eta, phi, *speed[1:], *turning / 20.0)
-    f1, f2, m3, _, c = pair_table.base_force(model, numbers, slip, xi, eta, 0.3 * normal)
+    f1, f2, m3, _, c, fn = pair_table.base_force(model, numbers, slip, xi, eta, 0.3 * normal)
     expected = forces[0], forces[1] * cosine + forces[2] * sine, (moments[2] * cosine - moments[1] * sine) / c
-    np.testing.assert_allclose(np.array([f1, f2, m3]) * 0.3 * normal, expected, rtol=2e-3)
     assert min(map(abs, expected)) > 200.0
+    expected = *expected, forces[2] * cosine - forces[1] * sine
+    np.testing.assert_allclose(np.array([f1, f2, m3, fn]) * 0.3 * normal, expected, rtol=2e-3)
+    assert abs(expected[3]) > 20.0
 
 
-def test_two_ellipses_stand_for_tread_and_root(own_cache):
-    """Where both carry in one overlap the creep force at two ellipses is the exact one within some percent of mu N, all
-    over the disk of creepages; at one ellipse of equal moments it is far off."""
+TREAD_AND_ROOT = -5.65e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
+BENT = -4.335e-3, 7e-4, 8.35e-5, -8.4e-3, -0.0343, pair_table.WIDE
+"""Places: tread and root carry in one overlap; a flange root lies in a gauge corner, bent by 0.85 rad."""
+
+
+@pytest.mark.parametrize(("place", "root", "bound"), [(TREAD_AND_ROOT, 0.5, 0.06), (BENT, 0.7, 0.13)])
+def test_two_ellipses_stand_for_a_lobe_that_turns(own_cache, place, root, bound):
+    """The creep force at two ellipses is the exact one within some percent of mu N, all over the disk of creepages; at
+    one ellipse of equal moments it is far off."""
     model, _ = compile_scene(load_scene(wr.example("trailer_vehicle"), {"contact.patch": "exact"}))
     strips = model.contact.strips._replace(looked_up=model.contact.friction)
     pair, points = pair_store.Pair(model.contact._replace(strips=strips), "two"), creep_modes().points
-    place = -5.65e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
     numbers, remainder = pair.solve(place, points)
-    assert 0.4 < numbers[pair_table.ROOT] < 0.6
-    assert np.hypot(*remainder.T[:2]).max() < 0.06
+    assert abs(numbers[pair_table.ROOT] - root) < 0.1
+    assert np.hypot(*remainder.T[:2]).max() < bound
     one, forces = numbers.copy(), np.zeros((2, len(points), 3))
     one[pair_table.ROOT] = 0.0
-    normal = pair_node.contact_modulus(model.contact.shear_modulus, model.contact.poisson_ratio) * 5e-5**1.5
+    normal = pair_node.contact_modulus(model.contact.shear_modulus, model.contact.poisson_ratio) * place[2] ** 1.5
     normal *= math.exp(numbers[pair_table.LOG_NORMAL])
     for row, force in zip((numbers, one), forces, strict=True):
         creeps = 1e-3 * points
-        pair_node.base_forces(pair._solvable, row, place[1], 0.0, creeps, np.ones(2), 0.3 * normal, force)
+        pair_node.base_forces(pair._solvable, row, place[1], place[3], creeps, np.ones(2), 0.3 * normal, force)
     assert np.hypot(*(forces[1] - forces[0]).T[:2]).max() > 0.1
 
 

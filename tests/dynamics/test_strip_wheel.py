@@ -9,6 +9,7 @@ from study.patch.rolling import solve_patch
 from tests.conftest import SCENES
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
+from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact import reduction as columns
 from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import strip_model, strip_work
@@ -150,6 +151,13 @@ def test_the_grid_gives_the_same_forces(exact):
     forces, axes = [columns.FX, columns.FY], [columns.SEMI_A, columns.SEMI_B]
     np.testing.assert_allclose(found[forces], row[forces], atol=0.015 * limit)
     np.testing.assert_allclose(found[axes], row[axes], rtol=0.03)
+
+
+def test_fixed_strips_are_told(benchmark_pair):
+    wheels = LoadedWheels(benchmark_pair, "exact", "coarse")
+    pressed_in = wheels.at_height("left", 7.187e-3, 0.4615724)  # until no strips end at the tips
+    usual = wheels.at_height("left", 3e-3, wheels.height("left", 3e-3, 6e4))
+    assert [(bool(one.on_fixed), one.on_grid) for one in (*pressed_in, *usual)] == [(True, False), (False, False)]
 
 
 def test_damping_presses_an_ellipse_and_strips_alike():

@@ -143,5 +143,7 @@ def run(options):
     remarks = f", {missing} poses without contact" if missing else ""
     if options.patch != "grid" and table.attrs["on_grid"]:
         remarks += f", {table.attrs['on_grid']} patches by the grid"
+    if table.attrs["on_fixed_strips"]:
+        remarks += f", {table.attrs['on_fixed_strips']} on fixed strips"
     print(f"{len(poses)} poses, {len(table)} patches{remarks}: {out}")
     return 0

@@ -32,7 +32,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, OUT_OF_RANGE, press_wheels
+from wrcore.dynamics.wheel import COUNTERS, press_wheels
 from wrcore.kernels.jit import jit
 
 RAILS = 4
@@ -125,12 +125,13 @@ def flexible_wrenches(model, state, work, rate, mode):
             motion[MOTION.y + i % 2] -= state[at]
             scratch.ground[k, i] = motion[MOTION.vy + i % 2]
             scratch.speeds[k, i] = 0.0 if massless else state[at + d]
-    missed, on_grid = work.counters[OUT_OF_RANGE], work.counters[ON_GRID]
+    c = work.counters
+    counted = c[0], c[1], c[2], c[3], c[4]
     _press(model, work, -1, mode)
     if massless:
         if _follow_where_sliding(model, work):
             _press(model, work, -1, mode | PATCHES_HELD)
-        _give_way(model, state, work, first, missed, on_grid, mode)
+        _give_way(model, state, work, first, counted, mode)
     scratch.power[0] = 0.0
     for k in range(scratch.speeds.shape[0]):
         at = first + size * k
@@ -262,8 +263,8 @@ def _moves(scratch, k, wheel):
 
 
 @jit(allocates=False)
-def _give_way(model, state, work, first, missed, on_grid, mode):
-    """Find the speeds of rails without mass, with all wrenches there; ``missed`` and ``on_grid`` restore counters."""
+def _give_way(model, state, work, first, counted, mode):
+    """Find the speeds of rails without mass, with all wrenches there; the counters start from ``counted`` each time."""
     track, scratch, differences = model.flexible_track, work.flexible_track, True
     scratch.left[:] = math.inf
     for n in range(MOST_STEPS):
@@ -276,7 +277,8 @@ def _give_way(model, state, work, first, missed, on_grid, mode):
                 if n == 0 or _moves(scratch, k, wheel):  # else it has arrived
                     differences |= _step(track, scratch, k, wheel, fresh)
                     moving |= _moves(scratch, k, wheel)
-        work.counters[OUT_OF_RANGE], work.counters[ON_GRID] = missed, on_grid
+        for k in range(COUNTERS):
+            work.counters[k] = counted[k]
         _press(model, work, -1, mode | PATCHES_HELD)
         if not moving:
             break

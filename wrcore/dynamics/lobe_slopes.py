@@ -219,10 +219,10 @@ def _sum_axes(rest, k, rates):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _difference_two(model, numbers, slip, args, own, rates, d_args, step, work):
+def _difference_two(model, numbers, slip, args, own, rates, d_args, step, normal, work):
     """What two ellipses' creep force (`base_force`) changes by in a direction, by a ``step`` in it. ``own``: what the
     place on the lattice changes by; ``rates``, ``d_args``: what the ``slip`` does, and ``args``, both creepages and
-    ln(mu N)."""
+    ln(mu N); ``normal``: what friction has along the normal here."""
     moved, along, base = work.numbers[1], work.along, work.rest
     for column in range(MODE):
         moved[column] = numbers[column] + step * _sum_along(along, column, own)
@@ -230,10 +230,11 @@ def _difference_two(model, numbers, slip, args, own, rates, d_args, step, work):
         slip.xi + step * rates.xi, slip.eta + step * rates.eta, slip.phi + step * rates.phi, slip.vy + step * rates.vy,
         slip.vz + step * rates.vz, slip.wx + step * rates.wx, slip.wy + step * rates.wy, slip.wz + step * rates.wz,
     )  # fmt: skip
-    f1, f2, m3, _, _ = base_force(
+    f1, f2, m3, _, _, fn = base_force(
         model, moved, there, args[0] + step * d_args[0], args[1] + step * d_args[1], args[2] * (1.0 + step * d_args[2])
     )
-    return (f1 - base[BASE, 0]) / step, (f2 - base[BASE, 1]) / step, (m3 - base[BASE, 2]) / step
+    d1, d2, d3 = (f1 - base[BASE, 0]) / step, (f2 - base[BASE, 1]) / step, (m3 - base[BASE, 2]) / step
+    return d1, d2, d3, (fn - normal) / step
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -262,8 +263,9 @@ def _force_slopes(model, m, log_depth, ahead, law, out, work):
     one, other = (1.0 + fade * more_xi) * slip.xi, (1.0 + fade * more_eta) * eta
     c, scale = math.sqrt(square), model.shear_modulus * square / limit
     x1, x2, x3, two = one * scale, other * scale, slip.phi * scale * c, of_two(numbers) > 0.0
+    fn = dn = 0.0
     if two:
-        law[0, 0], law[0, 1], law[0, 2], _, _ = base_force(model, numbers, slip, one, other, limit)
+        law[0, 0], law[0, 1], law[0, 2], _, _, fn = base_force(model, numbers, slip, one, other, limit)
     else:
         law_slopes(TABLE, model.creep, log_g, math.exp(log_g), (x1, x2, x3), law)
     c11, c22, _, _ = coefficients_at(log_g, model.creep.table.kalker)
@@ -304,9 +306,9 @@ def _force_slopes(model, m, log_depth, ahead, law, out, work):
                 slow * (ahead * (1.0 if j == MOVES + 4 else 0.0) - slip.wy * d.speed),
                 slow * (ahead * (1.0 if j == MOVES + 5 else 0.0) - slip.wz * d.speed),
             )  # fmt: skip
-            d1, d2, d3 = _difference_two(
+            d1, d2, d3, dn = _difference_two(
                 model, numbers, slip, (one, other, limit), own, rates, (d_one, d_other, d_limit),
-                DIFFERENCE if j < MOVES else SMALL_SLIP * speed, work,
+                DIFFERENCE if j < MOVES else SMALL_SLIP * speed, fn, work,
             )  # fmt: skip
         else:
             dx3 = ahead * d.phi * scale * c + x3 * (1.5 * wider - d_limit)
@@ -322,9 +324,11 @@ def _force_slopes(model, m, log_depth, ahead, law, out, work):
             across = fx * d1 + fy * d2
             d1, d2 = bound * (d1 - across * fx), bound * (d2 - across * fy)
         add_wrench_slope(
-            (px, py, pz), dp, (cosine, sine), (-sine * turned, cosine * turned), (f1, f2, normal, m3),
+            (px, py, pz), dp, (cosine, sine), (-sine * turned, cosine * turned),
+            (f1, f2, normal + bound * limit * fn, m3),
             (
-                ahead * limit * (d1 + fx * d_limit), limit * (d2 + fy * d_limit), normal * harder,
+                ahead * limit * (d1 + fx * d_limit), limit * (d2 + fy * d_limit),
+                normal * harder + bound * limit * (dn + fn * d_limit),
                 ahead * limit * c * (d3 + mz * (d_limit + 0.5 * wider)),
             ), out[j],
         )  # fmt: skip

@@ -260,14 +260,11 @@ def _part_numbers(numbers, sums):
     whole = [*sums[6:9], *numbers[[columns.ANGLE, columns.LOG_A, columns.LOG_B]]]
     numbers[columns.ROOT : columns.ROOT_B + 1] = root, *(sums[13:19] - root * np.array(whole))
     numbers[columns.REST_A : columns.REST_B + 1] = sums[19:21] - (1.0 - root) * np.array(whole[4:])
-    wide = 0.0
     for load, size in ((root, columns.ROOT_B), (1.0 - root, columns.REST_B)):  # strips lie in one plane
         turned = numbers[columns.ROOT_ANGLE] * columns.of_load(load)
         numbers[size] -= load * math.log(max(math.cos(turned), 0.5))
-        wide += math.exp(numbers[columns.LOG_B] + numbers[size] * columns.of_load(load))
     both = root * (1.0 - root)
-    apart = math.hypot(numbers[columns.ROOT_Y], numbers[columns.ROOT_Z]) / both
-    numbers[columns.PARTED] = both * columns.smooth(apart / wide, columns.TWO)
+    numbers[columns.PARTED] = both * columns.smooth(abs(numbers[columns.ROOT_ANGLE]) / math.sqrt(both), columns.BENT)
 
 
 @jit(allocates=False)
@@ -288,7 +285,7 @@ def base_forces(model, numbers, slope, yaw, creepages, factors, limit, forces):
     for k in range(len(creepages)):
         xi, eta = creepages[k, 0], creepages[k, 1]
         slip = rolling_slip(numbers, slope, yaw, half, radius, xi, eta)
-        f1, f2, m3, _, _ = base_force(model, numbers, slip, factors[0] * xi, factors[1] * eta, limit)
+        f1, f2, m3, _, _, _ = base_force(model, numbers, slip, factors[0] * xi, factors[1] * eta, limit)
         forces[k, 0], forces[k, 1], forces[k, 2] = f1, f2, m3
 
 
@@ -305,8 +302,8 @@ def unlike(model, modes, one, other, depth, slope, yaw, points):
     for k in range(len(points)):
         xi, eta = unit * points[k, 0] / c11, unit * points[k, 1] / c22
         slip = rolling_slip(one, slope, yaw, half, radius, xi, eta)
-        f1, f2, _, _ = tabulated_force(model, modes, one, slip, limit, 0.0)
-        g1, g2, _, _ = tabulated_force(model, modes, other, slip, limit, 0.0)
+        f1, f2, _, _, _ = tabulated_force(model, modes, one, slip, limit, 0.0)
+        g1, g2, _, _, _ = tabulated_force(model, modes, other, slip, limit, 0.0)
         worst = max(worst, abs(f1 - g1), abs(f2 - g2))
     return worst / limit
 

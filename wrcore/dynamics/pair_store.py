@@ -49,7 +49,7 @@ from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.told import PATIENCE, handed_on, told_if_long, warn_once
 
-WRONG = (3e-3, 0.01), (3e-3, 0.015), (4e-3, 0.02), (0.1, 0.3)
+WRONG = (3e-3, 0.01), (3e-3, 0.015), (3e-3, 0.015), (2e-3, 0.015), (0.1, 0.3)
 """Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
 in the end to the solver. Fine lattices are where a lobe is born. There forces bend, or the solver's own ones jump by a
 few percent, and steps through solutions would be as small as they can: in the finest only nonsense is refused."""

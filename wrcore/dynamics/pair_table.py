@@ -42,7 +42,7 @@ from wrcore.kernels.lanes import lanes8, load8, put8, take8, total
 STEPS = 2e-4, 5e-4, 0.25
 """Of the coarsest lattice in t (m), slope of the axle and ln D."""
 
-LEVELS = 4
+LEVELS = 5
 """Lattices, each with half the steps of the one before."""
 
 FIRST = -0.05, -0.1, math.log(4e-6)
@@ -78,16 +78,17 @@ PARTED_FROM, MODE = 16, 24
 plus the rolling radius); ln of the semi-axes and of p_max / E*; factors of both creepages, and how far they make
 the slopes exact (1; 0 where spin rules); the remainder of Fx, Fy (over mu N) and Mz (over mu N c) at no creepage;
 the load in its flange root over N, and, times that, the place (m), angle and ln of the semi-axes of this part less
-those of the whole; ln of the semi-axes of the rest less those of the whole, times its load over N; how far both
-parts are apart (0: one ellipse stands for both; 1: two do); and its coefficients of both families' modes. The rows
-of a cell are its 8 corners; a corner more at either end of its 12 edges; and odd and even part of what yaw adds at
-the 8 corners of the cell with twice the steps in which it lies."""
+those of the whole; ln of the semi-axes of the rest less those of the whole, times its load over N; how much their
+angles differ, times both loads over N^2 (0: one ellipse stands for both; 1: two do); and its coefficients of both
+families' modes. The rows of a cell are its 8 corners; a corner more at either end of its 12 edges; and odd and even
+part of what yaw adds at the 8 corners of the cell with twice the steps in which it lies."""
 
 ROOTS = (0.15, 0.25), (0.6, 0.8)
 """Contact angles between which what is pressed goes over from tread to flange root, and from there to the flange."""
 
-TWO = 0.8, 1.0
-"""Distance of both parts' places, over the sum of their half widths, between which one ellipse goes over to two."""
+BENT = 0.008, 0.025
+"""Standard deviation of both parts' contact angles over their load, rad, between which one ellipse goes over to two:
+parts that turn against each other spin differently."""
 
 LEAST, LITTLE = 1e-6, 3e-3
 """Load of a part, over N, below which the other part is the whole, and up to which its numbers go over to those of the
@@ -166,31 +167,31 @@ def _weights(f):
 @jit(allocates=False, forceinline=True)
 def key_of(level, part, turn, i, j, k):
     """One number, not 0, for the cell with this place in yaw and first corner; `corner_of` reads it."""
-    return (((((level + 1) * 128 + part) * 128 + turn) * 4096 + i) * 4096 + j) * 256 + k
+    return (((((level + 1) * 128 + part) * 256 + turn) * 8192 + i) * 8192 + j) * 512 + k
 
 
 def corner_of(key):
     """Level, part of the profile, place in yaw and first corner of a cell."""
     found = []
-    for count in (256, 4096, 4096, 128, 128):
+    for count in (512, 8192, 8192, 256, 128):
         key, rest = divmod(key, count)
         found.append(rest)
     return key - 1, *reversed(found)
 
 
-PART_CODE = 512 * 4096 * 4096 * 256
+PART_CODE = 512 * 8192 * 8192 * 512
 """What one part of the profile more adds to a `node_code`."""
 
 
 def node_code(level, part, turn, i, j, k):
     """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
-    return (level * 128 + part) * PART_CODE + ((turn * 4096 + i) * 4096 + j) * 256 + k
+    return (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
 
 
 def node_of(code):
     """Level, part of the profile, place in yaw and in the lattice of a node."""
     found = []
-    for count in (256, 4096, 4096, 512, 128):
+    for count in (512, 8192, 8192, 512, 128):
         code, rest = divmod(code, count)
         found.append(rest)
     return code, *reversed(found)
@@ -419,8 +420,8 @@ def of_load(load):
 @jit(allocates=False, fastmath=FUSED)
 def _of_part(model, numbers, slip, xi, eta, limit, load, side, sizes):
     """As `_at_ellipse`, of a part of a lobe with a ``load`` over N, for the creepages ``xi``, ``eta`` of the whole:
-    over mu N and m, about the place of the whole. ``side``: 1 in the flange root, -1 for the rest; ``sizes``: first of
-    the semi-axes' numbers."""
+    over mu N and m, about the place of the whole, and along the normal of the whole. ``side``: 1 in the flange root, -1
+    for the rest; ``sizes``: first of the semi-axes' numbers."""
     each = of_load(load)
     dx, dy, dz = side * each * numbers[ROOT_X], side * each * numbers[ROOT_Y], side * each * numbers[ROOT_Z]
     turned, angle = side * each * numbers[ROOT_ANGLE], numbers[ANGLE]
@@ -432,8 +433,9 @@ def _of_part(model, numbers, slip, xi, eta, limit, load, side, sizes):
     eta += vy * own_cosine + vz * own_sine - slip.vy * cosine - slip.vz * sine
     phi = slip.wz * own_cosine - slip.wy * own_sine
     f1, f2, m3, missed, c = _at_ellipse(model, log_a, log_b, load * limit, xi, eta, phi)
+    fn = load * f2 * math.sin(turned)
     f1, f2, m3 = load * f1, load * f2 * math.cos(turned), load * m3 * c * math.cos(turned)
-    return f1, f2, m3 - f1 * (dy * cosine + dz * sine) + f2 * dx, missed
+    return f1, f2, m3 - f1 * (dy * cosine + dz * sine) + f2 * dx, missed, fn
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -446,34 +448,36 @@ def of_two(numbers):
 @jit(allocates=False, fastmath=FUSED)
 def base_force(model, numbers, slip, xi, eta, limit):
     """Creep force of the creep table at a lobe's ellipse, or at those of its two parts, for creepages ``xi``, ``eta``
-    in place of the ``slip``'s, over mu N and mu N c; look-ups missed; c."""
+    in place of the ``slip``'s, over mu N and mu N c; look-ups missed; c; and what friction in the parts' own planes has
+    along the normal of the whole, over mu N."""
     root, log_a, log_b, two = numbers[ROOT], numbers[LOG_A], numbers[LOG_B], of_two(numbers)
     f1 = f2 = m3 = missed = 0.0
     c = math.exp(0.5 * (log_a + log_b))
     if two < 1.0:
         f1, f2, m3, missed, c = _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
         if two <= 0.0:
-            return f1, f2, m3, missed, c
-    g1, g2, n3, more = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
-    h1, h2, o3, most = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
+            return f1, f2, m3, missed, c, 0.0
+    g1, g2, n3, more, gn = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
+    h1, h2, o3, most, hn = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
     one = 1.0 - two
     f1, f2, m3 = one * f1 + two * (g1 + h1), one * f2 + two * (g2 + h2), one * m3 + two * (n3 + o3) / c
-    return f1, f2, m3, missed + more + most, c
+    return f1, f2, m3, missed + more + most, c, two * (gn + hn)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_force(model, modes, numbers, slip, limit, turning):
-    """Creep force Fx, Fy (N), together no more than friction bears, Mz (N m) from a node's numbers, and look-ups
-    missed. ``turning``: of the wheel's rate of rolling over that of free rolling, less 1."""
+    """Creep force Fx, Fy (N), together no more than friction bears, Mz (N m) from a node's numbers, look-ups missed,
+    and what friction has along the normal (N): a bent patch's parts have planes of their own. ``turning``: of the
+    wheel's rate of rolling over that of free rolling, less 1."""
     part = turning / LOCKED
     fade = max(0.0, 1.0 - part * part)
     fade *= fade
     xi = (1.0 + fade * (numbers[SLOPE_XI] - 1.0)) * slip.xi
     eta = (1.0 + fade * (numbers[SLOPE_ETA] - 1.0)) * slip.eta
-    f1, f2, m3, missed, c = base_force(model, numbers, slip, xi, eta, limit)
+    f1, f2, m3, missed, c, fn = base_force(model, numbers, slip, xi, eta, limit)
     scale = model.shear_modulus * c * c / (3.0 * limit)
     c11, c22, _, _ = coefficients_at(numbers[LOG_A] - numbers[LOG_B], model.creep.table.kalker)
     r1, r2, r3 = remainder(modes, numbers, xi * scale * c11, eta * scale * c22)
     fx, fy, mz = f1 + fade * r1, f2 + fade * r2, m3 + fade * r3
     scale = limit / max(math.sqrt(fx * fx + fy * fy), 1.0)
-    return scale * fx, scale * fy, limit * c * mz, missed
+    return scale * fx, scale * fy, limit * c * mz, missed, scale * fn

@@ -15,7 +15,7 @@ from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
 from wrcore.dynamics.strip_wheel import add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
-from wrcore.dynamics.wheel import wheel_wrenches
+from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind
 from wrcore.kernels.told import handed_on, told_if_long
 
@@ -54,7 +54,7 @@ def _with_own(contact):
 def _of_patches(kernel, contact, work):
     """Address of a kernel of patches."""
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
-    kind, counters = Kind(contact._replace(geometries=(), wheels=())), np.zeros(4, np.int64)
+    kind, counters = Kind(contact._replace(geometries=(), wheels=())), np.zeros(COUNTERS, np.int64)
     return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
 
 
@@ -90,7 +90,7 @@ class LateKernels:
     def _of_lobes(self):
         m, frame = WheelMotion(*np.zeros(len(WheelMotion._fields))), Frame(*np.zeros(len(Frame._fields)))
         kind, work = Kind(self._contact._replace(geometries=(), wheels=())), Kind(strip_work(self._contact.strips, 1))
-        return Kernel(look_lobes_up, kind, m, frame, 0.0, 0.0, 0.0, np.zeros(4, np.int64), work).address
+        return Kernel(look_lobes_up, kind, m, frame, 0.0, 0.0, 0.0, np.zeros(COUNTERS, np.int64), work).address
 
     def _with_ellipses(self):
         work, counts = Kind(strip_work(self._contact.strips, 1)), np.zeros((1, 2), np.int64)

@@ -27,14 +27,14 @@ from wrcore.contact.patch.gap import strip_wrenches as wrenches_of_strips
 from wrcore.contact.patch.grid import GridPatch, grid_normal, grid_rolling
 from wrcore.contact.patch.model import ELLIPSES as WITH_ELLIPSES
 from wrcore.contact.patch.model import LOAD
-from wrcore.contact.patch.strips import WEIGHT, WIDENED
+from wrcore.contact.patch.strips import FIXED, WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
 from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
-from wrcore.dynamics.wheel import ON_GRID, contact_of, detect_patches, falling, leaning_motion
+from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, contact_of, detect_patches, falling, leaning_motion
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit
 
@@ -318,6 +318,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
+        counters[ON_FIXED] += finer[FIXED] > 0.0
         found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE

@@ -37,7 +37,7 @@ from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.suspension import Elements, element_forces, with_laws
 from wrcore.dynamics.track import TrackModel, fill_rail_friction, rail_motions, turn_back_wrenches
 from wrcore.dynamics.vector import load
-from wrcore.dynamics.wheel import EVALUATIONS, ContactModel, contact_of, press_wheels, shaped, wheel_wrenches
+from wrcore.dynamics.wheel import COUNTERS, EVALUATIONS, ContactModel, contact_of, press_wheels, shaped, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -134,7 +134,7 @@ def workspace(model):
         np.tile(np.eye(3), (n + 1, 1, 1)), np.full(k, np.nan), np.zeros((n, 3)), np.zeros((n, 6)),
         np.zeros((k, 2, MAX_PATCHES, PATCH_COLUMNS)), np.zeros((k, 2), np.int64), np.zeros((k, 2, len(MOTION))),
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
-        np.zeros(4, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
+        np.zeros(COUNTERS, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
         np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 3), np.nan),
         np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),

@@ -160,7 +160,8 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
             continue
         r = roll_lobe(model, m, ahead, q, counters, work)
         add_force(r.px, r.py, r.pz, 0.0, -normal * r.sine, normal * r.cosine, work.wrench[0])
-        add_force(r.px, r.py, r.pz, r.f1, r.f2 * r.cosine, r.f2 * r.sine, work.wrench[1])
+        fy, fz = r.f2 * r.cosine - r.fn * r.sine, r.f2 * r.sine + r.fn * r.cosine
+        add_force(r.px, r.py, r.pz, r.f1, fy, fz, work.wrench[1])
         work.wrench[1, 4] -= r.m3 * r.sine
         work.wrench[1, 5] += r.m3 * r.cosine
         if bare > 0.0:
@@ -201,6 +202,8 @@ class Rolled(NamedTuple):
     f1: float
     f2: float
     m3: float
+    fn: float
+    """What friction has along the lobe's normal, N."""
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -223,6 +226,6 @@ def roll_lobe(model, m, ahead, q, counters, work):
         ahead * slowness * m.wy, ahead * slowness * m.wz,
     )  # fmt: skip
     turning = ahead * m.wy * radius / speed - 1.0
-    f1, f2, m3, missed = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning)
+    f1, f2, m3, missed, fn = tabulated_force(model, model.strips.table.modes, numbers, slip, limit, turning)
     counters[OUT_OF_RANGE] += missed
-    return Rolled(px, py, pz, cosine, sine, xi, eta, phi, ahead * f1, f2, ahead * m3)
+    return Rolled(px, py, pz, cosine, sine, xi, eta, phi, ahead * f1, f2, ahead * m3, fn)

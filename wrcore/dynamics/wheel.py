@@ -18,9 +18,11 @@ from wrcore.dynamics.motion import MOTION, WheelMotion, motion_of
 from wrcore.kernels.handles import call_address, member_of
 from wrcore.kernels.jit import FUSED, jit
 
-EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED = range(4)
-"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, and patches
-of a pair's table that were solved instead of looked up."""
+EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED = range(5)
+"""Places of the counters: evaluations, creep look-ups out of the table's range, patches solved on a grid, patches of a
+pair's table that were solved instead of looked up, and patches on fixed strips, whose tips were not found."""
+
+COUNTERS = 5
 
 
 class ContactModel(NamedTuple):

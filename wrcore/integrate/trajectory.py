@@ -63,6 +63,8 @@ class Trajectory:
     """Steps that were rejected three times in a row or more."""
     on_grid: int = 0
     """Patches that strips did not solve and a grid did."""
+    on_fixed_strips: int = 0
+    """Patches that strips solved without finding their tips."""
     not_tabulated: int = 0
     """Patches that were to be looked up and had to be solved."""
     unbalanced: int = 0

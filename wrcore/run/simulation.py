@@ -38,7 +38,8 @@ DERAILED_Y = 0.05
 COUNTERS = {
     "steps": "steps", "rejected": "rejected", "rhs_evaluations": "rhs_evaluations", "jacobians": "jacobians",
     "factorisations": "factorisations", "smallest_step_s": "smallest_step", "step_collapses": "collapses",
-    "table_out_of_range": "out_of_range", "patches_on_grid": "on_grid", "patches_not_tabulated": "not_tabulated",
+    "table_out_of_range": "out_of_range", "patches_on_grid": "on_grid",
+    "patches_on_fixed_strips": "on_fixed_strips", "patches_not_tabulated": "not_tabulated",
     "rails_unbalanced": "unbalanced", "wall_s": "wall_s",
 }  # fmt: skip
 """Counters of a run, and what a `Trajectory` calls them."""

@@ -43,14 +43,14 @@ from wrcore.scene.description import load_scene
 LOOKED_UP, REFINED, SOLVED = "looked up", "refined", "solved"
 """What becomes of a cell."""
 
-COLORS = "#B3DCF2", "#4FA3DB", "#00558C", "#E69F00"
+COLORS = "#B3DCF2", "#4FA3DB", "#00558C", "#0B2545", "#E69F00"
 """Of the lattices, coarsest first: blues that darken, and orange for the finest."""
 
 SOLVED_COLOR = "#CC3311"
 
 DOTS = {"marker": ".", "markersize": 1.6, "color": "k", "markeredgewidth": 0.0, "linestyle": ""}
 
-LINES = "-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1, 1, 1))
+LINES = "-", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1, 1, 1)), (0, (8, 2))
 """Of the lattices."""
 
 

@@ -17,7 +17,7 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS, REDUCTIONS
 from wrcore.contact.statics import height_at_load, settle
 from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.dynamics.motion import MOTION as _MOTION
-from wrcore.dynamics.wheel import wheel_wrenches
+from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked, same_shape
 from wrcore.geometry.track import SIDES
@@ -190,7 +190,7 @@ def _pressed(sides, motions, with_creep):
         model = one._at_work() if with_creep else one._still_handle
         rows, counts = np.zeros_like(out), np.zeros((count, 2), np.int64)
         wheel_wrenches(model, motions, rows, counts, np.zeros((count, 2)), np.zeros((count, 2, 6)),
-                       np.zeros(4, np.int64), one._work_handle)  # fmt: skip
+                       np.zeros(COUNTERS, np.int64), one._work_handle)  # fmt: skip
         there = np.arange(MAX_PATCHES) < counts[..., None]
         out[:, wheel] = np.where(there[..., None], rows, np.nan)[:, wheel]
     return out

@@ -32,7 +32,7 @@ from wrcore.dynamics.motion import MOTION, WheelMotion, as_left
 from wrcore.dynamics.patch_kernels import with_fallback, with_late
 from wrcore.dynamics.strip_wheel import group_wrench, mirror
 from wrcore.dynamics.tabulated_wheel import UNKNOWN, tabulated_wrench
-from wrcore.dynamics.wheel import ON_GRID, ContactModel, wheel_wrenches
+from wrcore.dynamics.wheel import COUNTERS, ON_FIXED, ON_GRID, ContactModel, wheel_wrenches
 from wrcore.errors import InputError, check_number, one_of
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.handles import Handle
@@ -79,6 +79,8 @@ class Found(NamedTuple):
     patch: Patch = None
     """With its fields, where the model has them and they were asked for."""
     on_grid: bool = False
+    on_fixed: bool = False
+    """Whether a grid, or fixed strips, stood in."""
 
     @property
     def vertical(self):
@@ -121,7 +123,7 @@ class LoadedWheels:
             contact = with_fallback(contact)
         self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
         self._rolling = {}
-        self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(4, np.int64)
+        self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(COUNTERS, np.int64)
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
         """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),
@@ -188,7 +190,7 @@ class LoadedWheels:
         count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
-            last, before = group_end(self.geometry, overlaps, count, first), self._counters[ON_GRID]
+            last, before = group_end(self.geometry, overlaps, count, first), self._counters.copy()
             work.spare[:] = 0.0  # of the last solution, and what runs ask for
             found = UNKNOWN
             if contact.value.strips.looked_up:
@@ -202,7 +204,7 @@ class LoadedWheels:
             extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
             if sign < 0.0:
                 mirror(out, 1, wrench)
-            on_grid = self._counters[ON_GRID] > before
+            on_grid, on_fixed = self._counters[[ON_GRID, ON_FIXED]] > before[[ON_GRID, ON_FIXED]]
             if on_grid and not self.refines:
                 x, a, b = out[0, [columns.X, columns.SEMI_A, columns.SEMI_B]]
                 yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, None, True)
@@ -210,7 +212,7 @@ class LoadedWheels:
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
                 patch = self._fields(out[0], found.load, pose, friction) if fields else None
-                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, patch)
+                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, patch, False, on_fixed)
             first = last
 
     def _fields(self, row, load, pose, friction):

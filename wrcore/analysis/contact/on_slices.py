@@ -3,7 +3,7 @@
 import math
 
 from wrcore.analysis.contact.loaded import LoadedWheels
-from wrcore.dynamics.wheel import ON_GRID
+from wrcore.dynamics.wheel import ON_FIXED, ON_GRID
 from wrcore.errors import InputError, one_of
 from wrcore.geometry.track import SIDES
 
@@ -73,11 +73,15 @@ class LoadedOnSlices(LoadedWheels):
         if math.isnan(self._lie(side, y, roll, yaw)):
             return []
         while True:
-            before = self._counters[ON_GRID]
+            before = self._stood_in()
             found = super().at_height(side, y, z, roll, yaw, rolling, friction, fields)
-            if self._counters[ON_GRID] == before or self._level + 1 == len(self._levels):
+            if self._stood_in() == before or self._level + 1 == len(self._levels):
                 return found
             self._solve_with(self._level + 1)
+
+    def _stood_in(self):
+        """Patches so far on which a grid or fixed strips stood in."""
+        return self._counters[[ON_GRID, ON_FIXED]].sum()
 
     def height(self, side, y, load, roll=0.0, yaw=0.0, rolling=None, friction=0.3, vertical=True, guess=math.nan):
         """As for `LoadedWheels`, at ``s``."""

@@ -24,8 +24,8 @@ def loaded_poses(
     detection="spatial", shear_modulus=8.2e10, poisson_ratio=0.28,
 ):  # fmt: skip
     """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.pose_file.read_poses`: columns
-    FIELDS, a row per patch, none without contact or equilibrium; ``attrs["on_grid"]``: patches that a grid has solved
-    instead of strips.
+    FIELDS, a row per patch, none without contact or equilibrium; ``attrs``: patches solved ``on_grid`` instead of
+    strips, and ``on_fixed_strips``, whose tips were not found.
 
     z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
     Neither: both are solved so that each wheel carries it. In place of a ``geometry`` a `WheelOnSlices` stands for both
@@ -41,7 +41,7 @@ def loaded_poses(
     on_slices = isinstance(geometry, WheelOnSlices)
     kind = LoadedOnSlices if on_slices else LoadedWheels
     wheels = kind(geometry, patch, resolution, slip, shear_modulus, poisson_ratio, detection)
-    rows, on_grid = [], 0
+    rows, on_grid, on_fixed = [], 0, 0
     for pose in poses.itertuples():
         if on_slices:
             wheels.s, wheels.turned = _given(pose, "s_m", 0.0), _given(pose, "pitch_rad", 0.0)
@@ -56,7 +56,7 @@ def loaded_poses(
         for side, z in heights.items():
             found = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
             for number, one in enumerate(found, start=1):
-                on_grid += one.on_grid
+                on_grid, on_fixed = on_grid + one.on_grid, on_fixed + one.on_fixed
                 if mu == 0.0:
                     one.row[columns.FX : columns.MZ + 1] = 0.0
                 rows.append([
@@ -65,7 +65,7 @@ def loaded_poses(
                     *(math.nan if rolling is None else one.row[columns.CHANNELS[name]] for name in ROLLING),
                 ])  # fmt: skip
     table = pd.DataFrame(rows, columns=list(FIELDS))
-    table.attrs["on_grid"] = on_grid
+    table.attrs |= {"on_grid": on_grid, "on_fixed_strips": int(on_fixed)}
     return table
 
 

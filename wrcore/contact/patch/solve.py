@@ -22,7 +22,7 @@ from wrcore.contact.patch.fixed import solve_fixed, windows_from_fixed
 from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps, unroll
 from wrcore.contact.patch.grading import grade
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
-from wrcore.contact.patch.strips import MAX_WINDOWS, WEIGHT, place_strips
+from wrcore.contact.patch.strips import FIXED, MAX_WINDOWS, WEIGHT, place_strips
 from wrcore.contact.patch.windows import drop_starved, guess_squares, guess_windows, merge_close, newborn, start_strips
 from wrcore.contact.strip import changes_along
 from wrcore.kernels.jit import FUSED, jit
@@ -34,8 +34,8 @@ _BORN, _HARDLY = 1e-3, 1e-2
 """Shares of the deepest penetration by which loaded surfaces interpenetrate where a lobe is born. The second is for
 lobes that barely touch: they are born with the first and starve, again and again."""
 
-_MORE_STRIPS = 2
-"""Strips by which a window's number may rise where no solution was found with less."""
+_OTHER_NUMBERS = 0, 4, -1, 2
+"""Strips by which a window's number differs in turn, where no solution was found."""
 
 _STRIPS_FROM = 4 + 3 * MAX_WINDOWS
 """Where a memory holds its strips."""
@@ -66,6 +66,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
     if it fits (its first number 0: none), which leaves the result the same to the square of the iteration's tolerance;
     filled with this one."""
+    work.more[FIXED] = 0.0
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
     guess_squares(hertz, patches, first, work, stretches)
@@ -82,15 +83,17 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         windows = guess_windows(work, stretches, resolution)
     memory[0] = 0.0
     for born in (_BORN, _HARDLY):
-        for extra in range(0, _MORE_STRIPS + 1, 2):
+        for extra in _OTHER_NUMBERS:
             strips = resolution + extra
+            if extra != 0:
+                windows = guess_windows(work, stretches, strips)
             found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds, born)
             if found > 0:
                 if attempts == 1 and extra == 0 and born == _BORN:
                     _remember(frame, work, found, memory)
                 return found, frame
-            windows = work.guessed[0] = 0
-    work.more[WEIGHT] = 0.0
+        windows = work.guessed[0] = 0
+    work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
     return solve_fixed(geometry, pose, frame, values, work, stretches), frame
 
 

@@ -49,8 +49,8 @@ MEMORY = 4 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
 tips of its windows; Q, c and X of its strips."""
 
 
-WIDENED, WEIGHT, GUESS = range(3)
-"""Places of a workspace's ``more``."""
+WIDENED, WEIGHT, GUESS, FIXED = range(4)
+"""Places of a workspace's ``more``; the last is not 0 where strips are fixed as no tips were found."""
 
 
 class NormalWork(NamedTuple):
@@ -121,7 +121,7 @@ def normal_work():
         *np.zeros((2, n)), np.zeros((4, n)), *np.zeros((2, n)), *np.zeros((3, n)), np.zeros((n, GAP_ROWS)),
         np.zeros((2, n)), np.zeros((4, 4)),
         *(np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)) for _ in range(2)), np.zeros(n, np.bool_), np.zeros(n),
-        np.array([1.0, 0.0, 0.0]),
+        np.array([1.0, 0.0, 0.0, 0.0]),
     )  # fmt: skip
 
 
