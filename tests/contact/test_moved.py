@@ -103,3 +103,21 @@ def test_an_overlap_of_a_wheel_that_is_lifted_a_little(benchmark_pair, poses):
         assert place == pytest.approx(lifted[0, U_WHEEL], abs=2e-6)
         compared += 1
     assert compared > 50
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.01, 0.0216, -0.0239])
+def test_an_overlap_at_its_own_pose_is_the_one_that_was_found(benchmark_pair, yaw):
+    """However far the wheel is yawed: beyond some 15 mrad strips are looked up one by one."""
+    axle, rows, seen = (-np.sin(yaw), np.cos(yaw), 0.0), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), 0
+    for y in np.arange(-9e-3, 6e-3, 5e-4):
+        for z in np.arange(0.466, 0.44, -2e-5):
+            if search(benchmark_pair, 1.0, y, z, *axle, rows):
+                break
+        for depth in (5e-6, 3e-5):
+            for row in rows[: search(benchmark_pair, 1.0, y, z - depth, *axle, rows)]:
+                square, place = overlap(benchmark_pair, y, z - depth, *axle, row)
+                expected = 16.0 / 15.0 * row[COSINE] * row[PENETRATION] ** 2.5 / np.sqrt(row[CURVATURE_Y])
+                assert square == pytest.approx(expected / row[COSINE] ** 2, rel=0.05), (y, depth)
+                assert place == pytest.approx(row[U_WHEEL], abs=1e-3)
+                seen += 1
+    assert seen > 50

@@ -204,7 +204,7 @@ def _looked_up(geometry, pose, nodes):
         gap = gap_at(geometry, pose, nodes.u + k * nodes.step)[0]
         if gap < 0.0:
             m0, m1, count = m0 + gap * gap, m1 + gap * gap * k, count + 1
-    return count, m0 * nodes.step, nodes.step * m1 / m0
+    return count, m0 * nodes.step, nodes.step * m1 / max(m0, 1e-300)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -214,6 +214,9 @@ def overlap_at(geometry, pose, row):
     nodes = _scan_nodes(geometry, pose, row)
     if leaves_cells(pose):
         count, square, place = _looked_up(geometry, pose, nodes)
+        if count < WIDE:
+            nodes = _fine_nodes(geometry, pose, row)
+            count, square, place = _looked_up(geometry, pose, nodes)
     else:
         count, square, place = _moments(nodes, geometry.scan_wheel, geometry.scan_rail)
         if count < WIDE:
