@@ -1,5 +1,7 @@
 """ProfileCurve: interpolation, curvature average, points, pose."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -240,6 +242,20 @@ def test_a_wheel_moves_to_its_tape_circle():
     curve = ProfileCurve.from_points(u, wheel(u) + 0.002, "wheel")
     assert curve(0.0) == pytest.approx(0.0, abs=1e-15)
     assert np.nanmax(np.abs(curve(u) - wheel(u))) < 0.2e-6
+
+
+def test_noise_is_told_unless_it_is_evened_out(capsys):
+    """8 um of it on points of S1002 half a millimetre apart bend the curve by some 30/m; 0.1 um of rounding do not."""
+    u = np.arange(-0.04, 0.03, 5e-4)
+    f = named_profile("S1002", "wheel")(u)
+    noisy = f + np.random.default_rng(7).normal(scale=8e-6, size=u.size)
+    ProfileCurve.from_points(u, np.round(f, 7), "wheel", "rounded")
+    ProfileCurve.from_points(u, noisy, "wheel", "smoothed", smoothing=1e-5)
+    assert capsys.readouterr().err == ""
+    ProfileCurve.from_points(u, noisy, "wheel", "noisy")
+    said = capsys.readouterr().err
+    told = re.fullmatch(r"wrcore: noisy: points scatter by (\S+) m, .* by (\d+)/m \(.*smoothing.*\)\n", said)
+    assert float(told[1]) == pytest.approx(8e-6, rel=0.2) and float(told[2]) == pytest.approx(32.0, rel=0.3)
 
 
 def test_smoothing_takes_out_noise():

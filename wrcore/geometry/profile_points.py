@@ -25,6 +25,8 @@ _LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than t
 _WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
 _STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
 _COARSE = 3e-4  # m; a file whose points leave more open between two of them is told
+_BENDS = 5.0  # 1/m; noise that bends a profile by more is told
+_MEDIAN = 0.6745  # of the size of Gaussian noise, over its standard deviation
 _FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
 _SMOOTHER = " (dents and noise: smoothing, such as 1.0e-5, evens them out)"
 _OUTSIDE = "expected u = 0 (tape circle) inside a wheel profile, got it outside: tape_circle or flange_back says where"
@@ -236,6 +238,22 @@ def _check_gaps(u, f, name, lines):
         warn(f"{name}: line {lines[i + 1]}: {apart}: the curve may be wrong by as much")
 
 
+def _check_scatter(u, f, name):
+    """Tell of points whose noise bends the curve through them: each beside the cubic through its four neighbours."""
+    around = np.stack([u[i : u.size - 4 + i] for i in (0, 1, 3, 4)])
+    between, own = around[:, None] - around, np.eye(4, dtype=bool)[..., None]
+    with np.errstate(all="ignore"):  # on side faces points lie above each other
+        beside = np.where(own, 1.0, (u[2:-2] - around) / (between + own)).prod(axis=1)
+        missed = f[2:-2] - sum(beside[k] * f[i : u.size - 4 + i] for k, i in enumerate((0, 1, 3, 4)))
+        scatter = np.abs(missed) / np.sqrt(1.0 + (beside**2).sum(axis=0)) / _MEDIAN
+    level = (np.abs(f[4:] - f[:-4]) < u[4:] - u[:-4]) & np.isfinite(scatter)
+    if np.any(level):
+        bend = np.median(scatter[level] / (0.25 * (u[4:] - u[:-4])[level]) ** 2)
+        if bend > _BENDS:
+            size = np.median(scatter[level])
+            warn(f"{name}: points scatter by {size:.1g} m, which bends the curve by {bend:.2g}/m{_SMOOTHER}")
+
+
 def _spline(u, f, kept, name, lines, smoothing):
     """Parametric cubic spline over chord length through the points ``kept``; those that nearly coincide with the one
     before are left out."""
@@ -248,6 +266,8 @@ def _spline(u, f, kept, name, lines, smoothing):
     if len(used) < FEWEST:
         raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(used)}")
     _check_gaps(u[used], f[used], name, lines[used])
+    if smoothing == 0.0:
+        _check_scatter(u[used], f[used], name)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # FITPACK warns where it misses the asked distance
