@@ -11,7 +11,7 @@ from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch.fixed import solve_fixed
 from wrcore.contact.patch.gap import NODE_GAP, NODES, S, frame_of_overlaps, look_over_overlaps
 from wrcore.contact.patch.grading import grade, spread
-from wrcore.contact.patch.solve import LOAD, STRIP_ROWS, SUMS, publish
+from wrcore.contact.patch.solve import LOAD, MEAN_S, MEAN_X, STRIP_ROWS, SUMS, publish
 from wrcore.contact.patch.strips import MAX_STRIPS, normal_work
 from wrcore.contact.patch.windows import guess_squares
 from wrcore.contact.statics import height_of_zero
@@ -27,13 +27,13 @@ BENT = 6.24e-3, -8.45e-3
 """The same a little later: by 0.85 rad."""
 
 
-def at_load(geometry, strips, y, yaw, load=72e3):
+def at_load(geometry, strips, y, yaw, load=72e3, roll=7e-4):
     """`NormalContact` with a number of strips, and the height at which the left wheel carries a load."""
     contact = NormalContact(geometry, MODULUS)
     contact.resolution = strips
 
     def excess(z):
-        return sum(p.normal_force for p in contact.at_height("left", y, z, 7e-4, yaw)) ** (2 / 3) - load ** (2 / 3)
+        return sum(p.normal_force for p in contact.at_height("left", y, z, roll, yaw)) ** (2 / 3) - load ** (2 / 3)
 
     return contact, height_of_zero(excess, geometry.rolling_radius)
 
@@ -67,14 +67,14 @@ def test_twelve_strips_carry_what_many_do(benchmark_pair, y, yaw):
     assert few.mean_s == pytest.approx(many.mean_s, abs=0.01 * (many.s_max - many.s_min))
 
 
-@pytest.mark.parametrize(("higher", "bound"), [(0.0, 5e-3), (4e-6, 0.02)])
-def test_the_most_bent_patch_has_a_solution(benchmark_pair, higher, bound):
+@pytest.mark.parametrize("higher", [0.0, 4e-6])
+def test_the_most_bent_patch_has_a_solution(benchmark_pair, higher):
     # on strips of equal width, with distances in one plane, 12 carried 1.9 % too little; the grid 2 to 8 % too much.
-    # 4 um higher Newton's iteration finds nothing on 8 and 12 strips: fixed ones carry 1.8 % less
+    # 4 um higher Newton's iteration finds nothing on 8 and 12 strips; fixed ones left at the crests carried 1.8 % less
     found = [at_height(benchmark_pair, strips, *BENT, 0.460223147 + higher)[0] for strips in (8, 12, 16)]
     assert all(patch.converged and np.ptp(np.arctan(patch.tilt)) > 0.75 for patch in found)
     force = np.array([patch.normal_force for patch in found])
-    assert 7e4 < force.min() and np.ptp(force) < bound * force.mean()
+    assert 7e4 < force.min() and np.ptp(force) < 5e-3 * force.mean()
 
 
 def test_strips_act_along_the_bent_patch(benchmark_pair):
@@ -135,12 +135,27 @@ def test_fixed_strips_are_hertz_to_within_a_strip_at_the_tips(yaw):
     pair, z, force = cone_on_head()
     work, pose, frame, stretches = looked_over(pair, 0.0, z, yaw)
     contact = NormalContact(pair, MODULUS)
-    windows = solve_fixed(pair, pose, frame, contact._values, work, stretches)
+    windows = solve_fixed(pair, pose, frame, contact._values, work, stretches, 3 if yaw else 2)
     strips, sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
     assert windows == 1 and 3 <= publish(MODULUS, work, windows, strips, sums) <= NODES
     (exact,) = contact.at_height("left", 0.0, z, 0.0, yaw)
     assert sums[LOAD] == pytest.approx(exact.normal_force, rel=3e-3)
     assert yaw != 0.0 or exact.normal_force == pytest.approx(force, rel=1.5e-3)
+
+
+@pytest.mark.parametrize("yaw", [4e-3, -8e-3])
+def test_fixed_strips_of_a_yawed_flange_lie_where_newtons_do(benchmark_pair, yaw):
+    # yaw shifts their middles, by more than their half lengths differ; left at the gap's crests the patch lay 0.4 to
+    # 0.8 % of rad off
+    contact, z = at_load(benchmark_pair, 16, 6.5e-3, yaw, roll=0.0)
+    (newton,) = contact.at_height("left", 6.5e-3, z, 0.0, yaw)
+    work, pose, frame, stretches = looked_over(benchmark_pair, 6.5e-3, z, -math.sin(yaw))
+    windows = solve_fixed(benchmark_pair, pose, frame, contact._values, work, stretches, 3)
+    strips, sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
+    publish(MODULUS, work, windows, strips, sums)
+    assert sums[LOAD] == pytest.approx(newton.normal_force, rel=1e-3)
+    assert sums[MEAN_X] == pytest.approx(newton.mean_x, abs=2e-5)
+    assert sums[MEAN_S] == pytest.approx(newton.mean_s, abs=2e-5)
 
 
 @pytest.mark.parametrize(

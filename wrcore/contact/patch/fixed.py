@@ -1,5 +1,7 @@
 """Windows from fixed strips over the overlaps: slower than a guess, and safe."""
 
+import math
+
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
 from wrcore.contact.patch.strips import BEND, assemble, place_strips
@@ -16,7 +18,7 @@ _SETTLED = 0.02
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _fixed_strips(geometry, pose, frame, values, work, stretches):
+def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
     """Fixed strips over all overlaps, then finer ones about the runs that carry load, and their loads. Returns the
     number of windows (0 where no loads were found) and of runs, the largest c, and by what share of it c moved last."""
     nodes, count = work.nodes, work.ends[stretches - 1]
@@ -33,7 +35,7 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches):
             work.start[k + 1] = work.start[k] + FIXED // windows
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
         place_strips(geometry, pose, frame, work, windows)
-        moved = _carry(values, work, windows)
+        moved = _carry(values, work, windows, kinds)
         if moved < 0.0:
             return 0, found, largest, moved
         found, largest = active_runs(work, windows)
@@ -47,7 +49,7 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
     """Windows from fixed strips. Returns their number and leaves c and Q of the fixed strips at the nodes as the next
     guesses."""
     nodes, count = work.nodes, work.ends[stretches - 1]
-    windows, found, largest, _ = _fixed_strips(geometry, pose, frame, values, work, stretches)
+    windows, found, largest, _ = _fixed_strips(geometry, pose, frame, values, work, stretches, 2)
     if windows == 0:
         return 0
     total, squares = 0.0, 1e-300
@@ -64,10 +66,10 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
 
 
 @jit(allocates=False, fastmath=FUSED)
-def solve_fixed(geometry, pose, frame, values, work, stretches):
-    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips, and without the
-    shift of their middles by yaw. Returns the number of windows; 0 where c does not come to rest."""
-    windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches)
+def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
+    """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
+    number of windows; 0 where c does not come to rest."""
+    windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
     if moved > _SETTLED:
         return 0
     kept = first = 0
@@ -87,39 +89,48 @@ def solve_fixed(geometry, pose, frame, values, work, stretches):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _carry(values, work, windows):
-    """Loads of fixed strips by an active set at given half lengths, these from the loads; by which share of the largest
-    c one moved last, -1 without loads."""
+def _carry(values, work, windows, kinds):
+    """Loads of fixed strips by an active set at given half lengths and middles, these from the loads (middles for
+    ``kinds`` = 3, with yaw); by which share of the largest c one moved last, -1 without loads."""
     strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
     for i in range(strips):
         active[i] = work.gap[i, GAP] < 0.0
         work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * work.width[i] ** 2)
         work.middle[i] = work.gap[i, CREST]
-    offset, moved = 2 * strips + 2 * windows, 0.0
+    offset, moved, points = kinds * strips + 2 * windows, 0.0, kinds - 1.0  # twice the points with yaw
     for sweep in range(_SWEEPS):
         for i in range(strips):
             work.share[i] = 0.0
-        n = assemble(values, work, windows, 2)
-        if not _active_set(work, strips, n, offset):
+        n = assemble(values, work, windows, kinds)
+        if not _active_set(work, strips, kinds, n, offset):
             return -1.0
         if sweep + 1 == _SWEEPS:  # c and the loads belong together
             break
         largest, moved = 0.0, 0.0
         for i in range(strips):
-            bend = 0.0
+            bend = tilt = 0.0
             for j in range(strips):
-                bend -= matrix[2 * i + 1, 2 * j] / work.square[j] * load[j]
-            matrix[offset, i] = bend / (work.gap[i, SHAPE] * BEND)
+                share = load[j] / work.square[j]
+                bend -= matrix[kinds * i + 1, kinds * j] * share
+                tilt -= matrix[kinds * i + kinds - 1, kinds * j] * share
+            matrix[offset, i] = bend / (points * work.gap[i, SHAPE] * BEND)
+            if kinds == 3:  # the mean of t^2 over the points is 1/2
+                a = math.sqrt(work.square[i])
+                shift = work.gap[i, CREST] + 0.25 * tilt / (work.gap[i, SHAPE] * a) - work.middle[i]
+                matrix[offset + 1, i] = min(max(shift, -0.3 * a), 0.3 * a)
             largest = max(largest, matrix[offset, i])
         for i in range(strips):
             new = max(matrix[offset, i], 0.02 * largest, 0.02 * work.width[i] ** 2)
             new = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
             moved, work.square[i] = max(moved, abs(new - work.square[i]) / largest), new
+            if kinds == 3:
+                shift = matrix[offset + 1, i]
+                moved, work.middle[i] = max(moved, abs(shift) / math.sqrt(largest)), work.middle[i] + shift
     return moved
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _active_set(work, strips, n, offset):
+def _active_set(work, strips, kinds, n, offset):
     """Loads of the strips at their half lengths: none pulls, none that carries nothing is pressed in."""
     matrix, active, load = work.matrix, work.active, work.load
     for _ in range(12):
@@ -130,9 +141,9 @@ def _active_set(work, strips, n, offset):
                 row = offset + used
                 for j in range(strips):
                     if active[j]:
-                        matrix[row, column] = matrix[2 * i, 2 * j] / work.square[j]
+                        matrix[row, column] = matrix[kinds * i, kinds * j] / work.square[j]
                         column += 1
-                matrix[row, column] = matrix[2 * i, n]
+                matrix[row, column] = matrix[kinds * i, n]
                 used += 1
         if used == 0 or not solve_linear(matrix[offset:], used):
             return False
@@ -148,9 +159,9 @@ def _active_set(work, strips, n, offset):
             continue
         for i in range(strips):
             if not active[i]:
-                gap = -matrix[2 * i, n]
+                gap = -matrix[kinds * i, n]
                 for j in range(strips):
-                    gap += matrix[2 * i, 2 * j] / work.square[j] * load[j]
+                    gap += matrix[kinds * i, kinds * j] / work.square[j] * load[j]
                 if gap < 0.0:
                     active[i] = changed = True
         if not changed:

@@ -94,7 +94,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 return found, frame
         windows = work.guessed[0] = 0
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
-    return solve_fixed(geometry, pose, frame, values, work, stretches), frame
+    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
 
 
 @jit(allocates=False)
