@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wrcore.contact.detection import find_patches
-from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, UP, YAW, move_patch, moved_axle, overlap_at
+from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, UP, YAW, move_patch, moved_axle
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -37,11 +37,6 @@ def move(geometry, side, y, z, ex, ey, ez, rows, count, sums, moved):
     for patch in range(count):
         known += move_patch(geometry, pose, rows[patch], patch, sums, moved)
     return known
-
-
-@jit
-def overlap(geometry, y, z, ex, ey, ez, row):
-    return overlap_at(geometry, make_pose(1.0, y, z, ex, ey, ez, True), row)
 
 
 @pytest.fixture(scope="module")
@@ -83,41 +78,3 @@ def test_moved_patches_are_those_of_a_search(benchmark_pair, poses):
     print(*(f"{e:.2e}" for e in np.percentile(worst, [50, 95, 99, 100])))
     # where a difference moves an edge of the profile into a narrow patch, or a node into it, the search has a corner
     assert np.percentile(worst, 95) < 2e-3 and np.percentile(worst, 99) < 0.05
-
-
-def test_an_overlap_of_a_wheel_that_is_lifted_a_little(benchmark_pair, poses):
-    """Its int g^2 and its place, from where it was found before."""
-    compared = 0
-    for _, y, z, *axle in poses:
-        rows, lifted = np.zeros((2, MAX_PATCHES, PATCH_COLUMNS))
-        y = abs(y) - 2e-3
-        count, more = (
-            search(benchmark_pair, 1.0, y, z, *axle, rows),
-            search(benchmark_pair, 1.0, y, z + 3e-6, *axle, lifted),
-        )
-        if count != 1 or more != 1:
-            continue
-        square, place = overlap(benchmark_pair, y, z + 3e-6, *axle, rows[0])
-        depth, curvature = lifted[0, PENETRATION], lifted[0, CURVATURE_Y]
-        assert 0.9375 * square * lifted[0, COSINE] == pytest.approx(depth**2.5 / curvature**0.5, rel=1e-4)
-        assert place == pytest.approx(lifted[0, U_WHEEL], abs=2e-6)
-        compared += 1
-    assert compared > 50
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.01, 0.0216, -0.0239])
-def test_an_overlap_at_its_own_pose_is_the_one_that_was_found(benchmark_pair, yaw):
-    """However far the wheel is yawed: beyond some 15 mrad strips are looked up one by one."""
-    axle, rows, seen = (-np.sin(yaw), np.cos(yaw), 0.0), np.zeros((MAX_PATCHES, PATCH_COLUMNS)), 0
-    for y in np.arange(-9e-3, 6e-3, 5e-4):
-        for z in np.arange(0.466, 0.44, -2e-5):
-            if search(benchmark_pair, 1.0, y, z, *axle, rows):
-                break
-        for depth in (5e-6, 3e-5):
-            for row in rows[: search(benchmark_pair, 1.0, y, z - depth, *axle, rows)]:
-                square, place = overlap(benchmark_pair, y, z - depth, *axle, row)
-                expected = 16.0 / 15.0 * row[COSINE] * row[PENETRATION] ** 2.5 / np.sqrt(row[CURVATURE_Y])
-                assert square == pytest.approx(expected / row[COSINE] ** 2, rel=0.05), (y, depth)
-                assert place == pytest.approx(row[U_WHEEL], abs=1e-3)
-                seen += 1
-    assert seen > 50

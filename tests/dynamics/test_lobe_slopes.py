@@ -106,7 +106,7 @@ def test_numbers_along_the_lattice():
 @pytest.mark.parametrize(("angle", "linear"), [(0.05, 1.0), (0.3, 0.4), (0.5, 0.0)])
 def test_what_modes_change_by(angle, linear):
     """Over both creepages and along the lattice; of either family of modes and where both count."""
-    random, modes = np.random.default_rng(5), creep_modes().values
+    random, modes = np.random.default_rng(5), creep_modes(0.3).values
     numbers, along = random.normal(size=NUMBERS), random.normal(size=(AXES, NUMBERS))
     numbers[pair_table.ANGLE], numbers[pair_table.LINEAR] = angle, linear
     along[:, pair_table.LINEAR] *= linear > 0.0

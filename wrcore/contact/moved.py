@@ -28,8 +28,8 @@ from wrcore.contact.reduction import (
     edge_by_newton,
     patch_from_moments,
 )
-from wrcore.contact.scan import Grid, fine_cell_shift, fine_grid, gaps_of_eight, leaves_cells, make_window
-from wrcore.contact.strip import cubic_at, gap_at, make_pose, strip_point
+from wrcore.contact.scan import Grid, fine_cell_shift, fine_grid, leaves_cells, make_window
+from wrcore.contact.strip import cubic_at, make_pose, strip_point
 from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
 
@@ -110,7 +110,7 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, sums):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _scan_nodes(geometry, pose, row):
+def scan_nodes(geometry, pose, row):
     """The scan's nodes over the overlap of a patch."""
     grid, inverse = make_window(geometry, pose).grid, 1.0 / SCAN_STEP
     start = geometry.scan_wheel_start + grid.node * SCAN_STEP
@@ -127,7 +127,7 @@ def _scan_nodes(geometry, pose, row):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _fine_nodes(geometry, pose, row):
+def fine_nodes(geometry, pose, row):
     """The wheel profile's own nodes there."""
     shift, step = fine_cell_shift(geometry, row[U_WHEEL], row[U_RAIL]), geometry.wheel_step
     grid, u, begin, end = fine_grid(geometry, pose, shift, row[OUTSIDE], row[BEYOND])
@@ -181,58 +181,19 @@ def _narrow_slopes(geometry, pose, row, sums):
     return place
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _moments(nodes, wheel, rail):
-    """Number of nodes in overlap, M0, and M1 / M0 about the first node."""
-    begin, end, zero = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end)), lanes.lanes8(0.0)
-    m0, m1, count = zero, zero, 0
-    for k in range(0, nodes.end, LANES):
-        index, gap = float(k) + lanes.ramp8(), gaps_of_eight(nodes.grid, wheel, rail, k)
-        gap = lanes.where_below(index, begin, zero, lanes.where_below(index, end, gap, zero))
-        gap = lanes.where_below(gap, zero, gap, zero)
-        count += lanes.count_bits(lanes.below(gap, zero))
-        m0, m1 = m0 + gap * gap, m1 + gap * gap * index
-    square = lanes.total(m0)
-    return count, square * nodes.step, nodes.step * lanes.total(m1) / square
-
-
 @jit(allocates=False, fastmath=FUSED)
-def _looked_up(geometry, pose, nodes):
-    """The same where strips leave their rail cells."""
-    m0, m1, count = 0.0, 0.0, 0
-    for k in range(nodes.first, nodes.end):
-        gap = gap_at(geometry, pose, nodes.u + k * nodes.step)[0]
-        if gap < 0.0:
-            m0, m1, count = m0 + gap * gap, m1 + gap * gap * k, count + 1
-    return count, m0 * nodes.step, nodes.step * m1 / max(m0, 1e-300)
-
-
-@jit(allocates=False, fastmath=FUSED)
-def overlap_at(geometry, pose, row):
-    """M0 (m^3) of the overlap of a ``row``, found by moments at a pose nearby, at this ``pose``, and its place on the
-    wheel's profile, m; M0 is 0 without overlap."""
-    nodes = _scan_nodes(geometry, pose, row)
-    if leaves_cells(pose):
-        count, square, place = _looked_up(geometry, pose, nodes)
-        if count < WIDE:
-            nodes = _fine_nodes(geometry, pose, row)
-            count, square, place = _looked_up(geometry, pose, nodes)
-    else:
-        count, square, place = _moments(nodes, geometry.scan_wheel, geometry.scan_rail)
-        if count < WIDE:
-            nodes = _fine_nodes(geometry, pose, row)
-            count, square, place = _moments(nodes, geometry.fine_wheel, geometry.fine_rail)
-    if count >= WIDE:
-        return square, nodes.u + place
-    (place, width), square, moment = _narrow(geometry, pose, row), 0.0, 0.0
-    if not width > 0.0:
-        return 0.0, row[U_WHEEL]
-    for i in range(len(GAUSS_POINTS)):
-        e = width * GAUSS_POINTS[i]
-        gap = min(gap_at(geometry, pose, place + e)[0], 0.0)
-        share = width * GAUSS_WEIGHTS[i] * gap * gap
-        square, moment = square + share, moment + share * e
-    return square, place + (moment / square if square > 0.0 else 0.0)
+def slopes_of_moments(geometry, pose, row, least, sums):
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row``, found by moments and spatially at a pose
+    nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes, and
+    whether the scan's were enough: from ``least`` on."""
+    if least < math.inf:
+        nodes = scan_nodes(geometry, pose, row)
+        if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) >= least:
+            return nodes.u, True
+    nodes = fine_nodes(geometry, pose, row)
+    if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) >= WIDE:
+        return nodes.u, False
+    return math.nan, False
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -241,15 +202,11 @@ def move_patch(geometry, pose, row, patch, sums, moved):
     is after each move by `DIFFERENCE`; False where only a search tells. ``sums`` (3, 1 + MOVES) is scratch."""
     if leaves_cells(pose):
         return False
-    nodes = _scan_nodes(geometry, pose, row)
-    middle = nodes.u
-    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) < WIDE:
-        nodes = _fine_nodes(geometry, pose, row)
-        middle = nodes.u
-        if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) < WIDE:
-            middle = _narrow_slopes(geometry, pose, row, sums)
-            if math.isnan(middle):
-                return False
+    middle, _ = slopes_of_moments(geometry, pose, row, WIDE, sums)
+    if math.isnan(middle):
+        middle = _narrow_slopes(geometry, pose, row, sums)
+        if math.isnan(middle):
+            return False
     if not patch_from_moments(geometry, pose, middle, sums[0, 0], sums[1, 0], sums[2, 0], moved[0, patch]):
         return False
     for k in range(MOVES):

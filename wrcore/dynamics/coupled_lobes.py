@@ -18,7 +18,7 @@ from wrcore.contact import reduction
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.dynamics import pair_table as columns
-from wrcore.dynamics.pair_table import CURVATURE, depth_of
+from wrcore.dynamics.pair_table import CURVATURE
 from wrcore.kernels.jit import FUSED, jit
 
 NORMAL, LIFT, FORCE_X, FORCE_S, MOMENT, END, CELL, TILT, SLIP_XI, SLIP_ETA, RISE = range(11)
@@ -31,7 +31,7 @@ STEPS = 6
 """Steps towards balance of the lobes' loads and lifts."""
 
 USUAL, LONG, BROAD = math.log(0.85), 0.75, 0.6
-"""ln(N / (E* D^1.5)) of a lobe that is not known yet, and its semi-axes over those of its overlap."""
+"""ln(N / (E* D^1.5)) of a lobe on the tread that is not known yet, and its semi-axes over those of its overlap."""
 
 LOADED, LOADED_PART = np.array([-1.0, 0.0, 1.0]) * math.sqrt(3.0 / 7.0), np.array([7.0, 16.0, 7.0]) / 30.0
 PUNCHED, PUNCHED_PART = np.array([-1.0, 0.0, 1.0]) * math.sqrt(0.6), np.array([5.0, 8.0, 5.0]) / 18.0
@@ -46,14 +46,15 @@ def load_of(modulus, numbers, depth):
 
 @jit(allocates=False, forceinline=True)
 def depth_left(rows, first, last, lobe, y):
-    """D of a lobe that is lifted, and tilted about ``y``, m."""
-    total = 0.0
+    """D of a lobe that is lifted, and tilted about ``y``, and its place on the wheel's profile, m."""
+    total = moment = 0.0
     for k in range(first, last):
         row, b, tilt = rows[k], rows[k, reduction.CURVATURE_Y], lobe[TILT]
         beside = (row[reduction.Y] - y) / row[reduction.COSINE]
         left = max(row[reduction.PENETRATION] - lobe[LIFT] - tilt * beside + 0.25 * tilt * tilt / b, 0.0)
-        total += left * left * math.sqrt(left / b)
-    return (math.sqrt(CURVATURE) * total) ** 0.4
+        square = left * left * math.sqrt(left / b) / row[reduction.COSINE]
+        total, moment = total + square, moment + square * row[reduction.U_WHEEL]
+    return (math.sqrt(CURVATURE) * total) ** 0.4, moment / max(total, 1e-30)
 
 
 @jit(allocates=False, forceinline=True)
@@ -74,12 +75,14 @@ def guess_lobes(model, pose, axle_y, axle_z, low, count, work):
         last, numbers, row = int(work.lobes[q, END]), work.numbers[q], work.rows[first]
         numbers[:] = 0.0
         deep = row[reduction.PENETRATION]
-        numbers[columns.LOG_NORMAL], numbers[columns.ANGLE] = USUAL, row[reduction.ANGLE]
+        numbers[columns.LOG_NORMAL] = USUAL + 0.6 * math.log(row[reduction.COSINE])
+        numbers[columns.ANGLE] = row[reduction.ANGLE]
         numbers[columns.LOG_A] = math.log(LONG * math.sqrt(deep / row[reduction.CURVATURE_X]))
         numbers[columns.LOG_B] = math.log(BROAD * math.sqrt(deep / row[reduction.CURVATURE_Y]))
         numbers[columns.PLACE_Y] = row[reduction.Y] - pose.y - axle_y
         numbers[columns.PLACE_Z] = row[reduction.Z] - pose.z - axle_z + model.geometry.rolling_radius
-        work.lobes[q, NORMAL] = load_of(modulus, numbers, depth_of(work.rows, first, last)[0])
+        depth, _ = depth_left(work.rows, first, last, work.lobes[q], row[reduction.Y])
+        work.lobes[q, NORMAL] = load_of(modulus, numbers, depth)
         first = last
     balance(model, pose.y + axle_y, low, count, work)
 
@@ -124,7 +127,7 @@ def balance(model, y, low, count, work):
         first = low
         for i in range(count):
             last = int(lobes[i, END])
-            depth = depth_left(work.rows, first, last, lobes[i], y + numbers[i, columns.PLACE_Y])
+            depth, _ = depth_left(work.rows, first, last, lobes[i], y + numbers[i, columns.PLACE_Y])
             lobes[i, NORMAL] = load_of(modulus, numbers[i], depth)
             first = last
 

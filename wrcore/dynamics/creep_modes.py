@@ -1,5 +1,10 @@
-"""Modes of the creep force: what exact contact adds to the creep table, told by few numbers a node."""
+"""Modes of the creep force: what exact contact adds to the creep table, told by few numbers a node.
 
+What a surface's curvature adds to the slip counts for more of the creepages of saturation the less friction there is:
+each of a few coefficients of friction has modes of its own.
+"""
+
+import math
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -45,7 +50,15 @@ def mode_weights(weights, linear):
 
 
 @cache
-def creep_modes():
-    """The package's `Modes`."""
+def _all_modes():
     with checked_hdf5(SHIPPED / "creep_modes.h5", "modes of the creep force") as file:
-        return Modes(*(np.ascontiguousarray(file[name][...]) for name in Modes._fields))
+        return {
+            float(friction): Modes(*(np.ascontiguousarray(group[name][...]) for name in Modes._fields))
+            for friction, group in file.items()
+        }
+
+
+def creep_modes(friction):
+    """The package's `Modes` of the nearest coefficient of friction."""
+    every = _all_modes()
+    return every[min(every, key=lambda one: abs(math.log(one / friction)))]

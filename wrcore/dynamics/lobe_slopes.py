@@ -1,20 +1,21 @@
 """What the wrench on a wheel changes by its pose and velocity where its patch is one lobe, looked up.
 
-All is chain rule: over the pose by moved patches (:mod:`wrcore.contact.moved`), of the wheel and of the wheel that the
-damping lifts; along the lattice (:mod:`wrcore.dynamics.table_slopes`); over the creepages. Only the creep table is
-differenced. What the damping lifts the wheel by changes with its approach speed, and so with all velocities.
+All is chain rule: over the pose by what M0 changes by (:mod:`wrcore.contact.moved`); along the lattice
+(:mod:`wrcore.dynamics.table_slopes`); over the creepages. The creep table is differenced, and over the pose what the
+damping lifts the wheel by: that changes with its approach speed, and so with all velocities.
 """
 
 import math
 
 import numpy as np
 
-from wrcore.contact import reduction
+from wrcore.contact.approach import Pressed, add_pressed, approach_of, least_of, pressed_from
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL
-from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, move_patch
+from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, moved_axle, slopes_of_moments
 from wrcore.contact.normal import contact_modulus
-from wrcore.contact.patch.gap import Frame, frame_of_rows, group_end
+from wrcore.contact.patch.gap import group_end
+from wrcore.contact.scan import leaves_cells
 from wrcore.contact.strip import changes_along, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.contact_blocks import MOVING, UNCOUNTED, add_slope
@@ -46,14 +47,13 @@ from wrcore.dynamics.pair_table import (
     STEPS,
     Slip,
     base_force,
-    depth_of,
     lobe_end,
     locate,
-    log_depth_at,
     of_two,
 )
-from wrcore.dynamics.strip_wheel import deepest_place, lift_of_overlaps, lift_share
+from wrcore.dynamics.strip_wheel import lift_of, lift_share
 from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes, weigh_slopes
+from wrcore.dynamics.tabulated_wheel import lifted_place
 from wrcore.dynamics.wheel import contact_of, detect_patches, falling
 from wrcore.kernels.jit import FUSED, jit
 
@@ -78,9 +78,7 @@ def blocks_of_lobes(jacobian, model, work, columns):
         for wheel in range(2):
             contact, seen = contact_of(model.contact, k, wheel), motion_of(base[k, wheel])
             slopes[:], jacobian.counts[k, wheel] = 0.0, 0
-            if not lobe_slopes(
-                contact, as_left(seen), jacobian.patches[:, k, wheel], jacobian.law, slopes, work.strips
-            ):
+            if not lobe_slopes(contact, as_left(seen), jacobian.law, slopes, work.strips):
                 jacobian.counts[k, wheel] = UNCOUNTED
                 continue
             for j in range(SLOPES):
@@ -91,40 +89,33 @@ def blocks_of_lobes(jacobian, model, work, columns):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def lobe_slopes(model, m, found, scratch, out, work):
+def lobe_slopes(model, m, scratch, out, work):
     """Fill ``out`` (SLOPES, 6) with the slopes of a left wheel's wrench about the wheelset's centre; False where its
-    patch is not one lobe that the table has. ``found`` (1 + MOVES, MAX_PATCHES, PATCH_COLUMNS) and ``scratch`` (8, 1 +
-    MOVES) are overwritten."""
-    geometry, half, rows, table = model.geometry, model.geometry.half_distance, found[0], model.strips.table
+    patch is not one lobe that the table has. ``scratch`` (8, 1 + MOVES) is overwritten."""
+    geometry, rows, table = model.geometry, work.rows, model.strips.table
     if model.detection != SPATIAL or changes_along(geometry):
         return False
     count, _, _ = detect_patches(model, m, rows)
     if count == 0:
         return True
-    if group_end(geometry, rows, count, 0) < count:
-        return False
     pose, ahead = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True), -1.0 if m.vx < 0.0 else 1.0
-    for patch in range(count):
-        if not move_patch(geometry, pose, rows[patch], patch, scratch, found):
-            return False
-    frame = frame_of_rows(rows, 0, count)
-    lift, depth, _, _, _ = lift_of_overlaps(model, m, pose, frame, rows, 0, count, work.out)
-    if lift >= depth:
+    if group_end(geometry, rows, count, 0) < count or leaves_cells(pose):
+        return False
+    pressed = _pressed_nearby(geometry, pose, True, count, scratch, work)
+    if math.isnan(pressed.moment):
+        return False
+    lift = lift_of(model, m, pressed)
+    if lift.share >= 1.0:
         return True
-    _lift_slopes(model, m, pose, frame, found, count, work)
-    pose = make_pose(1.0, m.y - lift * frame.sine, m.z + lift * frame.cosine, m.ex, m.ey, m.ez, True)
+    pose, (log_depth, u) = lifted_place(m, pressed, lift)
     if lobe_end(geometry, pose, rows, 0, count, (APART, FAR, SADDLE)) < count:
         return False
-    log_depth, u = log_depth_at(geometry, pose, rows, 0, count)
-    if log_depth == -math.inf:
-        return True
-    for patch in range(count):
-        if not move_patch(geometry, pose, rows[patch], patch, scratch, found):
-            return False
-    _along_lattice(m, half, found, count, ahead, work.lattice)
-    at = locate(table, u, False, pose.y + half * m.ey - geometry.rail_distance, m.ez, log_depth, ahead * m.ex)
+    at = locate(
+        table, u, False, pose.y + geometry.half_distance * m.ey - geometry.rail_distance, m.ez, log_depth, ahead * m.ex
+    )  # fmt: skip
     if at.cell == 0:
         return False
+    _lattice_rates(model, m, pressed, lift, count, scratch, work)
     weigh_slopes(at, work.spread)
     look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
     if at.scale * (log_depth - FIRST[2]) < STEPS[2]:  # looked up at the least depth
@@ -133,47 +124,44 @@ def lobe_slopes(model, m, found, scratch, out, work):
     return True
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _approach(model, m, pose, frame, depth):
-    """How fast a patch of a ``depth`` gets deeper, m/s, and where it is from the wheelset's centre."""
-    px, py, pz = deepest_place(model, m, pose, frame, depth)
-    _, _, _, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, 1.0)
-    return approach, px, py, pz
+@jit(allocates=False, fastmath=FUSED)
+def _pressed_nearby(geometry, pose, first, count, sums, work):
+    """`Pressed` of the overlaps in ``work.rows`` at a pose nearby, a moment of NaN where one of them has few nodes. The
+    ``first`` time it is written into ``work.weights`` over which nodes they are summed."""
+    total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for patch in range(count):
+        least = least_of(work.rows[patch]) if first else work.weights[patch]
+        middle, enough = slopes_of_moments(geometry, pose, work.rows[patch], least, sums)
+        if first:
+            work.weights[patch] = 0.0 if enough else math.inf
+        total = add_pressed(total, pressed_from(pose, middle, sums))
+    return total
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _lift_slopes(model, m, pose, frame, found, count, work):
-    """Fill the columns T and DEPTH of ``work.lattice`` (SLOPES, AXES) with what y and z of the lifted wheel's centre
-    change by, for patches and moved patches ``found`` of the wheel as it is."""
-    rates, deepest = work.lattice, 0
-    for patch in range(count):
-        if found[0, patch, reduction.PENETRATION] > found[0, deepest, reduction.PENETRATION]:
-            deepest = patch
-    depth, cosine, sine = found[0, deepest, reduction.PENETRATION], frame.cosine, frame.sine
-    approach, px, py, pz = _approach(model, m, pose, frame, depth)
-    share = lift_share(model, approach)
-    rate = (lift_share(model, approach + SMALL) - share) / SMALL
+def _lattice_rates(model, m, pressed, lift, count, sums, work):
+    """Fill ``work.lattice`` (SLOPES, AXES) with what the wheel's place on the lattice changes by."""
+    rates = work.lattice
+    depth, aside = lift.depth * lift.sine, lift.share * lift.depth * lift.sine
+    own = pressed.across, pressed.up, pressed.about_x, pressed.about_z
+    ahead, half = -1.0 if m.vx < 0.0 else 1.0, model.geometry.half_distance
     for k in range(MOVES):
-        its, deeper = frame_of_rows(found[1 + k], 0, count), found[1 + k, deepest, reduction.PENETRATION]
-        across, up = (DIFFERENCE if k == ACROSS else 0.0), (DIFFERENCE if k == UP else 0.0)
-        moved = Frame(its.cosine, its.sine, its.x, its.ur - across, its.z - up, its.u)  # from where the centre was
-        faster, _, _, _ = _approach(model, m, pose, moved, deeper)
-        lift = (share + rate * (faster - approach)) * deeper
-        rates[k, T] = (across - (lift * its.sine - share * depth * sine)) / DIFFERENCE
-        rates[k, DEPTH] = (up + lift * its.cosine - share * depth * cosine) / DIFFERENCE
-    rate *= depth
-    _put_lift(rates[MOVES], 0.0, cosine, sine)
-    _put_lift(rates[MOVES + 1], rate * sine, cosine, sine)
-    _put_lift(rates[MOVES + 2], -rate * cosine, cosine, sine)
-    _put_lift(rates[MOVES + 3], -rate * (pz * sine + py * cosine), cosine, sine)
-    _put_lift(rates[MOVES + 4], rate * px * cosine, cosine, sine)
-    _put_lift(rates[MOVES + 5], rate * px * sine, cosine, sine)
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _put_lift(rates, lift, cosine, sine):
-    """Write what a lift moves."""
-    rates[T], rates[DEPTH] = -lift * sine, lift * cosine
+        ex, ey, ez = moved_axle(m.ex, m.ey, m.ez, k, DIFFERENCE)
+        across = DIFFERENCE if k == ACROSS else 0.0
+        there = make_pose(1.0, m.y + across, m.z + (DIFFERENCE if k == UP else 0.0), ex, ey, ez, True)
+        its = lift_of(model, m, _pressed_nearby(model.geometry, there, False, count, sums, work))
+        across += half * (ey - m.ey) - its.share * its.depth * its.sine + aside
+        rates[k, T], rates[k, TILT] = across / DIFFERENCE, (ez - m.ez) / DIFFERENCE
+        rates[k, TURN] = ahead * (ex - m.ex) / DIFFERENCE
+        rates[k, DEPTH] = 0.4 * own[k] / pressed.square - (its.share - lift.share) / (DIFFERENCE * (1.0 - lift.share))
+    size = math.sqrt(pressed.across * pressed.across + pressed.up * pressed.up)
+    approach = approach_of(pressed, m)[3]
+    faster = (lift_share(model, approach + SMALL) - lift.share) / (SMALL * size)
+    speeds = 0.0, pressed.across, pressed.up, pressed.about_x, pressed.about_y, pressed.about_z
+    for j in range(6):
+        share = faster * speeds[j]
+        rates[MOVES + j] = 0.0
+        rates[MOVES + j, T], rates[MOVES + j, DEPTH] = -share * depth, -share / (1.0 - lift.share)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -184,20 +172,6 @@ def _turned(m, j):
     if j == YAW:
         return -m.ey, m.ex, 0.0
     return 0.0, 0.0, 0.0
-
-
-@jit(allocates=False, fastmath=FUSED)
-def _along_lattice(m, half, found, count, ahead, rates):
-    """Turn the ``rates`` of `_lift_slopes` into those of a lobe's place on the lattice, for moved overlaps ``found`` of
-    the lifted wheel."""
-    deeper, (depth, _) = rates[SLOPES], depth_of(found[0], 0, count)
-    for k in range(MOVES):
-        deeper[k] = (depth_of(found[1 + k], 0, count)[0] / depth - 1.0) / DIFFERENCE
-    for j in range(SLOPES):
-        own, (ex, ey, ez) = rates[j], _turned(m, j)
-        across, up = own[T], own[DEPTH]
-        own[T], own[TILT], own[TURN] = across + half * ey, ez, ahead * ex
-        own[DEPTH] = deeper[ACROSS] * across + deeper[UP] * up + (deeper[j] if j == ROLL or j == YAW else 0.0)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -5,6 +5,7 @@ Few wheels stand so: the kernel is compiled when the first one does.
 
 import math
 
+from wrcore.contact.approach import LEVEL
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.coupled_lobes import (
     CELL,
@@ -22,9 +23,9 @@ from wrcore.dynamics.coupled_lobes import (
     slip_of_others,
     tilt_back,
 )
-from wrcore.dynamics.pair_table import APART, FAR, SADDLE, depth_of, lobe_end
+from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end
 from wrcore.dynamics.strip_wheel import lifted
-from wrcore.dynamics.tabulated_wheel import UNLISTED, look_lobe_up, look_only_lobe_up, roll_lobe
+from wrcore.dynamics.tabulated_wheel import UNLISTED, lifted_place, look_lobe_up, look_only_lobe_up, roll_lobe
 from wrcore.kernels.jit import FUSED, jit
 
 TURNS, ROLLS = 2, 3
@@ -32,19 +33,18 @@ TURNS, ROLLS = 2, 3
 
 
 @jit(allocates=False, fastmath=FUSED)
-def look_lobes_up(model, m, frame, lift, u, ahead, counters, work):
-    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a wheel that is lifted along the normal of a ``frame``,
-    m, near the place ``u`` on its profile. None has an end where it hangs in the air; the first one's cell is
-    `UNLISTED` if one of them is in no lattice."""
-    pose, low, high = lifted(model, m, frame, lift, True, u, work.rows)
+def look_lobes_up(model, m, pressed, lift, ends, ahead, counters, work):
+    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a lifted wheel, see `lifted`. None has an end where it
+    hangs in the air; the first one's cell is `UNLISTED` if one of them is in no lattice."""
+    pose, low, high = lifted(model, m, LEVEL, pressed, lift, True, ends, work)
     count, last = 0, low
     while last < high:
         last = lobe_end(model.geometry, pose, work.rows, last, high, (APART, FAR, SADDLE))
         work.lobes[count, END] = last
         count += 1
     if count == 1:
-        depth, u = depth_of(work.rows, low, high)
-        if not look_only_lobe_up(model, m, pose, ahead, math.log(depth), u, work):
+        pose, place = lifted_place(m, pressed, lift)
+        if not look_only_lobe_up(model, m, pose, ahead, place, work):
             work.lobes[0, CELL] = UNLISTED
     elif count > 1:
         _look_apart_up(model, m, pose, ahead, low, count, counters, work)
@@ -61,9 +61,8 @@ def _look_apart_up(model, m, pose, ahead, low, count, counters, work):
         first = low
         for q in range(count):
             last, lobe, numbers = int(lobes[q, END]), lobes[q], work.numbers[q]
-            tilt, (_, u) = lobe[TILT], depth_of(work.rows, first, last)
-            depth = depth_left(work.rows, first, last, lobe, pose.y + axle_y + numbers[columns.PLACE_Y])
-            aside = tilt * (geometry.rolling_radius - numbers[columns.PLACE_Z])
+            depth, u = depth_left(work.rows, first, last, lobe, pose.y + axle_y + numbers[columns.PLACE_Y])
+            tilt, aside = lobe[TILT], lobe[TILT] * (geometry.rolling_radius - numbers[columns.PLACE_Z])
             lobe[NORMAL] = 0.0
             if depth > 0.0:
                 place = t - aside, m.ez + tilt, math.log(depth), ahead * m.ex

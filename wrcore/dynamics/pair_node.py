@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from wrcore.contact.approach import LEVEL, pressed_together
 from wrcore.contact.detection import find_patches
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import rolling, solve
@@ -17,7 +18,7 @@ from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import PART, WIDE, Slip, base_force, depth_of, lobe_end, root_share, tabulated_force
+from wrcore.dynamics.pair_table import PART, WIDE, Slip, base_force, lobe_end, log_depth_of, root_share, tabulated_force
 from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
@@ -43,7 +44,7 @@ REACH = 2.0 * PART
 
 
 @jit(allocates=False, nogil=True)
-def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows):
+def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows, sums):
     """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, their depth D and their own
     place; 0, 0, 0 and the place where there is none."""
     low, high, found, at, first = 0, 0, 0.0, place, 0
@@ -53,9 +54,10 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows):
         group = group_end(geometry, rows, count, first)
         while first < group:
             last = lobe_end(geometry, pose, rows, first, group, limits)
-            depth, u = depth_of(rows, first, last)
+            pressed = pressed_together(geometry, pose, True, LEVEL, rows, first, last, sums)
+            log_depth, u = log_depth_of(pressed)
             if abs(u - place) < nearest:
-                low, high, found, at, nearest = first, last, depth, u, abs(u - place)
+                low, high, found, at, nearest = first, last, math.exp(log_depth), u, abs(u - place)
             first = last
     return low, high, found, at
 
@@ -69,9 +71,10 @@ def least_gap(geometry, y, z, ex, ey, ez, place):
     return least
 
 
-def lobe_of(geometry, place, rows):
+def lobe_of(geometry, place, work):
     """Pose of the wheelset (y, z, axle) at which the lobe of a place, see `solve_place`, has its depth, where it then
-    lies on the wheel's profile, and whether others lie beside it; None where there is none."""
+    lies on the wheel's profile, and whether others lie beside it; None where there is none. ``work``: `StripWork`, of
+    which it needs the rows of overlaps."""
     t, slope, depth, yaw, u, limits = place
     axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
     y = t + geometry.rail_distance - geometry.half_distance * axle[1]
@@ -79,14 +82,14 @@ def lobe_of(geometry, place, rows):
     level -= least_gap(geometry, y, level, *axle, u) + 0.5 * depth
 
     def excess(z):
-        found = lobe_at(geometry, y, z, *axle, u, limits, rows)[2]
+        found = lobe_at(geometry, y, z, *axle, u, limits, work.rows, work.moments)[2]
         if found == 0.0 and least_gap(geometry, y, z, *axle, u) < 0.0:  # one with its neighbours
             return depth
         return found - depth
 
     z = height_of_zero(excess, level)
-    first, last, found, at = lobe_at(geometry, y, z, *axle, u, limits, rows)
-    beside = (first, last) != lobe_at(geometry, y, z, *axle, u, WIDE, rows)[:2]
+    first, last, found, at = lobe_at(geometry, y, z, *axle, u, limits, work.rows, work.moments)
+    beside = (first, last) != lobe_at(geometry, y, z, *axle, u, WIDE, work.rows, work.moments)[:2]
     return ((y, z, axle), at, beside) if abs(found - depth) < 1e-6 * depth else None
 
 
@@ -132,7 +135,7 @@ def press_lobe(model, y, z, axle, place, limits, velocity, more, sums, work):
     frame, and the weight of the solution with more strips.
     """
     finer, geometry, (ex, ey, ez) = work.normal.more, model.geometry, axle
-    first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, limits, work.rows)
+    first, last, _, _ = lobe_at(geometry, y, z, ex, ey, ez, place, limits, work.rows, work.moments)
     pose, deepest = make_pose(1.0, y, z, ex, ey, ez, True), 0.0
     for k in range(first, last):
         deepest = max(deepest, work.rows[k, PENETRATION])
@@ -184,7 +187,7 @@ def solve_place(contact, handle, works, place, points):
     """
     (_, _, depth, _, u, limits), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
-    found = lobe_of(geometry, place, works[0].value.rows)
+    found = lobe_of(geometry, place, works[0].value)
     if found is None:
         return None
     (y, z, axle), *_ = found

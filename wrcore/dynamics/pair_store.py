@@ -71,7 +71,7 @@ class Pair:
 
     def __init__(self, contact, digest):
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
-        self._works = LifoQueue()
+        self.modes, self._works = creep_modes(contact.strips.looked_up), LifoQueue()
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 2), np.float32)
         self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
@@ -89,7 +89,7 @@ class Pair:
     def table(self):
         """`PairTable` for kernels, which keeps the pair alive."""
         address = ctypes.cast(self._call, ctypes.c_void_p).value
-        return PairTable(np.asarray(self), self._states, self._cells, self._misses, creep_modes().values, address)
+        return PairTable(np.asarray(self), self._states, self._cells, self._misses, self.modes.values, address)
 
     @cached_property
     def _solvable(self):
@@ -165,7 +165,7 @@ class Pair:
         """Part of the wheel's profile in which a node's lobe lies, and `BESIDE`."""
         _, works, place = self._solvable, self._works.get(), node_of(code)
         try:
-            found = lobe_of(self.contact.geometry, _place(*place), works[0].value.rows)
+            found = lobe_of(self.contact.geometry, _place(*place), works[0].value)
         finally:
             self._works.put(works)
         if found is None:
@@ -208,7 +208,7 @@ class Pair:
         return self._at_place(_place(*node_of(code)))
 
     def _at_place(self, place):
-        modes = creep_modes()
+        modes = self.modes
         found = self.solve(place, modes.points)
         if found is None:
             return np.full(NUMBERS, np.nan, np.float32)
@@ -238,7 +238,7 @@ class Pair:
         columns.weigh(columns.Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
-        light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, creep_modes()
+        light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, self.modes
         points = np.vstack([modes.points, AT_REST])
         creep = unlike(self._solvable, modes.values, exact, found, place[2], place[1], place[3], points)
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
@@ -354,7 +354,7 @@ def _write_all():
 def pair_of(contact):
     """The `Pair` of a `ContactModel` without geometries of its wheels' own."""
     digest = hashlib.sha256(source_digest().encode())
-    parts = contact.geometry, contact.creep.table, creep_modes()
+    parts = contact.geometry, contact.creep.table, creep_modes(contact.strips.looked_up)
     for array in _flat(parts):
         digest.update(np.ascontiguousarray(array).tobytes())
     settings = contact.strips
@@ -379,7 +379,7 @@ def fingerprint(contact):
         settings.strips,
         settings.surfaces,
     ]
-    for part in _flat((contact.geometry, contact.creep.table, creep_modes())):
+    for part in _flat((contact.geometry, contact.creep.table, creep_modes(contact.strips.looked_up))):
         size = np.abs(np.asarray(part, float)).ravel()
         numbers += [len(size), size.sum(), size @ (2.0 + np.cos(np.arange(len(size))))]
     return np.array(numbers)

@@ -4,13 +4,14 @@ A patch consists of lobes: overlaps that lie near each other, or are about to be
 rail decides its contact: t, the distance of the wheel's tape circle from the rail's origin across the track; the slope
 of the wheel's axle; its yaw; the part of the wheel's profile where it lies; and the depth D that its overlaps imply,
 
-    M0 = sum of int g^2 ds,   D = (15/16 sqrt(B0) M0)^0.4,
+    M0 = sum of int g^2 du,   D = (15/16 sqrt(B0) M0)^0.4,
 
-which stays smooth where overlaps merge. Between nodes at no yaw: Catmull-Rom along each of t, slope and ln D, linear in
-the other two, the three together less twice what is linear in all (a Boolean sum, which wants 32 nodes in place of 64
-and errs by the product of two curvatures more). What yaw changes from the middle of a cell is a parabola through three
-nodes, linear between nodes of a lattice with twice the steps. A node depends on its place alone, not on what was solved
-before it. Where the lattice is too coarse another one with half its steps (in yaw a third) takes over.
+with the gap g along z: a sum that stays smooth where overlaps merge. Between nodes at no yaw: Catmull-Rom along each of
+t, slope and ln D, linear in the other two, the three together less twice what is linear in all (a Boolean sum, which
+wants 32 nodes in place of 64 and errs by the product of two curvatures more). What yaw changes from the middle of a
+cell is a parabola through three nodes, linear between nodes of a lattice with twice the steps. A node depends on its
+place alone, not on what was solved before it. Where the lattice is too coarse another one with half its steps (in yaw
+a third) takes over.
 
 References
 ----------
@@ -30,9 +31,8 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.contact.geometry import LANES
-from wrcore.contact.moved import overlap_at
 from wrcore.contact.patch.model import MODES, NODES
-from wrcore.contact.strip import cubic_at, gap_at, strip_point, wheel_slope
+from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
 from wrcore.kernels.handles import call_c
@@ -128,33 +128,10 @@ def lobe_end(geometry, pose, rows, first, last, limits):
     return end
 
 
-@jit(allocates=False)
-def depth_of(rows, first, last):
-    """D of the overlaps of a lobe, and its place on the wheel's profile, m."""
-    total = mean = 0.0
-    for k in range(first, last):
-        d, root = rows[k, reduction.PENETRATION], math.sqrt(rows[k, reduction.CURVATURE_Y])
-        share = d * d * math.sqrt(d) / root
-        total += share
-        mean += share * rows[k, reduction.U_WHEEL]
-    return (math.sqrt(CURVATURE) * total) ** 0.4, mean / total
-
-
-@jit(allocates=False, fastmath=FUSED)
-def log_depth_at(geometry, pose, rows, first, last):
-    """ln D of a lobe at a ``pose`` and its place on the wheel's profile, m, whose overlaps have been found at one
-    nearby; minus infinity without overlap. See `depth_of`."""
-    total = mean = 0.0
-    for k in range(first, last):
-        square, u = overlap_at(geometry, pose, rows[k])
-        if square > 0.0:
-            ur, _, _, slope, _, along = strip_point(geometry, pose, u)
-            _, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
-            slope = 0.5 * (wheel_slope(pose, slope, along) + df)
-            share = 0.9375 * square / math.sqrt(1.0 + slope * slope)
-            total += share
-            mean += share * u
-    return 0.4 * math.log(math.sqrt(CURVATURE) * total), mean / total
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def log_depth_of(pressed):
+    """ln D of a lobe, and its place on the wheel's profile, m, from what its overlaps have `Pressed`."""
+    return 0.4 * math.log(0.9375 * math.sqrt(CURVATURE) * pressed.square), pressed.moment / pressed.square
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

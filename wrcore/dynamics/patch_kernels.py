@@ -5,6 +5,7 @@ import ctypes
 
 import numpy as np
 
+from wrcore.contact.approach import Pressed
 from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, LOBES, MODEL, strip_work, with_tables
 from wrcore.contact.reduction import PATCH_COLUMNS
@@ -13,7 +14,7 @@ from wrcore.dynamics.lobes_apart import look_lobes_up
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
-from wrcore.dynamics.strip_wheel import add_group, solve_on_grid
+from wrcore.dynamics.strip_wheel import Lift, add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind
@@ -88,9 +89,10 @@ class LateKernels:
                 self._places[[MODEL, KERNEL]] = self._model.address, kernel
 
     def _of_lobes(self):
-        m, frame = WheelMotion(*np.zeros(len(WheelMotion._fields))), Frame(*np.zeros(len(Frame._fields)))
+        m, pressed, lift = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pressed, Lift))
         kind, work = Kind(self._contact._replace(geometries=(), wheels=())), Kind(strip_work(self._contact.strips, 1))
-        return Kernel(look_lobes_up, kind, m, frame, 0.0, 0.0, 0.0, np.zeros(COUNTERS, np.int64), work).address
+        counters = np.zeros(COUNTERS, np.int64)
+        return Kernel(look_lobes_up, kind, m, pressed, lift, (0.0, 0.0), 0.0, counters, work).address
 
     def _with_ellipses(self):
         work, counts = Kind(strip_work(self._contact.strips, 1)), np.zeros((1, 2), np.int64)

@@ -9,7 +9,7 @@ takes from the wheelset what it dissipates. A right wheel is solved as the mirro
 tell them apart.
 
 The damping factor acts as on an ellipse: the half-space sees the elastic approach c_d^(2/3) delta, and the wheel is
-lifted along the contact normal by the rest.
+lifted along the contact normal by the rest; how deep, along which normal and how fast: :mod:`wrcore.contact.approach`.
 """
 
 import math
@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact import reduction
+from wrcore.contact.approach import approach_of, pressed_together
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL, find_patches
 from wrcore.contact.normal import damping_factor, inverse_cube_root
@@ -116,21 +117,53 @@ def solve_on_grid(model, m, pose, frame, creepage, friction, row):
     row[reduction.SEMI_B] = math.sqrt(5.0 * max(ss / load - sm * sm, 1e-14))
 
 
+class Lift(NamedTuple):
+    """What the damping lifts a wheel by: a share of the depth (m) along the normal."""
+
+    share: float
+    depth: float
+    cosine: float
+    sine: float
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lift_share(model, approach):
+    """Share of its depth by which the damping lifts a wheel."""
+    factor = damping_factor(approach, model.damping, model.damping_speed)
+    return 1.0 - factor * inverse_cube_root(factor)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lift_of(model, m, pressed):
+    """`Lift` of a wheel whose overlaps have ``pressed``."""
+    depth, cosine, sine, approach = approach_of(pressed, m)
+    return Lift(lift_share(model, approach), depth, cosine, sine)
+
+
 @jit(allocates=False, fastmath=FUSED)
-def lifted(model, m, frame, lift, spatial, u, rows):
-    """Overlaps of a wheel lifted along a frame's normal (m) and, of its groups, the one nearest to wheel coordinate
-    ``u``: (pose, first, last)."""
-    y, z = m.y - lift * frame.sine, m.z + lift * frame.cosine
+def _overlaps_above(model, m, height, lift, spatial, ends, rows):
+    """Pose of a wheel lifted by a ``height``, and which of its overlaps lie between two ends on its profile."""
+    low, y, z = 0, m.y - height * lift.sine, m.z + height * lift.cosine
     pose = make_pose(1.0, y, z, m.ex, m.ey, m.ez, spatial)
-    count = find_patches(model.geometry, 1.0, y, z, m.ex, m.ey, m.ez, spatial, reduction.MOMENT, rows)
-    best, low, high, first = 1e9, 0, 0, 0
-    while first < count:
-        last = group_end(model.geometry, rows, count, first)
-        for k in range(first, last):
-            distance = abs(rows[k, reduction.U_WHEEL] - u)
-            if distance < best:
-                best, low, high = distance, first, last
-        first = last
+    high = count = find_patches(model.geometry, 1.0, y, z, m.ex, m.ey, m.ez, spatial, reduction.MOMENT, rows)
+    while low < count and not ends[0] < rows[low, reduction.U_WHEEL] < ends[1]:
+        low += 1
+    while high > low and not ends[0] < rows[high - 1, reduction.U_WHEEL] < ends[1]:
+        high -= 1
+    return pose, low, high
+
+
+@jit(allocates=False, fastmath=FUSED)
+def lifted(model, m, lean, pressed, lift, spatial, ends, work):
+    """Overlaps of a lifted wheel between two ``ends`` on its profile (m), into ``work.rows``: (pose, first, last).
+
+    M0^0.4 of what has ``pressed`` falls by the share of the lift: the first of two steps is right for a parabola."""
+    rest, height = 1.0 - lift.share, lift.share * lift.depth
+    pose, low, high = _overlaps_above(model, m, height, lift, spatial, ends, work.rows)
+    if high > low:
+        now = pressed_together(model.geometry, pose, spatial, lean, work.rows, low, high, work.moments)
+        height += ((now.square / pressed.square) ** 0.4 - rest) * lift.depth
+        pose, low, high = _overlaps_above(model, m, height, lift, spatial, ends, work.rows)
     return pose, low, high
 
 
@@ -253,45 +286,25 @@ def _roll_on_grid(model, m, pose, frame, depth, creepage, friction, row, work):
     return Solution(xi, eta, phi, load, x, s, a, b, p_max, power)
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def lift_share(model, approach):
-    """Share of its depth by which the damping lifts a wheel."""
-    factor = damping_factor(approach, model.damping, model.damping_speed)
-    return 1.0 - factor * inverse_cube_root(factor)
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def deepest_place(model, m, pose, frame, depth):
-    """Place of a patch's deepest material point from the wheelset's centre, in axes that lean as the patch does."""
+@jit(allocates=False, fastmath=FUSED)
+def _deepest_slip(model, m, pose, frame, depth):
+    """Creepages of a patch's deepest material point, and coefficient of friction. The motion ``m`` is in axes that lean
+    as the patch does."""
+    speed = max(abs(m.vx), model.least_speed)
     py = frame.ur + model.geometry.rail_distance + depth * frame.sine - m.y
     pz = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - depth * frame.cosine - m.z)
     px, pz = leaning(model.geometry, lean_of(model.geometry, pose, frame), frame.x, pz)
-    return px, py, pz
+    xi, eta, phi, _ = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, speed)
+    return (xi, eta, phi), falling(model, m.friction, xi, eta, speed)
 
 
-@jit(allocates=False, fastmath=FUSED)
-def lift_of(model, m, pose, frame, depth):
-    """What the damping lifts a left wheel by along the normal of a frame, of a ``depth``, m; creepages and coefficient
-    of friction. The motion ``m`` is in axes that lean as the patch does."""
-    speed = max(abs(m.vx), model.least_speed)
-    # a material point of the undeformed wheel, as the surfaces' slip has it
-    px, py, pz = deepest_place(model, m, pose, frame, depth)
-    xi, eta, phi, approach = creepages(m.vx, m.vy, m.vz, m.wx, m.wy, m.wz, px, py, pz, frame.cosine, frame.sine, speed)
-    friction = falling(model, m.friction, xi, eta, speed)
-    return lift_share(model, approach) * depth, (xi, eta, phi), friction
-
-
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def lift_of_overlaps(model, m, pose, frame, rows, first, last, out):
-    """What the damping lifts a left wheel by, see `lift_of`; the depth and the place of its deepest row, which fills
-    ``out``; creepages and coefficient of friction."""
-    depth, u = 0.0, 0.0
-    for k in range(first, last):
-        if rows[k, reduction.PENETRATION] > depth:
-            depth, u = rows[k, reduction.PENETRATION], rows[k, reduction.U_WHEEL]
-            copy_into(out, rows[k])
-    lift, creepage, friction = lift_of(model, m, pose, frame, depth)
-    return lift, depth, u, creepage, friction
+@jit(allocates=False, forceinline=True)
+def copy_deepest(rows, first, last, out):
+    """Fill ``out`` with the deepest of the rows."""
+    deepest = first
+    for k in range(first + 1, last):
+        deepest = k if rows[k, reduction.PENETRATION] > rows[deepest, reduction.PENETRATION] else deepest
+    copy_into(out, rows[deepest])
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -300,12 +313,17 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""
     speed, windows = max(abs(m.vx), model.least_speed), 0
     pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
-    frame = frame_of_rows(rows, first, last)  # the surfaces' own: through a mean plane a sliding wheel comes nearer
-    m = leaning_motion(model.geometry, m, lean_of(model.geometry, pose, frame))
-    lift, depth, u, creepage, friction = lift_of_overlaps(model, m, pose, frame, rows, first, last, out)
-    depth -= lift
+    frame = frame_of_rows(rows, first, last)
+    lean = lean_of(model.geometry, pose, frame)
+    m = leaning_motion(model.geometry, m, lean)
+    pressed = pressed_together(model.geometry, pose, spatial, lean, rows, first, last, work.moments)
+    lift = lift_of(model, m, pressed)
+    copy_deepest(rows, first, last, out)
+    creepage, friction = _deepest_slip(model, m, pose, frame, out[reduction.PENETRATION])
+    depth = (1.0 - lift.share) * out[reduction.PENETRATION]
     if depth > 0.0:
-        pose, low, high = lifted(model, m, frame, lift, spatial, u, work.rows)
+        ends = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
+        pose, low, high = lifted(model, m, lean, pressed, lift, spatial, ends, work)
         if high == low:
             out[reduction.NORMAL] = 0.0
             return NOTHING

@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact import reduction
+from wrcore.contact.approach import LEVEL, pressed_together
 from wrcore.contact.creepage import creepages
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch import solve
@@ -23,7 +24,7 @@ from wrcore.dynamics.pair_table import (
     Slip,
     lobe_end,
     locate,
-    log_depth_at,
+    log_depth_of,
     look_modes_up,
     look_up,
     tabulated_force,
@@ -34,8 +35,9 @@ from wrcore.dynamics.strip_wheel import (
     ROWLESS,
     UNSOLVED,
     Solution,
+    copy_deepest,
     fill_row,
-    lift_of_overlaps,
+    lift_of,
 )
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address, call_c
@@ -50,19 +52,24 @@ UNLISTED = -1.0
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
     """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
+    if not spatial:  # the lattices are of spatial detection
+        counters[SOLVED] += 1
+        return UNKNOWN
     frame, ahead = frame_of_rows(rows, first, last), -1.0 if m.vx < 0.0 else 1.0
-    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, spatial)
-    lift, depth, u, _, _ = lift_of_overlaps(model, m, pose, frame, rows, first, last, out)
-    pose = make_pose(1.0, m.y - lift * frame.sine, m.z + lift * frame.cosine, m.ex, m.ey, m.ez, spatial)
-    lobes = 0
-    if lift < depth and spatial:  # the lattices are of spatial detection
-        lobes = _look_lobes_up(model, m, pose, frame, (lift, u), ahead, rows, first, last, counters, work)
-    if lift >= depth or lobes < 0:
+    pose = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True)
+    pressed = pressed_together(model.geometry, pose, True, LEVEL, rows, first, last, work.moments)
+    lift, lobes = lift_of(model, m, pressed), -1
+    if lift.share < 1.0:
+        pose, place = lifted_place(m, pressed, lift)
+        lobes = _look_lobes_up(model, m, pose, pressed, lift, place, ahead, rows, first, last, counters, work)
+    if lobes < 0:
         out[reduction.NORMAL] = 0.0
         return NOTHING
     if lobes == 0:
         counters[SOLVED] += 1
         return UNKNOWN
+    if work.spare[ROWLESS] == 0.0:
+        copy_deepest(rows, first, last, out)
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
@@ -96,23 +103,28 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
         call_address(late[KERNEL], late[MODEL], m, spatial, rows, first, last, out, wrench, counters, memory, work)
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def lifted_place(m, pressed, lift):
+    """Pose of a lifted wheel, and ln D and place on the wheel's profile of its overlaps if they are one lobe."""
+    height, (log_depth, u) = lift.share * lift.depth, log_depth_of(pressed)
+    pose = make_pose(1.0, m.y - height * lift.sine, m.z + height * lift.cosine, m.ex, m.ey, m.ez, True)
+    return pose, (log_depth + math.log(1.0 - lift.share), u)
+
+
 @jit(allocates=False, fastmath=FUSED)
-def _look_lobes_up(model, m, pose, frame, lift, ahead, rows, first, last, counters, work):
-    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a lifted wheel at a ``pose``; ``rows`` are its overlaps
-    where it is not lifted. Returns how many there are, 0 if one of them is in no lattice, -1 if it hangs in the air.
-    ``lift``: along the frame's normal, and place on the wheel's profile of what is lifted, m."""
+def _look_lobes_up(model, m, pose, pressed, lift, place, ahead, rows, first, last, counters, work):
+    """Fill ``work.numbers`` and ``work.lobes`` of the lobes of a wheel with a `lifted_place`; ``rows`` are its overlaps
+    where it is not lifted. Returns how many there are, 0 if one of them is in no lattice, -1 if it hangs in the air."""
     lobes, late = work.lobes, model.strips.late
     lobes[:] = 0.0
     if lobe_end(model.geometry, pose, rows, first, last, (APART, FAR, SADDLE)) == last:
-        log_depth, u = log_depth_at(model.geometry, pose, rows, first, last)
-        if log_depth == -math.inf:
-            return -1
-        return 1 if look_only_lobe_up(model, m, pose, ahead, log_depth, u, work) else 0
+        return 1 if look_only_lobe_up(model, m, pose, ahead, place, work) else 0
     if late[LOBES] == 0:
         call_c(late[LOAD], LOBES)
     if late[LOBES] == 0:  # interrupted
         return 0
-    call_address(late[LOBES], model, m, frame, lift[0], lift[1], ahead, counters, work)
+    ends = rows[first, reduction.OUTSIDE], rows[last - 1, reduction.BEYOND]
+    call_address(late[LOBES], model, m, pressed, lift, ends, ahead, counters, work)
     if lobes[0, CELL] == UNLISTED:
         return 0
     count = 0
@@ -122,9 +134,9 @@ def _look_lobes_up(model, m, pose, frame, lift, ahead, rows, first, last, counte
 
 
 @jit(allocates=False, fastmath=FUSED)
-def look_only_lobe_up(model, m, pose, ahead, log_depth, u, work):
-    """Look up the only lobe of a wheel; False if it is in no lattice."""
-    t = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance
+def look_only_lobe_up(model, m, pose, ahead, place, work):
+    """Look up the only lobe of a wheel with a `lifted_place`; False if it is in no lattice."""
+    t, (log_depth, u) = pose.y + model.geometry.half_distance * m.ey - model.geometry.rail_distance, place
     return look_lobe_up(model, work.numbers[0], work.lobes[0], u, False, t, m.ez, log_depth, ahead * m.ex, True, work)
 
 

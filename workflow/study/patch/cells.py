@@ -15,10 +15,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from wrcore.analysis.pictures.style import MM, styled
+from wrcore.contact.approach import LEVEL, pressed_together
 from wrcore.contact.detection import axle_direction, find_patches
 from wrcore.contact.normal import damping_factor
 from wrcore.contact.patch.gap import group_end
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics.pair_store import _PAIRS, WRONG, Pair, pair_of
 from wrcore.dynamics.pair_table import (
@@ -33,8 +34,8 @@ from wrcore.dynamics.pair_table import (
     YAW,
     YAWS,
     corner_of,
-    depth_of,
     lobe_end,
+    log_depth_of,
 )
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import Simulation
@@ -148,17 +149,16 @@ def lobes_of(contact, poses):
 def depths_of(contact, left, overlaps):
     """D (m) of each lobe of a left wheel, as damping at rest leaves it; ``overlaps`` is scratch."""
     geometry, first, found = contact.geometry, 0, []
-    factor, pose = damping_factor(0.0, contact.damping, contact.damping_speed), make_pose(1.0, *left, True)
+    left_over = damping_factor(0.0, contact.damping, contact.damping_speed) ** (2.0 / 3.0)
     count = find_patches(geometry, 1.0, *left, True, MOMENT, overlaps)
+    pose, sums = make_pose(1.0, *left, True), np.zeros((3, 5))
     while first < count:
-        end = group_end(geometry, overlaps, count, first)
-        lift = (1.0 - factor ** (2.0 / 3.0)) * overlaps[first:end, PENETRATION].max()
-        overlaps[first:end, PENETRATION] = np.maximum(overlaps[first:end, PENETRATION] - lift, 0.0)
-        while first < end:
-            last = lobe_end(geometry, pose, overlaps, first, end, (APART, FAR, SADDLE))
-            found.append(depth_of(overlaps, first, last)[0])
-            first = last
-    return [depth for depth in found if depth > 0.0]
+        group = group_end(geometry, overlaps, count, first)
+        last = lobe_end(geometry, pose, overlaps, first, group, (APART, FAR, SADDLE))
+        log_depth, _ = log_depth_of(pressed_together(geometry, pose, True, LEVEL, overlaps, first, last, sums))
+        found.append(left_over * math.exp(log_depth))
+        first = last
+    return found
 
 
 @styled

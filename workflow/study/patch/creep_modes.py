@@ -1,11 +1,13 @@
-"""Modes of what exact contact adds to the creep table: ``python -m study.patch.creep_modes [POSES] [--out FILE]``.
+"""Modes of what exact contact adds to the creep table: ``python -m study.patch.creep_modes [POSES] [--out FILE]
+[--friction MU ...]``.
 
 Exact patches of random poses, of the whole tread and of the flange, are solved for creepages all over the disk. The
 remainder beside the creep table at the ellipse of equal moments is fitted with quadratic B-splines, pose by pose, and
 the principal components over the poses are the modes: a family of contacts of little spin, and one of contacts of much
-(``FLANKS`` of `wrcore.dynamics.pair_table`). They come with the package (``wrcore/dynamics/tables/creep_modes.h5``) and
-serve all pairs: where one lobe carries, foreign modes are as good as a pair's own. Prints how well a node's few
-solutions give the remainder of poses that were kept back, over mu N in %: median, 95 % and 99 %.
+(``FLANKS`` of `wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own. They come with the
+package (``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries, foreign modes are as
+good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were kept back, over mu N
+in %: median, 95 % and 99 %.
 """
 
 import argparse
@@ -31,6 +33,9 @@ REGIONS = {
     "flange": ((3.5e-3, 9e-3), (-0.05, -0.025), (6e-6, 1.2e-4)),
 }
 """Where poses lie: lateral place of the wheel, place on its profile, and depth, m."""
+
+FRICTIONS = 0.05, 0.12, 0.3, 0.7
+"""Coefficients of friction that have modes."""
 
 KEPT = 60
 """Poses of each region on which modes are tried."""
@@ -126,29 +131,35 @@ def errors(modes, numbers, remainder, points):
     return np.array([columns.remainder(modes.values, row, *point) for point in points]) - remainder
 
 
-def main():
-    """Train modes on the default profiles, print what they leave, write them."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("poses", nargs="?", type=int, default=900)
-    parser.add_argument("--out", default=SHIPPED / "creep_modes.h5")
-    chosen = parser.parse_args()
-    model, _ = compile_scene(load_scene(example("suspended_wheelset"), {"contact.patch": "exact"}))
+def make(poses, friction):
+    """Modes trained on the default profiles; prints what they leave."""
+    settings = {"contact.patch": "exact", "contact.friction": friction}
+    model, _ = compile_scene(load_scene(example("suspended_wheelset"), settings))
     contact = model.contact
     pair = Pair(contact._replace(strips=contact.strips._replace(looked_up=contact.friction)), "modes")
-    points, poses = (
-        np.vstack([disk(SAMPLES), 0.2 * disk(NEAR)]),
-        {"tread": chosen.poses, "flange": 2 * chosen.poses // 3},
-    )
-    found = [collect(pair, REGIONS[name], count, points) for name, count in poses.items()]
+    points, counts = np.vstack([disk(SAMPLES), 0.2 * disk(NEAR)]), {"tread": poses, "flange": 2 * poses // 3}
+    found = [collect(pair, REGIONS[name], count, points) for name, count in counts.items()]
     modes = train(*(np.concatenate(part) for part in zip(*found, strict=True)), points)
     for name in REGIONS:
         every = np.vstack([modes.points, points])
         left = [errors(modes, *pose, every) for pose in zip(*collect(pair, REGIONS[name], KEPT, every, 6), strict=True)]
         for part, size in (("force", np.hypot(*np.array(left).T[:2])), ("moment", np.abs(np.array(left).T[2]))):
-            print(name, part, *(f"{100 * value:.2f}" for value in np.percentile(size, [50, 95, 99])))
+            print(friction, name, part, *(f"{100 * value:.2f}" for value in np.percentile(size, [50, 95, 99])))
+    return modes
+
+
+def main():
+    """Train modes, print what they leave, write them."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("poses", nargs="?", type=int, default=600)
+    parser.add_argument("--out", default=SHIPPED / "creep_modes.h5")
+    parser.add_argument("--friction", nargs="+", type=float, default=FRICTIONS)
+    chosen = parser.parse_args()
+    made = {friction: make(chosen.poses, friction) for friction in chosen.friction}
     with new_hdf5(chosen.out) as file:
-        for name, value in modes._asdict().items():
-            file[name] = value
+        for friction, modes in made.items():
+            for name, value in modes._asdict().items():
+                file[f"{friction:g}/{name}"] = value
 
 
 if __name__ == "__main__":

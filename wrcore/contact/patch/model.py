@@ -110,7 +110,9 @@ class StripWork(NamedTuple):
     along: np.ndarray
     rest: np.ndarray
     lattice: np.ndarray
-    """(5, NODES), (4, NUMBERS), (8, 3) and (11, 4): of its slopes, see `wrcore.dynamics.lobe_slopes`."""
+    """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): of its slopes, see `wrcore.dynamics.lobe_slopes`."""
+    moments: np.ndarray
+    """(3, 5): of overlaps, see `wrcore.contact.moved.slopes_of_moments`."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
@@ -164,7 +166,7 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES),
-        *(np.zeros(shape if model.looked_up else (0, 0)) for shape in ((5, NODES), (4, NUMBERS), (8, 3), (11, 4))),
-        normal,
+        *(np.zeros(shape if model.looked_up else (0, 0)) for shape in ((5, NODES), (4, NUMBERS), (8, 3), (10, 4))),
+        np.zeros((3, 5)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),
     )  # fmt: skip

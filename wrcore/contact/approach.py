@@ -1,0 +1,141 @@
+"""How deep the overlaps of a patch are together, along which normal, and how fast they get deeper.
+
+With the vertical gap g of a left wheel's strips, M0 = sum of int g^2 du changes by
+
+    dM0 = 2 sum of int g dg du
+
+where the wheel moves. Lifted along n = -grad M0 / G, with the gradient over y and z and its size G, a single parabola
+would hang free at the height
+
+    depth = 2.5 M0 / G,
+
+its deepest penetration, and it comes nearer at the speed (dM0/dt) / G. All three are sums over the overlaps: nothing
+steps where two of them merge.
+"""
+
+import math
+from typing import NamedTuple
+
+from wrcore.contact.detection import WIDE
+from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, scan_nodes, slopes_of_moments
+from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, U_WHEEL, X, Y, Z
+from wrcore.contact.scan import leaves_cells
+from wrcore.contact.strip import AHEAD, LIFT, changes_along, cubic_at, leaning, on_rail, strip_point, with_rail_along
+from wrcore.kernels.jit import FUSED, jit
+
+LEVEL = 1.0, 0.0
+"""Axes that do not lean, see `wrcore.contact.strip.lean_at`."""
+
+TREAD, SMOOTH = 0.9928, 14
+"""Nodes of the scan over which M0 is summed, at least, where the normal has this cosine; else those of the profile: 10
+of the scan are off by 7e-4, and by 1e-3 where overlaps in a flange root merge."""
+
+
+class Pressed(NamedTuple):
+    """M0 of a patch's overlaps (m^3), their place on the wheel's profile times M0, and what M0 changes by where the
+    wheel's centre moves across and up (m^2) or the wheel turns about x, y and z (m^3)."""
+
+    square: float
+    moment: float
+    across: float
+    up: float
+    about_x: float
+    about_y: float
+    about_z: float
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def add_pressed(one, other):
+    """Of both together."""
+    return Pressed(
+        one.square + other.square, one.moment + other.moment, one.across + other.across, one.up + other.up,
+        one.about_x + other.about_x, one.about_y + other.about_y, one.about_z + other.about_z,
+    )  # fmt: skip
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def approach_of(pressed, m):
+    """Depth (m), cosine and sine of the normal, and speed (m/s) at which a motion ``m`` makes the overlaps deeper."""
+    size = math.sqrt(pressed.across * pressed.across + pressed.up * pressed.up)
+    rate = pressed.across * m.vy + pressed.up * m.vz + pressed.about_x * m.wx + pressed.about_y * m.wy
+    inverse = 1.0 / size
+    rate += pressed.about_z * m.wz
+    return 2.5 * pressed.square * inverse, -pressed.up * inverse, pressed.across * inverse, rate * inverse
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _strip_rates(gap, slope, px, py, pz):
+    """Rates of a strip's g^2 over its gap's, see `Pressed`."""
+    g = 2.0 * gap
+    return -g * slope, g, g * (py + slope * pz), -g * px, -g * slope * px
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _of_parabola(pose, row):
+    """Of an overlap too narrow for anything else than a parabola, found at this pose."""
+    depth, cosine = row[PENETRATION], row[COSINE]
+    square = depth * depth * math.sqrt(depth / row[CURVATURE_Y]) / (0.9375 * cosine)
+    gap = -1.25 * square * cosine / depth
+    rates = _strip_rates(gap, math.tan(row[ANGLE]), row[X], row[Y] - pose.y, row[Z] - pose.z)
+    return Pressed(square, square * row[U_WHEEL], *rates)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _strip_by_strip(geometry, pose, lean, nodes):
+    """Of an overlap at its nodes, in axes that ``lean``, and how many there are."""
+    square = moment = across = up = about_x = about_y = about_z = 0.0
+    count = 0
+    for k in range(nodes.first, nodes.end):
+        u = nodes.u + k * nodes.step
+        ur, height, radius, _, _, along = strip_point(geometry, pose, u)
+        f, slope, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
+        gap = height - f
+        if gap < 0.0 and on_rail(geometry, ur):
+            x = radius * along * pose.q + (geometry.half_distance + u) * pose.ex
+            px, pz = with_rail_along(geometry, AHEAD, ur, 1.0, x), with_rail_along(geometry, LIFT, ur, 1.0, height)
+            px, pz = leaning(geometry, lean, px, pz - pose.z)
+            one = _strip_rates(gap, slope, px, ur + geometry.rail_distance - pose.y, pz)
+            square, moment, count = square + gap * gap, moment + gap * gap * u, count + 1
+            across, up = across + one[0], up + one[1]
+            about_x, about_y, about_z = about_x + one[2], about_y + one[3], about_z + one[4]
+    step = nodes.step
+    return count, Pressed(
+        step * square, step * moment, step * across, step * up, step * about_x, step * about_y, step * about_z
+    )
+
+
+@jit(allocates=False, forceinline=True)
+def least_of(row):
+    """Nodes of the scan that an overlap takes."""
+    return float(SMOOTH) if row[COSINE] > TREAD else math.inf
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def pressed_from(pose, middle, sums):
+    """Of an overlap with these `slopes_of_moments`."""
+    roll, yaw = sums[0, 1 + ROLL], sums[0, 1 + YAW]
+    turned = -(pose.ex * roll + pose.ez * yaw) / pose.ey  # about its axle a wheel turns without a change
+    moment = middle * sums[0, 0] + sums[1, 0]
+    return Pressed(sums[0, 0], moment, sums[0, 1 + ACROSS], sums[0, 1 + UP], roll, turned, yaw)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def pressed_by(geometry, pose, spatial, lean, row, sums):
+    """`Pressed` of one overlap of a left wheel, found by moments at this ``pose``. ``sums`` (3, 1 + MOVES) is
+    scratch."""
+    if spatial and not changes_along(geometry) and not leaves_cells(pose):
+        middle, _ = slopes_of_moments(geometry, pose, row, least_of(row), sums)
+        return _of_parabola(pose, row) if math.isnan(middle) else pressed_from(pose, middle, sums)
+    count, found = _strip_by_strip(geometry, pose, lean, scan_nodes(geometry, pose, row))
+    if count < least_of(row):
+        count, found = _strip_by_strip(geometry, pose, lean, fine_nodes(geometry, pose, row))
+    return found if count >= WIDE else _of_parabola(pose, row)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def pressed_together(geometry, pose, spatial, lean, rows, first, last, sums):
+    """`Pressed` of the overlaps from ``first`` to before ``last``."""
+    total = pressed_by(geometry, pose, spatial, lean, rows[first], sums)
+    for k in range(first + 1, last):
+        total = add_pressed(total, pressed_by(geometry, pose, spatial, lean, rows[k], sums))
+    return total
