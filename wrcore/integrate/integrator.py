@@ -53,8 +53,9 @@ wheelset, and at this pace a simulated second takes fifty million steps. The sho
 a stated length, or bounded by ``longest_step``, may be as short as they are asked to be.
 """
 
-CHUNK = 2000
-"""Attempts between two returns to Python, for progress and interrupts."""
+CHUNK, FIRST_CHUNK, BREATH = 2000, 16, 0.5
+"""Most attempts between two returns to Python, for progress and interrupts, how many there are at first, and how long
+(s) they may take: an attempt with exact patches takes some 10 ms."""
 
 
 def integrate(
@@ -89,8 +90,15 @@ def integrate(
     outcome, given_up = run.advance(record, 0), ""  # compiles, or loads the kernel from the cache
     before, started = run.memory.counters.copy(), time.perf_counter()
     headway = Headway(run.memory, most_steps, 0.0 if step else min(STALL_STEP, 0.1 * longest_step))
+    attempts = min(FIRST_CHUNK, chunk)
     while outcome == engine.RUNNING and not given_up:
-        outcome = run.advance(record, min(chunk, headway.attempts_left()))
+        begun = time.perf_counter()
+        outcome = run.advance(record, min(attempts, headway.attempts_left()))
+        spent = time.perf_counter() - begun
+        if spent < 0.5 * BREATH:
+            attempts = min(2 * attempts, chunk)
+        elif spent > BREATH:
+            attempts = max(attempts // 2, 1)
         if progress is not None:
             progress(min(run.memory.clock[engine.T], times[-1]))
         given_up = headway.lost() or (stop() if stop is not None else "")

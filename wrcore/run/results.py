@@ -257,10 +257,14 @@ def _check_run(path, run):
         raise InputError(path, "t", "expected increasing times")
     for group, channels in run.groups.items():
         for name, values in channels.items():
-            values = np.asarray(values)
-            if values.dtype.kind != "f" or values.ndim not in (1, 2) or len(values) != len(times):
-                expected = f"expected {len(times)} numbers or rows of numbers, got {values.dtype} {values.shape}"
-                raise InputError(path, f"{group}/{name}", expected)
+            _check_channel(path, f"{group}/{name}", np.asarray(values), len(times))
+
+
+def _check_channel(path, name, values, count):
+    """A channel, or its dataset, has one number or row for each of so many times."""
+    if values.dtype.kind != "f" or len(values.shape) not in (1, 2) or values.shape[0] != count:
+        expected = f"expected {count} numbers or rows of numbers, got {values.dtype} {values.shape}"
+        raise InputError(path, name, expected)
 
 
 def _read_frame(file):
@@ -286,5 +290,8 @@ def read_part(path: str | PathLike[str]) -> tuple[str, Run, list[np.ndarray]]:
         _check_format(path, file)
         run = _read_frame(file)
         _check_run(path, run)
+        for name, item in _items(file):
+            if isinstance(item, h5py.Dataset) and "/" in name:
+                _check_channel(path, name, item, len(run.t))
         places = [file[END][name][()] for name in sorted(file.get(END, ())) if name.startswith("place_")]
         return str(file.attrs.get("fingerprint", "")) if run.end else "", run, places
