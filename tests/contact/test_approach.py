@@ -114,13 +114,14 @@ def test_damping_does_not_step_where_overlaps_change(benchmark_pair, merging):
 
 
 @pytest.mark.parametrize("vy", [0.0, -0.03])
-def test_damped_force_does_not_step_where_overlaps_merge(benchmark_pair, vy):
-    """The solver's normal force over steps of 1 um."""
-    wheels = LoadedWheels(benchmark_pair, "exact")
-    wheels._rolling[0.0] = Handle(wheels._at_work().value._replace(damping=0.8, damping_speed=0.05))
+@pytest.mark.parametrize(("model", "friction"), [("exact", 0.0), ("tabulated", 0.3)])
+def test_damped_force_does_not_step_where_overlaps_merge(benchmark_pair, vy, model, friction):
+    """The normal force, solved and looked up, over steps of 1 um."""
+    wheels = LoadedWheels(benchmark_pair, model)
+    wheels._rolling[friction] = Handle(wheels._at_work(friction).value._replace(damping=0.8, damping_speed=0.05))
     (z, middle), forces = merger(wheels), []
     for y in middle + 1e-6 * np.arange(-2.5, 3.0):
-        found = wheels.at_height("left", y, z, rolling=Rolling(20.0, 20.0 / 0.46, vy))
+        found = wheels.at_height("left", y, z, rolling=Rolling(20.0, 20.0 / 0.46, vy), friction=0.3)
         forces.append(sum(one.row[reduction.NORMAL] for one in found))
     steps = np.diff(forces)
     assert abs(np.diff(steps)).max() < 0.02 * abs(steps).mean()

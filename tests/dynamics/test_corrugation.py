@@ -76,5 +76,3 @@ def test_what_does_not_go_together_is_refused():
         load_scene(SCENES / "suspended_wheelset.yaml", wave | {"wheel.left.out_of_round": FLAT})
     with pytest.raises(InputError, match="rises less than 0.2, got 0.377"):
         load_scene(SCENES / "suspended_wheelset.yaml", wave | {"track.corrugation.amplitude": 3e-3})
-    with pytest.raises(InputError, match="tables are of round wheels and smooth rails"):
-        load_scene(SCENES / "suspended_wheelset.yaml", wave | {"contact.patch": "tabulated"})

@@ -10,14 +10,18 @@ import pytest
 from tests.conftest import ROOT, SCENES
 from tests.dynamics.crossing_rails import write_rail
 from wrcore.analysis.pictures.plot_crossing import plot_crossing
+from wrcore.contact.reduction import ANGLE, FX, FY, SEMI_A, SEMI_B
 from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.seen_table import ROWS, S_STEP, seen_table
+from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.crossing import interpolate, laid_at
 from wrcore.dynamics.system import Equations
+from wrcore.dynamics.wheel import SOLVED
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_value
-from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.crossing import Crossing, write_crossing
 from wrcore.geometry.standards import named_profile
+from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 
@@ -234,7 +238,7 @@ def test_its_picture_shows_the_load_going_over():
 def test_its_page_is_read_and_run():
     text = (ROOT / "reports" / "crossings.md").read_text(encoding="utf-8")
     blocks = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     for block in blocks:
         assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 
@@ -278,9 +282,47 @@ def test_rails_that_do_not_join_are_refused(tmp_path):
         load_scene(SCENES / "wheelset.yaml", ROUND | {"track.crossing": {"slices": str(path), "at": 10.0}})
 
 
-def test_tables_of_pairs_are_refused():
-    with pytest.raises(InputError, match="expected maximum, moment or exact"):
-        load_scene(CROSSING, contact__patch="tabulated")
+def test_rails_with_a_hole_or_a_wall_are_refused(tmp_path):
+    wall = write_rail(tmp_path, 0.025 * np.arange(121), lambda s: 8e-3 * (abs(s - 1.0) < 1e-6))
+    with pytest.raises(InputError, match=r"rise less than 0.2 along the track, got"):
+        load_scene(SCENES / "wheelset.yaml", ROUND | {"track.crossing": {"slices": str(wall), "at": 10.0}})
+    write_crossing(tmp_path / "own")
+    head, *rows = (tmp_path / "own" / "crossing.csv").read_text().splitlines()
+    names = head.split(",")
+    kept = [row for row in rows if not ("wing" in row and float(row.split(",")[names.index("s_m")]) > 0.2)]
+    (tmp_path / "own" / "crossing.csv").write_text("\n".join([head, *kept]))
+    with pytest.raises(InputError, match=r"a head under the wheels everywhere, got none at s = 0.4"):
+        load_scene(CROSSING, {"track.crossing.slices": str(tmp_path / "own" / "crossing.csv")})
+
+
+def test_a_rail_that_swings_out_between_far_slices_is_told(tmp_path, capsys):
+    path = write_rail(tmp_path, [0.0, 0.5, 1.0, 1.05, 1.5, 2.0, 2.5], lambda s: -1e-3 * (1.0 < s < 2.0))
+    load_scene(SCENES / "wheelset.yaml", ROUND | {"track.crossing": {"slices": str(path), "at": 10.0}})
+    assert re.search(r"the rail swings out by \d.\d mm .* add slices", capsys.readouterr().err)
+    load_scene(CROSSING)
+    assert "swings out" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_tables_serve_the_plain_rail_and_the_solver_the_crossing(side):
+    changes, on = {"track.crossing.at": 3.0, "track.crossing.rail": side}, list(SIDES).index(side)
+    (exact, state), (table, _) = (compile_scene(load_scene(CROSSING, changes, contact__patch=patch))
+                                  for patch in ("exact", "tabulated"))  # fmt: skip
+    equations = [Equations(model) for model in (exact, table)]
+    for s in (0.0, 2.95):  # before it, and where the wing leads the wheel outwards
+        moved = state.copy()
+        moved[STATE_SIZE * exact.bodies.wheelsets[0]] += s
+        solved = equations[1].work.counters[SOLVED]
+        for one in equations:
+            one(0.0, moved)
+        solution, found = (one.work.rail_wrenches[0] for one in equations)
+        assert np.abs(found[1 - on] - solution[1 - on]).max() < 5e-4 * solution[1 - on].max()
+        assert np.abs(found[on] - solution[on]).max() < (1e-9 if s else 5e-4) * solution[on].max()
+        assert equations[1].work.counters[SOLVED] - solved == (s > 0.0)
+        rows = [one.work.patches[0, 1 - on, 0] for one in equations]  # the other wheel's are its own
+        assert rows[1][ANGLE] == pytest.approx(rows[0][ANGLE], abs=2e-4)
+        assert rows[1][[SEMI_A, SEMI_B]] == pytest.approx(rows[0][[SEMI_A, SEMI_B]], rel=0.02)
+        assert rows[1][[FX, FY]] == pytest.approx(rows[0][[FX, FY]], abs=2e-3 * solution[1 - on].max())
 
 
 def test_impact_on_rigid_rails_is_told(capsys):

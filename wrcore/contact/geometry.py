@@ -84,7 +84,7 @@ class ContactGeometry(NamedTuple):
     rail_distance: float
     """Rail profile origin from the track's centre line, m."""
     along: np.ndarray | tuple = ()
-    """(m, 4) where the rail changes along the track, at the rail's nodes: see `wrcore.contact.seen_rail`."""
+    """(m, 5) where the rail changes along the track, at the rail's nodes: see `wrcore.contact.seen_rail`."""
     over: np.ndarray | tuple = ()
     """(n, 1 + m): stations along the track, evenly apart, from the wheelset's cross-section, m; how much higher than at
     its nodes the rail is there, as it is, not as a parabola, m: for grids."""

@@ -99,7 +99,7 @@ class WheelOnSlices:
         geometry = contact_geometry(self.wheel, curve, self.rolling_radius, self.half_distance, self.rail_distance)
         over = np.where(np.isfinite(rail), rail - f, -BELOW)
         level = self.out_of_round is not None and self.rail.s.size == 1
-        along = np.column_stack([*seen[AHEAD:], np.zeros(u.size) if level else seen[AHEAD]])
+        along = np.column_stack([*seen[AHEAD:], np.zeros(u.size) if level else seen[AHEAD], np.ones(u.size)])
         return geometry._replace(along=along, over=np.column_stack([x, over])), touch
 
     def straight(self, s, u):

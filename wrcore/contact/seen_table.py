@@ -172,7 +172,7 @@ def _plain_geometry(pair, plain, u, section):
     """`ContactGeometry` on a rail with the rows of the plain one, of the type of those that change."""
     curve = ProfileCurve(plain.name, "rail", u, *section[: SECOND + 1].copy())
     geometry = contact_geometry(pair.wheel, curve, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-    return geometry._replace(along=np.zeros((u.size, 4)))
+    return geometry._replace(along=np.zeros((u.size, 5)))
 
 
 def _widened(pair):

@@ -21,10 +21,10 @@ from numba.extending import overload
 from wrcore.contact.geometry import CURVATURE, SLOPE, VALUE
 from wrcore.kernels.jit import jit
 
-AHEAD, BEND, LIFT, LEAN = range(4)
+AHEAD, BEND, LIFT, LEAN, CHANGED = range(5)
 """Columns of `ContactGeometry.along`, what the rail's change along the track adds to a strip: x of its least gap, half
 of the gap's second derivative along x, the height of the wheel's point there, and x as far as the rail's slope makes
-it: 0 for a wheel out of round on a level rail."""
+it: 0 for a wheel out of round on a level rail. `CHANGED`, of the first row: 0 where that is the plain rail."""
 
 
 class Pose(NamedTuple):
@@ -119,6 +119,23 @@ def _changes_by_type(along):
 def changes_along(geometry):
     """Whether the rail changes along the track: known when a kernel is compiled."""
     return _changes(geometry.along)
+
+
+def _changed(along):
+    return len(along) > 0 and along[0, CHANGED] != 0.0
+
+
+@overload(_changed, inline="always", jit_options=AS_KERNELS)
+def _changed_by_type(along):
+    if isinstance(along, types.BaseTuple):
+        return lambda along: False
+    return lambda along: along[0, CHANGED] != 0.0
+
+
+@jit(allocates=False, forceinline=True)
+def changed_here(geometry):
+    """Whether a wheel sees another rail than the plain one where it is."""
+    return _changed(geometry.along)
 
 
 @jit(allocates=False, forceinline=True)

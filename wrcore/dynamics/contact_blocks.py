@@ -46,11 +46,13 @@ UNCOUNTED = -1
 @jit(allocates=False, inline="always")
 def contacts_alone(model):
     """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
-    independently and a flexible track have internal states, whose rows and columns these do not tell."""
+    independently and a flexible track have internal states, whose rows and columns these do not tell, and check rails
+    press wheels too."""
     return (
         model.bodies.wheelsets.shape[0] > 0
         and model.bodies.independent.shape[0] == 0
         and model.flexible_track.mass.shape[0] == 0
+        and model.check_rails.rows.shape[0] == 0
     )
 
 

@@ -19,8 +19,8 @@ import numpy as np
 from wrcore.contact.geometry import MARGIN, RAIL_COSINE, RAIL_RESERVE, SAFETY, SCAN_STEP
 from wrcore.contact.reduction import MAXIMUM
 from wrcore.contact.seen_table import AHEAD, BEND, HEIGHT, PAD, PER_CELL, ROWS, S_STEP, SECOND, SLOPE, STRETCH, U_STEP
+from wrcore.contact.strip import CHANGED, LIFT
 from wrcore.contact.strip import LEAN as LEAN_AHEAD
-from wrcore.contact.strip import LIFT
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.track import arc_length_at
@@ -132,9 +132,9 @@ def lay_sections(model, state, work):
             if place == known[PLACE] and yaw == known[YAW]:
                 continue
             known[PLACE], known[YAW] = place, yaw
-            stretch = 0
+            stretch, geometry.along[0, CHANGED] = 0, 0.0
             if 0.0 < place < last:
-                stretch = 1 + int(place) // STRETCH
+                stretch, geometry.along[0, CHANGED] = 1 + int(place) // STRETCH, 1.0
             if stretch != known[IN_STRETCH]:
                 known[IN_STRETCH], gaps = stretch, geometry.zone_gaps
                 for i in range(gaps.shape[0]):

@@ -16,7 +16,7 @@ from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, moved
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch.gap import group_end
 from wrcore.contact.scan import leaves_cells
-from wrcore.contact.strip import changes_along, make_pose
+from wrcore.contact.strip import changed_here, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics.contact_blocks import MOVING, UNCOUNTED, add_slope
 from wrcore.dynamics.contact_slopes import (
@@ -93,7 +93,7 @@ def lobe_slopes(model, m, scratch, out, work):
     """Fill ``out`` (SLOPES, 6) with the slopes of a left wheel's wrench about the wheelset's centre; False where its
     patch is not one lobe that the table has. ``scratch`` (8, 1 + MOVES) is overwritten."""
     geometry, rows, table = model.geometry, work.rows, model.strips.table
-    if model.detection != SPATIAL or changes_along(geometry):
+    if model.detection != SPATIAL or changed_here(geometry):
         return False
     count, _, _ = detect_patches(model, m, rows)
     if count == 0:

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from wrcore.dynamics.check_rail import check_force
 from wrcore.dynamics.drive import actuator, controlled_force
 from wrcore.dynamics.system import derivatives_at
+from wrcore.dynamics.track import arc_length_at
 from wrcore.kernels.jit import jit
 
 
@@ -31,6 +33,25 @@ def _fill_drives(times, states, equations, model, work, rate, torques, rates, co
             outputs[i, k] = work.control.outputs[k]
         for k in range(torques.shape[1]):
             torques[i, k], rates[i, k] = actuator(model, k, force, times[i], states[i], work)
+
+
+@jit(allocates=False)
+def _fill_check_rails(times, states, equations, model, work, rate, wrench, forces):
+    for i in range(times.shape[0]):
+        derivatives_at(equations, times[i], states[i], model, work, rate)
+        for k in range(forces.shape[1]):
+            s = arc_length_at(model, states[i], work, k)
+            for wheel in range(2):
+                for j in range(model.check_rails.rows.shape[0]):
+                    forces[i, k, wheel] += check_force(model.check_rails.rows[j], s, work.motions[k, wheel], wrench)
+
+
+def check_rail_history(equations, times, states):
+    """Forces of check rails on the backs of all wheels (n, k, 2; N), by `Equations`, whose scratch arrays are
+    overwritten, at n times (s) and states."""
+    forces = np.zeros((len(times), len(equations.work.motions), 2))
+    _fill_check_rails(times, states, *equations.arguments, np.empty(states.shape[1]), np.zeros(6), forces)
+    return forces
 
 
 def drive_history(equations, times, states):

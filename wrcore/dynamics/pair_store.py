@@ -43,6 +43,7 @@ from wrcore.dynamics.pair_table import (
     node_code,
     node_of,
 )
+from wrcore.dynamics.wheel import alone
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
@@ -363,7 +364,7 @@ def pair_of(contact):
     name = digest.hexdigest()[:16]
     pair = _PAIRS.get(name)
     if pair is None:
-        bare = contact._replace(geometries=(), wheels=(), damping=1.0, friction=settings.looked_up)
+        bare = alone(contact, damping=1.0, friction=settings.looked_up)
         pair = _PAIRS[name] = Pair(bare, name)
     return pair
 

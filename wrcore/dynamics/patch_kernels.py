@@ -16,7 +16,7 @@ from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
 from wrcore.dynamics.strip_wheel import Lift, add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
-from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
+from wrcore.dynamics.wheel import COUNTERS, alone, wheel_wrenches
 from wrcore.kernels.handles import Handle, Kernel, Kind
 from wrcore.kernels.told import handed_on, told_if_long
 
@@ -25,7 +25,7 @@ def with_fallback(contact):
     """Contact on strips with the address of the kernel that solves a patch on a grid where they find no solution."""
     m, pose, frame = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pose, Frame))
     fallback = Kernel(
-        solve_on_grid, Kind(contact._replace(geometries=())), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
+        solve_on_grid, Kind(alone(contact)), m, pose, frame, (0.0, 0.0, 0.0), 0.0,
         np.zeros(PATCH_COLUMNS),
     )  # fmt: skip
     return contact._replace(strips=contact.strips._replace(fallback=fallback.address))
@@ -46,7 +46,7 @@ def with_late(contact):
 
 
 def _with_own(contact):
-    if contact.strips.looked_up and not contact.wheels:
+    if contact.strips.looked_up and not contact.wheels and not len(contact.strips.table.keys):
         contact = with_pair(contact)
     late = LateKernels(contact)
     return contact._replace(strips=contact.strips._replace(late=np.asarray(late)))
@@ -55,7 +55,7 @@ def _with_own(contact):
 def _of_patches(kernel, contact, work):
     """Address of a kernel of patches."""
     m, row = WheelMotion(*np.zeros(len(WheelMotion._fields))), np.zeros(PATCH_COLUMNS)
-    kind, counters = Kind(contact._replace(geometries=(), wheels=())), np.zeros(COUNTERS, np.int64)
+    kind, counters = Kind(alone(contact)), np.zeros(COUNTERS, np.int64)
     return Kernel(kernel, kind, m, True, row[None], 0, 0, row, row, counters, row, Kind(work)).address
 
 
@@ -90,7 +90,7 @@ class LateKernels:
 
     def _of_lobes(self):
         m, pressed, lift = (kind(*np.zeros(len(kind._fields))) for kind in (WheelMotion, Pressed, Lift))
-        kind, work = Kind(self._contact._replace(geometries=(), wheels=())), Kind(strip_work(self._contact.strips, 1))
+        kind, work = Kind(alone(self._contact)), Kind(strip_work(self._contact.strips, 1))
         counters = np.zeros(COUNTERS, np.int64)
         return Kernel(look_lobes_up, kind, m, pressed, lift, (0.0, 0.0), 0.0, counters, work).address
 

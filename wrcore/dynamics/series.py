@@ -38,7 +38,7 @@ def structure(model):
         Kind(model)._numba_type_, id(model.bodies), id(model.joints), internal_states(model), len(model.drive.rows),
         len(model.friction.points), len(model.flexible_track.mass), len(contact.geometries), shaped(contact),
         strips[:3], sizes, len(set(looked_up(model))), *model.controls.period, *map(np.shape, model.controls),
-        model.crossing.tables.shape,
+        model.crossing.tables.shape, len(model.check_rails.rows),
     )  # fmt: skip
 
 
@@ -47,7 +47,10 @@ def with_kernels_of(model, other):
     contact = model.contact
     if contact.strips.strips:
         contact = contact._replace(strips=contact.strips._replace(**_addresses(other.contact)))
-    names = "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides", "slopes"
+    names = (
+        "reactions", "torques", "rail_friction", "rails", "wheels", "samples", "sections", "strides", "guards",
+        "slopes",
+    )  # fmt: skip
     kept = {name: getattr(other, name) for name in names}
     contact = with_wheels(model._replace(contact=contact))
     kept |= {"elements": _with_laws_of(model.elements, other.elements), "controls": with_control_laws(model.controls)}

@@ -42,11 +42,9 @@ from wrcore.kernels.jit import FUSED, jit
 SLENDER = 3.0
 """Length over width from which strips get more panels along rolling."""
 
-UNSOLVED = 1
-"""Place in a spare memory: not 0 where what a table does not have is not to be solved."""
-
-STOOD_IN, ROWLESS = 2, 3
-"""Others: not 0 once ellipses have stood in; not 0 where no rows are wanted (`BARE`)."""
+UNSOLVED, STOOD_IN, ROWLESS = range(3)
+"""Places of `StripWork.flags`: not 0 where what a table does not have is not to be solved; once ellipses have stood in;
+where no rows are wanted (`BARE`)."""
 
 GRID, GRID_TOLERANCE = 32, 1e-3
 """Elements along and across the patch of the grid, and the tolerance of its tractions."""
@@ -423,7 +421,7 @@ def mirror(rows, count, wrench):
 @jit(allocates=False)
 def _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode):
     """`wheel_wrenches`, called by its address: few runs need it."""
-    late, work.spare[STOOD_IN] = model.strips.late, 1.0
+    late, work.flags[STOOD_IN] = model.strips.late, 1.0
     if late[WITH_ELLIPSES] == 0:
         call_c(late[LOAD], WITH_ELLIPSES)
     if late[WITH_ELLIPSES] == 0:  # interrupted
@@ -440,7 +438,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
     if rough and not (model.strips.looked_up > 0.0 and model.detection == SPATIAL):
         _press_ellipses(model, motions, patches, counts, bounds, wrenches, counters, work, mode)
         return
-    work.spare[ROWLESS] = 1.0 if mode & BARE else 0.0
+    work.flags[UNSOLVED], work.flags[ROWLESS] = 1.0 if rough else 0.0, 1.0 if mode & BARE else 0.0
     for i in range(motions.shape[0]):
         for wheel in range(2):
             rows, wrench, contact = patches[i, wheel], wrenches[i, wheel], contact_of(model, i, wheel)
@@ -453,7 +451,7 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             while first < count:
                 last = group_end(contact.geometry, rows, count, first)
                 memory = work.memory[i, wheel, group] if mode & WARM else work.spare
-                work.spare[0], work.spare[UNSOLVED] = 0.0, 1.0 if rough else 0.0
+                work.spare[0] = 0.0
                 call_address(
                     contact.strips.group, contact, m, spatial, rows, first, last, work.out, wrench, counters, memory,
                     work,

@@ -17,6 +17,7 @@ from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.seen_table import ROWS
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotation_matrix
+from wrcore.dynamics.check_rail import CheckRails, no_check_rails, press_check_rails, shorten_beside
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, constraint_workspace
 from wrcore.dynamics.control import Controls, ControlWork, control_work, no_controls, with_controls
 from wrcore.dynamics.crossing import Crossing, lay_sections, no_crossing, shorten_step, with_own_arrays
@@ -37,7 +38,16 @@ from wrcore.dynamics.schedule import Schedules, pack_schedules
 from wrcore.dynamics.suspension import Elements, element_forces, with_laws
 from wrcore.dynamics.track import TrackModel, fill_rail_friction, rail_motions, turn_back_wrenches
 from wrcore.dynamics.vector import load
-from wrcore.dynamics.wheel import COUNTERS, EVALUATIONS, ContactModel, contact_of, press_wheels, shaped, wheel_wrenches
+from wrcore.dynamics.wheel import (
+    COUNTERS,
+    EVALUATIONS,
+    ContactModel,
+    alone,
+    contact_of,
+    press_wheels,
+    shaped,
+    wheel_wrenches,
+)
 from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
@@ -87,6 +97,8 @@ class Model(NamedTuple):
     crossing: Crossing = no_crossing()  # rails that change along the track
     sections: int = 0  # address of the kernel that lays what the wheels see of them
     strides: int = 0  # address of the kernel that keeps steps short on them
+    check_rails: CheckRails = no_check_rails()
+    guards: int = 0  # address of the kernel that adds their forces
     slopes: int = 0  # address of the kernel of what patches change, for methods with a Jacobian
 
 
@@ -205,6 +217,8 @@ def _add_rail_wrenches(model, state, work, rate, mode):
             call_address(model.rails, model, state, work, rate, mode)
         else:
             press_wheels(model, work, mode)
+        if model.guards != 0:
+            call_address(model.guards, model, state, work)
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])
@@ -294,12 +308,16 @@ def with_wheels(model):
     """Contact of a model with what each wheel runs on where they differ, and with what its patches need."""
     contact, of_rails = model.contact, looked_up(model)
     if contact.geometries or of_rails[0] != of_rails[1]:
-        wheels, alone = [], contact._replace(geometries=())
+        wheels, bare = [], alone(contact)
         for k, geometry in enumerate(contact.geometries or (contact.geometry,) * (2 * len(model.bodies.wheelsets))):
             strips = contact.strips._replace(looked_up=of_rails[k % 2])
+            if strips.looked_up and contact.plain:
+                from wrcore.dynamics.pair_store import with_pair
+
+                strips = with_pair(bare._replace(geometry=contact.plain[k], strips=strips)).strips
             geometry = with_own_arrays(geometry) if len(model.crossing.tables) else geometry
-            wheels.append(alone._replace(geometry=geometry, strips=strips))
-        contact = alone._replace(wheels=tuple(wheels))
+            wheels.append(bare._replace(geometry=geometry, strips=strips))
+        contact = bare._replace(wheels=tuple(wheels))
     if contact.strips.strips:
         from wrcore.dynamics.patch_kernels import with_late
 
@@ -335,6 +353,9 @@ def with_kernels(model, work):
     if len(model.crossing.tables):
         kernels["sections"] = Kernel(lay_sections, kind, state, scratch)
         kernels["strides"] = Kernel(shorten_step, kind, state, scratch, state, 0)
+    if len(model.check_rails.rows):
+        kernels["guards"] = Kernel(press_check_rails, kind, state, scratch)
+        kernels["strides"] = Kernel(shorten_beside, kind, state, scratch, state, 0)
     if len(model.bodies.wheelsets) and len(model.flexible_track.mass):
         kernels["rails"] = Kernel(flexible_wrenches, kind, state, scratch, state, FRESH)
     if len(model.bodies.wheelsets):

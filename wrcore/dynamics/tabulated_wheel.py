@@ -1,4 +1,5 @@
-"""Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer.
+"""Wrench of the rails on a wheel with exact contact, looked up in a `PairTable`; solved where that has no answer, and
+where the rail is not the plain one.
 
 Most wheels have one lobe. Those that are apart are in :mod:`wrcore.dynamics.lobes_apart`, compiled when they are met.
 """
@@ -14,7 +15,7 @@ from wrcore.contact.patch import solve
 from wrcore.contact.patch.gap import add_force, frame_of_rows
 from wrcore.contact.patch.model import KERNEL, LOAD, LOBES, MODEL
 from wrcore.contact.reduction import MAX_PATCHES
-from wrcore.contact.strip import make_pose
+from wrcore.contact.strip import changed_here, make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI
 from wrcore.dynamics.pair_table import (
@@ -52,7 +53,7 @@ UNLISTED = -1.0
 @jit(allocates=False, fastmath=FUSED)
 def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
     """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
-    if not spatial:  # the lattices are of spatial detection
+    if not spatial or changed_here(model.geometry):  # the lattices are of spatial detection on plain rails
         counters[SOLVED] += 1
         return UNKNOWN
     frame, ahead = frame_of_rows(rows, first, last), -1.0 if m.vx < 0.0 else 1.0
@@ -68,13 +69,13 @@ def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters
     if lobes == 0:
         counters[SOLVED] += 1
         return UNKNOWN
-    if work.spare[ROWLESS] == 0.0:
+    if work.flags[ROWLESS] == 0.0:
         copy_deepest(rows, first, last, out)
     work.wrench[:] = 0.0
     y, z = frame.ur + model.geometry.rail_distance - pose.y, frame.z - pose.z
     found = _roll_lobes(model, m, frame, y, z, ahead, lobes, counters, work)
     out[reduction.NORMAL] = found.load
-    if work.spare[ROWLESS] == 0.0:
+    if work.flags[ROWLESS] == 0.0:
         fill_row(model.geometry, (1.0, 0.0), frame, y, z, found, work.wrench, out)
         out[reduction.Y], out[reduction.Z] = out[reduction.Y] + pose.y, out[reduction.Z] + pose.z
         heaviest = 0
@@ -91,7 +92,7 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
     """`tabulated_wrench`, or what the solver finds, for who calls it by its address; a normal force below 0 where that
     is not wanted."""
     found = tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work)
-    if found.load < 0.0 and work.spare[UNSOLVED] > 0.0:
+    if found.load < 0.0 and work.flags[UNSOLVED] > 0.0:
         out[reduction.NORMAL] = -1.0
     elif found.load < 0.0:
         late = model.strips.late
@@ -162,7 +163,7 @@ def _roll_lobes(model, m, frame, y, z, ahead, count, counters, work):
     """`Solution` of the lobes together, their load alone where no rows are wanted; adds what acts on them to
     ``work.wrench``. ``y``, ``z``: of the frame's origin from the wheelset's centre. A wheel that rolls back is the
     mirror image, along x, of one that rolls ahead."""
-    extent, modulus, bare = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio), work.spare[ROWLESS]
+    extent, modulus, bare = work.sums, contact_modulus(model.shear_modulus, model.poisson_ratio), work.flags[ROWLESS]
     load = x = s = xx = ss = xi = eta = phi = phi_x = peak = power = 0.0
     x_min = s_min = 1.0
     x_max = s_max = -1.0

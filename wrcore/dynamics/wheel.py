@@ -47,8 +47,15 @@ class ContactModel(NamedTuple):
     friction_decay: float = 0.0  # B: rate at which friction falls with slip velocity, s/m
     geometries: tuple = ()
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
+    plain: tuple = ()
+    """Where rails change along the track: the `ContactGeometry` of each wheel where they do not."""
     wheels: tuple = ()  # the same as contact models, see `wrcore.dynamics.system.with_kernels`
     friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
+
+
+def alone(contact, **more):
+    """A `ContactModel` without what its wheels have of their own, and ``more`` in it."""
+    return contact._replace(geometries=(), plain=(), wheels=(), **more)
 
 
 @jit(allocates=False, inline="always")

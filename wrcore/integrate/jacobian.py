@@ -309,9 +309,9 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
         first, end = (0, 0) if in_time else (sweep.starts[i], sweep.starts[i + 1])
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time
-            work.strips.spare[STOOD_IN] = 0.0
+            work.strips.flags[STOOD_IN] = 0.0
             renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, model, work, fine)
-            if not (rough or whole) and work.strips.spare[STOOD_IN] > 0.0:
+            if not (rough or whole) and work.strips.flags[STOOD_IN] > 0.0:
                 rough = True
                 derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
                 rates_of_increments(n, axes, drift, 0.0, state, state, base)

@@ -51,6 +51,8 @@ DESCRIPTIONS = {
     "sleeper_y_m": "displacement of the sleeper under the wheelset, to the left (track that gives)",
     "sleeper_z_m": "displacement of the sleeper under the wheelset, upwards (track that gives)",
     "sleeper_roll_rad": "roll of the sleeper under the wheelset (track that gives)",
+    "check_rail_left_N": "force of a check rail on the back of the left wheel",
+    "check_rail_right_N": "force of a check rail on the back of the right wheel",
     "planar_error_left_m": "bound of the penetration that planar detection misses, left wheel",
     "planar_error_right_m": "bound of the penetration that planar detection misses, right wheel",
     "spatial_left": "1 where detection auto chose spatial for the left wheel, else 0",

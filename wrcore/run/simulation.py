@@ -16,7 +16,7 @@ from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.flexible_track import track_places
-from wrcore.dynamics.outputs import drive_history, evaluations_at
+from wrcore.dynamics.outputs import check_rail_history, drive_history, evaluations_at
 from wrcore.dynamics.system import Equations, Model, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
@@ -172,6 +172,7 @@ class Simulation:
         if len(states):
             self.arc_lengths = ArcLengths(equations.work.arc_lengths.copy(), poses[-1, :, 0].copy())
         groups = self._of_bodies(range(len(model.bodies.mass)), states, evaluations, poses, axes)
+        self._add_check_rails(groups, trajectory, equations)
         if energies is not None:
             groups["energy"] = energies
         groups |= self._drive_channels(trajectory, equations)
@@ -195,6 +196,7 @@ class Simulation:
         if bodies:
             evaluations = evaluated(self.model, trajectory, self._from_here(equations))
             groups = self._of_bodies(bodies, trajectory.states, evaluations, *self._poses(trajectory.states, bodies))
+            self._add_check_rails(groups, trajectory, equations)
         if any(group.startswith(("drive/", "control/")) for group in asked):
             groups |= self._drive_channels(trajectory, equations)
         if "energy" in asked and self._wants("energy"):
@@ -260,6 +262,16 @@ class Simulation:
         """Channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
         places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
+
+    def _add_check_rails(self, groups, trajectory, equations):
+        """Add channels of the forces of check rails, if there are any, to those of wheelsets."""
+        if not len(self.model.check_rails.rows) or not self._wants("contact"):
+            return
+        forces = check_rail_history(self._from_here(equations), trajectory.t, trajectory.states)
+        for k, body in enumerate(self.model.bodies.wheelsets):
+            group = groups.get(self.scene.vehicle.body_names[body])
+            if group is not None:
+                group |= {f"check_rail_{side}_N": forces[:, k, i] for i, side in enumerate(SIDES)}
 
     def _drive_channels(self, trajectory, equations):
         """Torque and power of motors and brakes, force and speed of the controller, outputs and states of control laws,

@@ -30,6 +30,12 @@ STEEPEST_ALONG = 0.2
 RUNNING = -0.03, 0.01, -0.012
 """Where that is looked at: from and to which lateral coordinate, and down to which depth, m."""
 
+SWING = 5e-4
+"""By how much a rail may leave the heights of the slices before and behind, m: more is told."""
+
+BENEATH, BELOW, CROWN = 0.08, -0.03, 3e-3
+"""Wheels find heads up to this lateral coordinate, no lower than this height, and run on so much of them, m."""
+
 
 @dataclass(frozen=True, eq=False)
 class LaidCrossing:
@@ -57,7 +63,6 @@ def read_crossing(data, vehicle, pairs, folder, source):
     spec = data["track"].get("crossing")
     if spec is None:
         return None
-    refuse_tables(data, "track.crossing", source)
     slices = _slices(spec["slices"], folder, source)
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     depth = data["track"]["gauge_depth"]
@@ -67,6 +72,8 @@ def read_crossing(data, vehicle, pairs, folder, source):
     for rail, pair in zip(rails, pairs, strict=False):
         if rail is not None:
             _check_joints(rail, pair.rail, source)
+            _check_surface(rail, source)
+            _warn_of_swings(rail, source)
     laid = LaidCrossing(tuple(rails), float(spec["at"]), spec["reversed"])
     if slices.alike:
         return None
@@ -112,6 +119,37 @@ def _check_joints(slices, plain, source):
             raise InputError(source, "track.crossing.slices", f"{expected}, got {got} at u = {u[worst]:.3f} m")
 
 
+def _check_surface(slices, source):
+    """An InputError where a rail has no head under the wheels, or one that is too steep along the track."""
+    field, between = "track.crossing.slices", 0.5 * (slices.s[1:] + slices.s[:-1])
+    s, u = np.sort(np.concatenate([slices.s, between])), np.arange(RUNNING[0], BENEATH, 1e-3)
+    for part in np.array_split(s, math.ceil(s.size / 500)):
+        f, _, along = slices.heights(part, u)
+        top = np.max(f, axis=1, where=np.isfinite(f), initial=-np.inf)
+        if (gone := np.flatnonzero(top < BELOW)).size:
+            expected = f"expected a head under the wheels everywhere, got none at s = {part[gone[0]]:g} m"
+            raise InputError(source, field, expected)
+        steep = np.max(np.abs(along), axis=1, where=f > top[:, None] - CROWN, initial=0.0)
+        worst = int(np.argmax(steep))
+        if not steep[worst] < STEEPEST_ALONG:
+            expected = f"expected heads that rise less than {STEEPEST_ALONG:g} along the track"
+            raise InputError(source, field, f"{expected}, got {steep[worst]:.3g} at s = {part[worst]:g} m")
+
+
+def _warn_of_swings(slices, source):
+    """Say where the splines through the slices leave the heights of both neighbours."""
+    u, worst = np.arange(RUNNING[0], RUNNING[1], 1e-3), (0.0, 0.0)
+    for part in np.array_split(np.arange(slices.s.size - 1), math.ceil(slices.s.size / 500)):
+        ends, middle = slices.s[[part, part + 1]], 0.5 * (slices.s[part] + slices.s[part + 1])
+        (low, high), f = (slices.heights(at, u)[0] for at in ends), slices.heights(middle, u)[0]
+        out = np.maximum(np.minimum(low, high) - f, f - np.maximum(low, high))
+        out = np.max(out, axis=1, where=np.isfinite(out) & (f > RUNNING[2]), initial=0.0)
+        worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
+    if worst[0] > SWING:
+        text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
+        warn(f"{source}: track.crossing.slices: {text}: add slices there")
+
+
 def read_corrugation(data, crossing, shapes, source):
     """`Corrugation` of a scene's content, None where its rails are smooth."""
     spec = data["track"].get("corrugation")
@@ -128,15 +166,7 @@ def read_corrugation(data, crossing, shapes, source):
     if not slope < STEEPEST_ALONG:
         expected = f"expected a wave that rises less than {STEEPEST_ALONG:g}, got {slope:.3g}"
         raise InputError(source, "track.corrugation.amplitude", expected)
-    refuse_tables(data, "corrugated rails", source)
     return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
-
-
-def refuse_tables(data, what, source):
-    """An InputError where a scene looks contact up in tables."""
-    if data["contact"]["patch"] == "tabulated":
-        expected = f"expected maximum, moment or exact with {what}: tables are of round wheels and smooth rails"
-        raise InputError(source, "contact.patch", f"{expected}, got tabulated")
 
 
 def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
@@ -152,7 +182,7 @@ def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
         wave = corrugation if corrugation and list(SIDES)[k % 2] in corrugation.sides else None
         if slices is None and shape is None and wave is None:
             geometry = pair.geometry
-            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 4))))
+            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 5))))
             of_wheels.append(-1)
             laid.append(np.zeros(LAID))
             continue

@@ -37,6 +37,7 @@ from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
+from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossing, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
@@ -185,6 +186,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     data["track"] = validate(data["track"], "track", source)
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
+    read_check_rails(data, (pairs or _alike(vehicle, wheel, rail, track))[0], source)
     crossing = read_crossing(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
     shapes = read_out_of_round(data, vehicle, pairs, crossing, folder, source)
     corrugation = read_corrugation(data, crossing, shapes, source)
@@ -346,12 +348,12 @@ def compile_scene(
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
-    geometries, crossing = tuple(pair.geometry for pair in scene.pairs), no_crossing()
+    geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
     if any(changing):
         pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
         starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
         geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(*changing, pairs, starts))
-        geometry = geometries[0]  # of the type of all
+        geometry, plain = geometries[0], tuple(pair.geometry for pair in pairs)  # of the type of all
         if "support" not in data["track"]:
             warn_of_rigid_rails(scene.source)
     support, elements = track_support(
@@ -370,7 +372,7 @@ def compile_scene(
             strip_model(contact["patch"], contact["resolution"], contact["slip"], material["poisson_ratio"],
                         friction.largest),
             friction.ratio, friction.decay,
-            geometries, friction_factors=friction.factors,
+            geometries, plain, friction_factors=friction.factors,
         ),
         elements, vehicle.joints,
         TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
@@ -379,6 +381,7 @@ def compile_scene(
         friction=friction.rails, flexible_track=support,
         drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
         controls=read_controls(data, vehicle, folder, scene.source), crossing=crossing,
+        check_rails=read_check_rails(data, scene.pairs[0] if scene.pairs else scene.alike, scene.source),
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

@@ -12,7 +12,7 @@ from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import TURN
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.told import warn_once
-from wrcore.scene.crossing import STEEPEST_ALONG, refuse_tables
+from wrcore.scene.crossing import STEEPEST_ALONG
 from wrcore.scene.pairs import find_file
 
 LARGEST = 0.01
@@ -47,7 +47,6 @@ def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
         shapes.append((shape, angle))
     if not any(shape for shape, _ in shapes):
         return ()
-    refuse_tables(data, "wheels out of round", source)
     return tuple(shapes)
 
 

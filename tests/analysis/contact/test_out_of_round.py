@@ -53,7 +53,7 @@ def test_eccentric_wheel_touches_below_its_own_centre(tmp_path, turned):
     geometry, touch = pair.under("right", 0.0, 0.0, turned=turned)
     # the circle's centre has rolled forward about the axle: cos below it, sin behind it
     assert touch == pytest.approx(RADIUS + e * math.cos(turned), abs=2e-8)
-    ahead, bend, _, lean = geometry.along[round(-geometry.rail_start / geometry.rail_step)]
+    ahead, bend, _, lean, _ = geometry.along[round(-geometry.rail_start / geometry.rail_step)]
     assert lean == 0.0  # the rail under it stays level
     assert ahead == pytest.approx(-e * math.sin(turned), abs=2e-6)
     radius = pair.wheel.f[np.argmin(np.abs(pair.wheel.u))]

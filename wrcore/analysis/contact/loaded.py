@@ -191,7 +191,7 @@ class LoadedWheels:
         out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
         while first < count:
             last, before = group_end(self.geometry, overlaps, count, first), self._counters.copy()
-            work.spare[:] = 0.0  # of the last solution, and what runs ask for
+            work.spare[0] = 0.0
             found = UNKNOWN
             if contact.value.strips.looked_up:
                 found = tabulated_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,

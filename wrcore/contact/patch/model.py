@@ -90,7 +90,9 @@ class StripWork(NamedTuple):
     """(wheelsets, 2, MAX_PATCHES, MEMORY): last solutions, from which the next ones may start; part of what a run
     knows."""
     spare: np.ndarray
-    """(MEMORY,): a memory of nothing."""
+    """(MEMORY,): a memory of nothing, once its first number is 0; solutions are written into it."""
+    flags: np.ndarray
+    """(3,): what is asked of patches, see `wrcore.dynamics.strip_wheel`."""
     rows: np.ndarray
     out: np.ndarray
     strips: np.ndarray
@@ -161,7 +163,7 @@ def strip_work(model, wheelsets, slips=1):
         count, wheels = 1, (0, 0, 0)
         normal = NormalWork(*(np.zeros((0,) * part.ndim, part.dtype) for part in normal))
     return StripWork(
-        np.zeros((*wheels, MEMORY)), np.zeros(MEMORY),
+        np.zeros((*wheels, MEMORY)), np.zeros(MEMORY), np.zeros(3),
         np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(PATCH_COLUMNS),
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),

@@ -1,0 +1,124 @@
+"""Check rails: a spring between a wheel's back and an upright face, with friction."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.check_rail import STRIDE
+from wrcore.dynamics.system import Equations
+from wrcore.errors import InputError
+from wrcore.geometry.standards import named_profile
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import compile_scene, load_scene
+
+SCENE = SCENES / "suspended_wheelset.yaml"
+RADIUS, REACH, TOP = 0.46, -named_profile("S1002", "wheel").f[0], 0.02
+STIFFNESS, FRICTION = 5e7, 0.25
+RAIL = {
+    "rail": "left", "begin": -5.0, "length": 1000.0, "flangeway": 0.038, "back_to_back": 1.360,
+    "stiffness": STIFFNESS, "friction": FRICTION,
+}  # fmt: skip
+FACE = 0.7175 - 0.038 - 0.680  # from a wheel's back, where the wheelset is in the middle
+
+
+def wrenches(y=0.0, yaw=0.0, **changes):
+    """What acts on the left wheel, with and without a check rail: (6,) each."""
+    found = []
+    for rails in ([RAIL | changes], []):
+        model, state = compile_scene(load_scene(SCENE, {"track.check_rails": rails, "initial.y": 0.0}))
+        equations, at = Equations(model), STATE_SIZE * model.bodies.wheelsets[0]
+        state[at + 1] += y
+        state[at + 3 : at + 7] = math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
+        equations(0.0, state)
+        found.append(equations.work.rail_wrenches[0].copy())
+    assert np.array_equal(found[0][1], found[1][1])  # the right wheel
+    return found[0][0] - found[1][0]
+
+
+def test_it_presses_a_back_as_a_spring_and_rubs_on_it():
+    lateral = wrenches(y=FACE - 1e-3)
+    normal, chord = STIFFNESS * 1e-3, math.sqrt((RADIUS + REACH) ** 2 - (RADIUS - TOP) ** 2)
+    assert lateral[1] == pytest.approx(normal, rel=1e-9)
+    ahead, down = 20.0 * TOP / RADIUS, 20.0 * chord / RADIUS  # sliding velocities of the two points, m/s
+    slip = math.sqrt(ahead**2 + down**2 + 0.02**2)
+    assert lateral[0] == pytest.approx(-FRICTION * normal * ahead / slip, rel=5e-3)
+    assert abs(lateral[2]) < 1e-3 * normal  # up ahead, down behind: a moment that brakes the wheel
+    brakes = FRICTION * normal * down / slip * chord
+    assert lateral[4] == pytest.approx(-brakes - lateral[0] * (RADIUS - TOP), rel=1e-3)
+
+
+@pytest.mark.parametrize("yaw", [0.004, -0.004])
+def test_a_wheel_that_yaws_is_touched_ahead_or_behind(yaw):
+    chord = math.sqrt((RADIUS + REACH) ** 2 - (RADIUS - TOP) ** 2)
+    found = wrenches(y=FACE, yaw=yaw)  # left: y of the back ahead grows with yaw, that behind falls
+    normal = 0.5 * STIFFNESS * 0.004 * chord
+    assert found[1] == pytest.approx(normal, rel=0.02)
+    assert found[5] + 0.68 * found[0] == pytest.approx(-math.copysign(chord, yaw) * normal, rel=0.02)
+
+
+def test_it_is_as_long_as_it_is_and_its_flares_open():
+    there = {"begin": 0.0, "length": 10.0, "flare": {"length": 2.0, "opening": 0.02}}
+    deep = FACE - 2e-3
+    for begin, share in ((-1.5, 0.0), (-2.5, 1.0), (-1.95, 0.5), (5.0, 0.0), (-11.0, 0.0)):
+        normal = wrenches(y=deep, **there | {"begin": begin})[1]
+        assert normal == pytest.approx(share * STIFFNESS * 2e-3, rel=1e-6, abs=1e-9)
+
+
+def test_a_wheelset_is_held_off_the_other_rail_and_nothing_changes_where_it_is_not_touched():
+    changes = {"initial.y": 0.0, "initial.yaw": -0.004, "integration.duration": 0.4, "output.rate": 1000.0}
+    there = RAIL | {"begin": 1.0, "length": 6.0, "flangeway": 0.0385, "flare": {"length": 0.5, "opening": 0.03}}
+    free = simulate(load_scene(SCENE, changes))
+    held = simulate(load_scene(SCENE, changes | {"track.check_rails": [there]}))
+    force, lateral = held["wheelset"]["check_rail_left_N"], held["wheelset"]["y_m"]
+    assert free["wheelset"]["y_m"].min() < -0.003
+    assert force.max() > 1e3
+    assert not held["wheelset"]["check_rail_right_N"].any()
+    assert lateral.min() > free["wheelset"]["y_m"].min() + 2e-4
+    before = held["wheelset"]["x_m"] < held["wheelset"]["x_m"][np.flatnonzero(force)[0]] - 2.0 * STRIDE
+    assert np.abs(lateral - free["wheelset"]["y_m"])[before].max() < 1e-6
+
+
+def test_left_and_right_are_mirror_images():
+    runs = [
+        simulate(load_scene(SCENE, {
+            "initial.y": -sign * 0.002, "initial.yaw": -sign * 0.002, "integration.duration": 0.2,
+            "track.check_rails": [RAIL | {"rail": side, "begin": 1.0, "length": 6.0}],
+        }))
+        for side, sign in (("left", 1), ("right", -1))
+    ]  # fmt: skip
+    left, right = (run["wheelset"] for run in runs)
+    assert left["check_rail_left_N"].max() > 1e3
+    assert np.abs(left["check_rail_left_N"] - right["check_rail_right_N"]).max() < 1e-6 * STIFFNESS * 1e-3
+    assert np.abs(left["y_m"] + right["y_m"]).max() < 1e-8
+
+
+def test_scenes_without_one_compile_nothing_of_it():
+    model, _ = compile_scene(load_scene(SCENE))
+    assert Equations(model).arguments[1].value.guards == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "expected"),
+    [
+        ({"length": 0.9}, "track.check_rails[0].length", "at least two flares of 0.5 m"),
+        ({"top": -0.015}, "track.check_rails[0].top", "down to where the wheel's profile ends"),
+        (
+            {"flare": {"opening": 0.0}, "flangeway": 0.034}, "track.check_rails[0].flare.opening",
+            "open beyond the wheels' backs",
+        ),
+        ({"flangeway": 0.5}, "track.check_rails.0.flangeway", "0.02 to 0.12"),
+        ({"stiff": 1.0}, "track.check_rails.0.stiff", "stiffness"),
+    ],
+)  # fmt: skip
+def test_bad_input_names_its_key(changes, field, expected):
+    with pytest.raises(InputError, match=expected) as error:
+        load_scene(SCENE, {"track.check_rails": [RAIL | changes]})
+    assert error.value.field == field
+
+
+def test_its_friction_has_no_account_of_energy():
+    with pytest.raises(InputError, match="no energy with track.check_rails"):
+        load_scene(SCENE, {"track.check_rails": [RAIL], "output.channels": ["energy"]})

@@ -1,0 +1,36 @@
+"""Check rails from a scene's key ``track.check_rails``."""
+
+import math
+
+import numpy as np
+
+from wrcore.dynamics.check_rail import CheckRails, no_check_rails
+from wrcore.errors import InputError
+from wrcore.geometry.track import SIDES
+
+
+def read_check_rails(data, pair, source):
+    """`CheckRails` of a scene's content, checked against the schema, for wheels like those of a `WheelOnRail`."""
+    rows = []
+    for k, spec in enumerate(data["track"].get("check_rails", ())):
+        field = f"track.check_rails[{k}]"
+        flare, face = spec["flare"], 0.5 * data["track"]["gauge"] - spec["flangeway"]
+        if not 2.0 * flare["length"] <= spec["length"]:
+            expected = f"expected at least two flares of {flare['length']:g} m, got {spec['length']:g} m"
+            raise InputError(source, f"{field}.length", expected)
+        radius = pair.rolling_radius - pair.wheel.f[0]
+        down, back = pair.rolling_radius - spec["top"], 0.5 * spec["back_to_back"]
+        if not radius > down:
+            expected = f"expected more than {1e3 * pair.wheel.f[0]:.1f} mm, down to where the wheel's profile ends"
+            raise InputError(source, f"{field}.top", f"{expected}, got {1e3 * spec['top']:g} mm")
+        if not face - flare["opening"] < back:
+            expected = f"expected flares that open beyond the wheels' backs, by more than {1e3 * (face - back):.1f} mm"
+            raise InputError(source, f"{field}.flare.opening", f"{expected}, got {1e3 * flare['opening']:g} mm")
+        rows.append((
+            SIDES[spec["rail"]], spec["begin"], spec["begin"] + spec["length"], face, flare["length"], flare["opening"],
+            back, math.sqrt(radius**2 - down**2), down, spec["stiffness"], spec["friction"],
+        ))  # fmt: skip
+    if rows and "energy" in data["output"]["channels"]:
+        expected = "expected no energy with track.check_rails, whose friction has no account"
+        raise InputError(source, "output.channels", f"{expected}, got energy")
+    return CheckRails(np.array(rows, float)) if rows else no_check_rails()
