@@ -105,10 +105,7 @@ def test_scenes_without_one_compile_nothing_of_it():
     [
         ({"length": 0.9}, "track.check_rails[0].length", "at least two flares of 0.5 m"),
         ({"top": -0.015}, "track.check_rails[0].top", "down to where the wheel's profile ends"),
-        (
-            {"flare": {"opening": 0.0}, "flangeway": 0.034}, "track.check_rails[0].flare.opening",
-            "open beyond the wheels' backs",
-        ),
+        ({"flangeway": 0.0374}, "track.check_rails[0].flangeway", "more than 37.5 mm, so that it does not press"),
         ({"flangeway": 0.5}, "track.check_rails.0.flangeway", "0.02 to 0.12"),
         ({"stiff": 1.0}, "track.check_rails.0.stiff", "stiffness"),
     ],

@@ -10,7 +10,7 @@ from wrcore.geometry.track import SIDES
 
 
 def read_check_rails(data, pair, source):
-    """`CheckRails` of a scene's content, checked against the schema, for wheels like those of a `WheelOnRail`."""
+    """`CheckRails` of a scene's content, checked against the schema, for wheels of one `WheelOnRail`."""
     rows = []
     for k, spec in enumerate(data["track"].get("check_rails", ())):
         field = f"track.check_rails[{k}]"
@@ -23,9 +23,10 @@ def read_check_rails(data, pair, source):
         if not radius > down:
             expected = f"expected more than {1e3 * pair.wheel.f[0]:.1f} mm, down to where the wheel's profile ends"
             raise InputError(source, f"{field}.top", f"{expected}, got {1e3 * spec['top']:g} mm")
-        if not face - flare["opening"] < back:
-            expected = f"expected flares that open beyond the wheels' backs, by more than {1e3 * (face - back):.1f} mm"
-            raise InputError(source, f"{field}.flare.opening", f"{expected}, got {1e3 * flare['opening']:g} mm")
+        if not face < back:
+            least = 0.5 * data["track"]["gauge"] - back
+            expected = f"expected more than {1e3 * least:.1f} mm, so that it does not press a wheelset in the middle"
+            raise InputError(source, f"{field}.flangeway", f"{expected}, got {1e3 * spec['flangeway']:g} mm")
         rows.append((
             SIDES[spec["rail"]], spec["begin"], spec["begin"] + spec["length"], face, flare["length"], flare["opening"],
             back, math.sqrt(radius**2 - down**2), down, spec["stiffness"], spec["friction"],

@@ -18,6 +18,7 @@ from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
+from wrcore.kernels.told import warn_once
 from wrcore.scene.kept_tables import kept_shape, kept_table
 from wrcore.scene.pairs import find_file
 
@@ -147,7 +148,7 @@ def _warn_of_swings(slices, source):
         worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
     if worst[0] > SWING:
         text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
-        warn(f"{source}: track.crossing.slices: {text}: add slices there")
+        warn_once(f"{source}: track.crossing.slices: {text}: add slices there")
 
 
 def read_corrugation(data, crossing, shapes, source):
