@@ -39,6 +39,7 @@ from wrcore.integrate.rosenbrock import advance_rosenbrock, factorise_again, new
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
+from wrcore.kernels.aside import planning
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""
@@ -117,6 +118,20 @@ def decided(model, start, t, method, rtol, atol, longest_step, equations=None):
     return start, method, step_tolerances(model, rtol, atol, method), equations
 
 
+def needed_last(model, method):
+    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method. ``auto`` is taken
+    for the method that it mostly is."""
+    if method in REFERENCES:
+        return []
+    method = "rodas4p2" if method == "auto" else method
+    with planning() as kernels:
+        start, tolerances = np.zeros(state_size(model)), step_tolerances(model, 0.0, 0.0, method)
+        equations = Equations(model)
+        before = len(kernels)
+        run = Integration(model, start, 0.0, method, tolerances, 0.0, 1.0, np.inf, equations)
+        return [*kernels[before:], run.kernel(run.record(np.zeros(1)))]
+
+
 class Integration:
     """A run by a compiled method between two calls of `advance`: ``equations``, ``memory`` and the rest of what it
     knows; arguments as for `integrate`, with the ``tolerances`` of `step_tolerances`."""
@@ -152,12 +167,16 @@ class Integration:
         """Outcome of at most so many attempts to reach the end of a record."""
         return self._kernel(*self._before, record, attempts, *self.equations.arguments)
 
+    def kernel(self, record):
+        """The kernel that advances it, and the types that this takes with records of this very layout."""
+        return self._kernel, tuple(map(typeof, (*self._before, record, 0, *self.equations.arguments)))
+
     def without_dispatch(self, record):
         """`advance` for records of this very layout, without numba's search for the kernel by the arguments' types,
         which costs five times as much as a call."""
-        arguments = *self._before, record, 0, *self.equations.arguments
-        self._kernel(*arguments)  # compiles, or loads the kernel from the cache
-        kernel = self._kernel.overloads[tuple(map(typeof, arguments))].entry_point
+        self.advance(record, 0)  # compiles, or loads the kernel from the cache
+        kernel, types = self.kernel(record)
+        kernel = kernel.overloads[types].entry_point
         before, after = self._before, self.equations.arguments
         return lambda record, attempts: kernel(*before, record, attempts, *after)
 

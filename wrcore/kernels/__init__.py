@@ -1,6 +1,7 @@
 """How kernels are compiled; nothing about rails.
 
 ``jit``      the compile decorator and a cache that never serves stale kernels
+``aside``    a second process that compiles what a first run needs last
 ``forms``    what of a kernel is compiled: for Python, for its address, or for other kernels
 ``lanes``    four or eight float64 side by side in kernels
 ``handles``  models behind a pointer, kernels behind an address

@@ -22,6 +22,7 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
+from wrcore.kernels.aside import missed
 from wrcore.kernels.cache import kernel_folder, sources_changed, warn
 
 _FOLDER = str(kernel_folder())
@@ -118,7 +119,7 @@ class KernelCache(FunctionCache):
     """Numba's cache of a kernel in one form; one that is damaged, or full, stops nothing."""
 
     def __init__(self, function, form="called"):
-        self._form = form
+        self._form, self._function = form, function
         self._impl_class = _LinkedFile if form == "linked" else CompileResultCacheImpl
         before, mask = numba.config.CACHE_DIR, os.umask(0o077)  # folders that it makes are closed to others
         try:
@@ -133,6 +134,10 @@ class KernelCache(FunctionCache):
 
     def load_overload(self, *args):
         """The kernel for some types, or None."""
+        found = self._load(*args)
+        return self._load(*args) if found is None and missed(self._function, self._form) else found
+
+    def _load(self, *args):
         try:
             return super().load_overload(*args)
         except Exception as error:  # pickles fail in many ways
@@ -180,8 +185,8 @@ def _number(kind):
 
 
 class _Form(CPUDispatcher):
-    """A kernel in a form that Python cannot call: its table of calls gets nothing. One copy serves for all values of a
-    number that callers may know; numba would compile one for each."""
+    """A kernel in a ``form`` that Python cannot call: its table of calls gets nothing. One copy serves for all values
+    of a number that callers may know; numba would compile one for each."""
 
     def get_call_template(self, args, kws):
         return super().get_call_template(tuple(map(_number, args)), {name: _number(kws[name]) for name in kws})
@@ -199,6 +204,8 @@ class _Form(CPUDispatcher):
 class KernelDispatcher(CPUDispatcher):
     """A kernel as Python calls it; other kernels get it linked."""
 
+    form = "called"
+
     def compile(self, sig):
         with _rarely_collected():
             return super().compile(sig)
@@ -215,13 +222,13 @@ class KernelDispatcher(CPUDispatcher):
         return self._compiling_counter or self.in_form("linked").is_compiling
 
     def in_form(self, form):
-        """The kernel "linked" or "addressed": a dispatcher of its own."""
-        forms = self.__dict__.setdefault("forms", {})
+        """The kernel "linked" or "addressed": a dispatcher of its own; "called": itself."""
+        forms = self.__dict__.setdefault("forms", {"called": self})
         if form not in forms:
             options = self.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
             compiler = _LinkedCompiler if form == "linked" else KernelCompiler
             forms[form] = _Form(self.py_func, dict(self.locals), options, pipeline_class=compiler)
-            forms[form]._cache = KernelCache(self.py_func, form)
+            forms[form]._cache, forms[form].form = KernelCache(self.py_func, form), form
         return forms[form]
 
     def add_overload(self, result):

@@ -17,6 +17,7 @@ from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, unbox
 
+from wrcore.kernels.aside import planned
 from wrcore.kernels.jit import jit
 
 _INDEX = ir.IntType(32)
@@ -187,15 +188,18 @@ FOUR = types.UniTuple(types.float64, 4)
 
 class Kernel:
     """A kernel that returns nothing (or ``returns``), compiled (or loaded) for the types of example arguments, to be
-    called by its address as long as this object lives."""
+    called by its address as long as this object lives; where that is only `planned`, none can be called."""
 
     def __init__(self, function, *examples, returns=types.none):
         signature = tuple(typeof(example) for example in examples)
         function = function.in_form("addressed") if hasattr(function, "in_form") else function
+        self._numba_type_, self.address, plan = KernelType(signature), 0, planned()
+        if plan is not None:
+            plan.append((function, signature))
+            return
         if signature not in function.overloads:
             function.compile(signature)
         compiled = function.overloads[signature]
-        self._numba_type_ = KernelType(signature)
         if compiled.signature.return_type != returns:
             raise TypeError(f"{function.__name__}: expected a kernel that returns {returns}, not {compiled.signature}")
         self._function = function  # its code may call what lives with it: plain Python of a user's own

@@ -24,6 +24,7 @@ import numba
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.kernels.aside import planned
 from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Kernel, call_c
 from wrcore.kernels.jit import FUSED
@@ -258,7 +259,15 @@ def _note_of(digest, watched):
 def addressed(wrap, digest, scalars, arrays, examples, returns):
     """The `Kernel` that ``wrap`` makes of the function with a digest and of what takes note of its results, for
     ``examples`` (`Example`); plain Python is called back with so many ``scalars``, then ``arrays``."""
+    if planned() is not None:  # no file keeps them
+        return NotCompiled
     return _addressed(wrap, digest, _KNOWN[digest], scalars, arrays, examples, returns, _WATCHED.get())
+
+
+class NotCompiled:
+    """In place of a `Kernel` that is only `planned`."""
+
+    address = 0
 
 
 @cache

@@ -6,6 +6,7 @@ import copy
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,9 @@ from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import irregularity_end
 from wrcore.geometry.track import SIDES
-from wrcore.integrate.integrator import integrate
+from wrcore.integrate.integrator import integrate, needed_last
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
+from wrcore.kernels.aside import compiled_aside
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.derived import OF_WHEELS, OF_WHEELSETS, asked_for
 from wrcore.run.run import Run
@@ -83,7 +85,10 @@ class Simulation:
     ) -> None:
         self._began = time.perf_counter()
         self.scene = scene
-        self.model, state = compile_scene(scene, progress, shared)
+        method = scene.data["integration"]["method"]
+        self.model, state = compile_scene(
+            scene, progress, shared, lambda model: compiled_aside(partial(needed_last, model, method))
+        )
         self.mark = model_fingerprint(self.model)
         self.start, self._moved = state, 0.0
         unknown = np.full(len(self.model.bodies.wheelsets), np.nan)

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from os import PathLike
@@ -330,14 +331,17 @@ def _creep(scene, progress):
 
 
 def compile_scene(
-    scene: Scene, progress: Callable | None = None, shared: dict[Any, Any] | None = None
+    scene: Scene,
+    progress: Callable | None = None,
+    shared: dict[Any, Any] | None = None,
+    meanwhile: Callable[[Model], AbstractContextManager] = nullcontext,
 ) -> tuple[Model, np.ndarray]:
     """A scene's model, as kernels take it, and its initial state (13 n,): wheelsets at rest on the rails vertically and
     in roll, rolling forward without slip.
 
     ``progress`` wraps the list of patches if a creep table has to be built, e.g. ``tqdm.tqdm``. ``shared`` keeps what
     does not change from one scene of a series to the next (contact geometry, creep table, static equilibrium); it knows
-    vehicles, profiles and tracks by their identity.
+    vehicles, profiles and tracks by their identity. ``meanwhile`` makes of the model a context for what follows on it.
     """
     shared = {} if shared is None else shared
     data, vehicle = scene.data, scene.vehicle
@@ -387,8 +391,9 @@ def compile_scene(
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),
         *damping.values(), *integration["baumgarte"].values(), json.dumps(data["track"].get("support")),
     )  # fmt: skip
-    at_rest = _kept(shared, "rest", decisive, lambda: rest(scene, model))
-    return model, initial_state(scene, model, at_rest, shared)
+    with meanwhile(model):
+        at_rest = _kept(shared, "rest", decisive, lambda: rest(scene, model))
+        return model, initial_state(scene, model, at_rest, shared)
 
 
 def _kept(shared, name, key, make):
