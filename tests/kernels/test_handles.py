@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from wrcore.kernels.handles import Handle, Kernel, call_at
+from wrcore.kernels.handles import Handle, Handles, Kernel, call_at, other_at, values_of
 from wrcore.kernels.jit import jit
 
 
@@ -42,6 +42,23 @@ def copy_of_weights(model):
 @pytest.fixture
 def model():
     return Outer(Inner(np.array([1.0, 2.0, 3.0]), True, 7), 1.5, np.arange(4.0).reshape(2, 2))
+
+
+@jit(allocates=False)
+def sum_factors(model, others, count):
+    total = 0.0
+    for k in range(count):
+        total += other_at(model, others[k] if len(others) > 0 else 0).factor
+    return total
+
+
+def test_values_behind_an_array_of_addresses_live_as_long_as_that(model):
+    others = np.asarray(Handles(model._replace(factor=factor) for factor in (2.0, 3.0)))
+    assert [one.factor for one in values_of(others)] == [2.0, 3.0] and values_of(np.zeros(0, np.int64)) == ()
+    assert sum_factors(Handle(model), others, 2) == 5.0
+    assert sum_factors(Handle(model), np.zeros(0, np.int64), 2) == 3.0
+    assert sum_factors(model, np.zeros(0, np.int64), 1) == 1.5  # no reference
+    assert len(sum_factors.overloads) == 2
 
 
 VALUES = np.array([1.0, 10.0, 100.0])

@@ -17,7 +17,7 @@ from wrcore.dynamics.pair_store import WITHOUT, with_pair
 from wrcore.dynamics.strip_wheel import Lift, add_group, solve_on_grid
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import COUNTERS, alone, wheel_wrenches
-from wrcore.kernels.handles import Handle, Kernel, Kind
+from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of
 from wrcore.kernels.told import handed_on, told_if_long
 
 
@@ -41,12 +41,13 @@ def with_groups(contact, work):
 
 def with_late(contact):
     """Contact on strips with tables, and with what is compiled late, its own and that of its wheels."""
-    contact = contact._replace(wheels=tuple(_with_own(each) for each in contact.wheels))
+    if len(contact.wheels):
+        contact = contact._replace(wheels=np.asarray(Handles(map(_with_own, values_of(contact.wheels)))))
     return _with_own(contact)
 
 
 def _with_own(contact):
-    if contact.strips.looked_up and not contact.wheels and not len(contact.strips.table.keys):
+    if contact.strips.looked_up and not len(contact.wheels) and not len(contact.strips.table.keys):
         contact = with_pair(contact)
     late = LateKernels(contact)
     return contact._replace(strips=contact.strips._replace(late=np.asarray(late)))

@@ -9,7 +9,7 @@ from wrcore.dynamics.suspension import with_laws
 from wrcore.dynamics.system import Equations, internal_states, looked_up, with_wheels, workspace
 from wrcore.dynamics.wheel import shaped
 from wrcore.elements.law import LAW
-from wrcore.kernels.handles import Kind
+from wrcore.kernels.handles import Kind, values_of
 
 
 def equations_of(model, shared=None):
@@ -66,7 +66,7 @@ def _with_laws_of(elements, other):
 
 def _addresses(contact):
     """Of the kernels of patches on strips, from a contact model that may have one for each wheel."""
-    strips = (contact.wheels[0] if contact.wheels else contact).strips
+    strips = (*values_of(contact.wheels), contact)[0].strips
     return {"fallback": strips.fallback, "group": strips.group}
 
 

@@ -48,7 +48,7 @@ from wrcore.dynamics.wheel import (
     shaped,
     wheel_wrenches,
 )
-from wrcore.kernels.handles import Handle, Kernel, Kind, call_address, call_at
+from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
 
 FRICTIONLESS = 1e-9
@@ -317,7 +317,7 @@ def with_wheels(model):
                 strips = with_pair(bare._replace(geometry=contact.plain[k], strips=strips)).strips
             geometry = with_own_arrays(geometry) if len(model.crossing.tables) else geometry
             wheels.append(bare._replace(geometry=geometry, strips=strips))
-        contact = bare._replace(wheels=tuple(wheels))
+        contact = bare._replace(wheels=np.asarray(Handles(wheels)))
     if contact.strips.strips:
         from wrcore.dynamics.patch_kernels import with_late
 

@@ -15,7 +15,7 @@ from wrcore.contact.strip import changes_along, lean_at, leaning, upright
 from wrcore.creep.laws import LAWS, CreepData, creep_force_at
 from wrcore.dynamics.modes import FRESH, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, WheelMotion, motion_of
-from wrcore.kernels.handles import call_address, member_of
+from wrcore.kernels.handles import call_address, other_at
 from wrcore.kernels.jit import FUSED, jit
 
 EVALUATIONS, OUT_OF_RANGE, ON_GRID, SOLVED, ON_FIXED = range(5)
@@ -49,19 +49,20 @@ class ContactModel(NamedTuple):
     """Where wheels or rails differ: the `ContactGeometry` of each wheel, left and right of wheelset after wheelset."""
     plain: tuple = ()
     """Where rails change along the track: the `ContactGeometry` of each wheel where they do not."""
-    wheels: tuple = ()  # the same as contact models, see `wrcore.dynamics.system.with_kernels`
+    wheels: np.ndarray = np.zeros(0, np.int64)
+    """The same as `Handles` of contact models, see `wrcore.dynamics.system.with_wheels`."""
     friction_factors: np.ndarray = np.zeros(0)  # (n,): of a friction law of the user's own, see `falling`
 
 
 def alone(contact, **more):
     """A `ContactModel` without what its wheels have of their own, and ``more`` in it."""
-    return contact._replace(geometries=(), plain=(), wheels=(), **more)
+    return contact._replace(geometries=(), plain=(), wheels=np.zeros(0, np.int64), **more)
 
 
 @jit(allocates=False, inline="always")
 def contact_of(model, wheelset, wheel):
     """The contact model of a wheel (0 left, 1 right): its own where wheels or rails differ, else that of all."""
-    return member_of(model, "wheels", 2 * wheelset + wheel)
+    return other_at(model, model.wheels[2 * wheelset + wheel] if len(model.wheels) > 0 else 0)
 
 
 @jit(allocates=False, forceinline=True)

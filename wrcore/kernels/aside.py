@@ -3,6 +3,9 @@
 A run knows the types of all its kernels before it compiles one (`planned`). Those that it needs last go to a second
 process, which leaves them in the cache; who needs one of them waits for it. Where that fails, or only one processor is
 there, all are compiled here, as if nothing had been.
+
+What kernels link is a matter of each process: numba numbers what it compiles, and with pieces of both, as it happened
+that one was there before the other, a kernel had some twice, was inlined otherwise, and rounded otherwise.
 """
 
 import atexit
@@ -20,9 +23,13 @@ from wrcore.kernels.cache import cache_root
 _BEGIN = """
 import pickle, sys
 sys.path[:], kernels = pickle.load(sys.stdin.buffer)
-from wrcore.kernels.aside import compile_all
-compile_all(pickle.loads(kernels))
+from wrcore.kernels import aside
+aside.linked = "aside"
+aside.compile_all(pickle.loads(kernels))
 """
+
+linked = ""
+"""Folder below that of the kernels where this process keeps what kernels link."""
 
 _PLAN, _NEEDED_LAST = ContextVar("plan", default=None), ContextVar("needed_last", default=None)
 

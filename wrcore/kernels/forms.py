@@ -22,7 +22,7 @@ from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
-from wrcore.kernels.aside import missed
+from wrcore.kernels import aside
 from wrcore.kernels.cache import kernel_folder, sources_changed, warn
 
 _FOLDER = str(kernel_folder())
@@ -123,7 +123,7 @@ class KernelCache(FunctionCache):
         self._impl_class = _LinkedFile if form == "linked" else CompileResultCacheImpl
         before, mask = numba.config.CACHE_DIR, os.umask(0o077)  # folders that it makes are closed to others
         try:
-            numba.config.CACHE_DIR = _FOLDER
+            numba.config.CACHE_DIR = os.path.join(_FOLDER, aside.linked) if form == "linked" else _FOLDER
             super().__init__(function)
         finally:
             numba.config.CACHE_DIR = before
@@ -135,7 +135,7 @@ class KernelCache(FunctionCache):
     def load_overload(self, *args):
         """The kernel for some types, or None."""
         found = self._load(*args)
-        return self._load(*args) if found is None and missed(self._function, self._form) else found
+        return self._load(*args) if found is None and aside.missed(self._function, self._form) else found
 
     def _load(self, *args):
         try:

@@ -112,20 +112,18 @@ def _pack(kind, value, begin, memory):
     return begin + numbers.nbytes, numbers.itemsize
 
 
-@intrinsic(prefer_literal=True)
-def member_of(_, whole, name, k):
-    """Reference to the k-th of the equal named tuples in the field ``name``; where that is empty, ``whole`` itself."""
-    target = whole.target if isinstance(whole, Reference) else whole
-    field = target.fields.index(name.literal_value)
-    members = target.types[field]
-    if not len(members):
-        return whole(whole, name, k), lambda context, builder, call, arguments: arguments[0]
+@intrinsic
+def other_at(_, reference, address):
+    """Reference to another value of the type of a reference, at an address; itself where that is 0. What is no
+    reference stays what it is."""
 
     def generate(context, builder, call, arguments):
-        place = builder.gep(arguments[0], [_INDEX(0), _INDEX(field)])
-        return builder.gep(place, [ir.IntType(64)(0), builder.sext(arguments[2], ir.IntType(64))])
+        if not isinstance(reference, Reference):
+            return arguments[0]
+        itself = builder.icmp_signed("==", arguments[1], ir.IntType(64)(0))
+        return builder.select(itself, arguments[0], builder.inttoptr(arguments[1], arguments[0].type))
 
-    return Reference(members.dtype)(whole, name, types.int64), generate
+    return reference(reference, types.int64), generate
 
 
 class Handle:
@@ -147,6 +145,25 @@ class Handle:
         """As `lay`, in a tenth of the time, by a kernel that takes two seconds to compile."""
         self.value = value
         _write(value, self._memory)
+
+
+class Handles:
+    """`Handle` of each of some ``values`` of one type. ``np.asarray`` of it is the array of their addresses and keeps
+    it alive; see `values_of`."""
+
+    def __init__(self, values):
+        self.values = tuple(values)
+        self._handles = [Handle(value) for value in self.values]
+        self._addresses = np.array([handle.address for handle in self._handles], np.int64)
+
+    @property
+    def __array_interface__(self):
+        return self._addresses.__array_interface__
+
+
+def values_of(addresses):
+    """The values of `Handles` from the array of their addresses."""
+    return addresses.base.values if len(addresses) else ()
 
 
 class Kind:

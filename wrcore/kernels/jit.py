@@ -5,8 +5,6 @@ folder is therefore named after the content of all sources in the rooms that hol
 fresh cache.
 """
 
-from unittest.mock import patch
-
 import numba
 from numba.core import types
 from numba.extending import intrinsic
@@ -14,8 +12,10 @@ from numba.np import linalg
 
 from wrcore.kernels.forms import KernelCache, KernelCompiler, KernelDispatcher
 
-with patch.object(linalg, "ensure_blas"):
-    from numba.np import arraymath  # noqa: F401  it would import scipy.linalg, a tenth of every start, to see it is there
+_ensured, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+from numba.np import arraymath  # noqa: E402, F401  it would import scipy.linalg, a tenth of every start, to see it is there
+
+linalg.ensure_blas = _ensured
 
 FAST = {"contract", "nsz", "arcp", "reassoc"}
 """Fast-math flags for scan loops: sums may be reordered; NaN and infinity stay what they are."""

@@ -29,6 +29,7 @@ import numpy as np
 from wrcore.contact import reduction
 from wrcore.contact.detection import PLANAR
 from wrcore.contact.geometry import CURVATURE, LARGEST_OFFSET, OFFSET_PER_ROLL, OFFSET_PER_YAW_SQUARE, SLOPE, VALUE
+from wrcore.kernels.handles import values_of
 
 WIDEST = 1.0 / 3.0  # largest semi-axis across rolling over the smaller radius of curvature
 WIDEST_TURN = 0.35  # largest turn of the normal over a patch in a hollow, rad
@@ -92,7 +93,7 @@ def look_up_errors(contact, patches):
     creep force, over what friction bears; nothing where patches are not looked up."""
     if not contact.strips.looked_up:
         return {}
-    wheels = contact.wheels or (contact,) * (2 * patches.shape[1])
+    wheels = values_of(contact.wheels) or (contact,) * (2 * patches.shape[1])
     cells = np.nan_to_num(patches[..., reduction.CELL]).astype(int).reshape(len(patches), -1, reduction.MAX_PATCHES)
     misses = [one.strips.table.misses[np.unique(cells[:, i])] for i, one in enumerate(wheels)]
     return dict(zip(LOOK_UP_ERRORS, map(float, np.vstack([np.zeros((1, 2)), *misses]).max(axis=0)), strict=True))

@@ -261,8 +261,8 @@ def interpreted(tally):
                 new = registers[name]
             elif name == "call_address" and module.__name__ in ("wrcore.dynamics.system", "wrcore.dynamics.wheel"):
                 new = _call
-            elif name == "member_of":
-                new = lambda whole, field, k: (getattr(whole, field) or {k: whole})[k]  # noqa: E731
+            elif name == "other_at":
+                new = lambda whole, address: whole  # noqa: E731
             elif name == "rarely_called":
                 new = lambda: None  # noqa: E731
             if (module.__name__, name) in WHERE:
