@@ -1,6 +1,7 @@
 """The creep table: accuracy, symmetry, limits, smoothness, and its life on disk."""
 
 import os
+from dataclasses import replace
 from itertools import product
 
 import h5py
@@ -255,6 +256,21 @@ def test_table_survives_the_disk(cache, tmp_path):
     assert read.data.axes == built.data.axes and read.force_error == built.force_error
     assert table_info(read) == table_info(built)
     assert os.listdir(tmp_path / "deep") == ["t.h5"]
+
+
+def test_a_file_is_read_once_and_anew_when_it_changes(cache, tmp_path):
+    path = tmp_path / "table.h5"
+    write_table(path, ensure_table(0.28))
+    table = load_table(path)
+    assert load_table(path) is table
+    write_table(path, replace(table, tolerance=0.5))
+    assert load_table(path).tolerance == 0.5
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match="table.h5"):
+        load_table(path)
+    path.unlink()
+    with pytest.raises(InputError, match="table.h5"):
+        load_table(path)
 
 
 def test_ensure_builds_once(cache, monkeypatch):

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from wrcore.errors import InputError
-from wrcore.errors.checked_yaml import DEEPEST, MOST_VALUES, _Loader, parse_value, read_yaml
+from wrcore.errors.checked_yaml import DEEPEST, MOST_VALUES, _Loader, check, parse_value, read_yaml
 
 MERGES = "a0: &a0 {x: 1}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join(6 * [f'*a{i - 1}'])}]}}\n" for i in range(1, 15))
 
@@ -103,3 +103,17 @@ def test_other_files_are_one_clear_line(read, text, says):
 
 def test_a_merge_gives_way_to_what_is_written_beside_it(read):
     assert read("a: &a {x: 1, y: 2}\nb: {<<: *a, x: 3}\n")["b"] == {"x": 3, "y": 2}
+
+
+def test_what_was_sound_once_is_looked_at_again_where_it_or_the_schema_changed():
+    schema = {"properties": {"a": {"type": "integer", "maximum": 3, "description": "at most 3"}}}
+    data = {"a": 3}
+    for _ in range(2):
+        check(data, schema, "here")
+    data["a"] = 4
+    for _ in range(2):
+        with pytest.raises(InputError, match="here: a: expected at most 3"):
+            check(data, schema, "here")
+    narrower = {"properties": {"a": {"type": "integer", "maximum": 2, "description": "at most 2"}}}
+    with pytest.raises(InputError, match="at most 2"):
+        check({"a": 3}, narrower, "here")

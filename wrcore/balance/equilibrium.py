@@ -37,30 +37,29 @@ class Equilibrium:
     """Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle."""
 
 
-def displaced(state, model, displacement):
-    """A state with displaced bodies: ``displacement`` (6 n + states,) has each body's translation (m) and rotation
-    vector (rad) in track axes, then changes of the elements' internal states (m)."""
-    out = state.copy()
+def displaced(state, model, displacements):
+    """States (k, size) with displaced bodies: a row of ``displacements`` (k, 6 n + states) has each body's translation
+    (m) and rotation vector (rad) in track axes, then changes of the elements' internal states (m)."""
     n = len(model.bodies.mass)
-    for b in range(n):
-        at, q = STATE_SIZE * b, displacement[6 * b : 6 * b + 6]
-        out[at : at + 3] += q[:3]
-        out[at + EULER : at + VELOCITY] = _turned(state[at + EULER : at + VELOCITY], q[3:])
-    out[STATE_SIZE * n :] += displacement[6 * n :]
-    return out
+    states = np.tile(state, (len(displacements), 1))
+    parts = states[:, : STATE_SIZE * n].reshape(-1, n, STATE_SIZE)
+    place = displacements[:, : 6 * n].reshape(-1, n, 6)
+    parts[..., :3] += place[..., :3]
+    parts[..., EULER:VELOCITY] = _turned(parts[..., EULER:VELOCITY], place[..., 3:])
+    states[:, STATE_SIZE * n :] += displacements[:, 6 * n :]
+    return states
 
 
 def _turned(p, turn):
-    """Euler parameters after a further rotation by a rotation vector in track axes."""
-    angle = np.linalg.norm(turn)
+    """Euler parameters (..., 4) after a further rotation by a rotation vector (..., 3) in track axes."""
+    angle = np.linalg.norm(turn, axis=-1)
     scale = 0.5 * np.sinc(0.5 * angle / np.pi)
-    a0, (a1, a2, a3) = np.cos(0.5 * angle), scale * turn
-    e0, e1, e2, e3 = p
-    turned = np.array([
+    a0, (a1, a2, a3), (e0, e1, e2, e3) = np.cos(0.5 * angle), scale * np.moveaxis(turn, -1, 0), np.moveaxis(p, -1, 0)
+    turned = np.stack([
         a0 * e0 - a1 * e1 - a2 * e2 - a3 * e3, a0 * e1 + a1 * e0 + a2 * e3 - a3 * e2,
         a0 * e2 + a2 * e0 + a3 * e1 - a1 * e3, a0 * e3 + a3 * e0 + a1 * e2 - a2 * e1,
-    ])  # fmt: skip
-    return turned / np.linalg.norm(turned)
+    ], axis=-1)  # fmt: skip
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
 
 def _unknowns(model):
@@ -87,8 +86,9 @@ def solve_equilibrium(model, state, iterations=50):
     size = int(unknown.sum())
     residual = before = np.inf
     for _ in range(iterations):
-        rows = [displaced(state, model, h * row) for h in (STEP, -STEP) for row in np.eye(len(unknown))[unknown]]
-        values = _accelerations(equations.at(0.0, np.array([*rows, state])), model)[:, unknown]
+        rows = STEP * np.eye(len(unknown))[unknown]
+        states = displaced(state, model, np.vstack([rows, -rows]))
+        values = _accelerations(equations.at(0.0, np.vstack([states, state])), model)[:, unknown]
         residual = float(np.max(np.abs(values[-1])))
         if residual < RESIDUAL and not residual < 0.1 * before:
             break
@@ -108,7 +108,7 @@ def solve_equilibrium(model, state, iterations=50):
 def _improved(state, step, model, equations, residual):
     """The state after the longest of the step, its half, its quarter, ... that comes closer to equilibrium, or None."""
     for halvings in range(12):
-        new = displaced(state, model, step * 0.5**halvings)
+        new = displaced(state, model, step[None, :] * 0.5**halvings)[0]
         rates = equations.at(0.0, new[None, :])
         if np.max(np.abs(_accelerations(rates, model)[:, _unknowns(model)])) < residual:
             return new

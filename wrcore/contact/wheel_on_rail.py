@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+
+import numpy as np
 
 from wrcore.contact.geometry import contact_geometry
 from wrcore.errors import InputError, check_number
@@ -55,7 +58,30 @@ class WheelOnRail:
         distance = self.rail_distance
         if distance is None or math.isnan(distance):
             raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
-        return contact_geometry(self.wheel, self.rail, self.rolling_radius, self.half_distance, float(distance))
+        pair = _ByContent(self.wheel), _ByContent(self.rail)
+        return _geometry_of(*pair, self.rolling_radius, self.half_distance, float(distance))
+
+
+@lru_cache(maxsize=16)
+def _geometry_of(wheel, rail, *lengths):
+    """The `ContactGeometry`, of some 2 MB, that scenes with the same profiles share."""
+    return contact_geometry(wheel.curve, rail.curve, *lengths)
+
+
+class _ByContent:
+    """A `ProfileCurve` that equals others with the same nodes."""
+
+    def __init__(self, curve):
+        self.curve, digest = curve, hashlib.sha256()
+        for row in (curve.u, curve.f, curve.df, curve.d2f):
+            digest.update(np.ascontiguousarray(row).data)
+        self._digest = digest.digest()
+
+    def __eq__(self, other):
+        return self._digest == other._digest
+
+    def __hash__(self):
+        return hash(self._digest)
 
 
 @checked

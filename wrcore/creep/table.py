@@ -11,8 +11,10 @@ finer table is built until the 99 % quantile of the force error is below the tol
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -178,6 +180,16 @@ def write_table(path, table):
 
 def load_table(path):
     """Read a `CreepTable`; InputError if the file is missing, is none, or is no longer what was written."""
+    try:
+        status = os.stat(path)
+    except OSError:  # said below
+        return _read_table(path, None)
+    return _read_table(path, (status.st_ino, status.st_size, status.st_mtime_ns))
+
+
+@lru_cache(maxsize=4)
+def _read_table(path, _):
+    """As `load_table`, once for a file of this size and time."""
     with checked_hdf5(path, "a creep table in HDF5") as file:
         found = file.attrs.get("schema")
         if found != SCHEMA:

@@ -58,6 +58,9 @@ few percent, and steps through solutions would be as small as they can: in the f
 LIGHT = 2e-5
 """Errors of a lobe of less depth are beside the load of this one, m: some 6 kN."""
 
+WRITINGS = 20.0
+"""A table is kept again after so many times what that took, and not before `PATIENCE`."""
+
 THREADS = min(len(os.sched_getaffinity(0)), 8)
 """Nodes that are solved side by side."""
 
@@ -76,7 +79,7 @@ class Pair:
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 2), np.float32)
         self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
-        self._new, self._spent, self._written = 0, 0.0, time.monotonic()
+        self._new, self._spent, self._next_written = 0, 0.0, time.monotonic() + PATIENCE
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
         self._take_shipped()
@@ -111,7 +114,7 @@ class Pair:
             with handed_on("patches are solved without a table"), told_if_long(text, self._spent):
                 self._keep(key, *self._solved(key))  # or the cell stays as if never met
             self._spent += time.monotonic() - begin
-            if time.monotonic() - self._written > PATIENCE:
+            if time.monotonic() > self._next_written:
                 self.write()
 
     def _solved(self, key):
@@ -281,6 +284,7 @@ class Pair:
         """Keep what was solved since it was last kept, beside what others have."""
         if self._new:
             try:
+                begin = time.monotonic()
                 self._read()
                 data = (
                     list(self._solved_at), list(self._solved_at.values()),
@@ -290,7 +294,8 @@ class Pair:
                 with new_hdf5(self.path) as file:
                     for name, part in zip(_PARTS, data, strict=True):
                         file[name] = part
-                self._new, self._written = 0, time.monotonic()
+                self._new, now = 0, time.monotonic()
+                self._next_written = now + max(PATIENCE, WRITINGS * (now - begin))
             except OSError as error:
                 warn(f"{self.path}: {error.strerror}; what was solved is not kept")
                 self._new = 0

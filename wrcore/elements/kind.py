@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,11 @@ class Kind:
     """Kernels of its parts along one direction, see `wrcore.elements.law`."""
     first_load: Callable[[dict], float] | None = None
     """Vertical load (N) with which the search for the one begins that it carries, if its parts depend on it."""
+
+    @cached_property
+    def schema(self) -> dict:
+        """JSON schema of its keys."""
+        return {"properties": self.keys}
 
 
 class Spring(NamedTuple):

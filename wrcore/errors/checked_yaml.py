@@ -1,6 +1,7 @@
 """YAML files read strictly: one clear line for whatever is wrong, before any work starts."""
 
 import copy
+import hashlib
 import math
 import os
 import re
@@ -20,8 +21,12 @@ from wrcore.errors.input_files import check_regular
 MOST_BYTES, MOST_VALUES, DEEPEST = 4_000_000, 100_000, 50
 """A longer document, one with more values, or nested deeper, is none that a person wrote."""
 
-_GRAMMAR = "rfc3987_syntax"
-"""Of JupyterLab: jsonschema would build it, most of a second, for a format that no schema here has."""
+_FORMATS = (
+    "fqdn", "idna", "isoduration", "jsonpointer", "rfc3339_validator", "rfc3986_validator", "rfc3987", "rfc3987_syntax",
+    "uri_template", "webcolors",
+)  # fmt: skip
+"""Modules that jsonschema would import where they are, as beside JupyterLab, for up to a second; all for formats that no
+schema here has."""
 
 _TAG = "tag:yaml.org,2002:"
 _LIBYAML = yaml.__with_libyaml__
@@ -29,15 +34,14 @@ _LIBYAML = yaml.__with_libyaml__
 
 @cache
 def _validator():
-    """The class of jsonschema's validators, without that grammar."""
-    hidden = _GRAMMAR not in sys.modules
-    if hidden:
-        sys.modules[_GRAMMAR] = None  # type: ignore[assignment]
+    """The class of jsonschema's validators, without those formats."""
+    hidden = [name for name in _FORMATS if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
     try:
         from jsonschema import Draft202012Validator
     finally:
-        if hidden:
-            del sys.modules[_GRAMMAR]
+        for name in hidden:
+            del sys.modules[name]
     return Draft202012Validator
 
 
@@ -231,13 +235,26 @@ def validate(data, schema_name, source):
     return data
 
 
+_SOUND: dict[tuple[int, bytes], dict] = {}
+
+MOST_SOUND = 10_000
+"""Data that are remembered to be sound."""
+
+
 def check(data, schema, source, above=""):
-    """Raise an InputError where data are not what a schema (a dict) asks for; ``above``: the field that holds them."""
+    """Raise an InputError where data are not what a schema (a dict) asks for; ``above``: the field that holds them.
+    Nothing is checked twice against the same schema."""
+    known = id(schema), hashlib.sha256(repr(data).encode(errors="surrogatepass")).digest()
+    if known in _SOUND:
+        return
     found = islice(_validator()(schema).iter_errors(data), 1000)
     errors = sorted(found, key=lambda e: (len(e.path), str(e.path)))
     if errors:
         field, expected = _explain(errors[0], schema)
         raise InputError(source, ".".join(filter(None, [above, field])), expected)
+    if len(_SOUND) >= MOST_SOUND:
+        _SOUND.clear()
+    _SOUND[known] = schema  # which lives as long as its id is known
 
 
 def plain_tree(data, source):

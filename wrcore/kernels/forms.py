@@ -20,6 +20,7 @@ from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 from numba.core.typed_passes import NativeLowering
 
 from wrcore.kernels import aside
@@ -115,12 +116,23 @@ class _LinkedFile(CompileResultCacheImpl):
         )  # fmt: skip
 
 
+class _MachineCode(CompileResultCacheImpl):
+    """What of a kernel with machine code is kept on disk. Numba would keep what others link, too, and read it at every
+    start; that is another form here, and of this one the functions' names do."""
+
+    def reduce(self, result):
+        (name, kind, (code, linked)), *rest = super().reduce(result)
+        names = [function.name for function in binding.parse_bitcode(linked).functions if not function.is_declaration]
+        stubs = binding.parse_assembly("\n".join(f'define void @"{each}"() {{ ret void }}' for each in names))
+        return (name, kind, (code, stubs.as_bitcode())), *rest
+
+
 class KernelCache(FunctionCache):
     """Numba's cache of a kernel in one form; one that is damaged, or full, stops nothing."""
 
     def __init__(self, function, form="called"):
         self._form, self._function = form, function
-        self._impl_class = _LinkedFile if form == "linked" else CompileResultCacheImpl
+        self._impl_class = _LinkedFile if form == "linked" else _MachineCode
         before, mask = numba.config.CACHE_DIR, os.umask(0o077)  # folders that it makes are closed to others
         try:
             numba.config.CACHE_DIR = os.path.join(_FOLDER, aside.linked) if form == "linked" else _FOLDER
@@ -137,9 +149,12 @@ class KernelCache(FunctionCache):
         found = self._load(*args)
         return self._load(*args) if found is None and aside.missed(self._function, self._form) else found
 
-    def _load(self, *args):
+    def _load(self, signature, target_context):
+        """As numba's `load_overload`, without what compilers need, a tenth of every start."""
+        rtsys.initialize(target_context)
         try:
-            return super().load_overload(*args)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(signature, target_context)
         except Exception as error:  # pickles fail in many ways
             warn(f"cache {self.cache_path}: damaged ({type(error).__name__}); kernels are compiled anew")
             self._tried(self.flush)

@@ -6,6 +6,8 @@ reads what it names, and calls pass one address. A `Kernel` called by its addres
 many others call it.
 """
 
+import struct
+
 import numpy as np
 from llvmlite import ir
 from numba import typeof
@@ -93,23 +95,34 @@ def _write(value, memory):
     _store(value, memory)
 
 
-def _pack(kind, value, begin, memory):
-    """Lay a value out in memory as C does, from ``begin``, and return where it ends and on what it is aligned. A kernel
-    that does it has to be compiled for each type, at a second each."""
+def _format_of(kind, begin=0):
+    """How `struct` lays out a value of a type as C does, from ``begin``, where it ends and on what it is aligned."""
     if isinstance(kind, types.BaseTuple):
-        end, coarsest = begin, 1
+        parts, end, coarsest = "", begin, 1
+        for one in kind.types:
+            part, end, aligned = _format_of(one, end)
+            parts, coarsest = parts + part, max(coarsest, aligned)
+        return f"{parts}{-end % coarsest}x", end + -end % coarsest, coarsest
+    number = np.dtype(np.int64 if isinstance(kind, types.Array) else str(kind))
+    count = 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
+    begin, pad = begin + -begin % number.itemsize, -begin % number.itemsize
+    return f"{pad}x{count}{_CODES[number.str[1:]]}", begin + count * number.itemsize, number.itemsize
+
+
+_CODES = {"f8": "d", "f4": "f", "i8": "q", "i4": "i", "u8": "Q", "u4": "I", "b1": "?"}
+
+
+def _add_numbers(kind, value, numbers):
+    """Add the numbers that a value is in memory to a list. A kernel that lays values out has to be compiled for each
+    type, at a second each."""
+    if isinstance(kind, types.BaseTuple):
         for one, part in zip(kind.types, value, strict=True):
-            end, aligned = _pack(one, part, end, memory)
-            coarsest = max(coarsest, aligned)
-        return end + -end % coarsest, coarsest
-    if isinstance(kind, types.Array):
+            _add_numbers(one, part, numbers)
+    elif isinstance(kind, types.Array):
         place = value.__array_interface__["data"][0]
-        numbers = np.array([0, 0, value.size, value.itemsize, place, *value.shape, *value.strides], np.int64)
+        numbers += 0, 0, value.size, value.itemsize, place, *value.shape, *value.strides
     else:
-        numbers = np.array([value], str(kind))
-    begin += -begin % numbers.itemsize
-    memory[begin : begin + numbers.nbytes] = numbers.view(np.uint8)
-    return begin + numbers.nbytes, numbers.itemsize
+        numbers.append(value)
 
 
 @intrinsic
@@ -131,15 +144,16 @@ class Handle:
 
     def __init__(self, value):
         self.value = value
-        self._numba_type_, size = _layout(value)
+        self._numba_type_, self._format, size = _layout(value)
         self._memory = np.zeros(size, np.uint8)
         self.lay(value)
         self.address = self._memory.ctypes.data
 
     def lay(self, value):
         """Keep another value of the same type."""
-        self.value = value
-        _pack(self._numba_type_.target, value, 0, self._memory)
+        self.value, numbers = value, []
+        _add_numbers(self._numba_type_.target, value, numbers)
+        self._format.pack_into(self._memory, 0, *numbers)
 
     def renew(self, value):
         """As `lay`, in a tenth of the time, by a kernel that takes two seconds to compile."""
@@ -170,18 +184,20 @@ class Kind:
     """The type of a `Handle` without its value: what kernels are compiled for."""
 
     def __init__(self, value):
-        self._numba_type_, _ = _layout(value)
+        self._numba_type_, _, _ = _layout(value)
 
 
 _LAYOUTS = {}
 
 
 def _layout(value):
-    """Type of a handle and the bytes that its value takes: found once for all values of a type."""
+    """Type of a handle, `struct.Struct` of its value and the bytes that this takes: found once for all values of a
+    type."""
     key = compute_fingerprint(value)
     if key not in _LAYOUTS:
         kind, context = typeof(value), cpu_target.target_context
-        _LAYOUTS[key] = Reference(kind), context.get_abi_sizeof(context.get_value_type(kind))
+        size = context.get_abi_sizeof(context.get_value_type(kind))
+        _LAYOUTS[key] = Reference(kind), struct.Struct("=" + _format_of(kind)[0]), size
     return _LAYOUTS[key]
 
 

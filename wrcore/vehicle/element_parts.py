@@ -21,7 +21,7 @@ def check_element(item, source):
     for key in given:
         if key not in kind.keys:
             raise InputError(source, f"{field}.{key}", f"unknown for kind {item['kind']}; {one_of(kind.keys, key)}")
-    check(given, {"properties": kind.keys}, source, field)
+    check(given, kind.schema, source, field)
     for key, expected in kind.check(item):
         raise InputError(source, f"{field}.{key}".rstrip("."), expected)
 
