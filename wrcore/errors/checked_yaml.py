@@ -25,8 +25,8 @@ _FORMATS = (
     "fqdn", "idna", "isoduration", "jsonpointer", "rfc3339_validator", "rfc3986_validator", "rfc3987", "rfc3987_syntax",
     "uri_template", "webcolors",
 )  # fmt: skip
-"""Modules that jsonschema would import where they are, as beside JupyterLab, for up to a second; all for formats that no
-schema here has."""
+"""Modules that jsonschema would import where they are, as beside JupyterLab, in up to a second; all for formats that
+no schema here has."""
 
 _TAG = "tag:yaml.org,2002:"
 _LIBYAML = yaml.__with_libyaml__

@@ -14,8 +14,8 @@ jit       ``njit(_nrt=False)``: no reference counts in kernels that create no ar
 forms     ``JITCodeLibrary`` makes machine code in ``_finalize_final_module`` alone; ``flags.no_compile``,
           ``NativeLowering``, ``insert_user_function``; dispatchers ask for other kernels by ``get_call_template`` and
           ``get_overload``; ``CompileResultCacheImpl`` and what it makes of a library, ``FunctionCache._index_key`` and
-          ``_load_overload``, ``rtsys``; ``numba.config.CACHE_DIR`` read when a cache is made; ``cached_internal_func`` of a
-          compiler's ``targetctx`` holds numba's helpers
+          ``_load_overload``, ``rtsys``; ``numba.config.CACHE_DIR`` read when a cache is made; ``cached_internal_func``
+          of a compiler's ``targetctx`` holds numba's helpers
 lanes     ``intrinsic`` and ``register_model`` for a type of one's own, its operators by ``infer_global`` and
           ``lower_builtin``; ``cgutils.get_or_insert_function``, ``unpack_tuple``; ``context.make_array``
 handles   ``compute_fingerprint`` of a named tuple as the key of its layout; ``AttributeTemplate``, ``infer_getattr``,
