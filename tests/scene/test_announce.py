@@ -2,7 +2,9 @@
 
 import pytest
 
-from wrcore.run.progress import simulated_time
+from wrcore.kernels.cache import warn
+from wrcore.kernels.jit import jit
+from wrcore.kernels.told import warn_once
 from wrcore.scene import description
 from wrcore.scene.description import _creep, announce, load_scene
 
@@ -29,12 +31,15 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
     assert len(said) == lines and all("creep table" in line for line in said)
 
 
-def test_compiling_is_announced_where_nobody_watches(monkeypatch, capsys, tmp_path):
+def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
-    monkeypatch.setattr("wrcore.run.progress.kernel_folder", lambda: tmp_path)
-    with simulated_time(1.0) as advance:
-        assert advance is None
-    assert "compiling" in capsys.readouterr().err
+    monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
+    for each in (warn, warn_once):
+        each.cache_clear()
+    for factor in (2.0, 3.0):
+        assert jit(lambda x, factor=factor: factor * x + 1.0, cache=False)(1.0) == factor + 1.0
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "compiling" in said
 
 
 def test_no_line_where_none_is_wanted(monkeypatch, capsys):

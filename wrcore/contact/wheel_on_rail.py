@@ -59,12 +59,14 @@ class WheelOnRail:
         if distance is None or math.isnan(distance):
             raise InputError(self.rail.name, "gauge", "expected a rail down to where the gauge is measured, got a part")
         pair = _ByContent(self.wheel), _ByContent(self.rail)
-        return _geometry_of(*pair, self.rolling_radius, self.half_distance, float(distance))
+        made = _geometry_of(*pair, self.rolling_radius, self.half_distance, float(distance))
+        arrays = {name: part for name, part in made._asdict().items() if isinstance(part, np.ndarray)}
+        return made._replace(**{name: part.copy("K") for name, part in arrays.items()})
 
 
 @lru_cache(maxsize=16)
 def _geometry_of(wheel, rail, *lengths):
-    """The `ContactGeometry`, of some 2 MB, that scenes with the same profiles share."""
+    """The `ContactGeometry`, of some 2 MB, that is copied for scenes with the same profiles."""
     return contact_geometry(wheel.curve, rail.curve, *lengths)
 
 

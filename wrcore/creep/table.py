@@ -13,7 +13,8 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -180,11 +181,13 @@ def write_table(path, table):
 
 def load_table(path):
     """Read a `CreepTable`; InputError if the file is missing, is none, or is no longer what was written."""
-    try:
+    stamp = None
+    with suppress(OSError):  # said below
         status = os.stat(path)
-    except OSError:  # said below
-        return _read_table(path, None)
-    return _read_table(path, (status.st_ino, status.st_size, status.st_mtime_ns))
+        stamp = status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+    table = _read_table(path, stamp)
+    kalker = table.data.kalker._replace(cubic=table.data.kalker.cubic.copy())  # nobody can change another one's
+    return replace(table, data=table.data._replace(kalker=kalker, coefficients=table.data.coefficients.copy()))
 
 
 @lru_cache(maxsize=4)

@@ -148,4 +148,10 @@ def _remove_own(root, process):
 @cache
 def warn(text):
     """Say something on standard error, once."""
-    print(f"wrcore: {text}", file=sys.stderr)
+    say(text)
+
+
+def say(text):
+    """Say something on standard error, where there is one."""
+    if sys.stderr is not None:  # in a process without a console
+        print(f"wrcore: {text}", file=sys.stderr, flush=True)

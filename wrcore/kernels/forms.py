@@ -9,7 +9,7 @@ Numba makes all of it for every kernel, with a wrapper for C besides. Most kerne
 
 import gc
 import os
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import numba
 from llvmlite import binding
@@ -25,6 +25,7 @@ from numba.core.typed_passes import NativeLowering
 
 from wrcore.kernels import aside
 from wrcore.kernels.cache import kernel_folder, sources_changed, warn
+from wrcore.kernels.told import told_if_long
 
 _FOLDER = str(kernel_folder())
 
@@ -180,18 +181,27 @@ def _set_environments(result):
         result.library.codegen.set_env(environment.env_name, environment)
 
 
+_COMPILING = "compiling, once: about half a minute for a scene of a new kind, a minute or two for exact contact"
+
+
 @contextmanager
 def _rarely_collected():
     """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
     and looking took it a tenth of its time. One thread after the other, as they compile: else one would take for usual
-    what another one has set."""
+    what another one has set. What takes long is told, but with ``WRCORE_PROGRESS=0``."""
     with global_compiler_lock:
         before = gc.get_threshold()
-        gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
+        outermost = before[0] < _RARELY and os.environ.get("WRCORE_PROGRESS") != "0"
+        gc.set_threshold(before[0] and max(before[0], _RARELY), *before[1:])
         try:
-            yield
+            with told_if_long(_COMPILING) if outermost else nullcontext():
+                yield
         finally:
             gc.set_threshold(*before)
+
+
+_RARELY = 100_000
+"""New objects after which Python looks for cycles."""
 
 
 def _number(kind):

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar in a terminal or a notebook; in a log one line before the first long wait."""
+"""Progress of long work: a bar in a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from wrcore.kernels.cache import kernel_folder
-from wrcore.scene.description import announce
-
 DELAY = 1.0  # work that is done within this time shows no bar, s
 
 
@@ -18,7 +15,7 @@ def somebody_watches() -> bool:
     """Whether a person sees what is printed now: a terminal or a notebook, and not ``WRCORE_PROGRESS=0``."""
     if os.environ.get("WRCORE_PROGRESS") == "0":
         return False
-    return sys.stderr.isatty() or _in_notebook()
+    return (sys.stderr is not None and sys.stderr.isatty()) or _in_notebook()
 
 
 def _in_notebook() -> bool:
@@ -35,8 +32,6 @@ def simulated_time(duration: float, begin: float = 0.0) -> Iterator[Callable[[fl
     ...     if advance:
     ...         advance(5.0)
     """
-    if not any(kernel_folder().rglob("*advance_*.nbi")):
-        announce("compiling for the first run of this version: about half a minute, once")
     if not somebody_watches():
         yield None
         return

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import json
 import os
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
@@ -38,6 +37,7 @@ from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
+from wrcore.kernels.cache import say
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossing, seen_by_wheels, warn_of_rigid_rails
@@ -307,7 +307,7 @@ def _with_points(track, folder, source):
 def announce(text):
     """One line on stderr before work that takes long, whoever listens; none with ``WRCORE_PROGRESS=0``."""
     if os.environ.get("WRCORE_PROGRESS") != "0":
-        print(f"wrcore: {text}", file=sys.stderr, flush=True)
+        say(text)
 
 
 def _creep(scene, progress):
