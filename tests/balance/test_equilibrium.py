@@ -8,7 +8,7 @@ import yaml
 
 import wrcore as wr
 from tests.conftest import ROOT, SCENES
-from wrcore.balance.equilibrium import wheel_loads
+from wrcore.balance.equilibrium import displaced, wheel_loads
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.system import Equations, workspace
@@ -37,6 +37,23 @@ def heights(scene, equilibrium):
     """Height of each body's centre in equilibrium, m, by name."""
     names = scene.vehicle.body_names
     return {name: equilibrium.state[STATE_SIZE * b + 2] for b, name in enumerate(names)}
+
+
+def test_displacements_turn_bodies_about_track_axes():
+    """Rodrigues' rotation, after that of the body, for each row and body by itself; all else stays."""
+    model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", ["initial.yaw=0.004"]))
+    rng, n = np.random.default_rng(1), len(model.bodies.mass)
+    rows = 0.3 * rng.normal(size=(3, 6 * n + len(state) - STATE_SIZE * n))
+    for row, moved in zip(rows, displaced(state, model, rows), strict=True):
+        for body in range(n):
+            at, (*shift, a, b, c) = STATE_SIZE * body, row[6 * body : 6 * body + 6]
+            angle, across = np.linalg.norm([a, b, c]), np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+            turn = np.eye(3) + np.sin(angle) / angle * across + (1.0 - np.cos(angle)) / angle**2 * across @ across
+            expected = turn @ matrix_of(state[at + 3 : at + 7])
+            np.testing.assert_allclose(matrix_of(moved[at + 3 : at + 7]), expected, rtol=0, atol=1e-14)
+            np.testing.assert_array_equal(moved[at : at + 3], state[at : at + 3] + shift)
+            np.testing.assert_array_equal(moved[at + 7 : at + 13], state[at + 7 : at + 13])
+        np.testing.assert_array_equal(moved[STATE_SIZE * n :], state[STATE_SIZE * n :] + row[6 * n :])
 
 
 @pytest.mark.parametrize("axle_boxes", ["false", "true"])

@@ -189,19 +189,22 @@ def _rarely_collected():
     """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
     and looking took it a tenth of its time. One thread after the other, as they compile: else one would take for usual
     what another one has set. What takes long is told, but with ``WRCORE_PROGRESS=0``."""
+    global _compiling
     with global_compiler_lock:
         before = gc.get_threshold()
-        outermost = before[0] < _RARELY and os.environ.get("WRCORE_PROGRESS") != "0"
-        gc.set_threshold(before[0] and max(before[0], _RARELY), *before[1:])
+        silent = _compiling or os.environ.get("WRCORE_PROGRESS") == "0"
+        _compiling += 1
+        gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
         try:
-            with told_if_long(_COMPILING) if outermost else nullcontext():
+            with nullcontext() if silent else told_if_long(_COMPILING):
                 yield
         finally:
             gc.set_threshold(*before)
+            _compiling -= 1
 
 
-_RARELY = 100_000
-"""New objects after which Python looks for cycles."""
+_compiling = 0
+"""Kernels that are being compiled, each for the one before it."""
 
 
 def _number(kind):
