@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import SCENES
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.check_rail import STRIDE
+from wrcore.dynamics.check_rail import CHORD, DOWN, STRIDE
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
@@ -48,6 +48,14 @@ def test_it_presses_a_back_as_a_spring_and_rubs_on_it():
     assert abs(lateral[2]) < 1e-3 * normal  # up ahead, down behind: a moment that brakes the wheel
     brakes = FRICTION * normal * down / slip * chord
     assert lateral[4] == pytest.approx(-brakes - lateral[0] * (RADIUS - TOP), rel=1e-3)
+
+
+def test_each_wheel_is_touched_where_its_own_back_ends():
+    changes = {"track.check_rails": [RAIL], "wheel.wheelsets": {"wheelset_2": {"left": {"rolling_radius": 0.44}}}}
+    model, _ = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", changes))
+    chords = [math.sqrt((r + REACH) ** 2 - (r - TOP) ** 2) for r in (RADIUS, 0.44, RADIUS, RADIUS)]
+    np.testing.assert_allclose(model.check_rails.rows[:, 0, CHORD], chords, rtol=1e-12)
+    np.testing.assert_allclose(model.check_rails.rows[:, 0, DOWN], [RADIUS - TOP, 0.44 - TOP] + 2 * [RADIUS - TOP])
 
 
 @pytest.mark.parametrize("yaw", [0.004, -0.004])

@@ -14,7 +14,7 @@ from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.seen_table import AHEAD, HEIGHT, PAD, ROWS, U_STEP, shape_table
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.dynamics.crossing import interpolate, laid_under
+from wrcore.dynamics.crossing import interpolate, laid_under, with_own_arrays
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
@@ -184,12 +184,12 @@ def test_a_yawed_wheel_finds_the_plain_rail_beyond_its_table():
     pair = WheelOnRail(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
     table = shape_table(pair, OutOfRound(RADIUS, (), (Wave(20, 1e-3),)))
     laid, plain = np.array(laid_under(table, 0.0, 0.0, RADIUS, 0.1)), table.sections[0, 0, HEIGHT]
-    rail, along = table.geometry.rail.copy(), table.geometry.along.copy()
-    scratch = np.zeros((ROWS + 4, len(rail)))
+    geometry = with_own_arrays(table.geometry)
+    scratch, cells = np.zeros((ROWS + 4, len(plain))), geometry.scan_rail.shape[1]
     for yaw in (0.0, 0.02, -0.04):
         turn = yaw / (table.step * RADIUS)
-        interpolate(table.sections, table.strips, laid, PAD + 0.3, turn, 1.0, scratch, rail, along, False)
-        assert 0.5e-3 < np.abs(rail[:, 0] - plain).max() < 1.1e-3
+        interpolate(table.sections, table.strips, laid, PAD + 0.3, turn, 1.0, scratch, geometry, False, 0, cells)
+        assert 0.5e-3 < np.abs(geometry.rail[:, 0] - plain).max() < 1.1e-3
 
 
 FLAT = {"flats": [{"length": 0.1, "depth": 9e-4}]}

@@ -1,8 +1,8 @@
 """A rail that changes along the track, over arc length as a wheel sees it: what runs look its section up in.
 
 The sections of `wrcore.contact.seen_rail`, for a wheelset in the middle and without roll and yaw, at arc lengths
-`S_STEP` apart; between these runs a cubic Hermite polynomial along the track. Before the first and behind the last
-slice the rail goes over, along `BLEND`, into one that is the same everywhere, and stays that.
+`S_STEP` apart, or further where slices are; between these runs a cubic Hermite polynomial along the track. Before the
+first and behind the last slice the rail goes over, along `BLEND`, into one that is the same everywhere, and stays that.
 
 A wheel out of round is seen over its angle in the same way, a corrugated rail over a wave: both go on for ever. Their
 sections are the plain rail's and what the wheel reaches further, or the rail is higher, at strips of some radii, with
@@ -28,7 +28,7 @@ from wrcore.contact.geometry import (
 )
 from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.contact.seen_rail import AHEAD as SEEN_AHEAD
-from wrcore.contact.seen_rail import BELOW, REACH, WheelOnSlices, filled
+from wrcore.contact.seen_rail import BELOW, REACH, STEP, WheelOnSlices, filled
 from wrcore.contact.seen_rail import BEND as SEEN_BEND
 from wrcore.contact.seen_rail import HEIGHT as SEEN_HEIGHT
 from wrcore.errors import InputError
@@ -37,6 +37,9 @@ from wrcore.geometry.slices import RailSlices
 
 S_STEP, U_STEP = 2e-3, 3e-4
 """Distances of the nodes along and across, m."""
+
+LARGEST_STEP, PER_SLICE = 1e-2, 10
+"""Greatest distance of the nodes along (m), and their number between two slices, of a rail whose heads go through."""
 
 PER_CELL = round(SCAN_STEP / U_STEP)
 """Nodes across per cell of the scan."""
@@ -87,10 +90,10 @@ def seen_table(pair, plain, backwards=False):
     laid the other way round, whose arc lengths then count from the same origin against those of its slices."""
     wide = _widened(pair)
     first, last = (pair.rail.s[k] + sign * (REACH + BLEND) for k, sign in ((0, -1.0), (-1, 1.0)))
-    begins = pair.rail.begins()
+    begins, step = pair.rail.begins(), _step_along(pair.rail)
     if begins.size:  # at a node
-        first = begins[0] - S_STEP * np.ceil((begins[0] - first) / S_STEP)
-    s = first + S_STEP * np.arange(int(np.ceil((last - first) / S_STEP)) + 1)
+        first = begins[0] - step * np.ceil((begins[0] - first) / step)
+    s = first + step * np.arange(int(np.ceil((last - first) / step)) + 1)
     u = _lateral(wide, plain)
     seen = wide.straight(s, u)
     floor = min(np.nanmin(seen[:, SEEN_HEIGHT]), plain.f.min()) - BELOW
@@ -110,7 +113,15 @@ def seen_table(pair, plain, backwards=False):
         sections[:, 1] *= -1.0
         sections[:, :, AHEAD] *= -1.0
     geometry = _plain_geometry(pair, plain, u, everywhere)
-    return _with_bounds(SeenTable(float(s[0]), S_STEP, sections, wide.strips(u), geometry, np.zeros(0)))
+    return _with_bounds(SeenTable(float(s[0]), step, sections, wide.strips(u), geometry, np.zeros(0)))
+
+
+def _step_along(rail):
+    """Distance of the nodes along a rail of slices, m, a multiple of `STEP`."""
+    if rail.begins().size or rail.s.size < 2:
+        return S_STEP
+    even = STEP * np.floor(np.diff(rail.s).min() / PER_SLICE / STEP + 1e-9)
+    return float(np.clip(even, S_STEP, LARGEST_STEP))
 
 
 def shape_table(pair, shape):

@@ -37,12 +37,12 @@ STRIDE = 0.05
 class CheckRails(NamedTuple):
     """Check rails, for kernels."""
 
-    rows: np.ndarray  # (n, COLUMNS)
+    rows: np.ndarray  # (k, n, COLUMNS), of each wheelset
 
 
 def no_check_rails():
     """`CheckRails` where there are none."""
-    return CheckRails(np.zeros((0, COLUMNS)))
+    return CheckRails(np.zeros((0, 0, COLUMNS)))
 
 
 @jit(allocates=False)
@@ -87,8 +87,8 @@ def press_check_rails(model, state, work):
     for k in range(work.rail_wrenches.shape[0]):
         s = arc_length_at(model, state, work, k)
         for wheel in range(2):
-            for j in range(rows.shape[0]):
-                check_force(rows[j], s, work.motions[k, wheel], work.rail_wrenches[k, wheel])
+            for j in range(rows.shape[1]):
+                check_force(rows[k, j], s, work.motions[k, wheel], work.rail_wrenches[k, wheel])
 
 
 @jit(allocates=False)
@@ -97,8 +97,8 @@ def shorten_beside(model, state, work, clock, at):
     shorten_step(model, state, work, clock, at)
     for k in range(work.motions.shape[0]):
         speed, s = abs(work.motions[k, 0, MOTION.vx]), arc_length_at(model, state, work, k)
-        for j in range(model.check_rails.rows.shape[0]):
-            row = model.check_rails.rows[j]
+        for j in range(model.check_rails.rows.shape[1]):
+            row = model.check_rails.rows[k, j]
             left = max(row[BEGIN] - row[CHORD] - s, s - row[END] - row[CHORD], STRIDE)
             if speed * clock[at] > left:
                 clock[at] = left / speed

@@ -3,7 +3,8 @@ as it goes.
 
 The kernels of search and patches know one rail profile per wheel. On such a rail it is the section that the wheel sees
 (`wrcore.contact.seen_table`), interpolated for the arc length at which it is, written into the wheel's own arrays
-before its contact is looked for. Where nothing changes nothing is written.
+before its contact is looked for: those blocks of it that the search may look at. Where nothing changes nothing is
+written.
 
 A wheel out of round is a round one on a rail whose sections come again with each turn, as a corrugated rail's do with
 each wave. Its angle is that of rolling
@@ -16,13 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.contact.geometry import MARGIN, RAIL_COSINE, RAIL_RESERVE, SAFETY, SCAN_STEP
+from wrcore.contact.detection import SPATIAL
+from wrcore.contact.geometry import MARGIN, PARTS, RAIL_COSINE, RAIL_RESERVE, SAFETY, SCAN_STEP
 from wrcore.contact.reduction import MAXIMUM
-from wrcore.contact.seen_table import AHEAD, BEND, HEIGHT, PAD, PER_CELL, ROWS, S_STEP, SECOND, SLOPE, STRETCH, U_STEP
-from wrcore.contact.strip import CHANGED, LIFT
+from wrcore.contact.scan import first_zone, leaves_cells, make_window, near_blocks
+from wrcore.contact.seen_table import AHEAD, BEND, HEIGHT, PAD, PER_CELL, ROWS, SECOND, SLOPE, STRETCH, U_STEP
+from wrcore.contact.strip import CHANGED, LIFT, make_pose
 from wrcore.contact.strip import LEAN as LEAN_AHEAD
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.motion import MOTION
+from wrcore.dynamics.flexible_track import displacement
+from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.track import arc_length_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import contact_of
@@ -38,9 +42,15 @@ patches lean with the rail (1) or it is level (0), arc lengths between which sec
 over which these come and go (m), and longest step on all (m)."""
 LAID = 10
 
-PLACE, YAW, IN_STRETCH = range(3)
+BESIDE = 2
+"""Cells on either side of those that are laid whose nodes are."""
+
+BOUNDS = 2 * PARTS
+"""Rows of bounds of gaps per node of the wheel."""
+
+PLACE, YAW, IN_STRETCH, BOUNDS_FROM = range(4)
 """What is known of the section that a wheel's arrays hold: its place in the table, in steps, the yaw it is seen in,
-and its stretch."""
+the stretch whose bounds of gaps are there, and from which row on."""
 
 
 class Crossing(NamedTuple):
@@ -71,7 +81,7 @@ def crossing_of(tables, of_wheels, laid):
 
 def laid_at(table, begin, lead):
     """How the `SeenTable` of a rail is laid under a wheel whose tape circle is ``lead`` (m) from the middle."""
-    return [begin, S_STEP, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, math.inf, 1.0, TRAVEL]
+    return [begin, table.step, len(table.sections) - 1, 0.0, lead, 1.0, -math.inf, math.inf, 1.0, TRAVEL]
 
 
 def laid_under(table, start, angle, radius, shortest):
@@ -106,7 +116,7 @@ def with_own_arrays(geometry):
 
 @jit(allocates=False)
 def lay_sections(model, state, work):
-    """Write the sections that the wheels see, whose motions are in ``work``, into their arrays."""
+    """Write the sections that the wheels see, whose motions are in ``work``, into their arrays: what may touch them."""
     crossing = model.crossing
     for k in range(crossing.tables.shape[0]):
         s = arc_length_at(model, state, work, k)
@@ -114,9 +124,9 @@ def lay_sections(model, state, work):
             table = crossing.tables[k, wheel]
             if table < 0:
                 continue
-            geometry, laid = contact_of(model.contact, k, wheel).geometry, crossing.laid[k, wheel]
-            row, known, last = work.motions[k, wheel], work.seen[k, wheel], laid[LAST]
-            yaw = row[MOTION.side] * row[MOTION.ex]
+            contact, laid = contact_of(model.contact, k, wheel), crossing.laid[k, wheel]
+            geometry, known, last = contact.geometry, work.seen[k, wheel], laid[LAST]
+            yaw = work.motions[k, wheel, MOTION.side] * work.motions[k, wheel, MOTION.ex]
             place, share = _place_of(laid, s + laid[LEAD] * yaw), 1.0
             if laid[PERIOD] > 0.0:
                 share = abs(s - laid[START]) / laid[FADE]
@@ -127,23 +137,44 @@ def lay_sections(model, state, work):
             if not place > 0.0:  # a stage that is not finite, too
                 place = 0.0
             place = min(place, last)
-            if not 0.0 < place < last:
+            changed = 0.0 < place < last
+            if not changed:
                 yaw = 0.0
-            if place == known[PLACE] and yaw == known[YAW]:
-                continue
-            known[PLACE], known[YAW] = place, yaw
-            stretch, geometry.along[0, CHANGED] = 0, 0.0
-            if 0.0 < place < last:
-                stretch, geometry.along[0, CHANGED] = 1 + int(place) // STRETCH, 1.0
-            if stretch != known[IN_STRETCH]:
-                known[IN_STRETCH], gaps = stretch, geometry.zone_gaps
-                for i in range(gaps.shape[0]):
-                    copy_into(gaps[i], crossing.bounds[table, stretch, i])
-            interpolate(
-                crossing.sections[table], crossing.strips[table], laid, place, yaw / laid[STEP], share, work.section,
-                geometry.rail, geometry.along, model.contact.reduction == MAXIMUM,
-            )  # fmt: skip
-            _lay_cells(geometry.rail, geometry.scan_rail)
+            if not (place == known[PLACE] and yaw == known[YAW]):
+                known[PLACE], known[YAW] = place, yaw
+                work.blocks[k, wheel], geometry.along[0, CHANGED] = 0, 1.0 if changed else 0.0
+            stretch = 1 + int(place) // STRETCH if changed else 0
+            blocks = _blocks_at_hand(model, crossing.bounds[table, stretch], stretch, state, k, wheel, work)
+            blocks &= ~work.blocks[k, wheel] & (~np.uint64(0) >> np.uint64(64 - geometry.zone_gaps.shape[1]))
+            work.blocks[k, wheel] |= blocks
+            while blocks > 0:
+                begin, end, blocks = first_zone(blocks, geometry.block)
+                interpolate(
+                    crossing.sections[table], crossing.strips[table], laid, place, yaw / laid[STEP], share,
+                    work.section, geometry, contact.reduction == MAXIMUM, begin, end,
+                )  # fmt: skip
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _blocks_at_hand(model, bounds, stretch, state, k, wheel, work):
+    """Blocks of the scan that the search may look at, a bit for each, where the ``bounds`` of a stretch tell: those
+    near the wheel, and their neighbours; else all. Has these bounds written where the search looks them up."""
+    contact, known = contact_of(model.contact, k, wheel), work.seen[k, wheel]
+    geometry, m = contact.geometry, motion_of(work.motions[k, wheel])
+    y, z = displacement(model, state, k, wheel)
+    pose = make_pose(m.side, m.y - y, m.z - z, m.side * m.ex, m.side * m.ey, m.side * m.ez, True)
+    window, cells = make_window(geometry, pose), geometry.scan_rail.shape[1]
+    node, tell = window.grid.node, stretch > 0 and contact.detection == SPATIAL and not contact.strips.strips
+    tell = tell and not leaves_cells(pose) and 1 <= node < geometry.scan_wheel.shape[1] - cells
+    first, end = (BOUNDS * (node - 1), BOUNDS * (node + 2)) if tell else (0, len(geometry.zone_gaps))
+    if stretch != known[IN_STRETCH] or first != known[BOUNDS_FROM]:
+        known[IN_STRETCH], known[BOUNDS_FROM] = stretch, first
+        for i in range(first, end):
+            copy_into(geometry.zone_gaps[i], bounds[i])
+    if not tell:
+        return ~np.uint64(0)
+    near = near_blocks(geometry, window)
+    return near | near << np.uint64(1) | near >> np.uint64(1)
 
 
 @jit(allocates=False, forceinline=True)
@@ -154,11 +185,14 @@ def _place_of(laid, s):
 
 
 @jit(allocates=False)
-def interpolate(sections, strips, laid, place, yaw, share, scratch, rail, along, curved):
-    """Write the section at a place, for a wheel that yaws by so many steps per metre, into the nodes of a rail; with
-    second derivatives if it is ``curved``. Below a ``share`` of 1 it goes over into the plain rail. ``scratch`` is
-    (ROWS + 4, m)."""
-    last, begin, size = int(laid[LAST]) - 1, 0, rail.shape[0]
+def interpolate(sections, strips, laid, place, yaw, share, scratch, geometry, curved, low, high):
+    """Write the section at a place, for a wheel that yaws by so many steps per metre, into the cells of the scan from
+    ``low`` to before ``high`` and into the nodes there; with second derivatives if it is ``curved``. Below a ``share``
+    of 1 it goes over into the plain rail. ``scratch`` is (ROWS + 4, m)."""
+    rail, along, cells = geometry.rail, geometry.along, (geometry.rail.shape[0] - 1) // PER_CELL
+    low, high = max(int(low) - MARGIN, 0), min(int(high) - MARGIN, cells)
+    first, size = PER_CELL * max(low - BESIDE, 0), min(PER_CELL * (high + BESIDE) + 2, rail.shape[0])
+    last, begin = int(laid[LAST]) - 1, first
     while begin < size:  # runs of nodes between the same two sections
         i, end = _step_of(place + yaw * strips[1, begin], last), begin + 1
         while end < size and _step_of(place + yaw * strips[1, end], last) == i:
@@ -170,10 +204,11 @@ def interpolate(sections, strips, laid, place, yaw, share, scratch, rail, along,
                      scratch[ROWS:], begin, end, scratch[row])  # fmt: skip
         begin = end
     if 0.0 < share < 1.0:
-        _fade(sections[0, 0], share * share * (3.0 - 2.0 * share), size, scratch)
-    _lay_nodes(strips[0], scratch, rail, along, curved)
+        _fade(sections[0, 0], share * share * (3.0 - 2.0 * share), first, size, scratch)
+    _lay_nodes(strips[0], scratch, rail, along, curved, first, size)
     if laid[LEAN] == 0.0:
-        _keep_level(sections[0, 0, HEIGHT], rail, along)
+        _keep_level(sections[0, 0, HEIGHT], rail, along, first, size)
+    _lay_cells(rail, geometry.scan_rail, low, high)
 
 
 @jit(allocates=False, forceinline=True)
@@ -199,24 +234,24 @@ def _mix(low, high, low_rate, high_rate, weights, begin, end, out):
 
 
 @jit(allocates=False)
-def _fade(plain, share, size, section):
+def _fade(plain, share, first, end, section):
     """Leave a ``share`` of what a section has more than the plain rail's."""
     for row in range(ROWS):
-        for j in range(size):
+        for j in range(first, end):
             section[row, j] = plain[row, j] + share * (section[row, j] - plain[row, j])
 
 
 @jit(allocates=False)
-def _keep_level(plain, rail, along):
+def _keep_level(plain, rail, along, first, end):
     """Have the wheel out of round touch a rail that is no higher than it is, and level."""
-    for j in range(rail.shape[0]):
+    for j in range(first, end):
         along[j, LIFT], along[j, LEAN_AHEAD] = plain[j] - rail[j, 0], 0.0
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _lay_nodes(curvatures, section, rail, along, curved):
+def _lay_nodes(curvatures, section, rail, along, curved, first, end):
     """Write a section into the nodes of a rail."""
-    for j in range(np.uint64(rail.shape[0])):
+    for j in range(np.uint64(first), np.uint64(end)):
         rail[j, 0], rail[j, 1] = section[HEIGHT, j], section[SLOPE, j]
         x, curvature = section[AHEAD, j], curvatures[j]
         square = (curvature * x) * (curvature * x)
@@ -228,24 +263,26 @@ def _lay_nodes(curvatures, section, rail, along, curved):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _lay_cells(rail, scan_rail):
-    """Write the cells of the scan: cubics through the nodes at their ends, reserves and inclinations."""
+def _lay_cells(rail, scan_rail, low, high):
+    """Write cells of the scan, from ``low`` to before ``high``: cubics through the nodes at their ends, reserves and
+    inclinations."""
     cells = (rail.shape[0] - 1) // PER_CELL
     inverse = 1.0 / SCAN_STEP
     before = here = 0.0
-    for k in range(cells + 1):
+    for k in range(max(low - 1, 0), min(high, cells) + 1):
         beyond, at = 0.0, MARGIN + k
         if k < cells:
-            low, high = rail[PER_CELL * k], rail[PER_CELL * (k + 1)]
-            rise = (high[0] - low[0]) * inverse
-            scan_rail[0, at], scan_rail[1, at] = low[0], low[1]
-            scan_rail[2, at] = (3.0 * rise - 2.0 * low[1] - high[1]) * inverse
-            scan_rail[3, at] = (low[1] + high[1] - 2.0 * rise) * inverse * inverse
-            mean = 0.5 * (low[1] + high[1])
-            scan_rail[RAIL_COSINE, at] = 1.0 / math.sqrt(1.0 + mean * mean)
             for j in range(PER_CELL):
                 beyond = max(beyond, abs(rail[PER_CELL * k + j + 1, 1] - rail[PER_CELL * k + j, 1]))
-        if k > 0:
+        if low <= k < high:
+            start, end = rail[PER_CELL * k], rail[PER_CELL * (k + 1)]
+            rise = (end[0] - start[0]) * inverse
+            scan_rail[0, at], scan_rail[1, at] = start[0], start[1]
+            scan_rail[2, at] = (3.0 * rise - 2.0 * start[1] - end[1]) * inverse
+            scan_rail[3, at] = (start[1] + end[1] - 2.0 * rise) * inverse * inverse
+            mean = 0.5 * (start[1] + end[1])
+            scan_rail[RAIL_COSINE, at] = 1.0 / math.sqrt(1.0 + mean * mean)
+        if k > low:
             largest = max(before, here, beyond) / U_STEP
             scan_rail[RAIL_RESERVE, at - 1] = SAFETY * 0.125 * SCAN_STEP * SCAN_STEP * largest
         before, here = here, beyond

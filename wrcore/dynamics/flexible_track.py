@@ -111,6 +111,18 @@ def rails_at(model, state, k):
     return state[track_places(model)[k, :RAILS]].reshape(2, 2)
 
 
+@jit(allocates=False, forceinline=True)
+def displacement(model, state, k, wheel):
+    """How far the rail under a wheel is displaced to the left and up, m."""
+    track = model.flexible_track
+    d = track.mass.shape[0]
+    if d == 0:
+        return 0.0, 0.0
+    size = d if track.mass[0] == 0.0 else 2 * d
+    at = STATE_SIZE * model.bodies.mass.shape[0] + track.first + size * k + 2 * wheel
+    return state[at], state[at + 1]
+
+
 @jit(allocates=False)
 def flexible_wrenches(model, state, work, rate, mode):
     """Wrenches of the rails on all wheels, as by the kernel of the wheels, and the rates of the track's states, written
@@ -122,7 +134,7 @@ def flexible_wrenches(model, state, work, rate, mode):
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
             at, motion = first + size * k + i, work.motions[k, i // 2]
-            motion[MOTION.y + i % 2] -= state[at]
+            motion[MOTION.y + i % 2] -= displacement(model, state, k, i // 2)[i % 2]
             scratch.ground[k, i] = motion[MOTION.vy + i % 2]
             scratch.speeds[k, i] = 0.0 if massless else state[at + d]
     c = work.counters

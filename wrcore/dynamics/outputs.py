@@ -42,8 +42,9 @@ def _fill_check_rails(times, states, equations, model, work, rate, wrench, force
         for k in range(forces.shape[1]):
             s = arc_length_at(model, states[i], work, k)
             for wheel in range(2):
-                for j in range(model.check_rails.rows.shape[0]):
-                    forces[i, k, wheel] += check_force(model.check_rails.rows[j], s, work.motions[k, wheel], wrench)
+                for j in range(model.check_rails.rows.shape[1]):
+                    row, motion = model.check_rails.rows[k, j], work.motions[k, wheel]
+                    forces[i, k, wheel] += check_force(row, s, motion, wrench)
 
 
 def check_rail_history(equations, times, states):

@@ -124,7 +124,8 @@ class Workspace(NamedTuple):
     flexible_track: FlexibleTrackWork
     control: ControlWork
     principal: np.ndarray  # (n, 3, 3): principal axes of the bodies, where they have ``Bodies.axes``
-    seen: np.ndarray  # (k, 2, 3): which sections of rails that change the wheels' arrays hold
+    seen: np.ndarray  # (k, 2, 4): which sections of rails that change the wheels' arrays hold
+    blocks: np.ndarray  # (k, 2) unsigned: which blocks of these, a bit for each
     section: np.ndarray  # (ROWS + 4, m): scratch of :mod:`wrcore.dynamics.crossing`
 
 
@@ -148,7 +149,8 @@ def workspace(model):
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(COUNTERS, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
-        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 3), np.nan),
+        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 4), np.nan),
+        np.zeros((len(model.crossing.tables), 2), np.uint64),
         np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),
     )  # fmt: skip
 

@@ -11,8 +11,10 @@ import math
 
 import numpy as np
 
+from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.contact_blocks import contacts_alone
 from wrcore.dynamics.contract import places
+from wrcore.dynamics.crossing import BEGIN, LAST, PERIOD, STEP, STRIDE
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.integrate.jacobian import plan_sweep
@@ -27,6 +29,9 @@ which a step renews the contacts' part. Where it renews all, that costs the eval
 
 STEPS_PER_METRE, ON_FLEXIBLE_TRACK = 6.5, 9.0
 """Of Rodas4P2, on irregular rails or with wheelsets that may hunt."""
+
+PER_METRE_ON_CHANGING_RAILS = 60.0
+"""The same where a wheelset passes rails that change, a crossing say: those of an impact."""
 
 PASSES, SETTLED, DISTURBANCE = 30, 10, 1e-8
 """Evaluations for the fastest rate, those that count, and the size of the disturbance in m (velocities, angles: as in
@@ -51,15 +56,31 @@ def fastest_rate(model, equations, t, state):
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
 
 
+def steps_on_changing_rails(model, start):
+    """Steps of Rodas4P2 per metre, up to where all wheelsets have passed, for rails that change and wheels out of
+    round."""
+    strides, passed, after = 0.0, 0.0, 0.0
+    for k, tables in enumerate(model.crossing.tables):
+        s, longest = start[STATE_SIZE * model.bodies.wheelsets[k]], 0.0
+        for table, laid in zip(tables, model.crossing.laid[k], strict=True):
+            if table >= 0 and laid[PERIOD] > 0.0:
+                strides = max(strides, 1.0 / laid[STRIDE])
+            elif table >= 0 and laid[BEGIN] + laid[STEP] * laid[LAST] > s:
+                longest = max(longest, laid[STEP] * laid[LAST])
+                after = max(after, laid[BEGIN] + laid[STEP] * laid[LAST] - s)
+        passed += longest
+    return strides + (PER_METRE_ON_CHANGING_RAILS * passed / after if after > 0.0 else 0.0)
+
+
 def cheaper_method(model, equations, t, state, longest_step):
     """``rodas4p2`` or ``tsit5``, whichever takes less for a run from a state with steps up to ``longest_step`` (s)."""
     bodies = model.bodies
     if may_drive(model):  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4p2"
     rough, cost = model.track.irregularity.coefficients.shape[0] > 0, STIFF + JACOBIAN
-    excited = rough or len(bodies.wheelsets) == len(bodies.mass)
+    excited, changing = rough or len(bodies.wheelsets) == len(bodies.mass), steps_on_changing_rails(model, state)
     per_metre = ON_FLEXIBLE_TRACK if rough and len(model.flexible_track.mass) else STEPS_PER_METRE
-    steps = 1.0 / longest_step + (per_metre * model.speed if excited else 0.0)
-    if rough and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps than that
+    steps = 1.0 / longest_step + ((per_metre if excited else 0.0) + changing) * model.speed
+    if (rough or changing) and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps
         cost += len(plan_sweep(model).starts)
     return "tsit5" if EXPLICIT * fastest_rate(model, equations, t, state) / STABLE < cost * steps else "rodas4p2"

@@ -9,29 +9,35 @@ from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
 
 
-def read_check_rails(data, pair, source):
-    """`CheckRails` of a scene's content, checked against the schema, for wheels of one `WheelOnRail`."""
-    rows = []
-    for k, spec in enumerate(data["track"].get("check_rails", ())):
-        field = f"track.check_rails[{k}]"
-        flare, face = spec["flare"], 0.5 * data["track"]["gauge"] - spec["flangeway"]
-        if not 2.0 * flare["length"] <= spec["length"]:
-            expected = f"expected at least two flares of {flare['length']:g} m, got {spec['length']:g} m"
-            raise InputError(source, f"{field}.length", expected)
-        radius = pair.rolling_radius - pair.wheel.f[0]
-        down, back = pair.rolling_radius - spec["top"], 0.5 * spec["back_to_back"]
-        if not radius > down:
-            expected = f"expected more than {1e3 * pair.wheel.f[0]:.1f} mm, down to where the wheel's profile ends"
-            raise InputError(source, f"{field}.top", f"{expected}, got {1e3 * spec['top']:g} mm")
-        if not face < back:
-            least = 0.5 * data["track"]["gauge"] - back
-            expected = f"expected more than {1e3 * least:.1f} mm, so that it does not press a wheelset in the middle"
-            raise InputError(source, f"{field}.flangeway", f"{expected}, got {1e3 * spec['flangeway']:g} mm")
-        rows.append((
-            SIDES[spec["rail"]], spec["begin"], spec["begin"] + spec["length"], face, flare["length"], flare["opening"],
-            back, math.sqrt(radius**2 - down**2), down, spec["stiffness"], spec["friction"],
-        ))  # fmt: skip
-    if rows and "energy" in data["output"]["channels"]:
+def read_check_rails(data, pairs, source):
+    """`CheckRails` of a scene's content, checked against the schema, for the `WheelOnRail` of all wheels."""
+    specs = data["track"].get("check_rails", ())
+    rows = [
+        [_row(data["track"], spec, pair[list(SIDES).index(spec["rail"])], source, f"track.check_rails[{k}]")
+         for k, spec in enumerate(specs)] for pair in zip(pairs[::2], pairs[1::2], strict=True)
+    ]  # fmt: skip
+    if specs and "energy" in data["output"]["channels"]:
         expected = "expected no energy with track.check_rails, whose friction has no account"
         raise InputError(source, "output.channels", f"{expected}, got energy")
-    return CheckRails(np.array(rows, float)) if rows else no_check_rails()
+    return CheckRails(np.array(rows, float)) if specs else no_check_rails()
+
+
+def _row(track, spec, pair, source, field):
+    """Of a check rail beside the wheel of a `WheelOnRail`."""
+    flare, face = spec["flare"], 0.5 * track["gauge"] - spec["flangeway"]
+    if not 2.0 * flare["length"] <= spec["length"]:
+        expected = f"expected at least two flares of {flare['length']:g} m, got {spec['length']:g} m"
+        raise InputError(source, f"{field}.length", expected)
+    radius = pair.rolling_radius - pair.wheel.f[0]
+    down, back = pair.rolling_radius - spec["top"], 0.5 * spec["back_to_back"]
+    if not radius > down:
+        expected = f"expected more than {1e3 * pair.wheel.f[0]:.1f} mm, down to where the wheel's profile ends"
+        raise InputError(source, f"{field}.top", f"{expected}, got {1e3 * spec['top']:g} mm")
+    if not face < back:
+        least = 0.5 * track["gauge"] - back
+        expected = f"expected more than {1e3 * least:.1f} mm, so that it does not press a wheelset in the middle"
+        raise InputError(source, f"{field}.flangeway", f"{expected}, got {1e3 * spec['flangeway']:g} mm")
+    return (
+        SIDES[spec["rail"]], spec["begin"], spec["begin"] + spec["length"], face, flare["length"], flare["opening"],
+        back, math.sqrt(radius**2 - down**2), down, spec["stiffness"], spec["friction"],
+    )  # fmt: skip

@@ -16,6 +16,7 @@ from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.crossing import Crossing
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
+from wrcore.geometry.switch import Switch
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
 from wrcore.kernels.told import warn_once
@@ -97,7 +98,12 @@ def _slices(spec, folder, source) -> RailSlices:
             raise InputError(
                 source, field, f"expected a crossing from 1/30 to 1/5, such as crossing:1/12, got {spec!r}"
             )
-        return Crossing(angle).rail()
+        return Crossing(angle).rail(f"crossing:1/{1.0 / angle:g}")
+    if kind == "switch" and colon:
+        radius = parse_ratio(value)
+        if not 100.0 <= radius <= 5000.0:
+            raise InputError(source, field, f"expected a switch of 100 to 5000 m, such as switch:500, got {spec!r}")
+        return Switch(radius).rail(f"switch:{radius:g}")
     how = spec if isinstance(spec, dict) else {"slices": spec}
     if not isinstance(how.get("slices"), str):
         raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")
@@ -138,12 +144,15 @@ def _check_surface(slices, source):
 
 
 def _warn_of_swings(slices, source):
-    """Say where the splines through the slices leave the heights of both neighbours."""
+    """Say where the splines through the slices leave the heights of both neighbours; a notch between two heads, which
+    moves along, is none."""
     u, worst = np.arange(RUNNING[0], RUNNING[1], 1e-3), (0.0, 0.0)
     for part in np.array_split(np.arange(slices.s.size - 1), math.ceil(slices.s.size / 500)):
         ends, middle = slices.s[[part, part + 1]], 0.5 * (slices.s[part] + slices.s[part + 1])
         (low, high), f = (slices.heights(at, u)[0] for at in ends), slices.heights(middle, u)[0]
-        out = np.maximum(np.minimum(low, high) - f, f - np.maximum(low, high))
+        top = np.max(f, axis=1, where=np.isfinite(f), initial=-np.inf)
+        under = np.where(f > top[:, None] - CROWN, np.minimum(low, high) - f, 0.0)
+        out = np.maximum(under, f - np.maximum(low, high))
         out = np.max(out, axis=1, where=np.isfinite(out) & (f > RUNNING[2]), initial=0.0)
         worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
     if worst[0] > SWING:

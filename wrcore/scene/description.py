@@ -187,7 +187,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     data["track"] = validate(data["track"], "track", source)
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
-    read_check_rails(data, (pairs or _alike(vehicle, wheel, rail, track))[0], source)
+    read_check_rails(data, pairs or _alike(vehicle, wheel, rail, track), source)
     crossing = read_crossing(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
     shapes = read_out_of_round(data, vehicle, pairs, crossing, folder, source)
     corrugation = read_corrugation(data, crossing, shapes, source)
@@ -353,8 +353,8 @@ def compile_scene(
     friction = read_friction(contact["friction"], scene.source, folder)
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
+    pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
     if any(changing):
-        pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
         starts = vehicle.positions[vehicle.bodies.wheelsets, 0]
         geometries, crossing = _kept(shared, "crossing", parts, lambda: seen_by_wheels(*changing, pairs, starts))
         geometry, plain = geometries[0], tuple(pair.geometry for pair in pairs)  # of the type of all
@@ -385,7 +385,7 @@ def compile_scene(
         friction=friction.rails, flexible_track=support,
         drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
         controls=read_controls(data, vehicle, folder, scene.source), crossing=crossing,
-        check_rails=read_check_rails(data, scene.pairs[0] if scene.pairs else scene.alike, scene.source),
+        check_rails=read_check_rails(data, pairs, scene.source),
     )  # fmt: skip
     decisive = (
         parts, scene.detection, contact["detection_tolerance"], contact["patch"], *material.values(),

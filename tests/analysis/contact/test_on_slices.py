@@ -17,7 +17,7 @@ from wrcore.contact.seen_rail import WINDOW, WheelOnSlices
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.errors import InputError
 from wrcore.geometry import slices
-from wrcore.geometry.crossing import Crossing, write_crossing
+from wrcore.geometry.crossing import Crossing
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.profile_files import read_profile
 from wrcore.geometry.slice_files import read_slices
@@ -131,7 +131,7 @@ def test_a_rail_that_leaves_is_a_wheelset_that_turns(tmp_path):
 
 def test_load_goes_over_from_the_wing_to_the_nose(tmp_path):
     made = Crossing()
-    slices, offset = read_slices(write_crossing(tmp_path)).placed()
+    slices, offset = read_slices(Crossing().write(tmp_path, "crossing.csv")).placed()
     assert list(slices.begins()) == [pytest.approx(made.nose_begins, abs=1e-6)]
     wheels = LoadedOnSlices(
         WheelOnSlices(named_profile("S1002", "wheel"), slices, rail_distance=0.7175 + offset), "moment"
@@ -154,7 +154,7 @@ def test_load_goes_over_from_the_wing_to_the_nose(tmp_path):
 def test_exact_load_goes_over_without_a_jump():
     # under 54.5 kN it goes over within some 9 mm: 1.1 to 1.2 % per 0.1 mm, evenly
     made, plain = Crossing(), named_profile("60E1", "rail", 0.0)
-    slices, distance = made.rail().along(plain), 0.7175 + plain.gauge_offset()
+    slices, distance = made.rail("crossing").along(plain), 0.7175 + plain.gauge_offset()
     wheels = LoadedOnSlices(WheelOnSlices(named_profile("S1002", "wheel"), slices, rail_distance=distance))
     load, shares = 54546.0, []
     for wheels.s in 0.7305 + 1e-4 * np.arange(11):
@@ -168,7 +168,7 @@ def test_exact_load_goes_over_without_a_jump():
 
 
 def test_heads_begin_and_end_at_slices(tmp_path):
-    slices = read_slices(write_crossing(tmp_path))
+    slices = read_slices(Crossing().write(tmp_path, "crossing.csv"))
     begin = Crossing().nose_begins
     assert [len(slices.heads(s)) for s in (-1.0, begin - 1e-3, begin + 0.01)] == [1, 1, 2]
     assert "parts begin or end at s = 0.672 m" in slices.source

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.signal import find_peaks
 
 from wrcore.analysis.assessment.wheels import wheelsets_of
 from wrcore.analysis.pictures.plot_run import COLORS
@@ -20,6 +21,9 @@ LEAST = 1.0
 
 COARSE, NODES = 0.01, 8 * SPACING
 """Distances along and across at which heads are looked at, m."""
+
+NOTCH = 5e-4
+"""Depth of a notch that parts heads which lie against each other, m."""
 
 
 @checked
@@ -119,7 +123,9 @@ class _Passage:
         low = min(sheet.points[:, 0].min() for sheet in self.slices.sheets)
         high = max(sheet.points[:, 0].max() for sheet in self.slices.sheets)
         u = np.arange(low, high, NODES)
-        there = np.isfinite(self.slices.heights(self._turn * (s - self._at), u)[0, 0])
+        f = self.slices.heights(self._turn * (s - self._at), u)[0, 0]
+        there = np.isfinite(f)
+        there[find_peaks(-np.where(there, f, -1.0), prominence=NOTCH)[0]] = False
         return u[np.flatnonzero(np.diff(there.astype(int), prepend=0, append=0)).reshape(-1, 2) - [0, 1]]
 
     def _heads(self, u):
