@@ -627,6 +627,19 @@ def test_another_profile_or_friction_is_another_table(own_cache, benchmark_pair)
     assert len({pair_store.pair_of(one).path for one in (contact, changed, slippery, coarse)}) == 4
 
 
+def test_gauge_and_vehicle_are_not_of_the_table(own_cache, benchmark_pair):
+    # a node solved with other distances from the middle of the track is the same but for rounding
+    contact = LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value
+    elsewhere = benchmark_pair._replace(half_distance=0.7, rail_distance=0.73)
+    shared = pair_store.pair_of(contact)
+    assert pair_store.pair_of(contact._replace(geometry=elsewhere)) is shared
+    moved = pair_store.Pair(shared.contact._replace(geometry=elsewhere), "elsewhere")
+    codes = [code for code, numbers in shipped_pair()._solved_at.items() if np.isfinite(numbers[0])]
+    for code in codes[:: len(codes) // 6]:
+        own, other = (pair._at(code) for pair in (shared, moved))
+        np.testing.assert_array_less(abs(own - other), np.where(np.isin(np.arange(NUMBERS), METRES), 1e-6, 1e-3))
+
+
 def test_a_run_beside_the_exact_one():
     table = simulated(0.3)
     run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.3, "contact.patch": "exact"})
