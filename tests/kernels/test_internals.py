@@ -21,7 +21,8 @@ INTERNALS = (
     "numba.core.cgutils.unpack_tuple", "numba.core.imputils.lower_builtin",
     "numba.core.imputils.lower_getattr_generic", "numba.core.registry.cpu_target",
     "numba.core.typing.templates.infer_global", "numba.core.typing.templates.infer_getattr",
-    "numba.core.typing.templates.AttributeTemplate", "numba.extending.intrinsic", "numba.extending.NativeValue",
+    "numba.core.typing.templates.AttributeTemplate", "numba.np.numpy_support.from_dtype",
+    "numba.np.numpy_support.map_layout", "numba.extending.intrinsic", "numba.extending.NativeValue",
 )  # fmt: skip
 
 
@@ -49,6 +50,13 @@ def test_a_kernel_has_an_address_and_a_handle_a_type():
 
     assert Kernel(fill, np.zeros(1)).address > 0
     assert "Reference" in str(Handle((np.zeros(1), 1.0))._numba_type_)
+
+
+def test_the_type_of_an_array_needs_no_masked_ones():
+    code = "import numpy as np, sys; from wrcore.kernels.handles import Handle; handle = Handle((np.zeros(2)[::-1], 1))"
+    code += "; print(handle._numba_type_.target, 'numpy.ma' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert found.split("\n")[0] == "Tuple(array(float64, 1d, A), int64) False"
 
 
 def test_a_handle_holds_what_a_kernel_would_write():

@@ -1,9 +1,9 @@
 """Pair tables in memory and on disk: nodes are solved where a run first needs them, and kept.
 
 What a table's numbers depend on (both surfaces, material, friction, strips, creep table, modes, and the sources of all
-kernels) is in its file's name; gauge and vehicle are not. A node depends on its place alone, and whether a cell may be looked
-up on its nodes and on an exact solution in its middle: a run gives the same numbers on a full table and on an empty
-one. Nodes and cells that the examples meet come with the package, for the pair of profiles of most of them.
+kernels) is in its file's name; gauge and vehicle are not. A node depends on its place alone, and whether a cell may be
+looked up on its nodes and on an exact solution in its middle: a run gives the same numbers on a full table and on an
+empty one. Nodes and cells that the examples meet come with the package, for the pair of profiles of most of them.
 """
 
 import atexit

@@ -17,7 +17,8 @@ from numba.core.errors import TypingError
 from numba.core.imputils import lower_getattr_generic
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import NativeValue, intrinsic, models, register_model, unbox
+from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
+from numba.np.numpy_support import from_dtype, map_layout
 
 from wrcore.kernels.aside import planned
 from wrcore.kernels.jit import jit
@@ -137,6 +138,17 @@ def other_at(_, reference, address):
         return builder.select(itself, arguments[0], builder.inttoptr(arguments[1], arguments[0].type))
 
     return reference(reference, types.int64), generate
+
+
+_TYPE_OF_ARRAY = typeof_impl.dispatch(np.ndarray)
+
+
+@typeof_impl.register(np.ndarray)
+def _type_of_array(value, context):
+    """Type of an array, as numba's own, which imports all of numpy.ma (40 ms) to ask whether it is one of that."""
+    if type(value) is not np.ndarray or value.dtype.kind not in "biuf":
+        return _TYPE_OF_ARRAY(value, context)
+    return types.Array(from_dtype(value.dtype), value.ndim, map_layout(value), readonly=not value.flags.writeable)
 
 
 class Handle:
