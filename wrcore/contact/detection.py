@@ -126,11 +126,12 @@ def _search(geometry, pose, grid, reduction, first_close, last_close, patches, c
     inside = False
     outside = first = last = deepest = begin
     depth = m0 = m1 = m2 = 0.0
-    two_back, one_back, two_back_at, one_back_at, before = 1.0, 1.0, begin, begin, 1.0
     least, most = 0, cells
     if exact:
         least, most = cells - grid.node, wheel.shape[1] - cells - grid.node
     k = max(first_close - 1, least)
+    two_back, one_back, before = 1.0, 1.0, 1.0
+    two_back_at, one_back_at = begin + (k - 2) * SCAN_STEP, begin + (k - 1) * SCAN_STEP
     end = min(last_close + 2, most)
     while k < end:
         here = begin + k * SCAN_STEP

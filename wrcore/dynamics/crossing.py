@@ -165,7 +165,7 @@ def _blocks_at_hand(model, bounds, stretch, state, k, wheel, work):
     pose = make_pose(m.side, m.y - y, m.z - z, m.side * m.ex, m.side * m.ey, m.side * m.ez, True)
     window, cells = make_window(geometry, pose), geometry.scan_rail.shape[1]
     node, tell = window.grid.node, stretch > 0 and contact.detection == SPATIAL and not contact.strips.strips
-    tell = tell and not leaves_cells(pose) and 1 <= node < geometry.scan_wheel.shape[1] - cells
+    tell = tell and not leaves_cells(pose) and 2 <= node < geometry.scan_wheel.shape[1] - cells
     first, end = (BOUNDS * (node - 1), BOUNDS * (node + 2)) if tell else (0, len(geometry.zone_gaps))
     if stretch != known[IN_STRETCH] or first != known[BOUNDS_FROM]:
         known[IN_STRETCH], known[BOUNDS_FROM] = stretch, first
