@@ -33,11 +33,12 @@ def test_stability_functions_against_known_limits():
 def test_errors_fall_with_the_tolerance(vehicles, assert_passed):
     methods = ["tsit5", "rk45", "rk23", "rk4", "rodas4", "rodas4p2", "ros34pw2"]
     found, curve = tolerance_ladder(
-        vehicles, ["suspended wheelset"], 20.0, [1e-1, 1e-4, 1e-6], methods, ["spatial"], 0.5
+        vehicles, ["suspended wheelset"], 20.0, [1e-1, 1e-4, 1e-7], methods, ["spatial"], 0.5
     )
     assert_passed(found)
     errors = {(row["integrator"], row["rtol"]): row["error_m"] for row in curve}
-    assert all(errors[method, 1e-6] < 0.1 * errors[method, 1e-4] for method in methods)
+    # at 1e-4 it is stability that bounds the steps of explicit methods: what they err by begins to fall below that
+    assert all(errors[method, 1e-7] < 0.1 * errors[method, 1e-4] for method in methods)
 
 
 def test_the_largest_stable_step_is_that_of_the_linearised_motion(vehicles, assert_passed):

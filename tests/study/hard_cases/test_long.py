@@ -21,7 +21,7 @@ def test_a_limit_cycle_stays_what_it_is():
     rows = checks(80.0)  # what joining the blocks takes is 3 % of a block's memory there, and 5 % of one half as long
     assert len(rows) == 6 and all(row["passed"] for row in rows.values()), rows
     first = next(iter(rows.values()))
-    assert (first["status"], first["simulated_s"], first["integrator"]) == ("completed", 80.0, "tsit5")
+    assert (first["status"], first["simulated_s"], first["integrator"]) == ("completed", 80.0, "rk4")
 
 
 def test_a_bit_that_differs_is_noticed(monkeypatch):
