@@ -52,9 +52,22 @@ def test_it_presses_a_back_as_a_spring_and_rubs_on_it():
 
 def test_each_wheel_is_touched_where_its_own_back_ends():
     changes = {"track.check_rails": [RAIL], "wheel.wheelsets": {"wheelset_2": {"left": {"rolling_radius": 0.44}}}}
+    wrenches, yaw = [], 0.004
+    for rails in ([RAIL | {"begin": -100.0, "friction": 0.0}], []):
+        scene = load_scene(SCENES / "trailer_vehicle.yaml", changes | {"track.check_rails": rails})
+        model, state = compile_scene(scene)
+        for at in STATE_SIZE * model.bodies.wheelsets:
+            state[at + 1], state[at + 3 : at + 7] = FACE, (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+        equations = Equations(model)
+        equations(0.0, state)
+        wrenches.append(equations.work.rail_wrenches[:, 0, 1].copy())
     model, _ = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", changes))
     chords = [math.sqrt((r + REACH) ** 2 - (r - TOP) ** 2) for r in (RADIUS, 0.44, RADIUS, RADIUS)]
     np.testing.assert_allclose(model.check_rails.rows[:, 0, CHORD], chords, rtol=1e-12)
+    depths = math.tan(yaw) * np.array(chords) - 0.680 * (
+        1.0 / math.cos(yaw) - 1.0
+    )  # of the point ahead; that behind: none
+    np.testing.assert_allclose(wrenches[0] - wrenches[1], 0.5 * STIFFNESS * depths, rtol=1e-4)
     np.testing.assert_allclose(model.check_rails.rows[:, 0, DOWN], [RADIUS - TOP, 0.44 - TOP] + 2 * [RADIUS - TOP])
 
 

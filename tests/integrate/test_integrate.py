@@ -203,6 +203,8 @@ def test_auto_takes_what_the_scene_needs(wheelset):
         ("suspended_wheelset", ["speed=50", ballast], "rodas4p2"),
         ("suspended_wheelset", ["speed=50", ballast, rough], "rk4"),  # a whole Jacobian, and that in each step
         ("metro_car", ["speed=60"], "rk4"),
+        ("crossing", [], "rk4"),  # impacts want short steps
+        ("crossing", ["track.crossing.at=1000"], "rodas4p2"),  # far off
     ):
         model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", overrides))
         assert integrate(model, start, [0.0, 1e-3]).method == expected, (scene, overrides)

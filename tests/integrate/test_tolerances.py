@@ -51,6 +51,18 @@ def test_bodies_lighter_than_a_wheelset_may_err_by_equal_energy():
     assert np.all(lightness(model.bodies._replace(wheelsets=model.bodies.wheelsets[:0])) == 1.0)
 
 
+def test_rails_without_mass_may_err_by_a_tenth_where_steps_are_explicit():
+    rail = {side: {"stiffness": 8e7, "damping": 6e4} for side in ("lateral", "vertical")}
+    for mass, share in (({}, 0.1), ({"mass": 79.0}, 1.0)):
+        support = {"track.support": {"rail": rail | mass}}
+        model, _ = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", support))
+        of_rails, of_body = slice(STATE_SIZE, STATE_SIZE + 4), slice(0, 3)
+        for method, own in (("rk4", share), ("tsit5", share), ("rodas4p2", 1.0)):
+            allowed = step_tolerances(model, 1e-4, method=method)[0]
+            np.testing.assert_allclose(allowed[of_body], SHARE.get(method, 1.0) * 1e-4 * LENGTH)
+            np.testing.assert_allclose(allowed[of_rails], own * allowed[0])
+
+
 def test_velocities_count_by_the_speed_of_the_slowest_wheelset_in_the_step():
     model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", {"speed": 20.0}))
     front, rear = (STATE_SIZE * body for body in model.bodies.wheelsets[[0, -1]])
