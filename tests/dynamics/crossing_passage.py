@@ -23,6 +23,12 @@ TRAILER = {
 }  # fmt: skip
 SWITCH = {"track.crossing.slices": "switch:500", "integration.duration": 1.0}
 OFF = {"track.path": [{"tangent": 5.75}, {"transition": 0.5}, {"curve": 100.0, "radius": 500.0}]}
+TURNOUT = {
+    "track.crossing": [{"slices": "switch:190", "at": 6.0}, {"slices": "crossing:1/9", "at": 29.07}],
+    "speed": 10.0, "integration.duration": 3.3,
+}  # fmt: skip
+DIVERGING = {"track.path": [{"tangent": 5.75}, {"transition": 0.5}, {"curve": 20.6, "radius": 190.0},
+                            {"transition": 0.5}, {"tangent": 50.0}]}  # fmt: skip
 CASES = {
     "suspended wheelset, facing": {},
     "suspended wheelset, trailing": {"track.crossing.reversed": True, "track.crossing.at": 7.5},
@@ -31,6 +37,8 @@ CASES = {
     "trailer vehicle, trailing": TRAILER | {"track.crossing.reversed": True, "track.crossing.at": 15.5},
     "switch, suspended wheelset, through": SWITCH,
     "switch, suspended wheelset, leaving": SWITCH | OFF,
+    "turnout at 10 m/s, suspended wheelset, through": TURNOUT,
+    "turnout at 10 m/s, suspended wheelset, leaving": TURNOUT | DIVERGING,
 }
 
 
@@ -52,7 +60,7 @@ def cost(changes):
     plain = copy.deepcopy(scene.data)
     del plain["track"]["crossing"]
     plain["vehicle"]["parameters"] = str(SCENES.parent / plain["vehicle"]["parameters"])
-    low, high = scene.crossing.ends
+    low, high = scene.crossings[0].ends
     inside = (high - low) * len(scene.vehicle.wheelset_names)
     walls = [min(simulate(load_scene(one)).counters["wall_s"] for _ in range(5)) for one in (plain, scene)]
     whole = scene.data["speed"] * scene.data["integration"]["duration"]

@@ -298,6 +298,64 @@ def test_a_crossing_is_the_same_for_the_route_that_leaves():
     np.testing.assert_allclose(runs[0]["wheelset"]["z_m"], runs[1]["wheelset"]["z_m"], rtol=0.0, atol=2e-6)
 
 
+NOSE = {"slices": "crossing:1/12", "at": 6.0, "rail": "right"}
+
+
+def test_stretches_of_a_rail_are_each_what_it_is_alone():
+    # in any order of listing, poses back and forth; before the second stretch nothing of it is felt
+    blade = NOSE | {"slices": "switch:190", "at": 30.0}
+    (both, start), (nose, _), (switch, _) = (
+        compile_scene(load_scene(CROSSING, {"track.crossing": what})) for what in ([blade, NOSE], NOSE, [blade])
+    )
+    both, nose, switch = (Equations(model) for model in (both, nose, switch))
+    first = poses_over_it(start, 300)
+    second = first.copy()
+    second[:, 0] = 30.0 + 2.0 * (first[:, 0] - 6.0)
+    for one, other in zip(first, second, strict=True):
+        for alone, state in ((nose, one), (switch, other)):
+            alone(0.0, state)
+            both(0.0, state)
+            np.testing.assert_allclose(both.work.rail_wrenches, alone.work.rail_wrenches, rtol=1e-6, atol=1.0)
+    assert [len(one.arguments[1].value.crossing.sections) for one in (both, nose)] == [2, 1]
+
+
+def test_a_turnout_is_run_in_one_scene():
+    # the crossing of a switch of 190 m, 1:9, 23 m behind its toe, on the route that leaves
+    switch, nose = NOSE | {"slices": "switch:190"}, NOSE | {"slices": "crossing:1/9", "at": 29.07}
+    path = [
+        {"tangent": 5.75},
+        {"transition": 0.5},
+        {"curve": 20.6, "radius": 190.0},
+        {"transition": 0.5},
+        {"tangent": 9},
+    ]
+    changes = {"track.crossing": [switch, nose], "track.path": path, "speed": 10.0, "integration.duration": 3.3}
+    scene = load_scene(CROSSING, changes)
+    run = simulate(scene)
+    s, load = run["wheelset"]["s_m"], loads(run, "right")
+    assert run.status == "completed" and len(scene.crossings) == 2
+    assert load[(s > 6.0) & (s < 14.0)].max() > 1.15 * load[0]  # on the blade
+    assert load[(s > 29.0) & (s < 30.5)].max() > 1.5 * load[0]  # on the nose
+    assert load[(s > 20.0) & (s < 26.0)].max() < 1.2 * load[(s > 20.0) & (s < 26.0)].min()  # between them
+    pictures = [plot_crossing(run, scene=scene, stretch=k) for k in (0, 1)]
+    assert [round(picture.axes[4].get_xlim()[0]) for picture in pictures] == [5, 29]
+    with pytest.raises(InputError, match="the number of one of 2, from 0, got 2"):
+        plot_crossing(run, scene=scene, stretch=2)
+
+
+def test_stretches_lie_apart_and_name_their_keys():
+    with pytest.raises(InputError, match="stretches of the right rail apart") as error:
+        load_scene(CROSSING, {"track.crossing": [NOSE | {"at": 7.0}, NOSE]})
+    assert error.value.field == "track.crossing.0.at"
+    load_scene(CROSSING, {"track.crossing": [NOSE | {"rail": "left"}, NOSE]})
+    with pytest.raises(InputError, match="'left', 'right' or 'both'") as error:
+        load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"at": 30.0}]}, track__crossing__1__rail="inner")
+    assert error.value.field == "track.crossing.1.rail"
+    with pytest.raises(InputError, match="from 1/30 to 1/5") as error:
+        load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"slices": "crossing:2"}]})
+    assert error.value.field == "track.crossing.1.slices"
+
+
 def test_its_picture_shows_the_load_going_over():
     scene = load_scene(CROSSING, BRIEF)
     figure = plot_crossing(simulate(scene), scene=scene)
@@ -316,7 +374,7 @@ def test_its_picture_shows_the_load_going_over():
 def test_its_page_is_read_and_run():
     text = (ROOT / "reports" / "crossings.md").read_text(encoding="utf-8")
     blocks = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
-    assert len(blocks) == 5
+    assert len(blocks) == 6
     for block in blocks:
         assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 

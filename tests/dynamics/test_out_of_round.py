@@ -369,7 +369,7 @@ def test_wheels_begin_round():
     for column in (columns.NORMAL, columns.PENETRATION, columns.Z):
         left, right = equations.work.patches[0, :, 0, column]
         assert left == pytest.approx(right, rel=1e-3, abs=1e-7)
-    assert model.crossing.tables.tolist() == [[0, -1]]
+    assert model.crossing.tables.tolist() == [[[0], [-1]]]
 
 
 @pytest.mark.parametrize(

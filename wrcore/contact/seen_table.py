@@ -85,16 +85,17 @@ class SeenTable:
     """(1 + stretches, ...): `ContactGeometry.zone_gaps` of the plain rail, then over each stretch."""
 
 
-def seen_table(pair, plain, backwards=False):
+def seen_table(pair, plain, backwards=False, lateral=None):
     """`SeenTable` of a `WheelOnSlices` that goes over into a ``plain`` rail at both ends; ``backwards``: of one that is
-    laid the other way round, whose arc lengths then count from the same origin against those of its slices."""
+    laid the other way round, whose arc lengths then count from the same origin against those of its slices. All rails
+    that the wheel passes lie between two ``lateral`` coordinates, m; left out: this one alone."""
     wide = _widened(pair)
     first, last = (pair.rail.s[k] + sign * (REACH + BLEND) for k, sign in ((0, -1.0), (-1, 1.0)))
     begins, step = pair.rail.begins(), _step_along(pair.rail)
     if begins.size:  # at a node
         first = begins[0] - step * np.ceil((begins[0] - first) / step)
     s = first + step * np.arange(int(np.ceil((last - first) / step)) + 1)
-    u = _lateral(wide, plain)
+    u = _lateral(wide, plain, lateral or pair.rail.lateral)
     seen = wide.straight(s, u)
     floor = min(np.nanmin(seen[:, SEEN_HEIGHT]), plain.f.min()) - BELOW
     sections = np.zeros((s.size, 2, ROWS, u.size))
@@ -129,7 +130,7 @@ def shape_table(pair, shape):
     `Corrugation`."""
     plain, sizes = pair.rail, (pair.rolling_radius, pair.half_distance, pair.rail_distance)
     wide = _widened(WheelOnSlices(pair.wheel, RailSlices.of(plain), *sizes))
-    u = _lateral(wide, plain)
+    u = _lateral(wide, plain, wide.rail.lateral)
     first, step, count = shape.nodes(S_STEP, PAD)
     curvatures, leads = wide.strips(u)
     at = u + pair.rail_distance - pair.half_distance
@@ -197,10 +198,8 @@ def _widened(pair):
     return WheelOnSlices(wide, pair.rail, pair.rolling_radius, pair.half_distance, pair.rail_distance)
 
 
-def _lateral(pair, plain):
-    """Lateral coordinates over which there is a rail and may be a wheel, m: whole cells, and a node more."""
-    points = [sheet.points[:, 0] for sheet in pair.rail.sheets]
-    there = min(p.min() for p in points), max(p.max() for p in points)
+def _lateral(pair, plain, there):
+    """Lateral coordinates over which ``there`` is a rail and may be a wheel, m: whole cells, and a node more."""
     shift = pair.half_distance - pair.rail_distance
     low = max(min(there[0], plain.u[0]), pair.wheel.u[0] + shift)
     high = min(max(there[1], plain.u[-1]), pair.wheel.u[-1] + shift)

@@ -48,9 +48,10 @@ BESIDE = 2
 BOUNDS = 2 * PARTS
 """Rows of bounds of gaps per node of the wheel."""
 
-PLACE, YAW, IN_STRETCH, BOUNDS_FROM = range(4)
-"""What is known of the section that a wheel's arrays hold: its place in the table, in steps, the yaw it is seen in,
+TABLE, PLACE, YAW, IN_STRETCH, BOUNDS_FROM = range(5)
+"""What is known of the section that a wheel's arrays hold: its table and place there, in steps, the yaw it is seen in,
 the stretch whose bounds of gaps are there, and from which row on."""
+KNOWN = 5
 
 
 class Crossing(NamedTuple):
@@ -63,20 +64,27 @@ class Crossing(NamedTuple):
     """(tables, 2, m): of the strips over it, see `SeenTable`."""
     bounds: np.ndarray  # (tables, 1 + stretches, rows, blocks)
     tables: np.ndarray
-    """(k, 2) int: the table of each wheel, -1 for a round one on a rail that is the same everywhere."""
-    laid: np.ndarray  # (k, 2, LAID): `BEGIN` to `STRIDE` of each wheel
+    """(k, 2, n) int: of each wheel the tables that it passes one after the other, -1 where there are less; all -1 for a
+    round one on a rail that is the same everywhere."""
+    laid: np.ndarray  # (k, 2, n, LAID): `BEGIN` to `STRIDE` of each
 
 
 def no_crossing():
     """A `Crossing` where no rail changes."""
     sizes = (0, 0, 2, ROWS, 0), (0, 2, 0), (0, 0, 0, 0)
-    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2), np.int64), np.zeros((0, 2, LAID)))
+    return Crossing(*map(np.zeros, sizes), np.zeros((0, 2, 1), np.int64), np.zeros((0, 2, 1, LAID)))
 
 
-def crossing_of(tables, of_wheels, laid):
-    """`Crossing` of a list of `SeenTable`, the table of each wheel (2 k,), -1: none, and how it is laid (2 k, LAID)."""
+def crossing_of(tables, of_wheels):
+    """`Crossing` of a list of `SeenTable` and of what each wheel (2 k) passes one after the other: pairs of a table's
+    number and how it is laid (LAID,)."""
     parts = (_stacked([getattr(one, name) for one in tables]) for name in ("sections", "strips", "bounds"))
-    return Crossing(*parts, np.reshape(of_wheels, (-1, 2)).astype(np.int64), np.reshape(laid, (-1, 2, LAID)))
+    shape = len(of_wheels), max(map(len, of_wheels))
+    numbers, laid = np.full(shape, -1), np.zeros((*shape, LAID))
+    for wheel, passed in enumerate(of_wheels):
+        for i, (table, row) in enumerate(passed):
+            numbers[wheel, i], laid[wheel, i] = table, row
+    return Crossing(*parts, numbers.reshape(-1, 2, shape[1]), laid.reshape(-1, 2, shape[1], LAID))
 
 
 def laid_at(table, begin, lead):
@@ -121,12 +129,16 @@ def lay_sections(model, state, work):
     for k in range(crossing.tables.shape[0]):
         s = arc_length_at(model, state, work, k)
         for wheel in range(2):
-            table = crossing.tables[k, wheel]
+            yaw = work.motions[k, wheel, MOTION.side] * work.motions[k, wheel, MOTION.ex]
+            at = _passed(crossing, k, wheel, s, yaw)
+            table, laid = crossing.tables[k, wheel, at], crossing.laid[k, wheel, at]
             if table < 0:
                 continue
-            contact, laid = contact_of(model.contact, k, wheel), crossing.laid[k, wheel]
-            geometry, known, last = contact.geometry, work.seen[k, wheel], laid[LAST]
-            yaw = work.motions[k, wheel, MOTION.side] * work.motions[k, wheel, MOTION.ex]
+            contact, known, last = contact_of(model.contact, k, wheel), work.seen[k, wheel], laid[LAST]
+            geometry = contact.geometry
+            if table != known[TABLE]:
+                known[:] = math.nan
+                known[TABLE] = table
             place, share = _place_of(laid, s + laid[LEAD] * yaw), 1.0
             if laid[PERIOD] > 0.0:
                 share = abs(s - laid[START]) / laid[FADE]
@@ -175,6 +187,17 @@ def _blocks_at_hand(model, bounds, stretch, state, k, wheel, work):
         return ~np.uint64(0)
     near = near_blocks(geometry, window)
     return near | near << np.uint64(1) | near >> np.uint64(1)
+
+
+@jit(allocates=False, forceinline=True)
+def _passed(crossing, k, wheel, s, yaw):
+    """Which of its tables a wheel is on, or was on last."""
+    at = 0
+    for i in range(1, crossing.tables.shape[2]):
+        laid = crossing.laid[k, wheel, i]
+        if crossing.tables[k, wheel, i] >= 0 and s + laid[LEAD] * yaw >= laid[BEGIN]:
+            at = i
+    return at
 
 
 @jit(allocates=False, forceinline=True)
@@ -297,16 +320,22 @@ def shorten_step(model, state, work, clock, at):
         first = STATE_SIZE * model.bodies.wheelsets[k] + VELOCITY
         speed, s = math.hypot(state[first], state[first + 1]), arc_length_at(model, state, work, k)
         for wheel in range(2):
-            if crossing.tables[k, wheel] < 0:
-                continue
-            laid = crossing.laid[k, wheel]
-            end = laid[BEGIN] + laid[STEP] * laid[LAST]
-            left = max(laid[BEGIN] - s, s - end, laid[STRIDE])
-            if laid[PERIOD] > 0.0:
-                place, left = _place_of(laid, s), laid[STRIDE]
-                if place > laid[LAST]:
-                    left = max((PAD + laid[PERIOD] - place) * laid[STEP], left)
-                if laid[END] < math.inf:
-                    left = max(left, laid[START] - s, s - laid[END])
-            if speed * clock[at] > left:
-                clock[at] = left / speed
+            for i in range(crossing.tables.shape[2]):
+                if crossing.tables[k, wheel, i] >= 0:
+                    left = _unchanged(crossing.laid[k, wheel, i], s)
+                    if speed * clock[at] > left:
+                        clock[at] = left / speed
+
+
+@jit(allocates=False, forceinline=True)
+def _unchanged(laid, s):
+    """How far a wheel may go in a step, m: to where what it sees of a table changes, or the stride."""
+    end = laid[BEGIN] + laid[STEP] * laid[LAST]
+    left = max(laid[BEGIN] - s, s - end, laid[STRIDE])
+    if laid[PERIOD] > 0.0:
+        place, left = _place_of(laid, s), laid[STRIDE]
+        if place > laid[LAST]:
+            left = max((PAD + laid[PERIOD] - place) * laid[STEP], left)
+        if laid[END] < math.inf:
+            left = max(left, laid[START] - s, s - laid[END])
+    return left

@@ -20,7 +20,7 @@ from wrcore.dynamics.body import OMEGA, STATE_SIZE, VELOCITY, euler_rates, rotat
 from wrcore.dynamics.check_rail import CheckRails, no_check_rails, press_check_rails, shorten_beside
 from wrcore.dynamics.constraints import ConstraintWork, add_reactions, constraint_workspace
 from wrcore.dynamics.control import Controls, ControlWork, control_work, no_controls, with_controls
-from wrcore.dynamics.crossing import Crossing, lay_sections, no_crossing, shorten_step, with_own_arrays
+from wrcore.dynamics.crossing import KNOWN, Crossing, lay_sections, no_crossing, shorten_step, with_own_arrays
 from wrcore.dynamics.drive import Drive, add_drive, no_drive
 from wrcore.dynamics.flexible_track import FlexibleTrack, FlexibleTrackWork, flexible_wrenches, rigid_track, track_work
 from wrcore.dynamics.inertia import (
@@ -149,7 +149,7 @@ def workspace(model):
         np.zeros((k, 2, 6)), np.tile(np.eye(3), (k, 2, 1, 1)), np.zeros((k, 2, 2)), np.full((k, 2), np.nan),
         np.zeros(COUNTERS, np.int64), constraint_workspace(model.joints), np.zeros((3, 3)), np.zeros((3, 4)),
         strip_work(model.contact.strips, k), track_work(model.flexible_track, k), control_work(model.controls),
-        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, 4), np.nan),
+        np.zeros(model.bodies.axes.shape), np.full((len(model.crossing.tables), 2, KNOWN), np.nan),
         np.zeros((len(model.crossing.tables), 2), np.uint64),
         np.zeros((ROWS + 4, model.crossing.sections.shape[-1])),
     )  # fmt: skip

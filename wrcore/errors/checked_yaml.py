@@ -215,8 +215,9 @@ def _keys(part, path):
         yield from _keys(item, key)
     for one in (*part.get("anyOf", ()), *kinds_in(part)):
         yield from _keys(one, path)
-    if isinstance(part.get("items"), dict):
-        yield from _keys(part["items"], f"{path}[]")
+    items = part.get("items")
+    if isinstance(items, dict) and not ("properties" in part and items["properties"] is part["properties"]):
+        yield from _keys(items, f"{path}[]")
 
 
 def kinds_in(part):
@@ -352,7 +353,7 @@ def _fill_defaults(data, schema, root):
 
 
 def _fill_inside(value, part, root):
-    if isinstance(value, dict) and part.get("type") == "object":
+    if isinstance(value, dict) and "object" in part.get("type", ()):
         _fill_defaults(value, part, root)
     if isinstance(value, list) and isinstance(part.get("items"), dict):
         for item in value:

@@ -125,6 +125,12 @@ class RailSlices:
         inner = min(u[k + 1 : top + 1].min(), crossing)
         return self.moved(-u[top], -f[top]), float(u[top] - inner)
 
+    @property
+    def lateral(self):
+        """Least and greatest lateral coordinate, m."""
+        points = [sheet.points[:, U] for sheet in self.sheets]
+        return min(float(p.min()) for p in points), max(float(p.max()) for p in points)
+
     def begins(self):
         """Arc lengths at which a part begins or ends, m, sorted."""
         ends = [end for sheet in self.sheets for end in (sheet.first, sheet.last)]

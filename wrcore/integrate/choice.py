@@ -63,14 +63,16 @@ def steps_on_changing_rails(model, start):
     round."""
     strides, passed, after = 0.0, 0.0, 0.0
     for k, tables in enumerate(model.crossing.tables):
-        s, longest = start[STATE_SIZE * model.bodies.wheelsets[k]], 0.0
-        for table, laid in zip(tables, model.crossing.laid[k], strict=True):
+        s, lengths = start[STATE_SIZE * model.bodies.wheelsets[k]], [0.0, 0.0]
+        for (wheel, i), table in np.ndenumerate(tables):
+            laid = model.crossing.laid[k, wheel, i]
+            length = laid[STEP] * laid[LAST]
             if table >= 0 and laid[PERIOD] > 0.0:
                 strides = max(strides, 1.0 / laid[STRIDE])
-            elif table >= 0 and laid[BEGIN] + laid[STEP] * laid[LAST] > s:
-                longest = max(longest, laid[STEP] * laid[LAST])
-                after = max(after, laid[BEGIN] + laid[STEP] * laid[LAST] - s)
-        passed += longest
+            elif table >= 0 and laid[BEGIN] + length > s:
+                lengths[wheel] += length
+                after = max(after, laid[BEGIN] + length - s)
+        passed += max(lengths)
     return strides + (PER_METRE_ON_CHANGING_RAILS * passed / after if after > 0.0 else 0.0)
 
 

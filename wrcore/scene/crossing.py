@@ -3,13 +3,14 @@ and of their own shapes."""
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 
 from wrcore.contact.seen_rail import REACH
 from wrcore.contact.seen_table import BLEND, SeenTable
-from wrcore.dynamics.crossing import LAID, crossing_of, laid_along, laid_at, laid_under
+from wrcore.dynamics.crossing import crossing_of, laid_along, laid_at, laid_under
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry.corrugation import Corrugation
@@ -41,7 +42,7 @@ BENEATH, BELOW, CROWN = 0.08, -0.03, 3e-3
 
 @dataclass(frozen=True, eq=False)
 class LaidCrossing:
-    """Where which rails of a scene change."""
+    """A stretch of track where rails change."""
 
     rails: tuple
     """`RailSlices` of the left and the right rail, in the coordinates of the plain ones; None where one is the same
@@ -59,38 +60,52 @@ class LaidCrossing:
         return (self.at - high, self.at - low) if self.backwards else (self.at + low, self.at + high)
 
 
-def read_crossing(data, vehicle, pairs, folder, source):
-    """`LaidCrossing` of a scene's content, checked against the schema, None where its rails are the same everywhere;
-    ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail they join."""
-    spec = data["track"].get("crossing")
-    if spec is None:
-        return None
-    slices = _slices(spec["slices"], folder, source)
+def read_crossings(data, vehicle, pairs, folder, source):
+    """`LaidCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
+    the schema; ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail
+    they join."""
+    specs, laid = data["track"].get("crossing", []), []
+    for k, spec in enumerate([specs] if isinstance(specs, dict) else specs):
+        field = "track.crossing" if isinstance(specs, dict) else f"track.crossing.{k}"
+        crossing = _read_crossing(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
+        if crossing is not None:
+            _check_begin(crossing, vehicle, source, f"{field}.at")
+            laid.append((crossing, field))
+    for side, name in enumerate(SIDES):
+        along = sorted((one.ends, field) for one, field in laid if one.rails[side] is not None)
+        for ((low, high), _), ((begin, end), field) in pairwise(along):
+            if begin < high:
+                expected = f"expected stretches of the {name} rail apart, got {low:g} to {high:g} m and {begin:g} to"
+                raise InputError(source, f"{field}.at", f"{expected} {end:g} m")
+    return tuple(sorted((one for one, _ in laid), key=lambda one: one.ends))
+
+
+def _read_crossing(spec, depth, pairs, folder, source, field):
+    slices = _slices(spec["slices"], folder, source, f"{field}.slices")
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
-    depth = data["track"]["gauge_depth"]
     rails = [
         slices.along(pair.rail, depth) if side in sides else None for side, pair in zip(SIDES, pairs, strict=False)
     ]
     for rail, pair in zip(rails, pairs, strict=False):
         if rail is not None:
-            _check_joints(rail, pair.rail, source)
-            _check_surface(rail, source)
-            _warn_of_swings(rail, source)
-    laid = LaidCrossing(tuple(rails), float(spec["at"]), spec["reversed"])
-    if slices.alike:
-        return None
-    low, high = laid.ends
+            _check_joints(rail, pair.rail, source, f"{field}.slices")
+            _check_surface(rail, source, f"{field}.slices")
+            _warn_of_swings(rail, f"{source}: {field}.slices")
+    return None if slices.alike else LaidCrossing(tuple(rails), float(spec["at"]), spec["reversed"])
+
+
+def _check_begin(crossing, vehicle, source, field):
+    """An InputError where a wheelset stands on it at the beginning."""
+    low, high = crossing.ends
     for name, x in zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True):
         if low < x < high:
             expected = (
                 f"expected no wheelset on it at the beginning, got {name} at {x:g} m, it from {low:g} to {high:g} m"
             )
-            raise InputError(source, "track.crossing.at", expected)
-    return laid
+            raise InputError(source, field, expected)
 
 
-def _slices(spec, folder, source) -> RailSlices:
-    field = "track.crossing.slices"
+def _slices(spec, folder, source, field) -> RailSlices:
     kind, colon, value = spec.partition(":") if isinstance(spec, str) else ("", "", "")
     if kind == "crossing" and colon:
         angle = parse_ratio(value)
@@ -111,7 +126,7 @@ def _slices(spec, folder, source) -> RailSlices:
     return read_slices({**how, "slices": str(path)}, described_by=f"{source}: {field}")
 
 
-def _check_joints(slices, plain, source):
+def _check_joints(slices, plain, source, field):
     """An InputError where the first or the last slice is no continuation of the plain rail."""
     low, high, depth = RUNNING
     u = np.arange(low, high, 1e-3)
@@ -123,12 +138,12 @@ def _check_joints(slices, plain, source):
         if off[worst] > JOINED:
             got = f"{1e3 * off[worst]:.3f} mm" if off[worst] < math.inf else "none"
             expected = f"expected a {which} slice within {1e3 * JOINED:g} mm of the scene's rail {plain.name}"
-            raise InputError(source, "track.crossing.slices", f"{expected}, got {got} at u = {u[worst]:.3f} m")
+            raise InputError(source, field, f"{expected}, got {got} at u = {u[worst]:.3f} m")
 
 
-def _check_surface(slices, source):
+def _check_surface(slices, source, field):
     """An InputError where a rail has no head under the wheels, or one that is too steep along the track."""
-    field, between = "track.crossing.slices", 0.5 * (slices.s[1:] + slices.s[:-1])
+    between = 0.5 * (slices.s[1:] + slices.s[:-1])
     s, u = np.sort(np.concatenate([slices.s, between])), np.arange(RUNNING[0], BENEATH, 1e-3)
     for part in np.array_split(s, math.ceil(s.size / 500)):
         f, _, along = slices.heights(part, u)
@@ -143,7 +158,7 @@ def _check_surface(slices, source):
             raise InputError(source, field, f"{expected}, got {steep[worst]:.3g} at s = {part[worst]:g} m")
 
 
-def _warn_of_swings(slices, source):
+def _warn_of_swings(slices, where):
     """Say where the splines through the slices leave the heights of both neighbours; a notch between two heads, which
     moves along, is none."""
     u, worst = np.arange(RUNNING[0], RUNNING[1], 1e-3), (0.0, 0.0)
@@ -157,17 +172,17 @@ def _warn_of_swings(slices, source):
         worst = max(worst, (float(out.max(initial=0.0)), float(middle[np.argmax(out)]) if out.size else 0.0))
     if worst[0] > SWING:
         text = f"the rail swings out by {1e3 * worst[0]:.1f} mm between slices near s = {worst[1]:g} m"
-        warn_once(f"{source}: track.crossing.slices: {text}: add slices there")
+        warn_once(f"{where}: {text}: add slices there")
 
 
-def read_corrugation(data, crossing, shapes, source):
+def read_corrugation(data, crossings, shapes, source):
     """`Corrugation` of a scene's content, None where its rails are smooth."""
     spec = data["track"].get("corrugation")
     if spec is None:
         return None
     sides = tuple(SIDES) if spec["rail"] == "both" else (spec["rail"],)
     for k, side in enumerate(SIDES):
-        changes = crossing is not None and crossing.rails[k] is not None
+        changes = any(crossing.rails[k] is not None for crossing in crossings)
         if side in sides and (changes or any(shape for shape, _ in shapes[k::2])):
             other = "track.crossing" if changes else "wheels out of round"
             expected = f"expected no {other} on the {side} rail where it is corrugated"
@@ -179,40 +194,52 @@ def read_corrugation(data, crossing, shapes, source):
     return Corrugation(spec["wavelength"], spec["amplitude"], spec["begin"], spec["length"], spec["fade"], sides)
 
 
-def seen_by_wheels(crossing, shapes, corrugation, pairs, starts):
+def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
     """`ContactGeometry` of each wheel, ``pairs`` of all wheelsets one after the other, on the plain rail, of one type;
     and the `wrcore.dynamics.crossing.Crossing`. ``shapes`` are those of `read_out_of_round`; ``starts`` the arc lengths
     (k,) at which wheelsets begin, m."""
     known: dict[tuple, int] = {}
     tables: list[SeenTable] = []
-    geometries, of_wheels, laid = [], [], []
-    for k, pair in enumerate(pairs):
-        slices = crossing.rails[k % 2] if crossing else None
-        shape, angle = shapes[k] if shapes else (None, 0.0)
-        wave = corrugation if corrugation and list(SIDES)[k % 2] in corrugation.sides else None
-        if slices is None and shape is None and wave is None:
-            geometry = pair.geometry
-            geometries.append(geometry._replace(along=np.zeros((len(geometry.rail), 5))))
-            of_wheels.append(-1)
-            laid.append(np.zeros(LAID))
-            continue
-        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(slices), id(shape or wave)
+    geometries, of_wheels = [], []
+
+    def number(pair, what, make):
+        """Of the table of what a pair's wheel sees, which is made once."""
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(what)
         if key not in known:
             known[key] = len(tables)
-            tables.append(
-                kept_table(pair, slices, crossing.backwards) if slices is not None else kept_shape(pair, shape or wave)
-            )
-        table = tables[known[key]]
-        of_wheels.append(known[key])
-        geometries.append(table.geometry)
-        if shape is not None:
+            tables.append(make())
+        return known[key]
+
+    for k, pair in enumerate(pairs):
+        laid = [crossing for crossing in crossings if crossing.rails[k % 2] is not None]
+        shape, angle = shapes[k] if shapes else (None, 0.0)
+        wave = corrugation if corrugation and list(SIDES)[k % 2] in corrugation.sides else None
+        passed = []
+        if laid:
+            wide = [crossing.rails[k % 2].lateral for crossing in laid]
+            lateral = min(low for low, _ in wide), max(high for _, high in wide)
+            for crossing in laid:
+                slices, back = crossing.rails[k % 2], crossing.backwards
+                table = number(pair, slices, partial(kept_table, pair, slices, back, lateral))
+                passed.append((table, laid_at(tables[table], tables[table].begin + crossing.at, pair.half_distance)))
+        elif shape is not None:
+            table = number(pair, shape, partial(kept_shape, pair, shape))
             radius = 0.5 * (pairs[k - k % 2].rolling_radius + pairs[k + 1 - k % 2].rolling_radius)
-            laid.append(laid_under(table, starts[k // 2], angle, radius, shape.shortest))
+            passed.append((table, laid_under(tables[table], starts[k // 2], angle, radius, shape.shortest)))
         elif wave is not None:
-            laid.append(laid_along(table, wave, pair.half_distance))
-        else:
-            laid.append(laid_at(table, table.begin + crossing.at, pair.half_distance))
-    return tuple(geometries), crossing_of(tables, of_wheels, laid)
+            table = number(pair, wave, partial(kept_shape, pair, wave))
+            passed.append((table, laid_along(tables[table], wave, pair.half_distance)))
+        geometries.append(_on_plain_rail(pair, [tables[table] for table, _ in passed]))
+        of_wheels.append(passed)
+    return tuple(geometries), crossing_of(tables, of_wheels)
+
+
+def _on_plain_rail(pair, tables):
+    """`ContactGeometry` of a wheel that passes tables, whose bounds hold for all of them."""
+    if not tables:
+        return pair.geometry._replace(along=np.zeros((len(pair.geometry.rail), 5)))
+    errors = np.max([table.geometry.zone_planar_errors for table in tables], axis=0)
+    return tables[0].geometry._replace(zone_planar_errors=errors)
 
 
 @cache

@@ -40,7 +40,7 @@ from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.cache import say
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
-from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossing, seen_by_wheels, warn_of_rigid_rails
+from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossings, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
 from wrcore.scene.friction import read_friction
 from wrcore.scene.out_of_round import read_out_of_round
@@ -65,8 +65,8 @@ class Scene:
     track : Track
     pairs : tuple of WheelOnRail
         Of each wheel, left and right of wheelset after wheelset; empty where all are alike.
-    crossing : LaidCrossing, optional
-        Rails that change along the track.
+    crossings : tuple of LaidCrossing
+        Stretches where rails change along the track.
     out_of_round : tuple
         Shape and angle at the beginning of each wheel, in the order of ``pairs``; empty where all are round.
     corrugation : Corrugation, optional
@@ -90,7 +90,7 @@ class Scene:
     rail: ProfileCurve
     track: Track
     pairs: tuple[WheelOnRail, ...] = ()
-    crossing: LaidCrossing | None = None
+    crossings: tuple[LaidCrossing, ...] = ()
     out_of_round: tuple[tuple[OutOfRound | None, float], ...] = ()
     corrugation: Corrugation | None = None
     files: dict[str, str] = field(default_factory=dict)
@@ -188,9 +188,9 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
     read_check_rails(data, pairs or _alike(vehicle, wheel, rail, track), source)
-    crossing = read_crossing(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
-    shapes = read_out_of_round(data, vehicle, pairs, crossing, folder, source)
-    corrugation = read_corrugation(data, crossing, shapes, source)
+    crossings = read_crossings(data, vehicle, pairs or _alike(vehicle, wheel, rail, track), folder, source)
+    shapes = read_out_of_round(data, vehicle, pairs, crossings, folder, source)
+    corrugation = read_corrugation(data, crossings, shapes, source)
     if track.path.pieces.size and np.any(vehicle.joints.bodies == FRAME):
         expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
         raise InputError(source, "track.path", expected)
@@ -199,7 +199,7 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
     read_controls(data, vehicle, folder, source)
     read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
     digests |= digests_of_files(vehicle.data["elements"], folder)
-    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossing, shapes, corrugation, digests)
+    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossings, shapes, corrugation, digests)
 
 
 def _alike(vehicle, wheel, rail, track):
@@ -347,7 +347,7 @@ def compile_scene(
     data, vehicle = scene.data, scene.vehicle
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
-    changing = scene.crossing, scene.out_of_round, scene.corrugation
+    changing = scene.crossings, scene.out_of_round, scene.corrugation
     parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)

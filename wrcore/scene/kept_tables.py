@@ -20,11 +20,12 @@ from wrcore.kernels.told import told_if_long
 OWN = "begin", "step", "sections", "strips", "bounds"
 
 
-def kept_table(pair, slices, backwards):
-    """`SeenTable` of slices in place of a pair's rail, from the cache where it was made before."""
+def kept_table(pair, slices, backwards, lateral=None):
+    """`seen_table` of slices in place of a pair's rail, from the cache where it was made before."""
     wheel = WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
-    digest = _digest(pair, slices.sheets, slices.s, backwards)
-    return _kept(digest, lambda: seen_table(wheel, pair.rail, backwards))
+    lateral = lateral or slices.lateral
+    digest = _digest(pair, slices.sheets, slices.s, backwards, *lateral)
+    return _kept(digest, lambda: seen_table(wheel, pair.rail, backwards, lateral))
 
 
 def kept_shape(pair, shape):
@@ -61,13 +62,13 @@ def _table_of(found):
     return SeenTable(**own, geometry=ContactGeometry(**parts))
 
 
-def _digest(pair, sheets_of_it, places, kind):
-    """Digest of all that a table depends on: a pair, sheets, the places of their slices, and a number."""
+def _digest(pair, sheets_of_it, places, *numbers):
+    """Digest of all that a table depends on: a pair, sheets, the places of their slices, and numbers."""
     digest = hashlib.sha256(source_digest().encode())
     curves = [array for curve in (pair.wheel, pair.rail) for array in (curve.u, curve.f, curve.df, curve.d2f)]
     sheets = [array for sheet in sheets_of_it for array in (sheet.s, sheet.points, (sheet.first, sheet.last))]
     bends = [sheet.spline.c for sheet in sheets_of_it if sheet.spline is not None]
-    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance, kind
+    sizes = pair.rolling_radius, pair.half_distance, pair.rail_distance, *numbers
     for part in (*curves, *sheets, *bends, places, sizes):
         digest.update(f"{np.shape(part)}".encode() + np.ascontiguousarray(part, float).tobytes())
     return digest.hexdigest()[:16]

@@ -25,7 +25,7 @@ NARROWER = 2e-3
 """Sections that end so much before the wheel does are told, m."""
 
 
-def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
+def read_out_of_round(data, vehicle, pairs, crossings, folder, source):
     """`OutOfRound` or `SlicedWheel` of each wheel, left and right of wheelset after wheelset, None of a round one, and
     the angle (rad) that touches at the beginning; empty where all are round. ``pairs`` are the scene's."""
     shapes, known = [], {}
@@ -41,7 +41,7 @@ def read_out_of_round(data, vehicle, pairs, crossing, folder, source):
             if key not in known:
                 known[key] = _shape(spec, pair, field, folder, source)
             shape, angle = known[key], float(spec["angle"])
-            if crossing is not None and crossing.rails[k % 2] is not None:
+            if any(crossing.rails[k % 2] is not None for crossing in crossings):
                 expected = f"expected a round wheel on the {side} rail, where track.crossing changes it"
                 raise InputError(source, field, expected)
         shapes.append((shape, angle))

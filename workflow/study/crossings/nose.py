@@ -14,7 +14,7 @@ SIDE = "right"  # that of the crossing
 
 def wheel_on_crossing(scene):
     """`WheelOnSlices` of the side of a scene with ``track.crossing: {rail: right}``."""
-    pair, slices = scene.alike, scene.crossing.rails[1]
+    pair, slices = scene.alike, scene.crossings[0].rails[1]
     return WheelOnSlices(pair.wheel, slices, pair.rolling_radius, pair.half_distance, pair.rail_distance)
 
 

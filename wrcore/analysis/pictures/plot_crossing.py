@@ -28,7 +28,7 @@ NOTCH = 5e-4
 
 @checked
 @styled
-def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = None) -> Figure:
+def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = None, stretch: int = 0) -> Figure:
     """Draw the passage of a wheel over rails that change along the track (`track.crossing`).
 
     Parameters
@@ -39,6 +39,8 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
         Its name; left out: the first one.
     scene : Scene, str, Path or dict, optional
         That of the run; left out: the one that the run names, with its files looked for from the working directory.
+    stretch : int, optional
+        Which of the stretches where rails change, from 0 along the track.
 
     Returns
     -------
@@ -59,14 +61,18 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     ['height / mm', 'radius / mm', 'load / kN', 'share', 'y / mm']
     """
     scene = as_scene(scene) if scene is not None else load_scene(run.scene)
-    if scene.crossing is None:
+    if not scene.crossings:
         raise InputError("plot_crossing", "run", "expected a run with track.crossing")
+    if not 0 <= stretch < len(scene.crossings):
+        expected = f"expected the number of one of {len(scene.crossings)}, from 0, got {stretch}"
+        raise InputError("plot_crossing", "stretch", expected)
+    crossing = scene.crossings[stretch]
     names = wheelsets_of(run)
     wheelset = wheelset or names[0]
     if wheelset not in names:
         raise InputError("plot_crossing", "wheelset", one_of(names, wheelset))
-    side = next(side for side, rail in zip(SIDES, scene.crossing.rails, strict=True) if rail is not None)
-    passage = _Passage(run, wheelset, side, scene)
+    side = next(side for side, rail in zip(SIDES, crossing.rails, strict=True) if rail is not None)
+    passage = _Passage(run, wheelset, side, scene, crossing)
     figure = Figure(figsize=(7.2, 8.0), layout="constrained")
     axes = figure.subplots(5, 1, sharex=True, height_ratios=[1.0, 1.0, 1.2, 1.0, 1.6])
     axes[0].plot(passage.s, MM * (passage.height - passage.height[0]), color="0.1")
@@ -79,7 +85,7 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
         axes[2].plot(passage.s, 1e-3 * load, color=color, label=name)
         axes[3].plot(passage.s, load / np.where(whole > LEAST, whole, np.nan), color=color)
         axes[4].plot(passage.where[on], MM * passage.y[on], ".", markersize=2, color=color)
-    for s, inner, outer in passage.plan(scene.crossing):
+    for s, inner, outer in passage.plan(crossing):
         axes[4].fill_between(s, inner, outer, color=RAIL, alpha=0.5, linewidth=0.0)
     for begin in passage.begins:
         for one in axes:
@@ -87,18 +93,18 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     for one, label in zip(axes, ("height", "radius", "load", "share", "y"), strict=True):
         one.set_ylabel(label + {"load": " / kN", "share": ""}.get(label, " / mm"))
     axes[2].legend(fontsize=7)
-    axes[4].set(xlabel="arc length / m", xlim=scene.crossing.ends)
+    axes[4].set(xlabel="arc length / m", xlim=crossing.ends)
     return figure
 
 
 class _Passage:
     """Channels of a wheel between the ends of a crossing, and on which head each patch is, counted from outside."""
 
-    def __init__(self, run, wheelset, side, scene):
+    def __init__(self, run, wheelset, side, scene, crossing):
         motion, group = run[wheelset], f"{wheelset}/{side}"
         if group not in run or "x_m" not in motion:
             raise InputError("plot_crossing", "run", "expected the channels pose and contact")
-        patches, crossing = run[group], scene.crossing
+        patches = run[group]
         s = motion["s_m"] if "s_m" in motion else motion["x_m"]
         low, high = crossing.ends
         inside = (s > low) & (s < high)
@@ -120,8 +126,7 @@ class _Passage:
 
     def _runs(self, s):
         """Ends (n, 2) of the heads at an arc length of the track, m, from the innermost one."""
-        low = min(sheet.points[:, 0].min() for sheet in self.slices.sheets)
-        high = max(sheet.points[:, 0].max() for sheet in self.slices.sheets)
+        low, high = self.slices.lateral
         u = np.arange(low, high, NODES)
         f = self.slices.heights(self._turn * (s - self._at), u)[0, 0]
         there = np.isfinite(f)
