@@ -54,7 +54,7 @@ def curve(radius, cant=0.1):
 
 
 def kept_at(speed):
-    return {"drive.controller.speed": speed, "contact.friction": 0.3}
+    return {"drive.controller.speed": speed, "drive.brakes": [], "contact.friction": 0.3}
 
 
 BALLAST = {"track.support": {

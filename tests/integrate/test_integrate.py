@@ -12,7 +12,7 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.integrate import engine
-from wrcore.integrate.choice import fastest_rate
+from wrcore.integrate.choice import fastest_rate, hunts
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.reference import SOLVERS, integrate_function
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
@@ -186,6 +186,12 @@ def test_stiff_scenes_cost_rosenbrock_methods_little():
     assert runs["tsit5"].smallest_step < 1e-4 < runs["rodas4"].t[-1] / runs["rodas4"].steps
 
 
+KEPT = [
+    "speed=45", "drive.controller.speed=45", "contact.friction=0.3",
+    "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 20}}",
+]  # fmt: skip
+
+
 def test_auto_takes_what_the_scene_needs(wheelset):
     """Creep makes low speed stiff; at high speed a rough track, or wheelsets that hunt, ask for short steps anyway."""
     assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4p2"
@@ -195,7 +201,12 @@ def test_auto_takes_what_the_scene_needs(wheelset):
     ballast = f"track.support={{rail: {{{rails}}}}}"
     for scene, overrides, expected in (
         ("suspended_wheelset", ["speed=0.1"], "rodas4p2"),
-        ("suspended_wheelset", ["speed=60"], "rk4"),
+        ("suspended_wheelset", ["speed=50"], "rodas4p2"),  # below its critical speed: motion dies away
+        ("suspended_wheelset", ["speed=80"], "rk4"),
+        ("wheelset", ["speed=20"], "rk4"),  # nothing holds it
+        ("locomotive", [*KEPT, "drive.brakes=[]"], "rk4"),
+        ("locomotive", KEPT, "rodas4p2"),  # its brakes may bring it to a stop
+        ("locomotive", [*KEPT, "drive.brakes=[]", "drive.controller.speed={time: [0, 9], speed: [45, 0]}"], "rodas4p2"),
         ("trailer_vehicle", ["speed=60"], "rodas4p2"),
         ("trailer_vehicle", ["speed=60", rough], "rk4"),
         ("trailer_vehicle", ["speed=15", rough], "rodas4p2"),
@@ -208,6 +219,21 @@ def test_auto_takes_what_the_scene_needs(wheelset):
     ):
         model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", overrides))
         assert integrate(model, start, [0.0, 1e-3]).method == expected, (scene, overrides)
+
+
+def test_wheelsets_hunt_where_long_waves_are_hardly_damped():
+    # the critical speed of the suspended one is 58 m/s
+    for scene, speeds, expected in (
+        ("suspended_wheelset", (1.0, 5.0, 20.0, 55.0), False),
+        ("suspended_wheelset", (70.0, 90.0), True),
+        ("wheelset", (2.0, 20.0, 70.0), True),
+    ):
+        for speed in speeds:
+            model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", {"speed": speed}))
+            equations = Equations(model)
+            counters = equations.work.counters.copy()
+            assert hunts(model, equations, 0.0, start) == expected, (scene, speed)
+            np.testing.assert_array_equal(equations.work.counters, counters)
 
 
 def test_auto_sees_a_stiff_damper(contact):  # noqa: F811
@@ -447,7 +473,7 @@ def same(run, other):
 
 
 def test_many_runs_are_the_single_ones():
-    scenes = [load_scene(WHEELSET, [f"speed={v}", "integration.duration=0.5"]) for v in (5, 20, 40)]
+    scenes = [load_scene(WHEELSET, [f"speed={v}", "integration.duration=0.5"]) for v in (5, 20, 80)]
     single = [simulate(scene) for scene in scenes]
     seen = []
     many = simulate_many(scenes, progress=lambda items: (seen.append(item) or item for item in items))

@@ -87,6 +87,17 @@ def may_drive(model):
     return driven or bool(model.drive.tables.points[:, 1].any())
 
 
+def lowest_speed(model):
+    """Speed (m/s) to which motors, brakes and a controller may bring a vehicle that runs forward down, infinite where
+    they cannot: of all that may brake it is known of a controller alone where that ends."""
+    drive, points = model.drive, np.split(model.drive.tables.points[:, 1], model.drive.tables.starts[1:-1])
+    brakes = len(model.controls.rows) > 0
+    for row in drive.rows[np.isin(drive.rows[:, KIND], (MOTOR, BRAKE))]:
+        torques = points[row[TABLE]]
+        brakes = brakes or bool(torques.any() if row[KIND] == BRAKE else torques.min() < 0.0)
+    return 0.0 if brakes else min((points[row[SPEED]].min() for row in drive.control), default=math.inf)
+
+
 def drive_links(model):
     """Pairs of bodies that motors, brakes or the controller link: one's motion enters the other's acceleration. A speed
     profile's arc length is left out: what a wheelset's place does through it is next to nothing, and a link from one

@@ -27,6 +27,7 @@ from wrcore.dynamics.contact_slopes import (
     slip_slope,
     slope_of_falling,
 )
+from wrcore.dynamics.modes import PATCHES_ONLY
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.pair_table import (
     ANGLE,
@@ -54,7 +55,7 @@ from wrcore.dynamics.pair_table import (
 from wrcore.dynamics.strip_wheel import lift_of, lift_share
 from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.dynamics.tabulated_wheel import lifted_place
-from wrcore.dynamics.wheel import contact_of, detect_patches, falling
+from wrcore.dynamics.wheel import contact_of, falling, press_wheels
 from wrcore.kernels.jit import FUSED, jit
 
 SMALL, SMALL_SLIP = 1e-6, 1e-8
@@ -74,11 +75,13 @@ MIRRORED = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 def blocks_of_lobes(jacobian, model, work, columns):
     """`contact_blocks` by the slopes of lobes; wheels with others are `UNCOUNTED` in ``jacobian.counts``."""
     base, slopes = jacobian.motions, jacobian.slopes
+    press_wheels(model, work, PATCHES_ONLY)
     for k in range(base.shape[0]):
         for wheel in range(2):
             contact, seen = contact_of(model.contact, k, wheel), motion_of(base[k, wheel])
             slopes[:], jacobian.counts[k, wheel] = 0.0, 0
-            if not lobe_slopes(contact, as_left(seen), jacobian.law, slopes, work.strips):
+            rows, count = work.patches[k, wheel], work.counts[k, wheel]
+            if not lobe_slopes(contact, as_left(seen), rows, count, jacobian.law, slopes, work.strips):
                 jacobian.counts[k, wheel] = UNCOUNTED
                 continue
             for j in range(SLOPES):
@@ -89,19 +92,19 @@ def blocks_of_lobes(jacobian, model, work, columns):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def lobe_slopes(model, m, scratch, out, work):
-    """Fill ``out`` (SLOPES, 6) with the slopes of a left wheel's wrench about the wheelset's centre; False where its
-    patch is not one lobe that the table has. ``scratch`` (8, 1 + MOVES) is overwritten."""
-    geometry, rows, table = model.geometry, work.rows, model.strips.table
+def lobe_slopes(model, m, rows, count, scratch, out, work):
+    """Fill ``out`` (SLOPES, 6) with the slopes of a left wheel's wrench about the wheelset's centre, whose overlaps are
+    the first ``count`` of ``rows``; False where its patch is not one lobe that the table has. Overwrites ``scratch``
+    (8, 1 + MOVES)."""
+    geometry, table = model.geometry, model.strips.table
     if model.detection != SPATIAL or changed_here(geometry):
         return False
-    count, _, _ = detect_patches(model, m, rows)
     if count == 0:
         return True
     pose, ahead = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True), -1.0 if m.vx < 0.0 else 1.0
     if group_end(geometry, rows, count, 0) < count or leaves_cells(pose):
         return False
-    pressed = _pressed_nearby(geometry, pose, True, count, scratch, work)
+    pressed = _pressed_nearby(geometry, pose, True, rows, count, scratch, work)
     if math.isnan(pressed.moment):
         return False
     lift = lift_of(model, m, pressed)
@@ -115,7 +118,7 @@ def lobe_slopes(model, m, scratch, out, work):
     )  # fmt: skip
     if at.cell == 0:
         return False
-    _lattice_rates(model, m, pressed, lift, count, scratch, work)
+    _lattice_rates(model, m, pressed, lift, rows, count, scratch, work)
     weigh_slopes(at, work.spread)
     look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
     if at.scale * (log_depth - FIRST[2]) < STEPS[2]:  # looked up at the least depth
@@ -125,13 +128,13 @@ def lobe_slopes(model, m, scratch, out, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _pressed_nearby(geometry, pose, first, count, sums, work):
-    """`Pressed` of the overlaps in ``work.rows`` at a pose nearby, a moment of NaN where one of them has few nodes. The
+def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
+    """`Pressed` of the overlaps in ``rows`` at a pose nearby, a moment of NaN where one of them has few nodes. The
     ``first`` time it is written into ``work.weights`` over which nodes they are summed."""
     total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for patch in range(count):
-        least = least_of(work.rows[patch]) if first else work.weights[patch]
-        middle, enough = slopes_of_moments(geometry, pose, work.rows[patch], least, sums)
+        least = least_of(rows[patch]) if first else work.weights[patch]
+        middle, enough = slopes_of_moments(geometry, pose, rows[patch], least, sums)
         if first:
             work.weights[patch] = 0.0 if enough else math.inf
         total = add_pressed(total, pressed_from(pose, middle, sums))
@@ -139,7 +142,7 @@ def _pressed_nearby(geometry, pose, first, count, sums, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _lattice_rates(model, m, pressed, lift, count, sums, work):
+def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
     """Fill ``work.lattice`` (SLOPES, AXES) with what the wheel's place on the lattice changes by."""
     rates = work.lattice
     depth, aside = lift.depth * lift.sine, lift.share * lift.depth * lift.sine
@@ -149,7 +152,7 @@ def _lattice_rates(model, m, pressed, lift, count, sums, work):
         ex, ey, ez = moved_axle(m.ex, m.ey, m.ez, k, DIFFERENCE)
         across = DIFFERENCE if k == ACROSS else 0.0
         there = make_pose(1.0, m.y + across, m.z + (DIFFERENCE if k == UP else 0.0), ex, ey, ez, True)
-        its = lift_of(model, m, _pressed_nearby(model.geometry, there, False, count, sums, work))
+        its = lift_of(model, m, _pressed_nearby(model.geometry, there, False, rows, count, sums, work))
         across += half * (ey - m.ey) - its.share * its.depth * its.sine + aside
         rates[k, T], rates[k, TILT] = across / DIFFERENCE, (ez - m.ez) / DIFFERENCE
         rates[k, TURN] = ahead * (ex - m.ex) / DIFFERENCE

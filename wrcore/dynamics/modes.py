@@ -17,7 +17,7 @@ WRENCHES_HELD = 8
 """The rails' wrenches are those found last."""
 
 PATCHES_ONLY = 16
-"""Ellipses: patches are found, no wrenches."""
+"""Overlaps are found, those that are looked up as of left wheels, no wrenches."""
 
 BARE = 32
 """Wrenches and counts alone: of patches that are looked up no rows are filled, which nobody reads within a step."""

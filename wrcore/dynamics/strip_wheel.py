@@ -32,7 +32,7 @@ from wrcore.contact.patch.strips import FIXED, WEIGHT, WIDENED
 from wrcore.contact.patch.surfaces import ContactPlane, Motion, plane_slip, strip_planes, surface_slip
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.strip import AHEAD, LIFT, leaning, make_pose, upright, with_rail_along
-from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, WARM
+from wrcore.dynamics.modes import BARE, ELLIPSES, FRESH, PATCHES_ONLY, WARM
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, contact_of, detect_patches, falling, leaning_motion
@@ -447,6 +447,9 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
             for k in range(6):
                 wrench[k] = 0.0
             count, bound, spatial = detect_patches(contact, m, rows)
+            if mode & PATCHES_ONLY:
+                counts[i, wheel], bounds[i, wheel] = count, bound
+                continue
             first = kept = group = 0
             while first < count:
                 last = group_end(contact.geometry, rows, count, first)

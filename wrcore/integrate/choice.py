@@ -1,22 +1,25 @@
 """Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
 
-Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites
-motion on and on, Rodas4P2 takes six or seven steps per metre (nine on a flexible track), else few more than the longest
-step asks for. Where a light part on a stiff spring follows the motion of others, as many do not keep Rodas4 accurate:
-there its order drops. A step costs as much as six of Kutta's method, and more where the whole Jacobian is renewed each
-time. Where stability bounds the steps Kutta's method takes two thirds of the evaluations of Tsit5, and errs less.
+Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites motion on and
+on, Rodas4P2 takes six or seven steps per metre (nine on a flexible track), where wheelsets hunt from flange to flange
+many more, else few more than the longest step asks for. Whether lone wheelsets hunt on smooth straight track their
+equations tell, linearised where they begin. Where a light part on a stiff spring follows the motion of others, as many
+do not keep Rodas4 accurate: there its order drops. A step costs as much as six of Kutta's method, and more where the
+whole Jacobian is renewed each time. Where stability bounds the steps Kutta's method takes two thirds of the evaluations
+of Tsit5, and errs less.
 `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
 """
 
 import math
+from contextlib import contextmanager
 
 import numpy as np
 
-from wrcore.dynamics.body import STATE_SIZE
+from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
 from wrcore.dynamics.contact_blocks import contacts_alone
 from wrcore.dynamics.contract import places
 from wrcore.dynamics.crossing import BEGIN, LAST, PERIOD, STEP, STRIDE
-from wrcore.dynamics.drive import may_drive
+from wrcore.dynamics.drive import lowest_speed
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.integrate.jacobian import plan_sweep
 from wrcore.integrate.tolerances import pace, step_tolerances
@@ -29,8 +32,15 @@ EXPLICIT, STIFF, JACOBIAN = 4.0, 13.0, 11.0
 Jacobian, of which a step renews the contacts' part. Where it renews all, that costs the evaluations that it takes on
 top."""
 
-STEPS_PER_METRE, ON_FLEXIBLE_TRACK = 6.5, 9.0
-"""Of Rodas4P2, on irregular rails or with wheelsets that may hunt."""
+STEPS_PER_METRE, ON_FLEXIBLE_TRACK, HUNTING = 6.5, 9.0, 40.0
+"""Of Rodas4P2, on irregular rails or with wheelsets that may hunt; and with those that do on smooth ones."""
+
+DAMPED, LONG_WAVE, DRIFT = 0.16, 3.0, 0.01
+"""Of a motion that goes on: damping, over the critical one, at most; angular frequency over the speed at most, rad/m
+(hunting is a wave of metres, a wheel on its contact vibrates faster); and growth at least, 1/s."""
+
+ACROSS = [1, 2, EULER + 1, EULER + 3, VELOCITY + 1, VELOCITY + 2, OMEGA, OMEGA + 2]
+"""Lateral and vertical motion, roll and yaw, and their rates, among a body's states on straight track."""
 
 PER_METRE_ON_CHANGING_RAILS = 60.0
 """The same where a wheelset passes rails that change, a crossing say: those of an impact."""
@@ -43,19 +53,49 @@ the tolerances)."""
 def fastest_rate(model, equations, t, state):
     """Largest absolute eigenvalue (1/s) of the equations of motion at a state, roughly, by the power method; NaN where
     the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
-    work, unit = equations.work, step_tolerances(model, 0.0, DISTURBANCE)
-    unit = unit[0] + pace(model, state, state) * unit[1]
-    kept = [(array, array.copy()) for array in (*places(work), work.counters)]
-    base, direction, growths = equations(t, state, ELLIPSES), np.random.default_rng(0).normal(size=len(state)), []
-    size = math.sqrt(direction.dot(direction) / len(state))
-    for _ in range(PASSES):
-        direction *= unit / (size or 1.0)
-        direction = (equations(t, state + direction, ELLIPSES) - base) / unit
+    unit, direction, growths = _disturbances(model, state), np.random.default_rng(0).normal(size=len(state)), []
+    with _undisturbed(equations.work):
+        base = equations(t, state, ELLIPSES)
         size = math.sqrt(direction.dot(direction) / len(state))
-        growths.append(size)
+        for _ in range(PASSES):
+            direction *= unit / (size or 1.0)
+            direction = (equations(t, state + direction, ELLIPSES) - base) / unit
+            size = math.sqrt(direction.dot(direction) / len(state))
+            growths.append(size)
+    return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
+
+
+def hunts(model, equations, t, state):
+    """Whether the lateral motion of lone wheelsets on smooth straight track goes on, by their equations linearised at a
+    state: whether a long wave is hardly damped."""
+    unit, columns = _disturbances(model, state), []
+    across = (STATE_SIZE * model.bodies.wheelsets[:, None] + ACROSS).ravel()
+    with _undisturbed(equations.work):
+        base = equations(t, state, ELLIPSES)
+        for i in across:
+            moved = state.copy()
+            moved[i] += unit[i]
+            columns.append((equations(t, moved, ELLIPSES) - base)[across] / unit[i])
+    if not np.isfinite(columns).all():
+        return True
+    rates = np.linalg.eigvals(columns)
+    rates = rates[np.abs(rates.imag) < LONG_WAVE * model.speed]
+    return bool(np.any(rates.real + DAMPED * np.abs(rates.imag) > DRIFT))
+
+
+def _disturbances(model, state):
+    """Of each component of a state, by which its rates are differenced."""
+    unit = step_tolerances(model, 0.0, DISTURBANCE)
+    return unit[0] + pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * unit[1]
+
+
+@contextmanager
+def _undisturbed(work):
+    """Leave counters and places of ``work`` as they are."""
+    kept = [(array, array.copy()) for array in (*places(work), work.counters)]
+    yield
     for array, before in kept:
         array[:] = before
-    return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
 
 
 def steps_on_changing_rails(model, start):
@@ -78,13 +118,18 @@ def steps_on_changing_rails(model, start):
 
 def cheaper_method(model, equations, t, state, longest_step):
     """``rodas4p2`` or ``rk4``, whichever takes less for a run from a state with steps up to ``longest_step`` (s)."""
-    bodies = model.bodies
-    if may_drive(model):  # creep gets ever stiffer towards standstill, wherever the run begins
+    bodies, slowest = model.bodies, min(lowest_speed(model), model.speed)
+    if not slowest > 0.0:  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4p2"
     rough, cost = model.track.irregularity.coefficients.shape[0] > 0, STIFF + JACOBIAN
-    excited, changing = rough or len(bodies.wheelsets) == len(bodies.mass), steps_on_changing_rails(model, state)
-    per_metre = ON_FLEXIBLE_TRACK if rough and len(model.flexible_track.mass) else STEPS_PER_METRE
-    steps = 1.0 / longest_step + ((per_metre if excited else 0.0) + changing) * model.speed
+    lone, changing = len(bodies.wheelsets) == len(bodies.mass), steps_on_changing_rails(model, state)
+    per_metre = STEPS_PER_METRE if rough or lone else 0.0
+    if rough and len(model.flexible_track.mass):
+        per_metre = ON_FLEXIBLE_TRACK
+    elif lone and not rough and model.track.tangent:
+        per_metre = HUNTING if hunts(model, equations, t, state) else 0.0
+    steps = 1.0 / longest_step + (per_metre + changing) * model.speed
     if (rough or changing) and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps
         cost += len(plan_sweep(model).starts)
-    return "rk4" if EXPLICIT * fastest_rate(model, equations, t, state) / STABLE < cost * steps else "rodas4p2"
+    rate = fastest_rate(model, equations, t, state) * model.speed / slowest
+    return "rk4" if EXPLICIT * rate / STABLE < cost * steps else "rodas4p2"

@@ -276,7 +276,7 @@ def advance_explicit(tableau, control, memory, scratch, record, budget, equation
             weight = step * tableau.error[i]
             for k in range(n):
                 errors[k] += weight * stages[i, k]
-        rate = pace(model, state, trial)
+        rate = pace(model.bodies.wheelsets, model.contact.least_speed, state, trial)
         error = error_size(control.tolerances, rate, model.bodies.mass.shape[0], trial, errors)
         if judge(control, tableau.exponent, 1.0, memory, error):
             accept(control, memory, trial, step)

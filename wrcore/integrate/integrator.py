@@ -82,7 +82,11 @@ def integrate(
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
-        rate = model.contact.least_speed / HALF_GAUGE if may_drive(model) else pace(model, start, start)
+        rate = (
+            model.contact.least_speed / HALF_GAUGE
+            if may_drive(model)
+            else pace(model.bodies.wheelsets, model.contact.least_speed, start, start)
+        )
         tolerances = tolerances[0] + rate * tolerances[1]  # theirs stay what they are
         return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip

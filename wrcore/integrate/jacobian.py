@@ -293,7 +293,9 @@ def refresh_jacobian(sweep, joined, whole, jacobian, t, state, rate, trial, slop
     axes = turn_of(jacobian)
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
-    fine = min(1.0, pace(model, state, state) * HALF_GAUGE / FINE_BELOW) * min(1.0, model.contact.friction / USUAL)
+    fine = min(
+        1.0, pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * HALF_GAUGE / FINE_BELOW
+    ) * min(1.0, model.contact.friction / USUAL)
     strips, wheels = model.contact.strips, contacts_alone(model)
     rough = strips.strips > 0 and strips.looked_up == 0.0
     copy_into(base, rate)

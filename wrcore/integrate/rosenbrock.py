@@ -90,7 +90,13 @@ def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
         for k in range(defect.shape[0]):
             defect[k] -= weight / step * stages[i, k]
     solve_stage(linear.jacobian, system, 1.0 / (step * tableau.gamma), defect)
-    return error_size(control.tolerances, pace(model, memory.state, scratch.trial), bodies, scratch.trial, defect)
+    return error_size(
+        control.tolerances,
+        pace(model.bodies.wheelsets, model.contact.least_speed, memory.state, scratch.trial),
+        bodies,
+        scratch.trial,
+        defect,
+    )
 
 
 @jit(allocates=False)
@@ -151,7 +157,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                 trial[k] += tableau.weights[i] * stages[i, k]
                 slope[k] += tableau.error[i] * stages[i, k]
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
-        rate = pace(model, state, trial)
+        rate = pace(model.bodies.wheelsets, model.contact.least_speed, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
         fresh, contacts = error <= 1.0, 0
         if fresh:  # the next step's first rate

@@ -84,12 +84,13 @@ def _forward_speed(state, at):
 
 
 @jit(allocates=False)
-def pace(model, old, new):
-    """Velocities' tolerance over that of positions in a step between two states, by the slowest wheelset, 1/s."""
+def pace(wheelsets, least_speed, old, new):
+    """Velocities' tolerance over that of positions in a step between two states, by the slowest of the ``wheelsets``
+    (bodies), 1/s; ``least_speed`` as creepages have it, m/s."""
     rate = RATE
-    for wheelset in model.bodies.wheelsets:
+    for wheelset in wheelsets:
         at = STATE_SIZE * wheelset
-        speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), model.contact.least_speed)
+        speed = max(min(_forward_speed(old, at), _forward_speed(new, at)), least_speed)
         rate = min(rate, speed / HALF_GAUGE)
     return rate
 
