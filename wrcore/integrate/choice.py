@@ -1,12 +1,12 @@
 """Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
 
-Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites motion on and
-on, Rodas4P2 takes six or seven steps per metre (nine on a flexible track), where wheelsets hunt from flange to flange
-many more, else few more than the longest step asks for. Whether lone wheelsets hunt on smooth straight track their
-equations tell, linearised where they begin. Where a light part on a stiff spring follows the motion of others, as many
-do not keep Rodas4 accurate: there its order drops. A step costs as much as six of Kutta's method, and more where the
-whole Jacobian is renewed each time. Where stability bounds the steps Kutta's method takes two thirds of the evaluations
-of Tsit5, and errs less.
+Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites motion on
+and on, Rodas4P2 takes six or seven steps per metre (nine on a flexible track), where wheelsets hunt from flange to
+flange many more, else few more than the longest step asks for. Whether lone wheelsets hunt on smooth straight track
+their equations tell, linearised where they begin. Where a light part on a stiff spring follows the motion of others,
+as many do not keep Rodas4 accurate: there its order drops. A step costs as much as six of Kutta's method, and more
+where the whole Jacobian is renewed each time. Where stability bounds the steps Kutta's method takes two thirds of the
+evaluations of Tsit5, and errs less.
 `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
 """
 
