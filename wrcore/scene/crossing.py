@@ -106,7 +106,8 @@ def _check_begin(crossing, vehicle, source, field):
 
 
 def _slices(spec, folder, source, field) -> RailSlices:
-    kind, colon, value = spec.partition(":") if isinstance(spec, str) else ("", "", "")
+    alone = spec["slices"] if isinstance(spec, dict) and list(spec) == ["slices"] else spec
+    kind, colon, value = alone.partition(":") if isinstance(alone, str) else ("", "", "")
     if kind == "crossing" and colon:
         angle = parse_ratio(value)
         if not 1.0 / 30.0 <= angle <= 1.0 / 5.0:

@@ -102,7 +102,7 @@ def run_sweep(
     >>> table
        run  speed     status    method  y_max_m
     0    0     20  completed  rodas4p2    0.002
-    1    1     30  completed       rk4    0.002
+    1    1     30  completed  rodas4p2    0.002
     """
     sweep = source if isinstance(source, Sweep) else load_sweep(source)
     return run_rows(sweep, sweep.runs, threads, progress)
