@@ -163,6 +163,7 @@ def test_numbers_in_the_theory_are_those_of_the_code():
             f"${choice.STABLE:g}/", f"{tolerances.LENGTH}\\ \\mathrm m",
             f"({choice.STEPS_PER_METRE} steps per metre, {choice.ON_FLEXIBLE_TRACK:g} on rails that give)",
             f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
+            f"for {choice.HUNTING:g} where that is below {choice.HARDLY_DAMPED:g}", f"ratio above {choice.DAMPED:g} in",
             f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", f"`rodas4p2` {share['rodas4p2']:g} times",
             f"`rk4` {share['rk4']:g} times",
             "a tenth of the last",

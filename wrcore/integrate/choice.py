@@ -33,11 +33,14 @@ Jacobian, of which a step renews the contacts' part. Where it renews all, that c
 top."""
 
 STEPS_PER_METRE, ON_FLEXIBLE_TRACK, HUNTING = 6.5, 9.0, 40.0
-"""Of Rodas4P2, on irregular rails or with wheelsets that may hunt; and with those that do on smooth ones."""
+"""Of Rodas4P2, on irregular rails or with wheelsets that may hunt; and with those that do so from flange to flange."""
 
-DAMPED, LONG_WAVE, DRIFT = 0.16, 3.0, 0.01
-"""Of a motion that goes on: damping, over the critical one, at most; angular frequency over the speed at most, rad/m
-(hunting is a wave of metres, a wheel on its contact vibrates faster); and growth at least, 1/s."""
+DAMPED, HARDLY_DAMPED = 0.23, 0.02
+"""Damping ratios of lateral motion above which it dies away, and below which it grows to the flanges."""
+
+LONG_WAVE, DRIFT = 3.0, 0.01
+"""Of lateral motion angular frequency over the speed at most, rad/m (hunting is a wave of metres, a wheel on its
+contact vibrates faster), and growth without oscillation at least, 1/s."""
 
 ACROSS = [1, 2, EULER + 1, EULER + 3, VELOCITY + 1, VELOCITY + 2, OMEGA, OMEGA + 2]
 """Lateral and vertical motion, roll and yaw, and their rates, among a body's states on straight track."""
@@ -65,9 +68,9 @@ def fastest_rate(model, equations, t, state):
     return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
 
 
-def hunts(model, equations, t, state):
-    """Whether the lateral motion of lone wheelsets on smooth straight track goes on, by their equations linearised at a
-    state: whether a long wave is hardly damped."""
+def lateral_damping(model, equations, t, state):
+    """Least damping ratio of the lateral motion of lone wheelsets on smooth straight track, in long waves, by their
+    equations linearised at a state; 1 where none is left to oscillate."""
     unit, columns = _disturbances(model, state), []
     across = (STATE_SIZE * model.bodies.wheelsets[:, None] + ACROSS).ravel()
     with _undisturbed(equations.work):
@@ -77,10 +80,10 @@ def hunts(model, equations, t, state):
             moved[i] += unit[i]
             columns.append((equations(t, moved, ELLIPSES) - base)[across] / unit[i])
     if not np.isfinite(columns).all():
-        return True
+        return -1.0
     rates = np.linalg.eigvals(columns)
-    rates = rates[np.abs(rates.imag) < LONG_WAVE * model.speed]
-    return bool(np.any(rates.real + DAMPED * np.abs(rates.imag) > DRIFT))
+    rates = rates[(np.abs(rates.imag) < LONG_WAVE * model.speed) & (np.abs(rates) > DRIFT)]
+    return float(min(-rates.real / np.abs(rates), default=1.0))
 
 
 def _disturbances(model, state):
@@ -127,7 +130,11 @@ def cheaper_method(model, equations, t, state, longest_step):
     if rough and len(model.flexible_track.mass):
         per_metre = ON_FLEXIBLE_TRACK
     elif lone and not rough and model.track.tangent:
-        per_metre = HUNTING if hunts(model, equations, t, state) else 0.0
+        damping = lateral_damping(model, equations, t, state)
+        if damping > HARDLY_DAMPED:
+            per_metre = 0.0 if damping > DAMPED else STEPS_PER_METRE
+        else:
+            per_metre = HUNTING
     steps = 1.0 / longest_step + (per_metre + changing) * model.speed
     if (rough or changing) and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps
         cost += len(plan_sweep(model).starts)
