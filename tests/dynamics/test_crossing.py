@@ -317,6 +317,9 @@ def test_stretches_of_a_rail_are_each_what_it_is_alone():
             both(0.0, state)
             np.testing.assert_allclose(both.work.rail_wrenches, alone.work.rail_wrenches, rtol=1e-6, atol=1.0)
     assert [len(one.arguments[1].value.crossing.sections) for one in (both, nose)] == [2, 1]
+    again = [NOSE | {"at": at, "reversed": at > 80.0} for at in (6.0, 30.0, 60.0, 90.0, 120.0)]
+    many, _ = compile_scene(load_scene(CROSSING, {"track.crossing": again}))
+    assert many.crossing.tables[0, 1].tolist() == [0, 0, 0, 1, 1]  # what is the same is there once
 
 
 def test_a_turnout_is_run_in_one_scene():

@@ -1,6 +1,7 @@
 """Rails that change along the track, a crossing say, from a scene's key ``track.crossing``, and what wheels see of them
 and of their own shapes."""
 
+import json
 import math
 from dataclasses import dataclass
 from functools import cache, partial
@@ -64,10 +65,13 @@ def read_crossings(data, vehicle, pairs, folder, source):
     """`LaidCrossing` of each stretch where a scene's rails change, along the track, from its content, checked against
     the schema; ``pairs`` are the `WheelOnRail` of at least one wheelset. Slices that are all alike are the plain rail
     they join."""
-    specs, laid = data["track"].get("crossing", []), []
+    specs, laid, known = data["track"].get("crossing", []), [], {}
     for k, spec in enumerate([specs] if isinstance(specs, dict) else specs):
         field = "track.crossing" if isinstance(specs, dict) else f"track.crossing.{k}"
-        crossing = _read_crossing(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
+        what = json.dumps([spec["slices"], spec["rail"]], sort_keys=True)
+        if what not in known:
+            known[what] = _rails(spec, data["track"]["gauge_depth"], pairs, folder, source, field)
+        crossing = known[what] and LaidCrossing(known[what], float(spec["at"]), spec["reversed"])
         if crossing is not None:
             _check_begin(crossing, vehicle, source, f"{field}.at")
             laid.append((crossing, field))
@@ -80,7 +84,8 @@ def read_crossings(data, vehicle, pairs, folder, source):
     return tuple(sorted((one for one, _ in laid), key=lambda one: one.ends))
 
 
-def _read_crossing(spec, depth, pairs, folder, source, field):
+def _rails(spec, depth, pairs, folder, source, field):
+    """Rails of a `LaidCrossing`, None where they are plain."""
     slices = _slices(spec["slices"], folder, source, f"{field}.slices")
     sides = list(SIDES) if spec["rail"] == "both" else [spec["rail"]]
     rails = [
@@ -91,7 +96,7 @@ def _read_crossing(spec, depth, pairs, folder, source, field):
             _check_joints(rail, pair.rail, source, f"{field}.slices")
             _check_surface(rail, source, f"{field}.slices")
             _warn_of_swings(rail, f"{source}: {field}.slices")
-    return None if slices.alike else LaidCrossing(tuple(rails), float(spec["at"]), spec["reversed"])
+    return None if slices.alike else tuple(rails)
 
 
 def _check_begin(crossing, vehicle, source, field):
@@ -203,9 +208,9 @@ def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
     tables: list[SeenTable] = []
     geometries, of_wheels = [], []
 
-    def number(pair, what, make):
+    def number(pair, what, make, backwards=False):
         """Of the table of what a pair's wheel sees, which is made once."""
-        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(what)
+        key = id(pair.wheel), id(pair.rail), pair.rolling_radius, id(what), backwards
         if key not in known:
             known[key] = len(tables)
             tables.append(make())
@@ -221,7 +226,7 @@ def seen_by_wheels(crossings, shapes, corrugation, pairs, starts):
             lateral = min(low for low, _ in wide), max(high for _, high in wide)
             for crossing in laid:
                 slices, back = crossing.rails[k % 2], crossing.backwards
-                table = number(pair, slices, partial(kept_table, pair, slices, back, lateral))
+                table = number(pair, slices, partial(kept_table, pair, slices, back, lateral), back)
                 passed.append((table, laid_at(tables[table], tables[table].begin + crossing.at, pair.half_distance)))
         elif shape is not None:
             table = number(pair, shape, partial(kept_shape, pair, shape))
