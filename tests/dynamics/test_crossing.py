@@ -14,7 +14,7 @@ from wrcore.contact.reduction import ANGLE, FX, FY, SEMI_A, SEMI_B, U_WHEEL
 from wrcore.contact.seen_rail import WheelOnSlices
 from wrcore.contact.seen_table import ROWS, seen_table
 from wrcore.dynamics.body import STATE_SIZE, VELOCITY
-from wrcore.dynamics.crossing import interpolate, laid_at, with_own_arrays
+from wrcore.dynamics.crossing import BEGIN, interpolate, laid_at, with_own_arrays
 from wrcore.dynamics.system import Equations
 from wrcore.dynamics.wheel import SOLVED
 from wrcore.errors import InputError
@@ -320,6 +320,23 @@ def test_stretches_of_a_rail_are_each_what_it_is_alone():
     again = [NOSE | {"at": at, "reversed": at > 80.0} for at in (6.0, 30.0, 60.0, 90.0, 120.0)]
     many, _ = compile_scene(load_scene(CROSSING, {"track.crossing": again}))
     assert many.crossing.tables[0, 1].tolist() == [0, 0, 0, 1, 1]  # what is the same is there once
+
+
+def test_a_wheel_that_changes_stretches_forgets_the_one_it_was_on():
+    # as far into the second one as it was into the first: what was laid, and bounds, are of another table
+    other = NOSE | {"at": 40.0, "reversed": True}
+    (both, start), (alone, _) = (
+        compile_scene(load_scene(CROSSING, {"track.crossing": w})) for w in ([NOSE, other], other)
+    )
+    begins, models = both.crossing.laid[0, 1, :, BEGIN], [Equations(model) for model in (both, alone)]
+    states = poses_over_it(start, 300)
+    for state, far in zip(states, np.random.default_rng(3).uniform(0.3, 1.8, len(states)), strict=True):
+        state[0] = begins[0] + far
+        models[0](0.0, state)
+        state[0] = begins[1] + far
+        for one in models:
+            one(0.0, state)
+        np.testing.assert_allclose(*(one.work.rail_wrenches for one in models), rtol=1e-6, atol=1.0)
 
 
 def test_a_turnout_is_run_in_one_scene():
