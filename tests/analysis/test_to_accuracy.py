@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import wrcore as wr
+from tests.conftest import SCENES as EXAMPLES
 from wrcore.analysis.to_accuracy import COMPLETE, Accuracy, _agree, _end, difference, simulate_to_accuracy
 from wrcore.cli import NOT_REACHED, main
 from wrcore.errors import InputError
 
-WHEELSET = "config/scenes/suspended_wheelset.yaml"
-COACH = "config/scenes/trailer_vehicle.yaml"
+WHEELSET = str(EXAMPLES / "suspended_wheelset.yaml")
+COACH = str(EXAMPLES / "trailer_vehicle.yaml")
 LOW = {"spectrum": {"level": "low", "seed": 3, "length": 500.0, "begin": 5.0}}
 CURVE = [{"tangent": 5.0}, {"transition": 15.0}, {"curve": 100.0, "radius": 600.0}]
 SCENES = {

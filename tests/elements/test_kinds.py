@@ -10,7 +10,7 @@ import pytest
 from numba import njit
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ROOT, SCENES
 from tests.dynamics.test_suspension import at_rest, evaluate, model_with, moving
 from tests.dynamics.test_system import body_state, contact, run  # noqa: F401 (contact is a fixture)
 from tests.elements import own_laws
@@ -248,7 +248,7 @@ def test_scenes_without_one_compile_none():
 
 def test_a_kind_of_another_package_is_as_a_file_beside_the_others(tmp_path, monkeypatch):
     """A module that an entry point names, here without a package."""
-    text = (SCENES.parents[1] / "wrcore" / "elements" / "kinds" / "traction_rod.py").read_text("utf-8")
+    text = (ROOT / "wrcore" / "elements" / "kinds" / "traction_rod.py").read_text("utf-8")
     (tmp_path / "other_package.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     entry = EntryPoint("other_rod", "other_package", kinds.GROUP)

@@ -1,13 +1,12 @@
 """Scenes on which `auto` is measured: of the accuracy study, of nobody, and random ones."""
 
-from pathlib import Path
-
 import numpy as np
 import yaml
 
+from tests.conftest import ROOT
+from tests.conftest import SCENES as EXAMPLES
 from wrcore.scene.description import compile_scene, load_scene
 
-ROOT = Path(__file__).parents[2]
 BOX, ARM, BUSHING, RELAXATION = 1.0, 0.46, 1.7e7, 6e-5
 """Of `trailing_arm_car`, all chosen: mass (kg) and every moment (kg m^2) of an axle box, which make its radius of
 gyration 1 m; length of its arm, m; radial stiffness of the undamped bushing at the arm's end, N/m, on which it pitches
@@ -41,7 +40,7 @@ def trailing_arm_car():
 def compiled(name, speed, changes):
     """Model and initial state of a scene by its name."""
     file = f"{name.split(',')[0].replace(' ', '_')}.yaml"
-    return compile_scene(load_scene(ROOT / "config" / "scenes" / file, {"speed": speed, **changes}))
+    return compile_scene(load_scene(EXAMPLES / file, {"speed": speed, **changes}))
 
 
 def rough(level="low", seed=1, begin=20.0):

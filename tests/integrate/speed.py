@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 
+from tests.conftest import SCENES
 from wrcore.dynamics.system import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene, load_scene
@@ -23,7 +24,7 @@ CASES = [
 
 def evaluation(name):
     """Processor time of one right-hand side, s: the least of sixty batches."""
-    model, state = compile_scene(load_scene(f"config/scenes/{name}.yaml", {"initial.y": 0.002}))
+    model, state = compile_scene(load_scene(SCENES / f"{name}.yaml", {"initial.y": 0.002}))
     equations, states, best = Equations(model), np.tile(state, (2000, 1)), np.inf
     equations.at(0.0, states[:2])
     for _ in range(60):
@@ -38,7 +39,7 @@ def main():
         print(f"{name}: {1e6 * evaluation(name):.3f} us an evaluation")
     for name, changes, duration, rtol in CASES:
         changes = changes | {"track.irregularity": SPECTRUM}
-        model, start = compile_scene(load_scene(f"config/scenes/{name}.yaml", changes))
+        model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", changes))
         times, best = np.linspace(0.0, duration, round(100 * duration) + 1), np.inf
         for _ in range(4):
             begun = time.process_time()

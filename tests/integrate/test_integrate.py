@@ -12,7 +12,15 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.integrate import engine
-from wrcore.integrate.choice import DAMPED, HARDLY_DAMPED, fastest_rate, lateral_damping
+from wrcore.integrate.choice import (
+    DAMPED,
+    HARDLY_DAMPED,
+    PASSAGE,
+    PER_METRE_ON_CHANGING_RAILS,
+    fastest_rate,
+    lateral_damping,
+    steps_on_changing_rails,
+)
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.reference import SOLVERS, integrate_function
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
@@ -215,10 +223,22 @@ def test_auto_takes_what_the_scene_needs(wheelset):
         ("suspended_wheelset", ["speed=50", ballast, rough], "rk4"),  # a whole Jacobian, and that in each step
         ("metro_car", ["speed=60"], "rk4"),
         ("crossing", [], "rk4"),  # impacts want short steps
+        ("crossing", ["integration.duration=20"], "rodas4p2"),  # most of the way is plain track
         ("crossing", ["track.crossing.at=1000"], "rodas4p2"),  # far off
     ):
-        model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", overrides))
-        assert integrate(model, start, [0.0, 1e-3]).method == expected, (scene, overrides)
+        loaded = load_scene(SCENES / f"{scene}.yaml", overrides)
+        end = loaded.data["integration"]["duration"]
+        assert integrate(*compile_scene(loaded), [0.0, 1e-3], end=end).method == expected, (scene, overrides)
+
+
+def test_auto_counts_the_impacts_on_the_way():
+    """As many in a run as it is long: none beyond its end; all on the way where no end is known."""
+    model, start = compile_scene(load_scene(SCENES / "crossing.yaml"))
+    (first, end), known = (5.5, 7.592), steps_on_changing_rails(model, start, 20.0)  # m
+    assert known == pytest.approx((PASSAGE + PER_METRE_ON_CHANGING_RAILS * (end - first)) / 20.0)
+    assert steps_on_changing_rails(model, start, 40.0) == pytest.approx(0.5 * known)
+    assert steps_on_changing_rails(model, start, first) == 0.0
+    assert steps_on_changing_rails(model, start, np.inf) == pytest.approx(known * 20.0 / end)
 
 
 def test_lateral_damping_of_lone_wheelsets():

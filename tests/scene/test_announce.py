@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.conftest import SCENES
 from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import warn_once
@@ -11,7 +12,7 @@ from wrcore.scene.description import _creep, announce, load_scene
 
 @pytest.fixture
 def scene():
-    return load_scene("config/scenes/suspended_wheelset.yaml")
+    return load_scene(SCENES / "suspended_wheelset.yaml")
 
 
 @pytest.mark.parametrize(("there", "lines"), [(True, 0), (False, 1)])

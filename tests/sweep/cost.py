@@ -19,7 +19,8 @@ SCENES = ("wheelset", "suspended_wheelset", "trailer_vehicle")
 def sweep_of(scene, runs):
     """Keys and measures of config/sweeps/wheelset_hunting.yaml on another scene."""
     return load_sweep({
-        "name": scene, "scene": f"config/scenes/{scene}.yaml", "set": {"integration.duration": 1.0},
+        "name": scene, "scene": f"config/scenes/{scene}.yaml",
+        "set": {"contact.patch": "moment", "integration.duration": 1.0},
         "sampling": {"kind": "latin_hypercube", "runs": runs, "seed": 1},
         "keys": {"speed": {"from": 15.0, "to": 75.0}, "initial.y": {"from": -0.004, "to": 0.004},
                  "contact.friction": {"from": 0.1, "to": 0.5}},

@@ -155,7 +155,8 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
     Examples
     --------
     >>> import wrcore as wr
-    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), integration__duration=0.2)
+    >>> changes = {"contact.patch": "moment", "integration.duration": 0.2}
+    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), changes)
     >>> found = wr.compare(wr.simulate(scene), wr.simulate(scene, contact__detection="planar"))
     >>> row = found.table.set_index(["group", "channel"]).loc["wheelset", "y_m"]
     >>> bool(row["rms"] < 1e-6), bool(row["relative"] < 1e-3)

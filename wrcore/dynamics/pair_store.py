@@ -253,13 +253,16 @@ class Pair:
         return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
 
     def _take_shipped(self):
-        """Take what comes with the package, if it is of this pair."""
+        """Take what comes with the package of this pair, if anything."""
+        own = fingerprint(self.contact)
         with checked_hdf5(SHIPPED / "nodes.h5", "nodes that come with the package") as file:
-            own, its = fingerprint(self.contact), file["fingerprint"][...]
-            if own.shape == its.shape and np.allclose(own, its, rtol=1e-9, atol=0.0):
-                *nodes, cells, misses = (file[name][...] for name in _PARTS[:-1])
-                self._take(*nodes)
-                self._known = {key: (miss, state) for (key, state), miss in zip(cells.tolist(), misses, strict=True)}
+            for known in file.values():
+                its = known["fingerprint"][...]
+                if own.shape == its.shape and np.allclose(own, its, rtol=1e-9, atol=0.0):
+                    *nodes, cells, misses = (known[name][...] for name in _PARTS[:-1])
+                    self._take(*nodes)
+                    met = zip(cells.tolist(), misses, strict=True)
+                    self._known = {key: (miss, state) for (key, state), miss in met}
 
     def _take(self, codes, numbers, parts):
         """Take nodes."""

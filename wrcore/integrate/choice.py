@@ -45,8 +45,8 @@ contact vibrates faster), and growth without oscillation at least, 1/s."""
 ACROSS = [1, 2, EULER + 1, EULER + 3, VELOCITY + 1, VELOCITY + 2, OMEGA, OMEGA + 2]
 """Lateral and vertical motion, roll and yaw, and their rates, among a body's states on straight track."""
 
-PER_METRE_ON_CHANGING_RAILS = 60.0
-"""The same where a wheelset passes rails that change, a crossing say: those of an impact."""
+PASSAGE, PER_METRE_ON_CHANGING_RAILS = 130.0, 45.0
+"""The same where a wheelset passes rails that change, a crossing or a switch: steps of its impact, and on its way."""
 
 PASSES, SETTLED, DISTURBANCE = 30, 10, 1e-8
 """Evaluations for the fastest rate, those that count, and the size of the disturbance in m (velocities, angles: as in
@@ -101,31 +101,34 @@ def _undisturbed(work):
         array[:] = before
 
 
-def steps_on_changing_rails(model, start):
-    """Steps of Rodas4P2 per metre, up to where all wheelsets have passed, for rails that change and wheels out of
-    round."""
-    strides, passed, after = 0.0, 0.0, 0.0
+def steps_on_changing_rails(model, start, distance):
+    """Steps of Rodas4P2 per metre over a distance (m), or, where it is infinite, up to where all wheelsets have passed,
+    for rails that change and wheels out of round."""
+    strides, passages, after = 0.0, 0.0, 0.0
     for k, tables in enumerate(model.crossing.tables):
-        s, lengths = start[STATE_SIZE * model.bodies.wheelsets[k]], [0.0, 0.0]
+        s, steps = start[STATE_SIZE * model.bodies.wheelsets[k]], [0.0, 0.0]
         for (wheel, i), table in np.ndenumerate(tables):
             laid = model.crossing.laid[k, wheel, i]
-            length = laid[STEP] * laid[LAST]
+            end = min(laid[BEGIN] + laid[STEP] * laid[LAST], s + distance)
             if table >= 0 and laid[PERIOD] > 0.0:
                 strides = max(strides, 1.0 / laid[STRIDE])
-            elif table >= 0 and laid[BEGIN] + length > s:
-                lengths[wheel] += length
-                after = max(after, laid[BEGIN] + length - s)
-        passed += max(lengths)
-    return strides + (PER_METRE_ON_CHANGING_RAILS * passed / after if after > 0.0 else 0.0)
+            elif table >= 0 and end > max(laid[BEGIN], s):
+                steps[wheel] += PASSAGE + PER_METRE_ON_CHANGING_RAILS * (end - max(laid[BEGIN], s))
+                after = max(after, end - s)
+        passages += max(steps)
+    over = distance if math.isfinite(distance) else after
+    return strides + (passages / over if passages > 0.0 else 0.0)
 
 
-def cheaper_method(model, equations, t, state, longest_step):
-    """``rodas4p2`` or ``rk4``, whichever takes less for a run from a state with steps up to ``longest_step`` (s)."""
+def cheaper_method(model, equations, t, state, longest_step, end=math.inf):
+    """``rodas4p2`` or ``rk4``, whichever takes less for a run from a state at a time to its ``end`` (s), if that is
+    known, with steps up to ``longest_step`` (s)."""
     bodies, slowest = model.bodies, min(lowest_speed(model), model.speed)
     if not slowest > 0.0:  # creep gets ever stiffer towards standstill, wherever the run begins
         return "rodas4p2"
     rough, cost = model.track.irregularity.coefficients.shape[0] > 0, STIFF + JACOBIAN
-    lone, changing = len(bodies.wheelsets) == len(bodies.mass), steps_on_changing_rails(model, state)
+    lone = len(bodies.wheelsets) == len(bodies.mass)
+    changing = steps_on_changing_rails(model, state, model.speed * (end - t))
     per_metre = STEPS_PER_METRE if rough or lone else 0.0
     if rough and len(model.flexible_track.mass):
         per_metre = ON_FLEXIBLE_TRACK

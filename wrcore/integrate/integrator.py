@@ -61,7 +61,7 @@ CHUNK, FIRST_CHUNK, BREATH = 2000, 16, 0.5
 
 def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=0.0, step=0.0, longest_step=0.05, derailed_y=np.inf,
-    progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
+    progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None, end=None,
 ):  # fmt: skip
     """Trajectory of a model's equations of motion at increasing output times (s), the last of which ends the run.
 
@@ -74,11 +74,15 @@ def integrate(
     Every ``chunk`` attempts, of no influence on the result, ``progress`` is called with the time reached and ``stop()``
     asked for a reason to end the run as stalled, or an empty string. ``most_steps`` bounds the steps tried, those
     before a checkpoint among them (references: the accepted ones; 0: no bound). ``equations``: those of this very
-    model, where they are at hand; these and ``step`` are for compiled methods only. An InputError if the start is none
+    model, where they are at hand; these and ``step`` are for compiled methods only. ``end`` (s): of a run whose first
+    stretch this is, for the choice of ``auto``. An InputError if the start is none
     of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
-    start, method, tolerances, equations = decided(model, start, times[0], method, rtol, atol, longest_step, equations)
+    end = times[-1] if end is None else end
+    start, method, tolerances, equations = decided(
+        model, start, times[0], method, rtol, atol, longest_step, equations, end
+    )
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
@@ -111,14 +115,14 @@ def integrate(
     return run.trajectory(record, outcome, given_up, before, wall)
 
 
-def decided(model, start, t, method, rtol, atol, longest_step, equations=None):
+def decided(model, start, t, method, rtol, atol, longest_step, equations=None, end=np.inf):
     """A checked start, the method and the tolerances for it, and equations if the choice needed them; arguments as for
-    `integrate`, the time (s) in place of times."""
+    `integrate`, the time (s) in place of times, and the ``end`` (s) where it is known."""
     start = _checked(start, model)
     method = start.method if isinstance(start, Checkpoint) else method
     if method == "auto":
         equations = equations or Equations(model)
-        method = cheaper_method(model, equations, t, start, longest_step)
+        method = cheaper_method(model, equations, t, start, longest_step, end)
     return start, method, step_tolerances(model, rtol, atol, method), equations
 
 

@@ -1,9 +1,9 @@
 """Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--more] [--out FILE]``.
 
 Scenes run on an empty table: those of `study.patch.look_up`, and examples at speeds, on tracks and from starts that a
-user may well try. What they meet of the pair of profiles that they share is kept: nodes, and which cells may be looked
-up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they
-meet besides is added.
+user may well try. What they meet is kept, a group per pair of profiles: nodes, and which cells may be looked up
+(``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they meet
+besides is added.
 """
 
 import argparse
@@ -18,6 +18,7 @@ from wrcore.dynamics import creep_modes, pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
 
 WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
+SHARP = {"track.path": [{"tangent": 5}, {"transition": 50}, {"curve": 100, "radius": 400, "cant": 0.1}]}
 MET = [
     *SCENES.values(),
     *(("suspended_wheelset", {"speed": v, "initial.y": 0.003}) for v in (20.0, 30.0, 40.0, 50.0, 60.0)),
@@ -26,12 +27,15 @@ MET = [
     *(("trailer_vehicle", {"speed": v, "integration.duration": 4.0, **ROUGH}) for v in (20.0, 40.0)),
     ("trailer_vehicle", {"speed": 25.0, "integration.duration": 6.0, **WIDER}),
     ("guided_car", {}),
+    ("trailer_vehicle", {"speed": 55.0, "integration.duration": 4.0, **ROUGH}),
+    ("trailer_vehicle", {"speed": 15.0, **SHARP}),
+    *(("metro_car", {"speed": v}) for v in (15.0, 20.0, 30.0)),
 ]
 """Examples and what is set in them."""
 
 
 def met(scenes, more=False):
-    """`Pair` with what scenes, (name, settings), meet on a table of their own, empty or with ``more`` as it ships."""
+    """`Pair` of each table with what scenes, (name, settings), meet on it, empty or with ``more`` as it ships."""
     pairs, shared = {}, (pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS)
     with tempfile.TemporaryDirectory() as folder:
         pair_store.Pair._take_shipped = shared[0] if more else lambda _: None
@@ -41,17 +45,17 @@ def met(scenes, more=False):
                 wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
         finally:
             pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS = shared
-        (pair,) = pairs.values()
-        pair.write()
-    return pair
+        for pair in pairs.values():
+            pair.write()
+    return [*pairs.values()]
 
 
-def write(pair, path):
-    """Keep a pair's nodes, and which of its cells may be looked up, with those that it began with."""
+def known(pair):
+    """A pair's nodes, and which of its cells may be looked up, with those that it began with: arrays by name."""
     states = {key: state for key, (_, state) in pair._known.items()}
     states |= {key: int(np.sign(state)) if state > 0 else state for key, state in pair.cells.items()}
     misses = {key: miss for key, (miss, _) in pair._known.items()} | dict(pair.misses)
-    data = {
+    return {
         "nodes": np.array(sorted(pair._solved_at)),
         "numbers": np.array([pair._solved_at[node] for node in sorted(pair._solved_at)]),
         "parts": np.array(sorted(pair._parts.items())),
@@ -59,9 +63,14 @@ def write(pair, path):
         "misses": np.array([misses[key] for key in states], np.float32),
         "fingerprint": pair_store.fingerprint(pair.contact),
     }
+
+
+def write(pairs, path):
+    """Keep what pairs know, a group each."""
     with new_hdf5(path) as file:
-        for name, array in data.items():
-            file.create_dataset(name, data=array, compression="gzip", compression_opts=9, shuffle=True)
+        for k, pair in enumerate(pairs):
+            for name, array in known(pair).items():
+                file.create_dataset(f"{k}/{name}", data=array, compression="gzip", compression_opts=9, shuffle=True)
 
 
 def main():
@@ -70,9 +79,9 @@ def main():
     parser.add_argument("--out", default=str(creep_modes.SHIPPED / "nodes.h5"))
     parser.add_argument("--more", action="store_true", help="begin with the nodes that come with the package")
     arguments = parser.parse_args()
-    path, pair = arguments.out, met(MET, arguments.more)
-    write(pair, path)
-    print(f"{len(pair.cells)} cells met, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
+    path, pairs = arguments.out, met(MET, arguments.more)
+    write(pairs, path)
+    print(f"{[len(pair.cells) for pair in pairs]} cells met, {Path(path).stat().st_size / 1e6:.1f} MB: {path}")
 
 
 if __name__ == "__main__":
