@@ -14,6 +14,7 @@ import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from functools import cached_property
 from queue import LifoQueue
 from threading import Lock
@@ -115,7 +116,8 @@ class Pair:
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
             begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path}); {WITHOUT}"
-            with handed_on("patches are solved without a table"), told_if_long(text, self._spent):
+            told = nullcontext() if key in self._known else told_if_long(text, self._spent)
+            with handed_on("patches are solved without a table"), told:
                 self._keep(key, *self._solved(key))  # or the cell stays as if never met
             self._spent += time.monotonic() - begin
             if time.monotonic() > self._next_written:

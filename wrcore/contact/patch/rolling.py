@@ -111,7 +111,7 @@ def rolling_work(strips, n, slips=1):
     m = 2 * n * strips
     vectors = [np.zeros(m, np.float32) for _ in range(2)] + [np.zeros((slips, m), np.float32) for _ in range(9)]
     return RollingWork(
-        np.zeros(m * m, np.float32), np.zeros(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
+        np.empty(m * m, np.float32), np.empty(m * m, np.float32), np.zeros((4, (n + 1) ** 2), np.float32),
         np.zeros((3, n * (n + 1)), np.float32), StripLayout(*np.zeros((10, strips))), np.zeros(5),
         *vectors, np.zeros(n + 2, np.float32), np.zeros(slips), np.zeros(slips),
     )  # fmt: skip
