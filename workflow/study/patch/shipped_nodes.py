@@ -18,6 +18,7 @@ from wrcore.dynamics import creep_modes, pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
 
 WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
+NOTEBOOK = {"track.irregularity": {"spectrum": {"level": "low", "seed": 3, "length": 150.0, "begin": 15.0}}}
 SHARP = {"track.path": [{"tangent": 5}, {"transition": 50}, {"curve": 100, "radius": 400, "cant": 0.1}]}
 MET = [
     *SCENES.values(),
@@ -30,6 +31,8 @@ MET = [
     ("trailer_vehicle", {"speed": 55.0, "integration.duration": 4.0, **ROUGH}),
     ("trailer_vehicle", {"speed": 15.0, **SHARP}),
     *(("metro_car", {"speed": v}) for v in (15.0, 20.0, 30.0)),
+    ("trailer_vehicle", {"speed": 60.0, "integration.duration": 2.0, **NOTEBOOK}),
+    ("trailer_vehicle", {"speed": 60.0, "initial.y": 0.0, "contact.friction": 0.15, "integration.duration": 1.0}),
 ]
 """Examples and what is set in them."""
 

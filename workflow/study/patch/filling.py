@@ -1,0 +1,67 @@
+"""What a run waits for until its table is filled: ``python -m study.patch.filling [SCENE ...]``.
+
+Each scene runs with looked-up contact on a table that knows what comes with the package and nothing else; the solver is
+compiled before. ``by lattice``: new cells from the coarsest lattice to the finest one.
+"""
+
+import argparse
+import collections
+import tempfile
+import time
+from pathlib import Path
+
+import pandas as pd
+
+import wrcore as wr
+from study.patch.look_up import ROUGH
+from study.patch.shipped_nodes import SHARP
+from wrcore.dynamics import pair_store
+from wrcore.dynamics.pair_table import LEVELS, corner_of
+
+OTHER, SEED = {"contact.friction": 0.25}, {"track.irregularity.spectrum.seed": 5}
+SCENES = {
+    "suspended wheelset, friction 0.25": ("suspended_wheelset", OTHER),
+    "trailer vehicle, friction 0.25": ("trailer_vehicle", OTHER),
+    "freight wagon, laden, friction 0.25": ("freight_wagon_laden", OTHER),
+    "metro car, friction 0.25": ("metro_car", OTHER),
+    "trailer vehicle, 55 m/s, rough track": ("trailer_vehicle", {"speed": 55.0, **ROUGH, **SEED}),
+    "trailer vehicle, 15 m/s, R 400 m": ("trailer_vehicle", {"speed": 15.0, **SHARP}),
+    "suspended wheelset, 65 m/s, 3 s": ("suspended_wheelset", {"speed": 65.0, "integration.duration": 3.0}),
+}
+"""Example scenes and what is set in them."""
+
+
+def waited(name, settings):
+    """Row of a run's new nodes and cells, and seconds: on the clock and of processors."""
+    pairs, shared = {}, (pair_store.table_folder, pair_store._PAIRS)
+    with tempfile.TemporaryDirectory() as folder:
+        pair_store.table_folder, pair_store._PAIRS = (lambda: Path(folder)), pairs
+        try:
+            wall, processor = time.perf_counter(), time.process_time()
+            run = wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
+            wall, processor = time.perf_counter() - wall, time.process_time() - processor
+        finally:
+            pair_store.table_folder, pair_store._PAIRS = shared
+        (pair,) = pairs.values()
+        cells = collections.Counter(corner_of(key)[0] for key in pair.cells if key not in pair._known)
+        row = {
+            "nodes": pair._new, "cells": cells.total(), "by lattice": [cells[level] for level in range(LEVELS)],
+            "wall, s": wall, "processors, s": processor, "solved in the run": run.counters["patches_not_tabulated"],
+        }  # fmt: skip
+        pair._new = 0  # nothing to keep
+    return row
+
+
+def main():
+    """Print a table of the scenes that are asked for, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("scenes", nargs="*", help="parts of their names")
+    words = parser.parse_args().scenes
+    wanted = {name: scene for name, scene in SCENES.items() if not words or any(word in name for word in words)}
+    waited("suspended_wheelset", {"contact.friction": 0.27, "integration.duration": 0.01})  # compiles
+    table = pd.DataFrame({name: waited(*scene) for name, scene in wanted.items()}).T
+    print(table.to_markdown(floatfmt=".1f"))
+
+
+if __name__ == "__main__":
+    main()
