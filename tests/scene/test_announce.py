@@ -47,3 +47,20 @@ def test_no_line_where_none_is_wanted(monkeypatch, capsys):
     monkeypatch.setenv("WRCORE_PROGRESS", "0")
     announce("work")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("detection", "lines"), [("spatial", 0), ("planar", 1), ("auto", 1)])
+def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeypatch):
+    class Known(Exception):
+        pass
+
+    def known(*_):
+        raise Known
+
+    said = []
+    monkeypatch.setattr(description, "announce", said.append)
+    monkeypatch.setattr(description, "_kept", known)
+    changes = {"contact.patch": "tabulated", "contact.detection": detection}
+    with pytest.raises(Known):
+        description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    assert len(said) == lines and all("contact.patch moment" in line for line in said)

@@ -103,8 +103,10 @@ def _print_run(done, as_json):
     )
     exceeded = [f"{counters[name]} {text}" for name, text in LIMITS.items() if counters[name]]
     if exceeded:
-        print(f"beyond the models' limits: {', '.join(exceeded)}; {counters['patches']} patches at the output times")
-    if errors:
+        print(f"beyond the models' limits: {', '.join(exceeded)} (of {counters['patches']} patches at output times)")
+    if solved := counters.get("patches_not_tabulated", 0):
+        print(f"exact contact was solved {solved} times where its table has no answer")
+    if any(errors.values()):  # some was looked up
         normal, force = (f"{100.0 * error:.2g} %" for error in errors.values())
         print(
             f"looked-up contact, in the middle of cells beside the exact solver: N within {normal}, creep force within "

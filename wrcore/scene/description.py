@@ -280,7 +280,8 @@ def _check_creep(contact, source, folder):
             raise InputError(source, "contact.patch", expected)
     elif creep["model"] != "table" and contact["patch"] not in REDUCTIONS:
         expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
-        raise InputError(source, "contact.creep.model", f"{expected}, got {creep['model']}")
+        got = f"got {creep['model']}; contact.patch {' and '.join(REDUCTIONS)} take any"
+        raise InputError(source, "contact.creep.model", f"{expected}, {got}")
     if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
     for key in ("k_A", "k_S"):
@@ -348,6 +349,9 @@ def compile_scene(
     contact, integration = data["contact"], data["integration"]
     material, damping = contact["material"], contact["normal"]["damping"]
     changing = scene.crossings, scene.out_of_round, scene.corrugation
+    if contact["patch"] == "tabulated" and scene.detection != "spatial":
+        announce(f"contact.detection {scene.detection}: patches are solved, not looked up, some hundred times as slow; "
+                 "contact.patch moment, or contact.detection spatial, does without")  # fmt: skip
     parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)
