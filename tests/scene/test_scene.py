@@ -199,3 +199,12 @@ def test_a_rail_that_ends_above_the_gauge_depth_is_named(tmp_path):
     with pytest.raises(InputError, match="expected a rail down to 0.014 m") as error:
         load_scene(SCENES / "wheelset.yaml", {"rail.profile": str(path), "rail.inclination": 0})
     assert (error.value.source, error.value.field) == (str(path), "gauge")
+
+
+def test_null_takes_a_key_out():
+    scene = load_scene(SCENES / "crossing.yaml", ["track.support=null", "integration.rtol=null"])
+    assert "support" not in scene.data["track"] and scene.data["integration"]["rtol"] == 1e-4  # the default
+    assert load_scene(SCENES / "crossing.yaml", track__support=None).data == scene.data
+    for key, expected in (("track.suport", "that the scene has"), ("speed", "the key is missing")):
+        with pytest.raises(InputError, match=f"{key}.*{expected}"):
+            load_scene(SCENES / "crossing.yaml", [f"{key}=null"])

@@ -26,7 +26,8 @@ def add(commands):
     command.add_argument("scene", metavar="SCENE.yaml", help="'wrcore init FOLDER' makes some to start from")
     command.add_argument(
         "--set", action="append", default=[], metavar="key.path=value", dest="overrides",
-        help="another value of a key of the scene, in SI units: speed=60, integration.duration=2; may be repeated",
+        help="another value of a key of the scene, in SI units: speed=60, integration.duration=2; may be repeated; "
+             "null takes a key out",
     )  # fmt: skip
     command.add_argument("--out", metavar="run.h5", help="write the run here; left out: it is only reported")
     command.add_argument(

@@ -115,7 +115,8 @@ class Pair:
             if self._full():
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
-            begin, text = time.monotonic(), f"exact contact is solved for its table, once ({self.path}); {WITHOUT}"
+            mu, begin = self.contact.strips.looked_up, time.monotonic()
+            text = f"exact contact at a friction of {mu:g} is solved for its table, once ({self.path}); {WITHOUT}"
             told = nullcontext() if key in self._known else told_if_long(text, self._spent)
             with handed_on("patches are solved without a table"), told:
                 self._keep(key, *self._solved(key))  # or the cell stays as if never met

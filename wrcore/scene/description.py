@@ -139,6 +139,7 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
         Scene file, the content of one (then paths count from the working directory), or a scene to be changed.
     overrides : sequence of str, or dict
         ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them; or values by ``key.path``.
+        ``null`` (None) takes a key out of the scene.
     **changes
         Further values by key: ``speed=30``, ``integration__duration=2.0`` (two underscores stand for the dot) or
         ``initial={"y": 0.003, "yaw": 0.001}`` (what the mapping does not name stays).
@@ -250,12 +251,17 @@ def _plain(value):
 
 
 def _set(data, key, value, source):
-    """Set the value at a path of keys; a number means one of a list."""
+    """Set the value at a path of keys, or take the key out for None; a number means one of a list."""
     *path, last = key.split(".")
     for part in path:
         data = data[_place(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
         if not isinstance(data, dict | list):
             raise InputError(source, key, f"expected a key below a mapping, but {part!r} holds a value")
+    if value is None and isinstance(data, dict):
+        if last not in data:
+            raise InputError(source, key, "expected a key that the scene has, to take it out")
+        del data[last]
+        return
     data[_place(data, last, key, source) if isinstance(data, list) else last] = value
 
 
