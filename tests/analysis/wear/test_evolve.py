@@ -70,6 +70,15 @@ def test_rails_lose_what_wheels_lose(worn):
     np.testing.assert_allclose(lost, 2 * table["volume_m3_per_m"].iloc[:-1], rtol=1e-9)
 
 
+def test_what_changes_set_stands_beside_what_the_plan_sets():
+    plan = PLAN | {"set": {"contact.patch": "maximum", "contact.friction": 0.25}}
+    data, scenes = ev.load_wear_plan(plan, {"set": {"contact.friction": 0.2}, "distance": 2e5})
+    assert data["set"] == {"contact.patch": "maximum", "contact.friction": 0.2} and data["distance"] == 2e5
+    assert [(scene.data["contact"]["patch"], scene.data["contact"]["friction"]) for scene in scenes] == [
+        ("maximum", 0.2)
+    ] * 2
+
+
 def test_threads_and_cost(worn, tmp_path):
     """Scenes at the same time give the same numbers; what the runs and their wear cost is told."""
     folder, table = worn

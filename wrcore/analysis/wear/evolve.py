@@ -54,10 +54,14 @@ def load_wear_plan(
     source: str | PathLike[str] | dict[str, Any], changes: dict[str, Any] | None = None
 ) -> tuple[dict[str, Any], list[Scene]]:
     """Read and check a plan (a file by the schema ``wear.yaml``, or its content, with paths from the working
-    directory), ``changes`` replacing its keys: its data with defaults, and its scenes in order.
+    directory), ``changes`` replacing its keys, of ``set`` those that they name: its data with defaults, and its scenes
+    in order.
     """
     name, folder, data = read_source(source, "plan")
-    data = validate({**data, **(changes or {})}, "wear", name)
+    changes = changes or {}
+    if isinstance(data.get("set"), dict) and isinstance(changes.get("set"), dict):
+        changes = changes | {"set": data["set"] | changes["set"]}
+    data = validate({**data, **changes}, "wear", name)
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
