@@ -601,7 +601,7 @@ def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
 
 @pytest.mark.parametrize("name, speed", [
     ("suspended_wheelset", 60.0), ("trailer_vehicle", 50.0), ("freight_wagon_empty", 20.0),
-    ("freight_wagon_laden", 20.0),
+    ("freight_wagon_laden", 20.0), ("metro_car", 30.0),
 ])  # fmt: skip
 def test_an_example_solves_nothing(own_cache, monkeypatch, name, speed):
     """What they meet comes with the package: not even the solver is compiled."""
