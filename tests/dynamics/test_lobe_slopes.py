@@ -6,13 +6,14 @@ import pytest
 import wrcore as wr
 from tests.dynamics.test_pair_table import known_numbers, pair_of_known_numbers
 from wrcore.contact.patch.model import MODES, NODES, NUMBERS
-from wrcore.dynamics import pair_table
+from wrcore.dynamics import pair_cells, pair_table
 from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, contact_blocks
 from wrcore.dynamics.creep_modes import creep_modes
 from wrcore.dynamics.modes import ELLIPSES
+from wrcore.dynamics.pair_cells import AXES, Place
 from wrcore.dynamics.pair_store import Pair
 from wrcore.dynamics.system import Equations
-from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes, weigh_slopes
+from wrcore.dynamics.table_slopes import look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.jacobian import new_jacobian
 from wrcore.kernels.jit import jit
@@ -72,16 +73,16 @@ def test_slopes_of_lobes_are_those_of_differences(case):
 
 def test_numbers_along_the_lattice():
     """A cell's numbers and what they change by, along each axis, in a finer lattice and from odd corners, too."""
-    key = pair_table.key_of(1, 71, 1, 301, 199, 10)
+    key = pair_cells.key_of(1, 71, 1, 301, 199, 10)
     rows = Pair._rows_of(pair_of_known_numbers(), key)
     assert Pair._add_yaw(pair_of_known_numbers(), key, rows)
     numbers, along, weights = np.zeros(NUMBERS), np.zeros((AXES, NUMBERS)), np.zeros((1 + AXES, NODES))
-    parts, steps = np.array([0.3, 0.6, 0.9]), np.array([*pair_table.STEPS, 1.0])
-    steps[:3], steps[3] = steps[:3] / 2.0, pair_table.YAW / 3.0
+    parts, steps = np.array([0.3, 0.6, 0.9]), np.array([*pair_cells.STEPS, 1.0])
+    steps[:3], steps[3] = steps[:3] / 2.0, pair_cells.YAW / 3.0
 
     def at(parts, turn):
         double = 0.5 * (parts + np.array([301, 199, 10]) % 2)
-        return pair_table.Place(1, *parts, *double, turn, 2.0, pair_table.YAW / 3.0)
+        return Place(1, *parts, *double, turn, 2.0, pair_cells.YAW / 3.0, 1.0)
 
     weigh_slopes(at(parts, 0.4), weights)
     look_slopes_up(rows, weights, numbers, along)

@@ -13,14 +13,15 @@ from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
 from wrcore.contact import reduction
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import find_patches
-from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, LOBES, MODES, NO_TABLE, NODES, NUMBERS
+from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOBE_COLUMNS, LOBES, MODES, NODES, NUMBERS
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.creep.laws import LAWS, creep_forces
-from wrcore.dynamics import coupled_lobes, modes, pair_node, pair_store, pair_table, patch_kernels
+from wrcore.dynamics import coupled_lobes, modes, pair_cells, pair_node, pair_store, pair_table, patch_kernels
 from wrcore.dynamics.creep_modes import creep_modes
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import YAW, YAWS, look_up
+from wrcore.dynamics.pair_cells import YAW, YAWS, Place
+from wrcore.dynamics.pair_table import look_up
 from wrcore.dynamics.system import Equations
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
@@ -64,13 +65,13 @@ def pair_of_known_numbers(lost=()):
 @pytest.mark.parametrize("first", [(300, 200, 9), (301, 199, 10)])
 def test_what_a_cell_gives_exactly(first):
     """Squares along each axis, what is linear in all, and what depends on yaw as a parabola; also from odd corners."""
-    key, pair, numbers = pair_table.key_of(1, 71, 1, *first), pair_of_known_numbers(), np.empty(NUMBERS)
-    assert pair_table.corner_of(key) == (1, 71, 1, *first)
+    key, pair, numbers = pair_cells.key_of(1, 71, 1, *first), pair_of_known_numbers(), np.empty(NUMBERS)
+    assert pair_cells.corner_of(key) == (1, 71, 1, *first)
     rows = pair_store.Pair._rows_of(pair, key)
     assert pair_store.Pair._add_yaw(pair, key, rows)
     part = np.array([0.3, 0.6, 0.9])
     weights = np.empty(NODES)
-    pair_table.weigh(pair_table.Place(1, *part, *0.5 * (part + np.array(first) % 2), 0.4, 1.0, 1.0), weights)
+    pair_table.weigh(Place(1, *part, *0.5 * (part + np.array(first) % 2), 0.4, 1.0, 1.0, 1.0), weights)
     look_up(rows, weights, numbers)
     x, y, z = part + first - (300, 200, 9)
     expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z
@@ -387,28 +388,9 @@ def test_lobes_act_on_each_other_as_loads_on_a_half_space_do(moment, rtol):
     assert tilt == pytest.approx((punched[2] - punched[0]) / 2e-5, rel=0.03)
 
 
-def test_half_the_steps_where_a_cell_is_too_coarse():
-    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place and
-    in a third of the cell in yaw."""
-    places = np.array([300.3, 200.6, 9.9]), np.array([600.6, 401.2, 19.8])
-    t, slope, log_depth = np.array(pair_table.FIRST) + places[0] * pair_table.STEPS
-    u, (coarse, fine) = 0.011, [list(map(int, place)) for place in places]
-    part = round((u - pair_table.FIELD) / pair_table.PART)
-    keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
-    for level, turn, corner, state in ((0, 1, coarse, pair_table.FINER), (1, 5, fine, 5)):
-        key = pair_table.key_of(level, part, turn, *corner)
-        keys[key % 1009], states[key % 1009] = key, state
-    table = NO_TABLE._replace(keys=keys, states=states)
-    state, *parts, turn, scale, half = pair_table.locate(table, u, False, t, slope, log_depth, 0.375 * YAW)
-    assert (state, scale, half) == (5, 2.0, YAW / 3.0)
-    expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
-    np.testing.assert_allclose(parts, expected, atol=1e-9)
-    assert turn == pytest.approx(0.375 * 3.0 - 2.0)
-
-
 def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
     """Beyond a cell; where one of its own corners has none, the cell has none."""
-    key = pair_table.key_of(0, 7, 1, 300, 200, 9)
+    key = pair_cells.key_of(0, 7, 1, 300, 200, 9)
     whole = pair_store.Pair._rows_of(pair_of_known_numbers(), key)
     rows = pair_store.Pair._rows_of(pair_of_known_numbers([(3, 299, 200, 9), (3, 300, 201, 11)]), key)
     changed = np.flatnonzero(abs(rows - whole).max(axis=1))
@@ -423,7 +405,7 @@ def test_a_corner_without_a_solution_goes_on_as_a_straight_line():
 
 def test_where_yaw_has_no_solution_it_adds_what_it_adds_elsewhere():
     """If that is known at half of the corners at least."""
-    key, empty = pair_table.key_of(0, 7, 1, 300, 200, 9), np.zeros((pair_table.NODES, NUMBERS), np.float32)
+    key, empty = pair_cells.key_of(0, 7, 1, 300, 200, 9), np.zeros((pair_table.NODES, NUMBERS), np.float32)
     corners = [(4, 300 + a, 200 + b, 8 + c) for a in (0, 2) for b in (0, 2) for c in (0, 2)]
     assert pair_store.Pair._add_yaw(pair_of_known_numbers(corners[:4]), key, empty)
     rows = empty[32:].reshape(8, 2, -1)

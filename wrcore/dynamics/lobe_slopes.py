@@ -29,11 +29,11 @@ from wrcore.dynamics.contact_slopes import (
 )
 from wrcore.dynamics.modes import PATCHES_ONLY
 from wrcore.dynamics.motion import as_left, motion_of
+from wrcore.dynamics.pair_cells import AXES, FIRST, STEPS, locate
 from wrcore.dynamics.pair_table import (
     ANGLE,
     APART,
     FAR,
-    FIRST,
     LOCKED,
     LOG_A,
     LOG_B,
@@ -45,15 +45,13 @@ from wrcore.dynamics.pair_table import (
     SADDLE,
     SLOPE_ETA,
     SLOPE_XI,
-    STEPS,
     Slip,
     base_force,
     lobe_end,
-    locate,
     of_two,
 )
 from wrcore.dynamics.strip_wheel import lift_of, lift_share
-from wrcore.dynamics.table_slopes import AXES, look_slopes_up, remainder_slopes, weigh_slopes
+from wrcore.dynamics.table_slopes import look_share_slopes_up, look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.dynamics.tabulated_wheel import lifted_place
 from wrcore.dynamics.wheel import contact_of, falling, press_wheels
 from wrcore.kernels.jit import FUSED, jit
@@ -113,14 +111,16 @@ def lobe_slopes(model, m, rows, count, scratch, out, work):
     pose, (log_depth, u) = lifted_place(m, pressed, lift)
     if lobe_end(geometry, pose, rows, 0, count, (APART, FAR, SADDLE)) < count:
         return False
-    at = locate(
-        table, u, False, pose.y + geometry.half_distance * m.ey - geometry.rail_distance, m.ez, log_depth, ahead * m.ex
-    )  # fmt: skip
+    t = pose.y + geometry.half_distance * m.ey - geometry.rail_distance
+    at = locate(table, u, False, t, m.ez, log_depth, ahead * m.ex, work.shares)
     if at.cell == 0:
         return False
     _lattice_rates(model, m, pressed, lift, rows, count, scratch, work)
-    weigh_slopes(at, work.spread)
-    look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
+    if at.own < 1.0:
+        look_share_slopes_up(table, at, work.shares, work.spread, work.numbers[0], work.along)
+    else:
+        weigh_slopes(at, work.spread)
+        look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
     if at.scale * (log_depth - FIRST[2]) < STEPS[2]:  # looked up at the least depth
         work.along[DEPTH] = 0.0
     _force_slopes(model, m, log_depth, ahead, scratch[3:, :3], out, work)

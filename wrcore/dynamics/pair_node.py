@@ -18,7 +18,8 @@ from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.pair_table import PART, WIDE, Slip, base_force, lobe_end, log_depth_of, root_share, tabulated_force
+from wrcore.dynamics.pair_cells import PART
+from wrcore.dynamics.pair_table import WIDE, Slip, base_force, lobe_end, log_depth_of, root_share, tabulated_force
 from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 

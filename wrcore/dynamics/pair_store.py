@@ -25,25 +25,26 @@ import numpy as np
 from wrcore.contact.patch.model import NODES, NUMBERS, PairTable, strip_work, with_tables
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.creep_modes import SHIPPED, creep_modes
-from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
-from wrcore.dynamics.pair_table import (
+from wrcore.dynamics.pair_cells import (
     BESIDE,
     FIELD,
     FINER,
     FIRST,
     HARD,
     LEVELS,
-    NARROW,
     PART,
     PART_CODE,
     STEPS,
-    WIDE,
     YAW,
     YAWS,
+    Place,
     corner_of,
+    key_of,
     node_code,
     node_of,
 )
+from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
+from wrcore.dynamics.pair_table import NARROW, WIDE
 from wrcore.dynamics.wheel import alone
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
@@ -55,6 +56,9 @@ WRONG = (3e-3, 0.01), (3e-3, 0.015), (3e-3, 0.015), (2e-3, 0.015), (0.1, 0.3)
 """Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
 in the end to the solver. Fine lattices are where a lobe is born. There forces bend, or the solver's own ones jump by a
 few percent, and steps through solutions would be as small as they can: in the finest only nonsense is refused."""
+
+SEAMED = 0.1, 0.2
+"""The same of what a cell that is left to the next lattice may miss to have a share near its neighbours."""
 
 LIGHT = 2e-5
 """Errors of a lobe of less depth are beside the load of this one, m: some 6 kN."""
@@ -132,13 +136,23 @@ class Pair:
             if rows is not None:
                 self._add_yaw(key, rows)
             return state, rows
-        rows, wrong = self._rows_of(key), WRONG[corner_of(key)[0]]
+        level = corner_of(key)[0]
+        if level >= LEVELS:
+            return self._left(key)
+        rows, wrong = self._rows_of(key), WRONG[level]
         self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
         if rows is not None and np.less(miss, wrong).all() and self._add_yaw(key, rows):
             self.misses[key] = miss = tuple(np.maximum(miss, self._miss(key, rows, 0.5)))
             if np.less(miss, wrong).all():
                 return 1, rows
-        return HARD if corner_of(key)[0] + 1 == LEVELS else FINER, None
+        return HARD if level + 1 == LEVELS else FINER, None
+
+    def _left(self, key):
+        """State and rows of what a cell gives that was left to the next lattice, for where it goes over to others."""
+        level, *cell = corner_of(key)
+        self.misses[key] = miss = self.misses[key_of(level - LEVELS, *cell)]
+        rows = self._rows_of(key) if np.less(miss, SEAMED).all() else None
+        return (1, rows) if rows is not None and self._add_yaw(key, rows) else (HARD, None)
 
     def _keep(self, key, state, rows):
         """Let kernels see a cell; where it has a state above 0, this becomes its number."""
@@ -158,7 +172,7 @@ class Pair:
         return 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS
 
     def _numbers(self, nodes):
-        """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_table.node_code`, solved side by
+        """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_cells.node_code`, solved side by
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
@@ -188,7 +202,7 @@ class Pair:
         has no solution. In the finest lattice up to four corners without take the mean of the others. Where a node
         beyond has none, a straight line goes on."""
         level, part, turn, *first = corner_of(key)
-        where = level, part, 2 * turn + 1
+        where = level % LEVELS, part, 2 * turn + 1
         rows, own = np.zeros((NODES, NUMBERS), np.float32), self._numbers(_nodes(*where, _CORNERS + first))
         lost = np.isnan(own[:, 0])
         if lost.sum() > (4 if level + 1 == LEVELS else 0):
@@ -205,7 +219,7 @@ class Pair:
         where more are not."""
         level, part, turn, *first = corner_of(key)
         corners = np.repeat(2 * (_CORNERS + np.array(first) // 2), 3, axis=0)
-        found = self._numbers(_nodes(level, part, 2 * turn + np.tile(np.arange(3), 8), corners))
+        found = self._numbers(_nodes(level % LEVELS, part, 2 * turn + np.tile(np.arange(3), 8), corners))
         left, middle, right = found.reshape(8, 3, NUMBERS).swapaxes(0, 1)
         yawed = rows[32:].reshape(8, 2, NUMBERS)
         yawed[:, 0], yawed[:, 1] = right - left, left + right - 2.0 * middle
@@ -246,7 +260,7 @@ class Pair:
             if level + 1 < LEVELS:
                 return math.nan, math.nan
             exact = rows[0].astype(float)
-        columns.weigh(columns.Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0), weights)
+        columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, self.modes

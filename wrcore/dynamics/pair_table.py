@@ -11,7 +11,7 @@ t, slope and ln D, linear in the other two, the three together less twice what i
 wants 32 nodes in place of 64 and errs by the product of two curvatures more). What yaw changes from the middle of a
 cell is a parabola through three nodes, linear between nodes of a lattice with twice the steps. A node depends on its
 place alone, not on what was solved before it. Where the lattice is too coarse another one with half its steps (in yaw
-a third) takes over.
+a third) takes over (:mod:`wrcore.dynamics.pair_cells`).
 
 References
 ----------
@@ -35,25 +35,9 @@ from wrcore.contact.patch.model import MODES, NODES
 from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
-from wrcore.kernels.handles import call_c
+from wrcore.dynamics.pair_cells import LEVELS, place_of
 from wrcore.kernels.jit import FAST, FUSED, jit
 from wrcore.kernels.lanes import lanes8, load8, put8, take8, total
-
-STEPS = 2e-4, 5e-4, 0.25
-"""Of the coarsest lattice in t (m), slope of the axle and ln D."""
-
-LEVELS = 5
-"""Lattices, each with half the steps of the one before."""
-
-FIRST = -0.05, -0.1, math.log(4e-6)
-"""Their first places."""
-
-COUNTS = 500, 400, 19
-"""Steps of the coarsest lattice."""
-
-YAW, YAWS = 8e-3, 3
-"""Half of a cell of the coarsest lattice in yaw (rad), and how many there are; each lattice has three for one of that
-before."""
 
 APART, FAR, SADDLE = 8e-3, 1.4e-2, 2e-5
 """Neighbouring overlaps are one lobe where their distance on the wheel's profile (m) is below the first; or the second,
@@ -61,12 +45,6 @@ and the gap between them (m) is nowhere more than the last."""
 
 NARROW, WIDE = (6e-3, 1.4e-2, 1e-5), (1e-2, 1.4e-2, 4e-5)
 """The same in nodes for lobes with others beside them and for lobes alone: nodes about a lobe are of its kind."""
-
-BESIDE = 64
-"""Added to the part of the wheel's profile in places of lobes with others beside them."""
-
-PART, FIELD = 4e-3, -0.1
-"""Width of the parts of the wheel's profile, and where they begin, m."""
 
 CURVATURE = 2.0
 """B0 of the depth D, 1/m."""
@@ -103,9 +81,6 @@ ROUND = 0.1
 LOCKED = 0.3
 """Deviation from free rolling at which the remainder has faded out."""
 
-EMPTY, FINER, HARD = 0, -1, -2
-"""States of a cell that has no corners: not met yet, left to the next lattice, left to the exact solver."""
-
 _TABLE = LAWS["table"]
 
 
@@ -139,100 +114,6 @@ def _weights(f):
     """Catmull-Rom's weights of four nodes at f, 0 to 1 between the middle two."""
     g = 1.0 - f
     return -0.5 * f * g * g, 1.0 + f * f * (1.5 * f - 2.5), 1.0 + g * g * (1.5 * g - 2.5), -0.5 * g * f * f
-
-
-@jit(allocates=False, forceinline=True)
-def key_of(level, part, turn, i, j, k):
-    """One number, not 0, for the cell with this place in yaw and first corner; `corner_of` reads it."""
-    return (((((level + 1) * 128 + part) * 256 + turn) * 8192 + i) * 8192 + j) * 512 + k
-
-
-def corner_of(key):
-    """Level, part of the profile, place in yaw and first corner of a cell."""
-    found = []
-    for count in (512, 8192, 8192, 256, 128):
-        key, rest = divmod(key, count)
-        found.append(rest)
-    return key - 1, *reversed(found)
-
-
-PART_CODE = 512 * 8192 * 8192 * 512
-"""What one part of the profile more adds to a `node_code`."""
-
-
-def node_code(level, part, turn, i, j, k):
-    """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
-    return (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
-
-
-def node_of(code):
-    """Level, part of the profile, place in yaw and in the lattice of a node."""
-    found = []
-    for count in (512, 8192, 8192, 512, 128):
-        code, rest = divmod(code, count)
-        found.append(rest)
-    return code, *reversed(found)
-
-
-@jit(allocates=False)
-def state_of(keys, states, key):
-    """State of a cell, or number of its corners."""
-    slot = key % len(keys)
-    while keys[slot] != key:
-        if keys[slot] == 0:
-            return EMPTY
-        slot = (slot + 1) % len(keys)
-    return states[slot]
-
-
-class Place(NamedTuple):
-    """Where a lobe lies in a cell."""
-
-    cell: int
-    """Number of the cell; 0 if the lobe is to be solved."""
-    fx: float
-    fy: float
-    fz: float
-    """Parts of a step of t, slope and ln D beyond the first corner."""
-    gx: float
-    gy: float
-    gz: float
-    """Parts of two steps beyond the first corner of the cell with twice the steps."""
-    turn: float
-    """Yaw from the cell's middle over half of the cell."""
-    scale: float
-    """Steps of the coarsest lattice over those of this one."""
-    half: float
-    """Half of the cell in yaw, rad."""
-
-
-NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW)
-
-
-@jit(allocates=False)
-def locate(table, u, beside, t, slope, log_depth, yaw):
-    """`Place` of a lobe with ln D. One that only just touches is looked up at the least depth."""
-    part, scale, half = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW
-    for level in range(LEVELS):
-        x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z, w = max(scale * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
-        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
-            break
-        if not 0.0 <= w < YAWS * YAW / half:
-            break
-        i, j, k, turn = int(x), int(y), int(z), int(w)
-        key = key_of(level, part, turn, i, j, k)
-        state = state_of(table.keys, table.states, key)
-        if state == EMPTY:
-            call_c(table.fill, key)
-            state = state_of(table.keys, table.states, key)
-        if state > 0:
-            gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
-            return Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half)
-        if state != FINER:
-            break
-        scale, half = 2.0 * scale, half / 3.0
-    return NOWHERE
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -300,6 +181,30 @@ def look_modes_up(rows, weights, numbers):
         if (part if family else 1.0 - part) > 0.0:
             first = MODE + MODES * family
             _sum_rows(rows, weights, first, first + MODES, numbers)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def look_shares_up(table, at, shares, weights, numbers):
+    """As `look_up` and `look_modes_up` together, from all cells that have a share, see `locate`."""
+    weigh(at, weights)
+    numbers[:] = 0.0
+    add_rows(table.cells[at.cell], weights, at.own, numbers)
+    for level in range(LEVELS):
+        if shares[level, 0] > 0.0:
+            there = place_of(shares[level])
+            weigh(there, weights)
+            add_rows(table.cells[there.cell], weights, there.own, numbers)
+    if not LEAST < numbers[ROOT] < 1.0 - LEAST:
+        numbers[PARTED_FROM:MODE] = 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def add_rows(rows, weights, share, numbers):
+    """Add the weighted sum of a cell's rows, times its share."""
+    for n in range(NODES):
+        weight = share * weights[n]
+        for column in range(numbers.shape[0]):
+            numbers[column] += weight * rows[n, column]
 
 
 @jit(allocates=False)

@@ -6,6 +6,7 @@ import numpy as np
 
 from wrcore.contact.geometry import LANES
 from wrcore.contact.patch.model import MODES, NODES
+from wrcore.dynamics.pair_cells import AXES, LEVELS, STEPS, place_of
 from wrcore.dynamics.pair_table import (
     ANGLE,
     FLANKS,
@@ -16,7 +17,6 @@ from wrcore.dynamics.pair_table import (
     PARTED_FROM,
     ROOT,
     ROUND,
-    STEPS,
     along_axis,
     flank_part,
     round_part,
@@ -25,9 +25,6 @@ from wrcore.dynamics.pair_table import (
 )
 from wrcore.kernels.jit import FUSED, jit
 from wrcore.kernels.lanes import lanes8, load8, put8, take8, total
-
-AXES = 4
-"""Of the lattice: t, slope, ln D and yaw."""
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -89,6 +86,33 @@ def look_slopes_up(rows, weights, numbers, along):
         if (part if family else 1.0 - part) > 0.0:
             first = MODE + MODES * family
             _sum_rows(rows, weights, first, first + MODES, numbers, along)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def look_share_slopes_up(table, at, shares, weights, numbers, along):
+    """As `look_slopes_up`, from all cells that have a share, see `wrcore.dynamics.pair_cells.locate`."""
+    numbers[:], along[:] = 0.0, 0.0
+    _add_slopes(table, at, shares[LEVELS], weights, numbers, along)
+    for level in range(LEVELS):
+        if shares[level, 0] > 0.0:
+            _add_slopes(table, place_of(shares[level]), shares[level], weights, numbers, along)
+    if not LEAST < numbers[ROOT] < 1.0 - LEAST:
+        numbers[PARTED_FROM:MODE] = 0.0
+        along[:, PARTED_FROM:MODE] = 0.0
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_slopes(table, at, share, weights, numbers, along):
+    """Add what a cell with a ``share``, that changes along the axes, has in the numbers and their slopes."""
+    weigh_slopes(at, weights)
+    rows = table.cells[at.cell]
+    for n in range(NODES):
+        for column in range(numbers.shape[0]):
+            row = rows[n, column]
+            numbers[column] += share[0] * weights[0, n] * row
+            for axis in range(AXES):
+                slope = share[0] * weights[1 + axis, n] + share[1 + axis] * weights[0, n]
+                along[axis, column] += slope * row
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

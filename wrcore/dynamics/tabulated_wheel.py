@@ -18,15 +18,16 @@ from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.contact.strip import changed_here, make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI
+from wrcore.dynamics.pair_cells import locate
 from wrcore.dynamics.pair_table import (
     APART,
     FAR,
     SADDLE,
     Slip,
     lobe_end,
-    locate,
     log_depth_of,
     look_modes_up,
+    look_shares_up,
     look_up,
     tabulated_force,
     weigh,
@@ -145,13 +146,16 @@ def look_only_lobe_up(model, m, pose, ahead, place, work):
 def look_lobe_up(model, numbers, lobe, u, apart, t, slope, log_depth, yaw, modes, work):
     """Look a lobe with ln D up, or only what is no coefficient of ``modes``; False if it is in no lattice."""
     table = model.strips.table
-    at = locate(table, u, apart, t, slope, log_depth, yaw)
+    at = locate(table, u, apart, t, slope, log_depth, yaw, work.shares)
     if at.cell == 0:
         return False
-    weigh(at, work.weights)
-    look_up(table.cells[at.cell], work.weights, numbers)
-    if modes:
-        look_modes_up(table.cells[at.cell], work.weights, numbers)
+    if at.own < 1.0:
+        look_shares_up(table, at, work.shares, work.weights, numbers)
+    else:
+        weigh(at, work.weights)
+        look_up(table.cells[at.cell], work.weights, numbers)
+        if modes:
+            look_modes_up(table.cells[at.cell], work.weights, numbers)
     modulus = contact_modulus(model.shear_modulus, model.poisson_ratio)
     lobe[NORMAL] = modulus * math.exp(numbers[columns.LOG_NORMAL] + 1.5 * log_depth)
     lobe[CELL] = at.cell

@@ -10,8 +10,8 @@ from matplotlib.colors import to_hex
 
 from study.patch import cells
 from study.report.legible import save_figure
+from wrcore.dynamics.pair_cells import FINER, HARD, YAW, key_of
 from wrcore.dynamics.pair_store import _place, pair_of
-from wrcore.dynamics.pair_table import FINER, HARD, YAW, key_of
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
 

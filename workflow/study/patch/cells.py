@@ -21,22 +21,9 @@ from wrcore.contact.normal import damping_factor
 from wrcore.contact.patch.gap import group_end
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import make_pose
+from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, STEPS, YAW, YAWS, corner_of
 from wrcore.dynamics.pair_store import _PAIRS, WRONG, Pair, pair_of
-from wrcore.dynamics.pair_table import (
-    APART,
-    FAR,
-    FINER,
-    FIRST,
-    HARD,
-    LEVELS,
-    SADDLE,
-    STEPS,
-    YAW,
-    YAWS,
-    corner_of,
-    lobe_end,
-    log_depth_of,
-)
+from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end, log_depth_of
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene

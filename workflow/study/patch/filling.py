@@ -16,7 +16,7 @@ import wrcore as wr
 from study.patch.look_up import ROUGH
 from study.patch.shipped_nodes import SHARP
 from wrcore.dynamics import pair_store
-from wrcore.dynamics.pair_table import LEVELS, corner_of
+from wrcore.dynamics.pair_cells import LEVELS, corner_of
 
 OTHER, SEED = {"contact.friction": 0.25}, {"track.irregularity.spectrum.seed": 5}
 SCENES = {

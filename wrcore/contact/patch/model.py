@@ -46,8 +46,9 @@ NO_TABLE = PairTable(
 NODES, NUMBERS, MODES = 48, 72, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
-LOBE_COLUMNS = 10 + 2 * MAX_PATCHES
-"""Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`."""
+LOBE_COLUMNS, SHARES = 10 + 2 * MAX_PATCHES, (7, 16)
+"""Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`, and of the cells that have a share in it, see
+`wrcore.dynamics.pair_cells`."""
 
 
 KERNEL, MODEL, ELLIPSES, LOBES, LOAD = range(5)
@@ -107,7 +108,8 @@ class StripWork(NamedTuple):
     lobes: np.ndarray
     numbers: np.ndarray
     weights: np.ndarray
-    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS) and (NODES,): of a patch that is looked up."""
+    shares: np.ndarray
+    """(MAX_PATCHES, LOBE_COLUMNS), (MAX_PATCHES, NUMBERS), (NODES,) and `SHARES`: of a patch that is looked up."""
     spread: np.ndarray
     along: np.ndarray
     rest: np.ndarray
@@ -168,6 +170,7 @@ def strip_work(model, wheelsets, slips=1):
         np.zeros((STRIP_ROWS, count)), np.zeros((4, count)), np.zeros((3, count)),
         np.zeros((2, 6)), np.zeros(SUMS), np.zeros(3, np.int64),
         np.zeros((MAX_PATCHES, LOBE_COLUMNS)), np.zeros((MAX_PATCHES, NUMBERS)), np.zeros(NODES),
+        np.zeros(SHARES),
         *(np.zeros(shape if model.looked_up else (0, 0)) for shape in ((5, NODES), (4, NUMBERS), (8, 3), (10, 4))),
         np.zeros((3, 5)), normal,
         *(rolling_work(count, max(one.level.panels, 2), slips) for one in (model.library, model.slender)),

@@ -1,0 +1,103 @@
+"""Cells of looked-up contact: which one a lobe lies in, and that lattices go over into each other."""
+
+import numpy as np
+import pytest
+
+import wrcore as wr
+from wrcore.contact.patch.model import NO_TABLE, NODES, NUMBERS, SHARES
+from wrcore.dynamics import pair_cells, pair_store
+from wrcore.dynamics.pair_cells import AXES, FINER, LEVELS, YAW, corner_of, key_of, locate
+from wrcore.dynamics.pair_table import look_shares_up, look_up, weigh
+from wrcore.dynamics.table_slopes import look_share_slopes_up
+from wrcore.scene.description import compile_scene, load_scene
+
+U, FINEST = 0.011, 2
+"""Place on the wheel's profile, and the finest lattice that these tables have."""
+
+
+def test_half_the_steps_where_a_cell_is_too_coarse():
+    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place and
+    in a third of the cell in yaw."""
+    places = np.array([300.3, 200.6, 9.9]), np.array([600.6, 401.2, 19.8])
+    t, slope, log_depth = np.array(pair_cells.FIRST) + places[0] * pair_cells.STEPS
+    coarse, fine = [list(map(int, place)) for place in places]
+    part = round((U - pair_cells.FIELD) / pair_cells.PART)
+    keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
+    for level, turn, corner, state in ((0, 1, coarse, FINER), (1, 5, fine, 5)):
+        key = key_of(level, part, turn, *corner)
+        keys[key % 1009], states[key % 1009] = key, state
+    table = NO_TABLE._replace(keys=keys, states=states)
+    state, *parts, turn, scale, half, own = locate(table, U, False, t, slope, log_depth, 0.375 * YAW, np.zeros(SHARES))
+    assert (state, scale, half, own) == (5, 2.0, YAW / 3.0, 1.0)
+    expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
+    np.testing.assert_allclose(parts, expected, atol=1e-9)
+    assert turn == pytest.approx(0.375 * 3.0 - 2.0)
+
+
+@pytest.fixture(params=range(2))
+def patchwork(request, tmp_path, monkeypatch):
+    """A table of which half of the cells are left to the next lattice, and whose numbers are 1, 2 and 3 on lattices
+    that have these numbers."""
+
+    def solved(pair, key):
+        level, _, *cell = corner_of(key)
+        rows = np.zeros((NODES, NUMBERS), np.float32)
+        rows[:32] = 1 + level % LEVELS
+        finer = np.random.default_rng([request.param, level, *cell]).random() < 0.5
+        pair.misses[key] = 0.0, 0.0
+        return (FINER, None) if level < FINEST and finer else (1, rows)
+
+    monkeypatch.setattr(pair_store, "table_folder", lambda: tmp_path)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    monkeypatch.setattr(pair_store.Pair, "_take_shipped", lambda _: None)
+    monkeypatch.setattr(pair_store.Pair, "_solved", solved)
+    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), **{"contact.patch": "tabulated"}))
+    return pair_store.Pair(model.contact, "patchwork")
+
+
+def number_at(table, place):
+    """A number at a place (steps of the coarsest lattice, its cells in yaw), and its cell's own share."""
+    t, slope, log_depth = np.array(pair_cells.FIRST) + place[:3] * pair_cells.STEPS
+    shares, weights, numbers = np.zeros(SHARES), np.zeros(NODES), np.zeros(NUMBERS)
+    at = locate(table, U, False, t, slope, log_depth, (2.0 * place[3] - pair_cells.YAWS) * YAW, shares)
+    if at.own < 1.0:
+        look_shares_up(table, at, shares, weights, numbers)
+    else:
+        weigh(at, weights)
+        look_up(table.cells[at.cell], weights, numbers)
+    return numbers[0], at, shares
+
+
+def test_lattices_go_over_into_each_other_without_a_step_or_a_kink(patchwork):
+    """Along lines in all directions, through three lattices."""
+    table, random, step = patchwork.table(), np.random.default_rng(2), 2.5e-4
+    seen = set()
+    for _ in range(8):
+        way = random.normal(size=AXES) * (1.0, 1.0, 1.0, 0.5)
+        way *= step / abs(way).max()
+        begin = random.uniform((300.0, 200.0, 8.0, 1.0), (301.0, 201.0, 9.0, 2.0)) - 750 * way
+        numbers = np.array([number_at(table, begin + n * way)[0] for n in range(1500)])
+        seen |= set(np.round(numbers, 9)) & {1.0, 2.0, 3.0}
+        assert 1.0 - 1e-9 < numbers.min() <= numbers.max() < 3.0 + 1e-9
+        assert abs(np.diff(numbers)).max() < 0.02  # a step has 1 or 2
+        assert abs(np.diff(numbers, 2)).max() < 6e-4  # a kink where a straight line begins has 2.5e-3
+    assert seen == {1.0, 2.0, 3.0}
+
+
+def test_what_shares_change_by(patchwork):
+    """Along each axis, against differences."""
+    table, random, step, count = patchwork.table(), np.random.default_rng(3), 1e-6, 0
+    units = np.array([*pair_cells.STEPS, 2.0 * YAW])
+    weights, numbers, along = np.zeros((1 + AXES, NODES)), np.zeros(NUMBERS), np.zeros((AXES, NUMBERS))
+    for place in random.uniform((300.0, 200.0, 8.0, 1.0), (302.0, 202.0, 10.0, 2.0), size=(1500, AXES)):
+        number, at, shares = number_at(table, place)
+        if at.own == 1.0:
+            continue
+        look_share_slopes_up(table, at, shares, weights, numbers, along)
+        assert numbers[0] == pytest.approx(number, rel=1e-12)
+        sides = [[number_at(table, place + h * axis)[0] for h in (step, -step)] for axis in np.eye(AXES)]
+        slopes = np.subtract(*np.transpose(sides)) / (2.0 * step)
+        if abs(slopes).max() > 1e-3:
+            np.testing.assert_allclose(along[:, 0] * units, slopes, rtol=1e-4, atol=1e-3 * abs(slopes).max())
+            count += 1
+    assert count > 100

@@ -1,0 +1,233 @@
+"""Cells of the lattices of a `PairTable`: which one a lobe lies in, and where one lattice goes over to the next.
+
+A cell is looked up, or left to the next lattice (`FINER`), or to the solver (`HARD`). One that is left to the next goes
+over to its neighbours that are not, near to them: what it would give itself has a share there, which falls from 1 to 0
+within a `SEAM` with its first derivative, so that no number of a lobe has a step, or a kink, where it passes.
+"""
+
+import math
+from typing import NamedTuple
+
+from wrcore.kernels.handles import call_c
+from wrcore.kernels.jit import jit
+
+STEPS = 2e-4, 5e-4, 0.25
+"""Of the coarsest lattice in t (m), slope of the axle and ln D."""
+
+LEVELS = 5
+"""Lattices, each with half the steps of the one before."""
+
+FIRST = -0.05, -0.1, math.log(4e-6)
+"""Their first places."""
+
+COUNTS = 500, 400, 19
+"""Steps of the coarsest lattice."""
+
+YAW, YAWS = 8e-3, 3
+"""Half of a cell of the coarsest lattice in yaw (rad), and how many there are; each lattice has three for one of that
+before."""
+
+AXES = 4
+"""Of a lattice: t, slope, ln D and yaw."""
+
+BESIDE = 64
+"""Added to the part of the wheel's profile in places of lobes with others beside them."""
+
+PART, FIELD = 4e-3, -0.1
+"""Width of the parts of the wheel's profile, and where they begin, m."""
+
+EMPTY, FINER, HARD = 0, -1, -2
+"""States of a cell that has no corners: not met yet, left to the next lattice, left to the exact solver."""
+
+SEAM = 0.1
+"""Share of a cell in which it goes over to a neighbour."""
+
+
+@jit(allocates=False, forceinline=True)
+def key_of(level, part, turn, i, j, k):
+    """One number, not 0, for the cell with this place in yaw and first corner; `corner_of` reads it. With `LEVELS` more
+    it means what a cell gives that is left to the next lattice."""
+    return (((((level + 1) * 128 + part) * 256 + turn) * 8192 + i) * 8192 + j) * 512 + k
+
+
+def corner_of(key):
+    """Level, part of the profile, place in yaw and first corner of a cell."""
+    found = []
+    for count in (512, 8192, 8192, 256, 128):
+        key, rest = divmod(key, count)
+        found.append(rest)
+    return key - 1, *reversed(found)
+
+
+PART_CODE = 512 * 8192 * 8192 * 512
+"""What one part of the profile more adds to a `node_code`."""
+
+
+def node_code(level, part, turn, i, j, k):
+    """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
+    return (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
+
+
+def node_of(code):
+    """Level, part of the profile, place in yaw and in the lattice of a node."""
+    found = []
+    for count in (512, 8192, 8192, 512, 128):
+        code, rest = divmod(code, count)
+        found.append(rest)
+    return code, *reversed(found)
+
+
+@jit(allocates=False)
+def state_of(keys, states, key):
+    """State of a cell, or number of its corners."""
+    slot = key % len(keys)
+    while keys[slot] != key:
+        if keys[slot] == 0:
+            return EMPTY
+        slot = (slot + 1) % len(keys)
+    return states[slot]
+
+
+@jit(allocates=False)
+def _filled(table, key):
+    """State of a cell, which is solved if it was not met yet."""
+    state = state_of(table.keys, table.states, key)
+    if state == EMPTY:
+        call_c(table.fill, key)
+        state = state_of(table.keys, table.states, key)
+    return state
+
+
+class Place(NamedTuple):
+    """Where a lobe lies in a cell."""
+
+    cell: int
+    """Number of the cell; 0 if the lobe is to be solved."""
+    fx: float
+    fy: float
+    fz: float
+    """Parts of a step of t, slope and ln D beyond the first corner."""
+    gx: float
+    gy: float
+    gz: float
+    """Parts of two steps beyond the first corner of the cell with twice the steps."""
+    turn: float
+    """Yaw from the cell's middle over half of the cell."""
+    scale: float
+    """Steps of the coarsest lattice over those of this one."""
+    half: float
+    """Half of the cell in yaw, rad."""
+    own: float
+    """Share that the cell has; coarser ones, near a seam, have the rest."""
+
+
+NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW, 1.0)
+
+
+@jit(allocates=False)
+def locate(table, u, beside, t, slope, log_depth, yaw, shares):
+    """`Place` of a lobe with ln D. One that only just touches is looked up at the least depth.
+
+    Where its ``own`` share is below 1 the others are in ``shares`` (`SHARES`): of each lattice its share and what this
+    changes by along the axes, and its `Place`; in a row more the first of these for what is left, and in the last one
+    what neighbours have."""
+    part, scale, half, own = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW, 1.0
+    for level in range(LEVELS):
+        x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
+        z, w = max(scale * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
+        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
+            break
+        if not 0.0 <= w < YAWS * YAW / half:
+            break
+        i, j, k, turn = int(x), int(y), int(z), int(w)
+        state = _filled(table, key_of(level, part, turn, i, j, k))
+        gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
+        at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half, own)
+        if state > 0:
+            return at
+        if state != FINER:
+            break
+        if near_an_end(at.fx) or near_an_end(at.fy) or near_an_end(at.fz) or near_an_end(w - turn):
+            own = go_over(table, level, part, (turn, i, j, k), at, shares)
+        scale, half = 2.0 * scale, half / 3.0
+    return NOWHERE
+
+
+@jit(allocates=False, forceinline=True)
+def near_an_end(f):
+    """Whether a part of a cell is in the `SEAM` with its next one."""
+    return f < SEAM or f > 1.0 - SEAM
+
+
+@jit(allocates=False)
+def _looked_up(table, level, part, turn, i, j, k):
+    """Whether lobes are looked up in this cell."""
+    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1], k // COUNTS[2]) >= 2**level:
+        return False
+    if not 0 <= turn < YAWS * 3**level:
+        return False
+    for coarser in range(level):
+        n = level - coarser
+        if _filled(table, key_of(coarser, part, turn // 3**n, i >> n, j >> n, k >> n)) != FINER:
+            return False
+    return _filled(table, key_of(level, part, turn, i, j, k)) > 0
+
+
+@jit(allocates=False)
+def go_over(table, level, part, cell, at, shares):
+    """Give a ``cell`` (turn, i, j, k) that is left to the next lattice its share, of what coarser ones have left.
+    Returns what is left.
+
+    A neighbour that is looked up has a function that is 1 on what it has in common with the cell and falls to 0 within
+    `SEAM` of it; of several, each takes its part of what the others leave."""
+    left, ends, share = shares[LEVELS], shares[LEVELS + 1], shares[level]
+    if at.own == 1.0:
+        shares[:, : 1 + AXES] = 0.0
+        left[0] = 1.0
+    for axis in range(AXES):
+        f = at.fx if axis == 0 else at.fy if axis == 1 else at.fz if axis == 2 else 0.5 * (at.turn + 1.0)
+        side = 0.0 if not near_an_end(f) else -1.0 if f < 0.5 else 1.0
+        q = 1.0 - (f if f < 0.5 else 1.0 - f) / SEAM
+        unit = 0.5 / at.half if axis == 3 else at.scale / STEPS[axis]
+        ends[3 * axis], ends[3 * axis + 1] = side, q * q * (3.0 - 2.0 * q)
+        ends[3 * axis + 2] = 6.0 * q * (1.0 - q) * side * unit / SEAM
+    turn, i, j, k = cell
+    rest, share[0 : 1 + AXES] = 1.0, 0.0
+    for axes in range(1, 2**AXES):
+        near, a, b, c, d = 1.0, 0, 0, 0, 0
+        for axis in range(AXES):
+            if axes >> axis & 1:
+                near *= ends[3 * axis + 1] if ends[3 * axis] != 0.0 else 0.0
+        if near <= 0.0:
+            continue
+        a, b, c = int(ends[0]) * (axes & 1), int(ends[3]) * (axes >> 1 & 1), int(ends[6]) * (axes >> 2 & 1)
+        d = int(ends[9]) * (axes >> 3)
+        if not _looked_up(table, level, part, turn + d, i + a, j + b, k + c):
+            continue
+        for axis in range(AXES):
+            more = near / ends[3 * axis + 1] * ends[3 * axis + 2] if axes >> axis & 1 else 0.0
+            share[1 + axis] = share[1 + axis] * (1.0 - near) + rest * more
+        rest *= 1.0 - near
+    if rest == 1.0:
+        return left[0]
+    number = _filled(table, key_of(LEVELS + level, part, turn, i, j, k))
+    if number <= 0:
+        share[0 : 1 + AXES] = 0.0
+        return left[0]
+    for axis in range(AXES):
+        own = share[1 + axis]
+        share[1 + axis] = left[1 + axis] * (1.0 - rest) + left[0] * own
+        left[1 + axis] = left[1 + axis] * rest - left[0] * own
+    share[0], left[0] = left[0] * (1.0 - rest), left[0] * rest
+    share[5], share[6], share[7], share[8], share[9] = number, at.fx, at.fy, at.fz, at.gx
+    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, at.turn, at.scale, at.half
+    return left[0]
+
+
+@jit(allocates=False, forceinline=True)
+def place_of(share):
+    """`Place` in a cell that has a share."""
+    return Place(
+        int(share[5]), share[6], share[7], share[8], share[9], share[10], share[11], share[12], share[13], share[14],
+        share[0],
+    )  # fmt: skip
