@@ -18,7 +18,7 @@ U, FINEST = 0.011, 2
 def test_half_the_steps_where_a_cell_is_too_coarse():
     """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps from the first place and
     in a third of the cell in yaw."""
-    places = np.array([300.3, 200.6, 9.9]), np.array([600.6, 401.2, 19.8])
+    places = np.array([300.3, 200.6, 9.8]), np.array([600.6, 401.2, 19.6])
     t, slope, log_depth = np.array(pair_cells.FIRST) + places[0] * pair_cells.STEPS
     coarse, fine = [list(map(int, place)) for place in places]
     part = round((U - pair_cells.FIELD) / pair_cells.PART)
@@ -27,22 +27,22 @@ def test_half_the_steps_where_a_cell_is_too_coarse():
         key = key_of(level, part, turn, *corner)
         keys[key % 1009], states[key % 1009] = key, state
     table = NO_TABLE._replace(keys=keys, states=states)
-    state, *parts, turn, scale, half, own = locate(table, U, False, t, slope, log_depth, 0.375 * YAW, np.zeros(SHARES))
+    state, *parts, turn, scale, half, own = locate(table, U, False, t, slope, log_depth, 0.5 * YAW, np.zeros(SHARES))
     assert (state, scale, half, own) == (5, 2.0, YAW / 3.0, 1.0)
     expected = np.concatenate([places[1] - fine, 0.5 * (places[1] - fine + np.array(fine) % 2)])
     np.testing.assert_allclose(parts, expected, atol=1e-9)
-    assert turn == pytest.approx(0.375 * 3.0 - 2.0)
+    assert turn == pytest.approx(0.5 * 3.0 - 2.0)
 
 
 @pytest.fixture(params=range(2))
 def patchwork(request, tmp_path, monkeypatch):
-    """A table of which half of the cells are left to the next lattice, and whose numbers are 1, 2 and 3 on lattices
-    that have these numbers."""
+    """A table of which half of the cells are left to the next lattice, and whose numbers are 1, 2 and 3 on its
+    lattices, and .3 more in every second cell of yaw."""
 
     def solved(pair, key):
         level, _, *cell = corner_of(key)
         rows = np.zeros((NODES, NUMBERS), np.float32)
-        rows[:32] = 1 + level % LEVELS
+        rows[:32] = 1.0 + level % LEVELS + 0.3 * (cell[0] % 2)
         finer = np.random.default_rng([request.param, level, *cell]).random() < 0.5
         pair.misses[key] = 0.0, 0.0
         return (FINER, None) if level < FINEST and finer else (1, rows)
@@ -71,17 +71,17 @@ def number_at(table, place):
 def test_lattices_go_over_into_each_other_without_a_step_or_a_kink(patchwork):
     """Along lines in all directions, through three lattices."""
     table, random, step = patchwork.table(), np.random.default_rng(2), 2.5e-4
-    seen = set()
+    plain, seen = {1.0, 1.3, 2.0, 2.3, 3.0, 3.3}, set()
     for _ in range(8):
         way = random.normal(size=AXES) * (1.0, 1.0, 1.0, 0.5)
         way *= step / abs(way).max()
         begin = random.uniform((300.0, 200.0, 8.0, 1.0), (301.0, 201.0, 9.0, 2.0)) - 750 * way
         numbers = np.array([number_at(table, begin + n * way)[0] for n in range(1500)])
-        seen |= set(np.round(numbers, 9)) & {1.0, 2.0, 3.0}
-        assert 1.0 - 1e-9 < numbers.min() <= numbers.max() < 3.0 + 1e-9
-        assert abs(np.diff(numbers)).max() < 0.02  # a step has 1 or 2
+        seen |= set(np.round(numbers, 6)) & plain
+        assert 1.0 - 1e-6 < numbers.min() <= numbers.max() < 3.3 + 1e-6
+        assert abs(np.diff(numbers)).max() < 0.02  # a step has .3 or more
         assert abs(np.diff(numbers, 2)).max() < 6e-4  # a kink where a straight line begins has 2.5e-3
-    assert seen == {1.0, 2.0, 3.0}
+    assert len(seen) >= 4
 
 
 def test_what_shares_change_by(patchwork):

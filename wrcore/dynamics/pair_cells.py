@@ -2,7 +2,8 @@
 
 A cell is looked up, or left to the next lattice (`FINER`), or to the solver (`HARD`). One that is left to the next goes
 over to its neighbours that are not, near to them: what it would give itself has a share there, which falls from 1 to 0
-within a `SEAM` with its first derivative, so that no number of a lobe has a step, or a kink, where it passes.
+within a `SEAM` with its first derivative. Cells beside each other in yaw go over into each other alike, from both
+sides. So no number of a lobe has a step where it passes.
 """
 
 import math
@@ -41,6 +42,9 @@ EMPTY, FINER, HARD = 0, -1, -2
 
 SEAM = 0.1
 """Share of a cell in which it goes over to a neighbour."""
+
+LEFT = 2 * LEVELS
+"""Row of shares with what is left to the finest cell; the next one has what neighbours have."""
 
 
 @jit(allocates=False, forceinline=True)
@@ -128,9 +132,8 @@ NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW, 1.0)
 def locate(table, u, beside, t, slope, log_depth, yaw, shares):
     """`Place` of a lobe with ln D. One that only just touches is looked up at the least depth.
 
-    Where its ``own`` share is below 1 the others are in ``shares`` (`SHARES`): of each lattice its share and what this
-    changes by along the axes, and its `Place`; in a row more the first of these for what is left, and in the last one
-    what neighbours have."""
+    Where its ``own`` share is below 1, other cells are in the first 2 LEVELS rows of ``shares`` (`SHARES`), each with
+    its share, what this changes by along the axes, and its `Place`; row `LEFT` has the first of these of the cell."""
     part, scale, half, own = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW, 1.0
     for level in range(LEVELS):
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
@@ -143,85 +146,56 @@ def locate(table, u, beside, t, slope, log_depth, yaw, shares):
         state = _filled(table, key_of(level, part, turn, i, j, k))
         gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
         at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half, own)
+        in_seam = _in_seam(w - turn)
         if state > 0:
-            return at
+            if in_seam:
+                own = _share_turned(table, level, part, (turn, i, j, k), at, shares)
+            return Place(state, at.fx, at.fy, at.fz, gx, gy, gz, at.turn, scale, half, own)
         if state != FINER:
             break
-        if near_an_end(at.fx) or near_an_end(at.fy) or near_an_end(at.fz) or near_an_end(w - turn):
-            own = go_over(table, level, part, (turn, i, j, k), at, shares)
+        if in_seam or _in_seam(at.fx) or _in_seam(at.fy) or _in_seam(at.fz):
+            own = _share_coarse(table, level, part, (turn, i, j, k), at, shares)
         scale, half = 2.0 * scale, half / 3.0
     return NOWHERE
 
 
 @jit(allocates=False, forceinline=True)
-def near_an_end(f):
-    """Whether a part of a cell is in the `SEAM` with its next one."""
+def _in_seam(f):
+    """Whether a part of a cell is in its `SEAM` with the next one."""
     return f < SEAM or f > 1.0 - SEAM
 
 
 @jit(allocates=False)
-def _looked_up(table, level, part, turn, i, j, k):
-    """Whether lobes are looked up in this cell."""
-    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1], k // COUNTS[2]) >= 2**level:
-        return False
-    if not 0 <= turn < YAWS * 3**level:
+def _reached(table, level, part, turn, i, j, k):
+    """Whether a cell is there, and all coarser ones are left to its lattice."""
+    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1], k // COUNTS[2]) >= 2**level or _beyond(level, turn):
         return False
     for coarser in range(level):
         n = level - coarser
         if _filled(table, key_of(coarser, part, turn // 3**n, i >> n, j >> n, k >> n)) != FINER:
             return False
-    return _filled(table, key_of(level, part, turn, i, j, k)) > 0
+    return True
+
+
+@jit(allocates=False, forceinline=True)
+def _beyond(level, turn):
+    """Whether a lattice has no such cell in yaw."""
+    return not 0 <= turn < YAWS * 3**level
 
 
 @jit(allocates=False)
-def go_over(table, level, part, cell, at, shares):
-    """Give a ``cell`` (turn, i, j, k) that is left to the next lattice its share, of what coarser ones have left.
-    Returns what is left.
-
-    A neighbour that is looked up has a function that is 1 on what it has in common with the cell and falls to 0 within
-    `SEAM` of it; of several, each takes its part of what the others leave."""
-    left, ends, share = shares[LEVELS], shares[LEVELS + 1], shares[level]
+def _begin(at, shares):
+    """Nothing has a share yet, if that is so."""
     if at.own == 1.0:
-        shares[:, : 1 + AXES] = 0.0
-        left[0] = 1.0
-    for axis in range(AXES):
-        f = at.fx if axis == 0 else at.fy if axis == 1 else at.fz if axis == 2 else 0.5 * (at.turn + 1.0)
-        side = 0.0 if not near_an_end(f) else -1.0 if f < 0.5 else 1.0
-        q = 1.0 - (f if f < 0.5 else 1.0 - f) / SEAM
-        unit = 0.5 / at.half if axis == 3 else at.scale / STEPS[axis]
-        ends[3 * axis], ends[3 * axis + 1] = side, q * q * (3.0 - 2.0 * q)
-        ends[3 * axis + 2] = 6.0 * q * (1.0 - q) * side * unit / SEAM
-    turn, i, j, k = cell
-    rest, share[0 : 1 + AXES] = 1.0, 0.0
-    for axes in range(1, 2**AXES):
-        near, a, b, c, d = 1.0, 0, 0, 0, 0
-        for axis in range(AXES):
-            if axes >> axis & 1:
-                near *= ends[3 * axis + 1] if ends[3 * axis] != 0.0 else 0.0
-        if near <= 0.0:
-            continue
-        a, b, c = int(ends[0]) * (axes & 1), int(ends[3]) * (axes >> 1 & 1), int(ends[6]) * (axes >> 2 & 1)
-        d = int(ends[9]) * (axes >> 3)
-        if not _looked_up(table, level, part, turn + d, i + a, j + b, k + c):
-            continue
-        for axis in range(AXES):
-            more = near / ends[3 * axis + 1] * ends[3 * axis + 2] if axes >> axis & 1 else 0.0
-            share[1 + axis] = share[1 + axis] * (1.0 - near) + rest * more
-        rest *= 1.0 - near
-    if rest == 1.0:
-        return left[0]
-    number = _filled(table, key_of(LEVELS + level, part, turn, i, j, k))
-    if number <= 0:
-        share[0 : 1 + AXES] = 0.0
-        return left[0]
-    for axis in range(AXES):
-        own = share[1 + axis]
-        share[1 + axis] = left[1 + axis] * (1.0 - rest) + left[0] * own
-        left[1 + axis] = left[1 + axis] * rest - left[0] * own
-    share[0], left[0] = left[0] * (1.0 - rest), left[0] * rest
+        shares[: LEFT + 1, : 1 + AXES] = 0.0
+        shares[LEFT, 0] = 1.0
+
+
+@jit(allocates=False)
+def _put(number, at, turn, share):
+    """Write the `Place` in a cell with a ``number`` into its share."""
     share[5], share[6], share[7], share[8], share[9] = number, at.fx, at.fy, at.fz, at.gx
-    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, at.turn, at.scale, at.half
-    return left[0]
+    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, turn, at.scale, at.half
 
 
 @jit(allocates=False, forceinline=True)
@@ -231,3 +205,82 @@ def place_of(share):
         int(share[5]), share[6], share[7], share[8], share[9], share[10], share[11], share[12], share[13], share[14],
         share[0],
     )  # fmt: skip
+
+
+@jit(allocates=False)
+def _share_turned(table, level, part, cell, at, shares):
+    """Near an end in yaw of a ``cell`` (turn, i, j, k) that is looked up: give the one beyond its part of what is left.
+    Returns what then is."""
+    _begin(at, shares)
+    _turn_over(table, level, part, cell, at, shares[LEFT], shares[LEVELS + level])
+    return shares[LEFT, 0]
+
+
+@jit(allocates=False)
+def _turn_over(table, level, part, cell, at, own, other):
+    """Give the ``other`` cell, beyond an end in yaw, its part of a cell's ``own`` share: a half at the end.
+
+    Both are parabolas in yaw about their own middles and agree there but for what their lattice bends otherwise."""
+    turn, i, j, k = cell
+    side = -1 if at.turn < 0.0 else 1
+    if _beyond(level, turn + side):
+        return
+    number = _filled(table, key_of(level, part, turn + side, i, j, k))
+    if number == FINER:
+        number = _filled(table, key_of(LEVELS + level, part, turn + side, i, j, k))
+    if number <= 0:
+        return
+    q = 0.5 - 0.25 * (1.0 - abs(at.turn)) / SEAM
+    near, slope = q * q * (3.0 - 2.0 * q), 1.5 * q * (1.0 - q) * side / (at.half * SEAM)
+    for axis in range(AXES):
+        other[1 + axis] = near * own[1 + axis] + (slope * own[0] if axis == 3 else 0.0)
+        own[1 + axis] -= other[1 + axis]
+    other[0] = near * own[0]
+    own[0] -= other[0]
+    _put(number, at, at.turn - 2.0 * side, other)
+
+
+@jit(allocates=False)
+def _share_coarse(table, level, part, cell, at, shares):
+    """Near ends of a ``cell`` (turn, i, j, k) that is left to the next lattice: give it its share of what is left.
+    Returns what then is.
+
+    A neighbour that is looked up has a function that is 1 on what it has in common with the cell and falls to 0 within
+    `SEAM` of it; of several, each takes its part of what the others leave."""
+    _begin(at, shares)
+    left, ends, share = shares[LEFT], shares[LEFT + 1], shares[level]
+    for axis in range(AXES):
+        f = at.fx if axis == 0 else at.fy if axis == 1 else at.fz if axis == 2 else 0.5 * (at.turn + 1.0)
+        side, q = -1.0 if f < 0.5 else 1.0, 1.0 - min(f, 1.0 - f) / SEAM
+        unit = 0.5 / at.half if axis == 3 else at.scale / STEPS[axis]
+        ends[3 * axis], ends[3 * axis + 1] = side, q * q * (3.0 - 2.0 * q) if q > 0.0 else 0.0
+        ends[3 * axis + 2] = 6.0 * q * (1.0 - q) * side * unit / SEAM
+    turn, i, j, k = cell
+    rest, share[: 1 + AXES] = 1.0, 0.0
+    for axes in range(1, 2**AXES):
+        near = 1.0
+        for axis in range(AXES):
+            near *= ends[3 * axis + 1] if axes >> axis & 1 else 1.0
+        if near == 0.0:
+            continue
+        a, b, c = int(ends[0]) * (axes & 1), int(ends[3]) * (axes >> 1 & 1), int(ends[6]) * (axes >> 2 & 1)
+        there = turn + int(ends[9]) * (axes >> 3), i + a, j + b, k + c
+        if not _reached(table, level, part, *there) or _filled(table, key_of(level, part, *there)) <= 0:
+            continue
+        for axis in range(AXES):
+            more = near / ends[3 * axis + 1] * ends[3 * axis + 2] if axes >> axis & 1 else 0.0
+            share[1 + axis] = share[1 + axis] * (1.0 - near) + rest * more
+        rest *= 1.0 - near
+    number = _filled(table, key_of(LEVELS + level, part, turn, i, j, k)) if rest < 1.0 else 0
+    if number <= 0:
+        share[: 1 + AXES] = 0.0
+        return left[0]
+    for axis in range(AXES):
+        more = left[0] * share[1 + axis]
+        share[1 + axis] = left[1 + axis] * (1.0 - rest) + more
+        left[1 + axis] = left[1 + axis] * rest - more
+    share[0], left[0] = left[0] * (1.0 - rest), left[0] * rest
+    _put(number, at, at.turn, share)
+    if _in_seam(0.5 * (at.turn + 1.0)):
+        _turn_over(table, level, part, cell, at, share, shares[LEVELS + level])
+    return left[0]

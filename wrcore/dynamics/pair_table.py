@@ -35,7 +35,7 @@ from wrcore.contact.patch.model import MODES, NODES
 from wrcore.contact.strip import gap_at
 from wrcore.creep.kalker import coefficients_at
 from wrcore.creep.laws import LAWS, creep_force_at
-from wrcore.dynamics.pair_cells import LEVELS, place_of
+from wrcore.dynamics.pair_cells import LEFT, place_of
 from wrcore.kernels.jit import FAST, FUSED, jit
 from wrcore.kernels.lanes import lanes8, load8, put8, take8, total
 
@@ -189,9 +189,9 @@ def look_shares_up(table, at, shares, weights, numbers):
     weigh(at, weights)
     numbers[:] = 0.0
     add_rows(table.cells[at.cell], weights, at.own, numbers)
-    for level in range(LEVELS):
-        if shares[level, 0] > 0.0:
-            there = place_of(shares[level])
+    for row in range(LEFT):
+        if shares[row, 0] > 0.0:
+            there = place_of(shares[row])
             weigh(there, weights)
             add_rows(table.cells[there.cell], weights, there.own, numbers)
     if not LEAST < numbers[ROOT] < 1.0 - LEAST:

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrcore.contact.geometry import LANES
 from wrcore.contact.patch.model import MODES, NODES
-from wrcore.dynamics.pair_cells import AXES, LEVELS, STEPS, place_of
+from wrcore.dynamics.pair_cells import AXES, LEFT, STEPS, place_of
 from wrcore.dynamics.pair_table import (
     ANGLE,
     FLANKS,
@@ -92,10 +92,10 @@ def look_slopes_up(rows, weights, numbers, along):
 def look_share_slopes_up(table, at, shares, weights, numbers, along):
     """As `look_slopes_up`, from all cells that have a share, see `wrcore.dynamics.pair_cells.locate`."""
     numbers[:], along[:] = 0.0, 0.0
-    _add_slopes(table, at, shares[LEVELS], weights, numbers, along)
-    for level in range(LEVELS):
-        if shares[level, 0] > 0.0:
-            _add_slopes(table, place_of(shares[level]), shares[level], weights, numbers, along)
+    _add_slopes(table, at, shares[LEFT], weights, numbers, along)
+    for row in range(LEFT):
+        if shares[row, 0] > 0.0:
+            _add_slopes(table, place_of(shares[row]), shares[row], weights, numbers, along)
     if not LEAST < numbers[ROOT] < 1.0 - LEAST:
         numbers[PARTED_FROM:MODE] = 0.0
         along[:, PARTED_FROM:MODE] = 0.0
