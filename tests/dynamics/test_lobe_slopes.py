@@ -82,7 +82,7 @@ def test_numbers_along_the_lattice():
 
     def at(parts, turn):
         double = 0.5 * (parts + np.array([301, 199, 10]) % 2)
-        return Place(1, *parts, *double, turn, 2.0, pair_cells.YAW / 3.0, 1.0)
+        return Place(1, *parts, *double, turn, 2.0, 2.0, pair_cells.YAW / 3.0, 1.0)
 
     weigh_slopes(at(parts, 0.4), weights)
     look_slopes_up(rows, weights, numbers, along)

@@ -9,6 +9,8 @@ sides. So no number of a lobe has a step where it passes.
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from wrcore.kernels.handles import call_c
 from wrcore.kernels.jit import jit
 
@@ -16,7 +18,7 @@ STEPS = 2e-4, 5e-4, 0.25
 """Of the coarsest lattice in t (m), slope of the axle and ln D."""
 
 LEVELS = 5
-"""Lattices, each with half the steps of the one before."""
+"""Lattices, each with half the steps in t and slope of the one before."""
 
 FIRST = -0.05, -0.1, math.log(4e-6)
 """Their first places."""
@@ -25,8 +27,11 @@ COUNTS = 500, 400, 19
 """Steps of the coarsest lattice."""
 
 YAW, YAWS = 8e-3, 3
-"""Half of a cell of the coarsest lattice in yaw (rad), and how many there are; each lattice has three for one of that
-before."""
+"""Half of a cell of the coarsest lattice in yaw (rad), and how many there are."""
+
+HALVED, THIRDS = (0, 0, 1, 2, 3), (0, 0, 0, 1, 2)
+"""How often each lattice's steps are halved in ln D and cut in three in yaw: what is too coarse is too coarse in t and
+slope first."""
 
 AXES = 4
 """Of a lattice: t, slope, ln D and yaw."""
@@ -63,6 +68,11 @@ def corner_of(key):
     return key - 1, *reversed(found)
 
 
+def steps_of(level):
+    """Steps of a lattice in t (m), slope and ln D."""
+    return np.array(STEPS) / (2.0**level, 2.0**level, 2.0 ** HALVED[level])
+
+
 PART_CODE = 512 * 8192 * 8192 * 512
 """What one part of the profile more adds to a `node_code`."""
 
@@ -70,6 +80,18 @@ PART_CODE = 512 * 8192 * 8192 * 512
 def node_code(level, part, turn, i, j, k):
     """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
     return (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
+
+
+def coarsest(nodes):
+    """Nodes (n, 6), see `node_code`, each in the coarsest lattice that has it."""
+    nodes = nodes.copy()
+    for level in range(LEVELS - 1, 0, -1):
+        deep, thirds = 2 ** (HALVED[level] - HALVED[level - 1]), 3 ** (THIRDS[level] - THIRDS[level - 1])
+        ratios = np.array([thirds, 2, 2, deep])
+        coarser = (nodes[:, 0] == level) & (nodes[:, 2:] % ratios == 0).all(axis=1)
+        nodes[coarser, 2:] //= ratios
+        nodes[coarser, 0] -= 1
+    return nodes
 
 
 def node_of(code):
@@ -118,14 +140,15 @@ class Place(NamedTuple):
     turn: float
     """Yaw from the cell's middle over half of the cell."""
     scale: float
-    """Steps of the coarsest lattice over those of this one."""
+    deeper: float
+    """Steps of the coarsest lattice over those of this one: in t and slope, and in ln D."""
     half: float
     """Half of the cell in yaw, rad."""
     own: float
     """Share that the cell has; coarser ones, near a seam, have the rest."""
 
 
-NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW, 1.0)
+NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, YAW, 1.0)
 
 
 @jit(allocates=False)
@@ -134,28 +157,29 @@ def locate(table, u, beside, t, slope, log_depth, yaw, shares):
 
     Where its ``own`` share is below 1, other cells are in the first 2 LEVELS rows of ``shares`` (`SHARES`), each with
     its share, what this changes by along the axes, and its `Place`; row `LEFT` has the first of these of the cell."""
-    part, scale, half, own = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, YAW, 1.0
+    part, scale, own = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, 1.0
     for level in range(LEVELS):
+        deeper, half = 2.0 ** HALVED[level], YAW / 3.0 ** THIRDS[level]
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z, w = max(scale * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
-        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < scale * COUNTS[2]):
+        z, w = max(deeper * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
+        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < deeper * COUNTS[2]):
             break
         if not 0.0 <= w < YAWS * YAW / half:
             break
         i, j, k, turn = int(x), int(y), int(z), int(w)
         state = _filled(table, key_of(level, part, turn, i, j, k))
         gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
-        at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half, own)
+        at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, deeper, half, own)
         in_seam = _in_seam(w - turn)
         if state > 0:
             if in_seam:
                 own = _share_turned(table, level, part, (turn, i, j, k), at, shares)
-            return Place(state, at.fx, at.fy, at.fz, gx, gy, gz, at.turn, scale, half, own)
+            return Place(state, at.fx, at.fy, at.fz, gx, gy, gz, at.turn, scale, deeper, half, own)
         if state != FINER:
             break
         if in_seam or _in_seam(at.fx) or _in_seam(at.fy) or _in_seam(at.fz):
             own = _share_coarse(table, level, part, (turn, i, j, k), at, shares)
-        scale, half = 2.0 * scale, half / 3.0
+        scale *= 2.0
     return NOWHERE
 
 
@@ -168,11 +192,13 @@ def _in_seam(f):
 @jit(allocates=False)
 def _reached(table, level, part, turn, i, j, k):
     """Whether a cell is there, and all coarser ones are left to its lattice."""
-    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1], k // COUNTS[2]) >= 2**level or _beyond(level, turn):
+    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1]) >= 2**level or _beyond(level, turn):
+        return False
+    if k >= COUNTS[2] * 2 ** HALVED[level]:
         return False
     for coarser in range(level):
-        n = level - coarser
-        if _filled(table, key_of(coarser, part, turn // 3**n, i >> n, j >> n, k >> n)) != FINER:
+        n, m, thirds = level - coarser, HALVED[level] - HALVED[coarser], 3 ** (THIRDS[level] - THIRDS[coarser])
+        if _filled(table, key_of(coarser, part, turn // thirds, i >> n, j >> n, k >> m)) != FINER:
             return False
     return True
 
@@ -180,7 +206,7 @@ def _reached(table, level, part, turn, i, j, k):
 @jit(allocates=False, forceinline=True)
 def _beyond(level, turn):
     """Whether a lattice has no such cell in yaw."""
-    return not 0 <= turn < YAWS * 3**level
+    return not 0 <= turn < YAWS * 3 ** THIRDS[level]
 
 
 @jit(allocates=False)
@@ -195,7 +221,8 @@ def _begin(at, shares):
 def _put(number, at, turn, share):
     """Write the `Place` in a cell with a ``number`` into its share."""
     share[5], share[6], share[7], share[8], share[9] = number, at.fx, at.fy, at.fz, at.gx
-    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, turn, at.scale, at.half
+    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, turn, at.scale, at.deeper
+    share[15] = at.half
 
 
 @jit(allocates=False, forceinline=True)
@@ -203,7 +230,7 @@ def place_of(share):
     """`Place` in a cell that has a share."""
     return Place(
         int(share[5]), share[6], share[7], share[8], share[9], share[10], share[11], share[12], share[13], share[14],
-        share[0],
+        share[15], share[0],
     )  # fmt: skip
 
 
@@ -252,7 +279,7 @@ def _share_coarse(table, level, part, cell, at, shares):
     for axis in range(AXES):
         f = at.fx if axis == 0 else at.fy if axis == 1 else at.fz if axis == 2 else 0.5 * (at.turn + 1.0)
         side, q = -1.0 if f < 0.5 else 1.0, 1.0 - min(f, 1.0 - f) / SEAM
-        unit = 0.5 / at.half if axis == 3 else at.scale / STEPS[axis]
+        unit = 0.5 / at.half if axis == 3 else (at.deeper if axis == 2 else at.scale) / STEPS[axis]
         ends[3 * axis], ends[3 * axis + 1] = side, q * q * (3.0 - 2.0 * q) if q > 0.0 else 0.0
         ends[3 * axis + 2] = 6.0 * q * (1.0 - q) * side * unit / SEAM
     turn, i, j, k = cell

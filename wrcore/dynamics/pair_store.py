@@ -30,18 +30,21 @@ from wrcore.dynamics.pair_cells import (
     FIELD,
     FINER,
     FIRST,
+    HALVED,
     HARD,
     LEVELS,
     PART,
     PART_CODE,
-    STEPS,
+    THIRDS,
     YAW,
     YAWS,
     Place,
+    coarsest,
     corner_of,
     key_of,
     node_code,
     node_of,
+    steps_of,
 )
 from wrcore.dynamics.pair_node import AT_REST, SLIPS, lobe_of, solve_place, unlike
 from wrcore.dynamics.pair_table import NARROW, WIDE
@@ -176,7 +179,7 @@ class Pair:
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
-        codes = node_code(*nodes.T).tolist()
+        codes = node_code(*coarsest(nodes).T).tolist()
         new = [code for code in dict.fromkeys(codes) if code not in self._parts]
         self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
         first = nodes[0, 1].item()
@@ -260,7 +263,7 @@ class Pair:
             if level + 1 < LEVELS:
                 return math.nan, math.nan
             exact = rows[0].astype(float)
-        columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0), weights)
+        columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, self.modes
@@ -354,8 +357,8 @@ def _nodes(level, part, turn, corners):
 
 def _place(level, part, turn, i, j, k):
     """Place, as `solve_place` has it, of a node."""
-    t, slope, log_depth = np.array(FIRST) + 0.5**level * np.array(STEPS) * (i, j, k)
-    yaw, (beside, part) = YAW * (turn / 3.0**level - YAWS), divmod(part, BESIDE)
+    t, slope, log_depth = np.array(FIRST) + steps_of(level) * (i, j, k)
+    yaw, (beside, part) = YAW * (turn / 3.0 ** THIRDS[level] - YAWS), divmod(part, BESIDE)
     return t, slope, math.exp(log_depth), yaw, FIELD + part * PART, NARROW if beside else WIDE
 
 
@@ -404,6 +407,9 @@ def fingerprint(contact):
     """Numbers that two contact models share, but for rounding, if their nodes are the same."""
     settings = contact.strips
     numbers = [
+        *steps_of(LEVELS - 1),
+        *HALVED,
+        *THIRDS,
         NUMBERS,
         contact.friction,
         contact.shear_modulus,

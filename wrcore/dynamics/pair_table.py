@@ -10,8 +10,8 @@ with the gap g along z: a sum that stays smooth where overlaps merge. Between no
 t, slope and ln D, linear in the other two, the three together less twice what is linear in all (a Boolean sum, which
 wants 32 nodes in place of 64 and errs by the product of two curvatures more). What yaw changes from the middle of a
 cell is a parabola through three nodes, linear between nodes of a lattice with twice the steps. A node depends on its
-place alone, not on what was solved before it. Where the lattice is too coarse another one with half its steps (in yaw
-a third) takes over (:mod:`wrcore.dynamics.pair_cells`).
+place alone, not on what was solved before it. Where the lattice is too coarse a finer one takes over
+(:mod:`wrcore.dynamics.pair_cells`).
 
 References
 ----------

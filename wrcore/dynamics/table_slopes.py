@@ -50,7 +50,7 @@ def weigh_slopes(at, weights):
     spread_weights(x, y, z, 0.5, at.turn, weights[4])
     for n in range(NODES):
         for axis in range(3):
-            weights[1 + axis, n] *= at.scale / STEPS[axis]
+            weights[1 + axis, n] *= (at.deeper if axis == 2 else at.scale) / STEPS[axis]
         weights[4, n] *= 0.0 if n < 32 else 1.0 / at.half
 
 

@@ -21,7 +21,7 @@ from wrcore.contact.normal import damping_factor
 from wrcore.contact.patch.gap import group_end
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import make_pose
-from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, STEPS, YAW, YAWS, corner_of
+from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, THIRDS, YAW, YAWS, corner_of, steps_of
 from wrcore.dynamics.pair_store import _PAIRS, WRONG, Pair, pair_of
 from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end, log_depth_of
 from wrcore.run.simulate import output_times
@@ -100,12 +100,15 @@ def cells_of(pair):
     rows = []
     for key, state in pair.cells.items():
         level, _, turn, *first = corner_of(key)
-        (t, slope, depth), yaw = ends_of(level, first), 2.0 * YAW * turn / 3.0**level - YAWS * YAW
+        if level >= LEVELS:  # what a cell gives that is left to the next lattice
+            continue
+        (t, slope, depth), width = ends_of(level, first), 2.0 * YAW / 3.0 ** THIRDS[level]
+        yaw = width * turn - YAWS * YAW
         normal, force = pair.misses[key]
         rows.append({
             "level": level, "t_low_m": t[0], "t_high_m": t[1], "slope_low": slope[0], "slope_high": slope[1],
             "D_low_m": math.exp(depth[0]), "D_high_m": math.exp(depth[1]), "yaw_low_rad": yaw,
-            "yaw_high_rad": yaw + 2.0 * YAW / 3.0**level, "state": {FINER: REFINED, HARD: SOLVED}.get(state, LOOKED_UP),
+            "yaw_high_rad": yaw + width, "state": {FINER: REFINED, HARD: SOLVED}.get(state, LOOKED_UP),
             "normal_error": normal, "force_error": force,
         })  # fmt: skip
     return pd.DataFrame(rows)
@@ -113,9 +116,8 @@ def cells_of(pair):
 
 def ends_of(level, first):
     """Ends of a cell in t, slope and ln D from its first corner."""
-    step = 0.5**level * np.array(STEPS)
-    low = np.array(FIRST) + step * first
-    return np.column_stack([low, low + step])
+    low = np.array(FIRST) + steps_of(level) * first
+    return np.column_stack([low, low + steps_of(level)])
 
 
 def lobes_of(contact, poses):
@@ -203,7 +205,7 @@ def legend_entries(cells):
     """Lattices with their steps in t, what is solved, lobes, and limits."""
     entries = []
     for level in range(LEVELS):
-        label = f"lattice {level + 1}: {MM * STEPS[0] * 0.5**level:g} mm"
+        label = f"lattice {level + 1}: {MM * steps_of(level)[0]:g} mm"
         entries.append(Line2D([], [], color=COLORS[level], linestyle=LINES[level], linewidth=2.5, label=label))
     if (cells["state"] == SOLVED).any():
         entries.append(Rectangle((0, 0), 1, 1, facecolor=SOLVED_COLOR, label="left to the solver"))
