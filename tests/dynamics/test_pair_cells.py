@@ -60,6 +60,7 @@ def patchwork(request, tmp_path, monkeypatch):
     monkeypatch.setattr(pair_store, "_PAIRS", {})
     monkeypatch.setattr(pair_store.Pair, "_take_shipped", lambda _: None)
     monkeypatch.setattr(pair_store.Pair, "_solved", solved)
+    monkeypatch.setattr(pair_store.Pair, "_own", lambda _, key: key)
     model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), **{"contact.patch": "tabulated"}))
     return pair_store.Pair(model.contact, "patchwork")
 

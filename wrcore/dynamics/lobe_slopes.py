@@ -121,7 +121,7 @@ def lobe_slopes(model, m, rows, count, scratch, out, work):
     else:
         weigh_slopes(at, work.spread)
         look_slopes_up(table.cells[at.cell], work.spread, work.numbers[0], work.along)
-    if at.deeper * (log_depth - FIRST[2]) < STEPS[2]:  # looked up at the least depth
+    if log_depth - FIRST[2] < STEPS[2]:  # looked up at the least depth
         work.along[DEPTH] = 0.0
     _force_slopes(model, m, log_depth, ahead, scratch[3:, :3], out, work)
     return True

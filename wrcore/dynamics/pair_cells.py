@@ -161,7 +161,7 @@ def locate(table, u, beside, t, slope, log_depth, yaw, shares):
     for level in range(LEVELS):
         deeper, half = 2.0 ** HALVED[level], YAW / 3.0 ** THIRDS[level]
         x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z, w = max(deeper * (log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
+        z, w = deeper * max((log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
         if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < deeper * COUNTS[2]):
             break
         if not 0.0 <= w < YAWS * YAW / half:
@@ -192,9 +192,9 @@ def _in_seam(f):
 @jit(allocates=False)
 def _reached(table, level, part, turn, i, j, k):
     """Whether a cell is there, and all coarser ones are left to its lattice."""
-    if min(i, j, k) < 1 or max(i // COUNTS[0], j // COUNTS[1]) >= 2**level or _beyond(level, turn):
+    if min(i, j) < 2**level or max(i // COUNTS[0], j // COUNTS[1]) >= 2**level or _beyond(level, turn):
         return False
-    if k >= COUNTS[2] * 2 ** HALVED[level]:
+    if not 1 <= k >> HALVED[level] < COUNTS[2]:
         return False
     for coarser in range(level):
         n, m, thirds = level - coarser, HALVED[level] - HALVED[coarser], 3 ** (THIRDS[level] - THIRDS[coarser])

@@ -91,6 +91,7 @@ class Pair:
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 2), np.float32)
         self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
+        self._others = set()
         self._new, self._spent, self._next_written = 0, 0.0, time.monotonic() + PATIENCE
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
@@ -117,7 +118,7 @@ class Pair:
     def _fill(self, key):
         """Solve what a cell needs; kernels call this."""
         with self._lock:
-            if key in self.cells:
+            if key in self.cells or key in self._others:
                 return
             if self._full():
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")
@@ -125,11 +126,24 @@ class Pair:
             mu, begin = self.contact.strips.looked_up, time.monotonic()
             text = f"exact contact at a friction of {mu:g} is solved for its table, once ({self.path}); {WITHOUT}"
             told = nullcontext() if key in self._known else told_if_long(text, self._spent)
-            with handed_on("patches are solved without a table"), told:
-                self._keep(key, *self._solved(key))  # or the cell stays as if never met
+            with handed_on("patches are solved without a table"), told:  # or the cell stays as if never met
+                own = self._own(key)
+                if own not in self.cells:
+                    self._keep(own, *self._solved(own))
+                if own != key and own in self.cells:
+                    self._others.add(key)
+                    self._list(key, self.cells[own])
             self._spent += time.monotonic() - begin
             if time.monotonic() > self._next_written:
                 self.write()
+
+    def _own(self, key):
+        """The cell for which a cell stands: that of the part of the profile in which its lobe lies, at most of its
+        corners. So cells of neighbouring parts are one."""
+        level, part, turn, *first = corner_of(key)
+        corners = _nodes(level % LEVELS, part, 2 * turn + 1, _CORNERS + first)
+        own = sorted(one % BESIDE for one in self._parts_of(corners))[4]
+        return key_of(level, own + part // BESIDE * BESIDE, turn, *first)
 
     def _solved(self, key):
         """State of a cell, 1 where its nodes have solutions and its middle is right, and its rows."""
@@ -164,30 +178,40 @@ class Pair:
         if state > 0:
             self._ready += 1
             self._cells[self._ready], self._misses[self._ready], state = rows, self.misses[key], self._ready
+        self.cells[key] = state
+        self._list(key, state)
+
+    def _list(self, key, state):
+        """Write a cell's state, or number, where kernels look for it."""
         slot = key % SLOTS
         while self._keys[slot]:
             slot = (slot + 1) % SLOTS
         self._states[slot] = state
-        self._keys[slot], self.cells[key] = key, state
+        self._keys[slot] = key
 
     def _full(self):
         """Whether no more cells can be kept."""
-        return 10 * len(self.cells) > 9 * SLOTS or self._ready + 1 == CELLS
+        return 10 * (len(self.cells) + len(self._others)) > 9 * SLOTS or self._ready + 1 == CELLS
 
     def _numbers(self, nodes):
         """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_cells.node_code`, solved side by
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
+        parts, first = self._parts_of(nodes), nodes[0, 1].item()
         codes = node_code(*coarsest(nodes).T).tolist()
-        new = [code for code in dict.fromkeys(codes) if code not in self._parts]
-        self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
-        first = nodes[0, 1].item()
-        keys = [code + (self._parts[code] - first) * PART_CODE for code in codes]
+        keys = [code + (part - first) * PART_CODE for code, part in zip(codes, parts, strict=True)]
         new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
         self._solved_at |= zip(new, _side_by_side(self._at, new), strict=True)
         self._new += len(new)
         return np.array([self._solved_at[key] for key in keys])
+
+    def _parts_of(self, nodes):
+        """Parts of the profile in which the lobes of nodes lie."""
+        codes = node_code(*coarsest(nodes).T).tolist()
+        new = [code for code in dict.fromkeys(codes) if code not in self._parts]
+        self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
+        return [self._parts[code] for code in codes]
 
     def _part(self, code):
         """Part of the wheel's profile in which a node's lobe lies, and `BESIDE`."""
