@@ -17,28 +17,28 @@ U, FINEST = 0.011, 2
 
 def test_finer_steps_where_a_cell_is_too_coarse():
     """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps of t and slope from the
-    first place; ln D is cut finer from the third lattice on, yaw from the fourth."""
-    coarse = np.array([300.3, 200.6, 9.8, 1.75])
+    first place and in a third of the yaw; ln D is cut finer from the third lattice on."""
+    coarse = np.array([300.3, 200.6, 9.8, 1.84])
     t, slope, log_depth = np.array(pair_cells.FIRST) + coarse[:3] * pair_cells.STEPS
     part = round((U - pair_cells.FIELD) / pair_cells.PART)
     keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
-    for level, parts in enumerate(((1, 1, 1, 1), (2, 2, 1, 1), (4, 4, 2, 1), (8, 8, 4, 3))):
+    for level, parts in enumerate(((1, 1, 1, 1), (2, 2, 1, 3), (4, 4, 2, 9), (8, 8, 4, 27))):
         i, j, k, turn = map(int, coarse * parts)
         key = key_of(level, part, turn, i, j, k)
         keys[key % 1009], states[key % 1009] = key, 5 if level == 3 else FINER
     table = NO_TABLE._replace(keys=keys, states=states)
     yaw = (2.0 * coarse[3] - pair_cells.YAWS) * YAW
     at = locate(table, U, False, t, slope, log_depth, yaw, np.zeros(SHARES))
-    assert (at.cell, at.scale, at.deeper, at.half, at.own) == (5, 8.0, 4.0, YAW / 3.0, 1.0)
-    expected = coarse * (8, 8, 4, 3) - (i, j, k, turn)
+    assert (at.cell, at.scale, at.deeper, at.half, at.own) == (5, 8.0, 4.0, YAW / 27.0, 1.0)
+    expected = coarse * (8, 8, 4, 27) - (i, j, k, turn)
     np.testing.assert_allclose((at.fx, at.fy, at.fz, 0.5 * (at.turn + 1.0)), expected, atol=1e-9)
     np.testing.assert_allclose((at.gx, at.gy, at.gz), 0.5 * (expected[:3] + np.array([i, j, k]) % 2), atol=1e-9)
 
 
 def test_a_node_of_several_lattices_is_solved_once():
-    nodes = np.array([(4, 25, 27, 2400, 1600, 80), (4, 25, 26, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)])
+    nodes = np.array([(4, 25, 243, 2400, 1600, 80), (4, 25, 242, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)])
     found = pair_cells.coarsest(nodes)
-    assert found.tolist() == [[0, 25, 3, 150, 100, 10], [4, 25, 26, 2400, 1600, 80], [1, 25, 3, 300, 201, 9]]
+    assert found.tolist() == [[0, 25, 3, 150, 100, 10], [4, 25, 242, 2400, 1600, 80], [1, 25, 3, 300, 201, 9]]
     for one, other in zip(nodes, found, strict=True):
         assert pair_store._place(*one) == pair_store._place(*other)
 

@@ -29,9 +29,9 @@ COUNTS = 500, 400, 19
 YAW, YAWS = 8e-3, 3
 """Half of a cell of the coarsest lattice in yaw (rad), and how many there are."""
 
-HALVED, THIRDS = (0, 0, 1, 2, 3), (0, 0, 0, 1, 2)
-"""How often each lattice's steps are halved in ln D and cut in three in yaw: what is too coarse is too coarse in t and
-slope first."""
+HALVED, THIRDS = (0, 0, 1, 2, 3), (0, 1, 2, 3, 4)
+"""How often each lattice's steps are halved in ln D and cut in three in yaw: what is too coarse is not so in ln D
+first."""
 
 AXES = 4
 """Of a lattice: t, slope, ln D and yaw."""

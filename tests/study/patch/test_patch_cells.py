@@ -15,7 +15,7 @@ from wrcore.dynamics.pair_store import _place, pair_of
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
 
-COARSE, FINE, WORST = key_of(0, 25, 1, 200, 200, 12), key_of(1, 25, 1, 400, 400, 12), key_of(3, 25, 4, 1600, 1600, 48)
+COARSE, FINE, WORST = key_of(0, 25, 1, 200, 200, 12), key_of(1, 25, 4, 400, 400, 12), key_of(3, 25, 40, 1600, 1600, 48)
 STATES, MISSES = {COARSE: FINER, FINE: 7, WORST: HARD}, {COARSE: (0.1, 0.2), FINE: (1e-3, 2e-3), WORST: (math.nan,) * 2}
 
 
@@ -30,7 +30,7 @@ def test_what_becomes_of_a_cell(table):
     assert table["normal_error"][:2].tolist() == [0.1, 1e-3] and math.isnan(table["force_error"][2])
 
 
-@pytest.mark.parametrize(("row", "node"), [(0, (0, 25, 3, 200, 200, 12)), (1, (1, 25, 3, 400, 400, 12))])
+@pytest.mark.parametrize(("row", "node"), [(0, (0, 25, 3, 200, 200, 12)), (1, (1, 25, 9, 400, 400, 12))])
 def test_ends_of_a_cell_are_its_nodes(table, row, node):
     """Yaw's nodes are the ends and the middle of a cell, so that there are two for each place."""
     found, (level, part, turn, *first) = table.iloc[row], node
