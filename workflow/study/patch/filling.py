@@ -44,7 +44,8 @@ def waited(name, settings):
             at_hand = len(pair_store.Pair(pair.contact, "at_hand")._solved_at)
         finally:
             pair_store.table_folder, pair_store._PAIRS = shared
-        cells = collections.Counter(corner_of(key)[0] for key in pair.cells if key not in pair._known)
+        levels = [corner_of(key)[0] for key in pair.cells if key not in pair._known]
+        cells = collections.Counter(level for level in levels if level < LEVELS)
         row = {
             "nodes": len(pair._solved_at) - at_hand, "cells": cells.total(),
             "by lattice": [cells[level] for level in range(LEVELS)],
