@@ -85,7 +85,7 @@ def node_code(level, part, turn, i, j, k):
 def coarsest(nodes):
     """Nodes (n, 6), see `node_code`, each in the coarsest lattice that has it."""
     nodes = nodes.copy()
-    for level in range(LEVELS - 1, 0, -1):
+    for level in range(nodes[:, 0].max(), 0, -1):
         deep, thirds = 2 ** (HALVED[level] - HALVED[level - 1]), 3 ** (THIRDS[level] - THIRDS[level - 1])
         ratios = np.array([thirds, 2, 2, deep])
         coarser = (nodes[:, 0] == level) & (nodes[:, 2:] % ratios == 0).all(axis=1)

@@ -142,7 +142,7 @@ class Pair:
         corners. So cells of neighbouring parts are one."""
         level, part, turn, *first = corner_of(key)
         corners = _nodes(level % LEVELS, part, 2 * turn + 1, _CORNERS + first)
-        own = sorted(one % BESIDE for one in self._parts_of(corners))[4]
+        own = sorted(one % BESIDE for one in self._parts_of(node_code(*coarsest(corners).T).tolist()))[4]
         return key_of(level, own + part // BESIDE * BESIDE, turn, *first)
 
     def _solved(self, key):
@@ -198,17 +198,16 @@ class Pair:
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
-        parts, first = self._parts_of(nodes), nodes[0, 1].item()
-        codes = node_code(*coarsest(nodes).T).tolist()
+        first, codes = nodes[0, 1].item(), node_code(*coarsest(nodes).T).tolist()
+        parts = self._parts_of(codes)
         keys = [code + (part - first) * PART_CODE for code, part in zip(codes, parts, strict=True)]
         new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
         self._solved_at |= zip(new, _side_by_side(self._at, new), strict=True)
         self._new += len(new)
         return np.array([self._solved_at[key] for key in keys])
 
-    def _parts_of(self, nodes):
+    def _parts_of(self, codes):
         """Parts of the profile in which the lobes of nodes lie."""
-        codes = node_code(*coarsest(nodes).T).tolist()
         new = [code for code in dict.fromkeys(codes) if code not in self._parts]
         self._parts |= zip(new, _side_by_side(self._part, new), strict=True)
         return [self._parts[code] for code in codes]
