@@ -25,7 +25,10 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
     low, high, found, largest, moved = 1e9, -1e9, 0, 0.0, -1.0
     for i in range(count):
         if nodes[NODE_GAP, i] < 0.0:
-            low, high = min(low, nodes[S, i]), max(high, nodes[S, i])
+            for k in (max(i - 1, 0), min(i + 1, count - 1)):  # the overlap's end lies before a node beyond
+                part = nodes[NODE_GAP, i] / (nodes[NODE_GAP, i] - max(nodes[NODE_GAP, k], 0.0))
+                end = nodes[S, i] + part * (nodes[S, k] - nodes[S, i])
+                low, high = min(low, end), max(high, end)
     if not high > low:
         return 0, found, largest, moved
     work.low[0], work.high[0], windows = low, high, 1
