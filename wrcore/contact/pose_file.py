@@ -53,4 +53,5 @@ def _refuse(path, frame, name, bad, expected):
     """Name the first row that is bad."""
     if bad.any():
         row = int(np.argmax(bad.to_numpy()))
-        raise InputError(path, f"{name}, row {row + 1}", f"expected {expected}, got {str(frame[name].iloc[row])!r}")
+        given = "nothing" if frame[name].isna().iloc[row] else repr(str(frame[name].iloc[row]))
+        raise InputError(path, f"{name}, row {row + 1}", f"expected {expected}, got {given}")

@@ -230,6 +230,10 @@ def _read_table(path, how, kind):
         heads.setdefault(row.get("head", ""), []).append((number, s, row["profile"], how, (number, places)))
     if not heads:
         raise InputError(path, "", "expected at least one slice, got none")
+    if "" in heads and len(heads) > 1:
+        raise InputError(
+            path, f"head, line {heads[''][0][0]}", "expected the name of a head, as in other lines; got none"
+        )
     return _assembled(path, list(heads.items()), kind)
 
 

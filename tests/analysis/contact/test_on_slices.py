@@ -206,6 +206,14 @@ def test_faults_name_file_and_line(tmp_path, change, where, what):
     assert what in str(error.value)
 
 
+def test_a_table_names_all_heads_or_none(tmp_path):
+    u = np.linspace(-30.0, 30.0, 121)
+    np.savetxt(tmp_path / "a.csv", np.column_stack([u, u**2 / 600.0]), delimiter=",", header="u_m,f_m", comments="")
+    (tmp_path / "rail.csv").write_text("s_m,profile,head\n0,a.csv,wing\n1,a.csv,\n2,a.csv,wing\n")
+    with pytest.raises(InputError, match=r"rail.csv: head, line 3: expected the name of a head"):
+        read_slices(tmp_path / "rail.csv")
+
+
 def cases(name, path):
     """Cases of CONTACT, of the file at the path (None: absent), without the flags that its README distrusts, a table
     per case."""
