@@ -53,7 +53,7 @@ def patchwork(request, tmp_path, monkeypatch):
         rows = np.zeros((NODES, NUMBERS), np.float32)
         rows[:32] = 1.0 + level % LEVELS + 0.3 * (cell[0] % 2)
         finer = np.random.default_rng([request.param, level, *cell]).random() < 0.5
-        pair.misses[key] = 0.0, 0.0
+        pair.misses[key] = 0.0, 0.0, 0.0, 0.0
         return (FINER, None) if level < FINEST and finer else (1, rows)
 
     monkeypatch.setattr(pair_store, "table_folder", lambda: tmp_path)

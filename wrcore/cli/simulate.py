@@ -108,8 +108,8 @@ def _print_run(done, as_json):
     if solved := counters.get("patches_not_tabulated", 0):
         print(f"exact contact was solved {solved} times where its table has no answer")
     if any(errors.values()):  # some was looked up
-        normal, force = (f"{100.0 * error:.2g} %" for error in errors.values())
+        normal, force, pressure = (f"{100.0 * error:.2g} %" for error in errors.values())
         print(
             f"looked-up contact, in the middle of cells beside the exact solver: N within {normal}, creep force within "
-            f"{force} of mu N"
+            f"{force} of mu N, p_max within {pressure}"
         )

@@ -34,13 +34,16 @@ class Modes(NamedTuple):
     weights: np.ndarray
     """(n,): of the modes there, where slopes at rest are exact."""
 
-    def coefficients(self, numbers, remainder):
-        """Of all modes (2 MODES,), from a node's other numbers and its remainder (n, 3) at the points."""
+    def fit(self, numbers, remainder):
+        """Coefficients of all modes (2 MODES,), from a node's other numbers and its remainder (n, 3) at the points; and
+        the largest creep force that they leave there, over mu N."""
         own = mode_weights(self.weights, numbers[columns.LINEAR])[:, None]
         seen = (remainder - (1.0 - own) * numbers[columns.FORCE : columns.FORCE + 3]) * self.weights[:, None] / own
         part = columns.flank_part(numbers[columns.ANGLE])
         shapes = self.shapes * np.repeat([1.0 - part, part], MODES)
-        return np.linalg.solve(shapes.T @ shapes + np.diag(self.prior**-2.0), shapes.T @ seen.ravel())
+        found = np.linalg.solve(shapes.T @ shapes + np.diag(self.prior**-2.0), shapes.T @ seen.ravel())
+        left = (seen.ravel() - shapes @ found).reshape(-1, 3) * own / self.weights[:, None]
+        return found, np.hypot(left[:, 0], left[:, 1]).max()
 
 
 def mode_weights(weights, linear):

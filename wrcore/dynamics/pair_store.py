@@ -55,12 +55,13 @@ from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.told import PATIENCE, handed_on, told_if_long, warn_once
 
-WRONG = (3e-3, 0.01), (3e-3, 0.015), (3e-3, 0.015), (2e-3, 0.015), (0.1, 0.3)
-"""Errors in the middle of a cell of each lattice, of N and over mu N, from which on it is left to the next lattice, and
-in the end to the solver. Fine lattices are where a lobe is born. There forces bend, or the solver's own ones jump by a
-few percent, and steps through solutions would be as small as they can: in the finest only nonsense is refused."""
+WRONG = (3e-3, 0.01, 0.03), (3e-3, 0.015, 0.03), (3e-3, 0.015, 0.03), (2e-3, 0.015, 0.03), (0.1, 0.3, 0.3)
+"""Errors in the middle of a cell of each lattice, of N, of the creep force over mu N and of p_max, from which on it is
+left to the next lattice, and in the end to the solver. Fine lattices are where a lobe is born. There forces bend, or
+the solver's own ones jump by a few percent, and steps through solutions would be as small as they can: in the finest
+only nonsense is refused."""
 
-SEAMED = 0.1, 0.2
+SEAMED = 0.1, 0.2, 0.3
 """The same of what a cell that is left to the next lattice may miss to have a share near its neighbours."""
 
 LIGHT = 2e-5
@@ -89,7 +90,7 @@ class Pair:
         self.path, self.contact, self._lock = table_folder() / f"pair_{digest}.h5", contact, Lock()
         self.modes, self._works = creep_modes(contact.strips.looked_up), LifoQueue()
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
-        self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 2), np.float32)
+        self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 4), np.float32)
         self._solved_at, self._parts, self._known, self.cells, self._ready, self.misses = {}, {}, {}, {}, 0, {}
         self._others = set()
         self._new, self._spent, self._next_written = 0, 0.0, time.monotonic() + PATIENCE
@@ -157,10 +158,10 @@ class Pair:
         if level >= LEVELS:
             return self._left(key)
         rows, wrong = self._rows_of(key), WRONG[level]
-        self.misses[key] = miss = (math.nan, math.nan) if rows is None else self._miss(key, rows)
-        if rows is not None and np.less(miss, wrong).all() and self._add_yaw(key, rows):
+        self.misses[key] = miss = _UNKNOWN if rows is None else self._miss(key, rows)
+        if np.less(miss[:3], wrong).all() and self._add_yaw(key, rows):
             self.misses[key] = miss = tuple(np.maximum(miss, self._miss(key, rows, 0.5)))
-            if np.less(miss, wrong).all():
+            if np.less(miss[:3], wrong).all():
                 return 1, rows
         return HARD if level + 1 == LEVELS else FINER, None
 
@@ -168,7 +169,7 @@ class Pair:
         """State and rows of what a cell gives that was left to the next lattice, for where it goes over to others."""
         level, *cell = corner_of(key)
         self.misses[key] = miss = self.misses[key_of(level - LEVELS, *cell)]
-        rows = self._rows_of(key) if np.less(miss, SEAMED).all() else None
+        rows = self._rows_of(key) if np.less(miss[:3], SEAMED).all() else None
         return (1, rows) if rows is not None and self._add_yaw(key, rows) else (HARD, None)
 
     def _keep(self, key, state, rows):
@@ -256,16 +257,16 @@ class Pair:
 
     def _at(self, code):
         """Numbers of a node; NaN where there is no solution."""
-        return self._at_place(_place(*node_of(code)))
+        return self._at_place(_place(*node_of(code)))[0]
 
     def _at_place(self, place):
-        modes = self.modes
-        found = self.solve(place, modes.points)
+        """Numbers of contact at a place, NaN where there is no solution, and what modes leave of its creep force."""
+        found = self.solve(place, self.modes.points)
         if found is None:
-            return np.full(NUMBERS, np.nan, np.float32)
+            return np.full(NUMBERS, np.nan, np.float32), math.nan
         numbers, remainder = found
-        numbers[columns.MODE :] = modes.coefficients(numbers, remainder)
-        return numbers.astype(np.float32)
+        numbers[columns.MODE :], left = self.modes.fit(numbers, remainder)
+        return numbers.astype(np.float32), left
 
     def solve(self, place, points):
         """`solve_place` with the pair's own scratch arrays."""
@@ -276,16 +277,18 @@ class Pair:
             self._works.put(works)
 
     def _miss(self, key, rows, turn=0.0):
-        """Errors in the middle of a cell, ``turn`` off in yaw: of N, and over mu N of the creep force and of its slopes
-        at rest; see `LIGHT`. Where the middle has no solution the finest lattice's is held against a corner."""
+        """Errors in the middle of a cell, ``turn`` off in yaw: of N, over mu N of the creep force and of its slopes at
+        rest, and of p_max, see `LIGHT`; and what modes leave of the creep force there, over mu N. Where the middle has
+        no solution the finest lattice's is held against a corner."""
         level, part, at, *first = corner_of(key)
         node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
         place, found, weights = _place(*node), np.zeros(NUMBERS), np.empty(NODES)
-        exact = self._at_place(place).astype(float)
+        exact, left = self._at_place(place)
         if np.isnan(exact[0]):
             if level + 1 < LEVELS:
-                return math.nan, math.nan
-            exact = rows[0].astype(float)
+                return _UNKNOWN
+            exact, left = rows[0], 0.0
+        exact = exact.astype(float)
         columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
@@ -293,7 +296,8 @@ class Pair:
         points = np.vstack([modes.points, AT_REST])
         creep = unlike(self._solvable, modes.values, exact, found, place[2], place[1], place[3], points)
         slopes = exact[columns.LINEAR] * np.abs(exact - found)[columns.SLOPE_XI : columns.SLOPE_ETA + 1].max()
-        return light * abs(math.expm1(found[0] - exact[0])), light * max(creep, slopes)
+        normal, peak = (abs(math.expm1(found[k] - exact[k])) for k in (columns.LOG_NORMAL, columns.LOG_PEAK))
+        return light * normal, light * max(creep, slopes), light * peak, light * left
 
     def _take_shipped(self):
         """Take what comes with the package of this pair, if anything."""
@@ -350,6 +354,8 @@ class Pair:
                 warn(f"{self.path}: {error.strerror}; what was solved is not kept")
                 self._new = 0
 
+
+_UNKNOWN = 4 * (math.nan,)
 
 _PARTS = "nodes", "numbers", "parts", "cells", "misses", "rows"
 

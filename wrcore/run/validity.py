@@ -49,7 +49,7 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
-LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error"
+LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error", "look_up_pressure_error"
 """Counters of a run that looks exact contact up: how far its cells are from the exact solver, see
 :func:`look_up_errors`."""
 
@@ -89,14 +89,18 @@ def exceeded(contact, patches, roll, yaw):
 
 def look_up_errors(contact, patches):
     """`LOOK_UP_ERRORS` of ``patches`` (n, k, 2, MAX_PATCHES, PATCH_COLUMNS) that were looked up in the tables of a
-    contact model: the largest errors in the middles of their cells, of a wheel's normal force, over it, and of its
-    creep force, over what friction bears; nothing where patches are not looked up."""
+    contact model: the largest errors in the middles of their cells, of a wheel's normal force, over it, of its creep
+    force, over what friction bears (what its modes leave included), and of the largest pressure, over it; nothing where
+    patches are not looked up."""
     if not contact.strips.looked_up:
         return {}
     wheels = values_of(contact.wheels) or (contact,) * (2 * patches.shape[1])
     cells = np.nan_to_num(patches[..., reduction.CELL]).astype(int).reshape(len(patches), -1, reduction.MAX_PATCHES)
     misses = [one.strips.table.misses[np.unique(cells[:, i])] for i, one in enumerate(wheels)]
-    return dict(zip(LOOK_UP_ERRORS, map(float, np.vstack([np.zeros((1, 2)), *misses]).max(axis=0)), strict=True))
+    normal, force, pressure, left = np.vstack([np.zeros((1, 4)), *misses]).T
+    return {
+        name: float(error.max()) for name, error in zip(LOOK_UP_ERRORS, (normal, force + left, pressure), strict=True)
+    }
 
 
 def _exceeded_by_each(contact, patches, roll, yaw):

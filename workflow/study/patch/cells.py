@@ -96,7 +96,8 @@ def filled_by_run(source, overrides):
 
 def cells_of(pair):
     """Cells of a `Pair`, one a row: lattice (0 is the coarsest), ends in t (m), slope (1), D (m) and yaw (rad), what
-    becomes of it, and its errors in the middle, of N over N and of the creep force over mu N."""
+    becomes of it, and its errors in the middle, of N, of the creep force over mu N, of p_max, and what modes leave of
+    the creep force."""
     rows = []
     for key, state in pair.cells.items():
         level, _, turn, *first = corner_of(key)
@@ -104,12 +105,12 @@ def cells_of(pair):
             continue
         (t, slope, depth), width = ends_of(level, first), 2.0 * YAW / 3.0 ** THIRDS[level]
         yaw = width * turn - YAWS * YAW
-        normal, force = pair.misses[key]
+        normal, force, pressure, left = pair.misses[key]
         rows.append({
             "level": level, "t_low_m": t[0], "t_high_m": t[1], "slope_low": slope[0], "slope_high": slope[1],
             "D_low_m": math.exp(depth[0]), "D_high_m": math.exp(depth[1]), "yaw_low_rad": yaw,
             "yaw_high_rad": yaw + width, "state": {FINER: REFINED, HARD: SOLVED}.get(state, LOOKED_UP),
-            "normal_error": normal, "force_error": force,
+            "normal_error": normal, "force_error": force, "pressure_error": pressure, "modes_left": left,
         })  # fmt: skip
     return pd.DataFrame(rows)
 

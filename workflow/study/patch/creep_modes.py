@@ -1,33 +1,32 @@
 """Modes of what exact contact adds to the creep table: ``python -m study.patch.creep_modes [POSES] [--out FILE]
 [--friction MU ...]``.
 
-Exact patches of random poses, of the whole tread and of the flange, are solved for creepages all over the disk. The
-remainder beside the creep table at the ellipse of equal moments is fitted with quadratic B-splines, pose by pose, and
-the principal components over the poses are the modes: a family of contacts of little spin, and one of contacts of much
-(``FLANKS`` of `wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own. They come with the
-package (``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries, foreign modes are as
-good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were kept back, over mu N
-in %: median, 95 % and 99 %.
-
-Those for 0.3 that come with the package are of 900 poses of an earlier version of this file, which stood beside the
-table at one ellipse. Trained by this version they have better tails (flange, 99 %: 2.0 for 2.6 % of mu N), but err by
-1.0 in place of 0.5 % where a slender contact slips about its spin pole: name the other coefficients, or train on such
-contacts, too.
+Exact patches are solved for creepages all over the disk: at places of nodes that come with the package, where runs have
+passed, as many of each range of contact angles; and at random ones, of the whole tread, of the flange and of wide
+contacts between them, of four pairs of profiles. The remainder beside the creep table at the ellipse of equal moments,
+or at those of a bent patch's parts, is fitted with quadratic B-splines, pose by pose, and the principal components over
+the poses are the modes: a family of contacts of little spin, and one of contacts of much (``FLANKS`` of
+`wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own. They come with the package
+(``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries, foreign modes are as good as a
+pair's own. Prints how well a node's few solutions give the remainder of poses that were kept back, over mu N in %, by
+contact angle: median, 95 % and 99 %.
 """
 
 import argparse
 import math
 
+import h5py
 import numpy as np
 
+from study.patch.look_up_errors import PAIRS
+from wrcore.analysis.contact.loaded import LoadedWheels
 from wrcore.contact.patch.model import MODES
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.creep_modes import SHIPPED, Modes, mode_weights
-from wrcore.dynamics.pair_store import Pair
-from wrcore.dynamics.pair_table import WIDE
+from wrcore.dynamics.pair_cells import node_of
+from wrcore.dynamics.pair_store import _place, _side_by_side, pair_of
+from wrcore.dynamics.pair_table import NARROW, WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
-from wrcore.scene.description import compile_scene, load_scene
-from wrcore.scene.examples import example
 
 SAMPLES, NEAR, CELLS, SOLUTIONS = 700, 500, 20, 20
 """Creepages of a pose all over the disk, and near none; cells of the splines across the disk; and solutions from which
@@ -36,14 +35,18 @@ a node's coefficients come."""
 REGIONS = {
     "tread": ((-7e-3, 7e-3), (-0.045, 0.02), (1e-5, 1.2e-4)),
     "flange": ((3.5e-3, 9e-3), (-0.05, -0.025), (6e-6, 1.2e-4)),
+    "wide": ((4e-3, 6.5e-3), (-0.016, 0.008), (4e-5, 2e-4)),
 }
 """Where poses lie: lateral place of the wheel, place on its profile, and depth, m."""
 
 FRICTIONS = 0.05, 0.12, 0.3, 0.7
 """Coefficients of friction that have modes."""
 
-KEPT = 60
-"""Poses of each region on which modes are tried."""
+ANGLES = np.append(np.arange(0.0, 1.15, 0.1), 1.3)
+"""Ranges of contact angles, of each of which there are as many places of nodes."""
+
+KEPT = 4
+"""One of so many poses is kept back, and modes are tried on it."""
 
 SMOOTHING, NOISE = 1e-3, 2e-3
 """Weight of the splines' second differences, and error of a solution over mu N."""
@@ -70,21 +73,39 @@ def splines(places, cells=CELLS):
     return values.reshape(len(places), -1)
 
 
-def collect(pair, region, poses, points, seed=5):
-    """Numbers (poses, NUMBERS) and remainder (poses, n, 3) at ``points``, of random places of a wheel."""
-    random, rows = np.random.default_rng(seed), []
-    middle, (across, profile, depths) = (
-        pair.contact.geometry.half_distance - pair.contact.geometry.rail_distance,
-        region,
-    )
-    while len(rows) < poses:
-        yaw = 0.0 if random.random() < 0.65 else random.uniform(-0.015, 0.015)
-        depth = math.exp(random.uniform(*np.log(depths)))
-        place = middle + random.uniform(*across), random.normal(0, 2e-3), depth, yaw, random.uniform(*profile), WIDE
-        found = pair.solve(place, points)
-        if found is not None:
-            rows.append(found)
-    return (np.array(part) for part in zip(*rows, strict=True))
+def visited_places(count, random):
+    """Some ``count`` places of nodes that come with the package."""
+    with h5py.File(SHIPPED / "nodes.h5") as file:
+        nodes, angles = file["0/nodes"][...], np.abs(file["0/numbers"][:, columns.ANGLE])
+    places = []
+    for low, high in zip(ANGLES, ANGLES[1:], strict=False):
+        inside = random.permutation(nodes[(angles >= low) & (angles < high)])
+        places += [_place(*node_of(int(node))) for node in inside[: count // (len(ANGLES) - 1)]]
+    return places
+
+
+def random_places(geometry, count, random):
+    """``count`` places of a wheel all over its `REGIONS`; few have a lobe."""
+    middle, places, regions = geometry.half_distance - geometry.rail_distance, [], [*REGIONS.values()]
+    for n in range(count):
+        across, profile, depths = regions[n % len(regions)]
+        yaw = 0.0 if random.random() < 0.4 else random.uniform(-0.02, 0.02)
+        depth, t = math.exp(random.uniform(*np.log(depths))), middle + random.uniform(*across)
+        limits = NARROW if random.random() < 0.3 else WIDE
+        places.append((t, random.normal(0, 2e-3), depth, yaw, random.uniform(*profile), limits))
+    return places
+
+
+def collect(poses, friction, points, seed=5):
+    """Numbers (n, NUMBERS) and remainder (n, points, 3) at ``points`` of places of all pairs: ``poses`` of nodes, and
+    twice as many at random, of which about a third has a lobe."""
+    random, found = np.random.default_rng(seed), []
+    for k, geometry_of in enumerate(PAIRS.values()):
+        pair = pair_of(LoadedWheels(geometry_of().geometry, "tabulated")._at_work(friction).value)
+        places = random_places(pair.contact.geometry, 2 * poses // len(PAIRS), random)
+        places += visited_places(poses, random) if k == 0 else []
+        found += [one for one in _side_by_side(lambda place, pair=pair: pair.solve(place, points), places) if one]
+    return (np.array(part) for part in zip(*found, strict=True))
 
 
 def train(numbers, remainder, points):
@@ -132,31 +153,32 @@ def _most_telling(families, allowed):
 def errors(modes, numbers, remainder, points):
     """Error (n, 3) of a node's remainder at ``points``, of which the first are those where it is solved."""
     row = numbers.copy()
-    row[columns.MODE :] = modes.coefficients(numbers, remainder[: len(modes.points)])
+    row[columns.MODE :] = modes.fit(numbers, remainder[: len(modes.points)])[0]
     return np.array([columns.remainder(modes.values, row, *point) for point in points]) - remainder
 
 
 def make(poses, friction):
-    """Modes trained on the default profiles; prints what they leave."""
-    settings = {"contact.patch": "exact", "contact.friction": friction}
-    model, _ = compile_scene(load_scene(example("suspended_wheelset"), settings))
-    contact = model.contact
-    pair = Pair(contact._replace(strips=contact.strips._replace(looked_up=contact.friction)), "modes")
-    points, counts = np.vstack([disk(SAMPLES), 0.2 * disk(NEAR)]), {"tread": poses, "flange": 2 * poses // 3}
-    found = [collect(pair, REGIONS[name], count, points) for name, count in counts.items()]
-    modes = train(*(np.concatenate(part) for part in zip(*found, strict=True)), points)
-    for name in REGIONS:
-        every = np.vstack([modes.points, points])
-        left = [errors(modes, *pose, every) for pose in zip(*collect(pair, REGIONS[name], KEPT, every, 6), strict=True)]
-        for part, size in (("force", np.hypot(*np.array(left).T[:2])), ("moment", np.abs(np.array(left).T[2]))):
-            print(friction, name, part, *(f"{100 * value:.2f}" for value in np.percentile(size, [50, 95, 99])))
+    """Modes trained for a coefficient of friction; prints what they leave."""
+    points = np.vstack([disk(SAMPLES), 0.2 * disk(NEAR)])
+    numbers, remainder = collect(poses, friction, points)
+    kept = np.random.default_rng(1).permutation(len(numbers)) < len(numbers) // KEPT
+    modes = train(numbers[~kept], remainder[~kept], points)
+    own = [int(np.argmin(np.hypot(*(points - point).T))) for point in modes.points]
+    order, angles = [*own, *range(0, len(points), 3)], np.abs(numbers[kept, columns.ANGLE])
+    every = zip(numbers[kept], remainder[kept], strict=True)
+    left = np.array([errors(modes, row, rest[order], points[order]) for row, rest in every])
+    for low, high in ((0.0, 0.1), (0.1, 0.4), (0.4, 0.7), (0.7, 1.3)):
+        some = left[(angles >= low) & (angles < high)]
+        for part, size in (("force", np.hypot(some[..., 0], some[..., 1])), ("moment", np.abs(some[..., 2]))):
+            told = " ".join(f"{100 * value:.2f}" for value in np.percentile(size, [50, 95, 99]))
+            print(f"{friction:g}: contact angle {low:g} to {high:g}, {len(some)} poses, {part}: {told}", flush=True)
     return modes
 
 
 def main():
     """Train modes, print what they leave, write them."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("poses", nargs="?", type=int, default=600)
+    parser.add_argument("poses", nargs="?", type=int, default=700)
     parser.add_argument("--out", default=SHIPPED / "creep_modes.h5")
     parser.add_argument("--friction", nargs="+", type=float, default=FRICTIONS)
     chosen = parser.parse_args()
