@@ -16,7 +16,10 @@ from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
 
 COARSE, FINE, WORST = key_of(0, 25, 1, 200, 200, 12), key_of(1, 25, 4, 400, 400, 12), key_of(3, 25, 40, 1600, 1600, 48)
-STATES, MISSES = {COARSE: FINER, FINE: 7, WORST: HARD}, {COARSE: (0.1, 0.2), FINE: (1e-3, 2e-3), WORST: (math.nan,) * 2}
+STATES, MISSES = (
+    {COARSE: FINER, FINE: 7, WORST: HARD},
+    {COARSE: (0.1, 0.2, 0.3, 0.0), FINE: (1e-3, 2e-3, 1e-3, 1e-3), WORST: (math.nan,) * 4},
+)
 
 
 @pytest.fixture
