@@ -89,6 +89,21 @@ def test_modes_leave_the_slopes_at_rest():
     assert max(map(abs, np.subtract(far, near))) > 1e-3
 
 
+@pytest.mark.parametrize(("angle", "linear"), [(0.05, 1.0), (0.3, 0.5), (1.1, 0.0)])
+def test_what_modes_leave_is_what_kernels_lack(angle, linear):
+    """A node's remainder less what is looked up of it, at the creepages where it was solved."""
+    modes, numbers = creep_modes(0.3), np.zeros(NUMBERS)
+    numbers[[pair_table.ANGLE, pair_table.LINEAR]] = angle, linear
+    numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.01, -0.02, 0.005
+    given = np.random.default_rng(3).normal(0.0, 0.02, (len(modes.points), 3))
+    numbers[pair_table.MODE :], left = modes.fit(numbers, given)
+    told = np.array([pair_table.remainder(modes.values, numbers, *point) for point in modes.points])
+    lacks = np.hypot(*(given - told)[:, :2].T).max()
+    assert left == pytest.approx(lacks, rel=1e-3) and left > 1e-3
+    _, nothing = modes.fit(numbers, told)
+    assert nothing < 0.3 * left
+
+
 def test_each_family_of_modes_has_its_contact_angles():
     """Of little spin up to 0.2 rad, of much from 0.4 rad on, half of both in between, on either side."""
     little, much = np.zeros(NUMBERS), np.zeros(NUMBERS)
@@ -642,6 +657,26 @@ def test_each_rail_has_a_table_of_its_own_friction():
         bound = friction * other.N_N[:, 0]
         assert abs((one.Fx_N - other.Fx_N)[:, 0] / bound).max() < pair_store.WRONG[0][1]
         assert abs(other.Fx_N[:, 0] / bound).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("miss", "state"),
+    [
+        ((1e-3, 1e-3, 0.02, 0.2), 1),
+        ((4e-3, 1e-3, 0.02, 0.0), -1),
+        ((1e-3, 0.02, 0.02, 0.0), -1),
+        ((1e-3, 1e-3, 0.04, 0.0), -1),
+    ],
+)
+def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(own_cache, monkeypatch, miss, state):
+    """But for what modes leave, which no lattice mends: that is told only."""
+    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), {"contact.patch": "tabulated"}))
+    monkeypatch.setattr(pair_store.Pair, "_rows_of", lambda *_: np.zeros((48, NUMBERS), np.float32))
+    monkeypatch.setattr(pair_store.Pair, "_add_yaw", lambda *_: True)
+    monkeypatch.setattr(pair_store.Pair, "_miss", lambda *_: miss)
+    pair, key = pair_store.Pair(model.contact, "any"), pair_cells.key_of(0, 25, 1, 7, 9, 11)
+    assert pair._solved(key)[0] == state
+    assert pair.misses[key] == miss
 
 
 def test_a_run_says_how_far_its_cells_are_from_the_exact_solver():
