@@ -108,6 +108,7 @@ def test_unknown_names_in_python_are_guessed_too():
 @pytest.mark.parametrize("kind, key, says", [
     ("scene", "contact.friction", "default: 0.3"), ("track", "gauge", "in m"), ("vehicle", "bodies.*.mass", "in kg"),
     ("sweep", "sampling", "sampling.kind"), ("wear", "distance", "(needed)"),
+    ("scene", "track.crossing", "crossing.at [m]"),
 ])  # fmt: skip
 def test_keys_are_listed_with_what_is_expected(capsys, kind, key, says):
     assert main(["keys", kind, key]) == 0

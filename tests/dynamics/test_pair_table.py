@@ -89,9 +89,10 @@ def test_modes_leave_the_slopes_at_rest():
     assert max(map(abs, np.subtract(far, near))) > 1e-3
 
 
-@pytest.mark.parametrize(("angle", "linear"), [(0.05, 1.0), (0.3, 0.5), (1.1, 0.0)])
-def test_what_modes_leave_is_what_kernels_lack(angle, linear):
-    """A node's remainder less what is looked up of it, at the creepages where it was solved."""
+@pytest.mark.parametrize(("angle", "linear", "again"), [(0.05, 1.0, 0.3), (0.3, 0.5, 0.4), (1.1, 0.0, 0.3)])
+def test_what_modes_leave_is_what_kernels_lack(angle, linear, again):
+    """A node's remainder less what is looked up of it, at the creepages where it was solved. What was looked up is told
+    again but for little; between both families each tells the whole, and noise comes back less well."""
     modes, numbers = creep_modes(0.3), np.zeros(NUMBERS)
     numbers[[pair_table.ANGLE, pair_table.LINEAR]] = angle, linear
     numbers[pair_table.FORCE : pair_table.FORCE + 3] = 0.01, -0.02, 0.005
@@ -101,7 +102,7 @@ def test_what_modes_leave_is_what_kernels_lack(angle, linear):
     lacks = np.hypot(*(given - told)[:, :2].T).max()
     assert left == pytest.approx(lacks, rel=1e-3) and left > 1e-3
     _, nothing = modes.fit(numbers, told)
-    assert nothing < 0.3 * left
+    assert nothing < again * left
 
 
 def test_each_family_of_modes_has_its_contact_angles():

@@ -22,9 +22,12 @@ def add(commands):
 
 
 def run(options):
-    rows = [row for row in keys_of(options.kind) if _is_below(row[0], options.below)]
+    every = keys_of(options.kind)
+    if options.kind == "scene" and options.below:
+        every = [*every, *((f"track.{path}", *rest) for path, *rest in keys_of("track"))]
+    rows = [row for row in every if _is_below(row[0], options.below)]
     if not rows:
-        known = {row[0] for row in keys_of(options.kind)}
+        known = {row[0] for row in every}
         raise InputError(
             "wrcore keys", options.below, f"expected a key of {options.kind}{similar(options.below, known)}"
         )

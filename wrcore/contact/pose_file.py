@@ -31,6 +31,7 @@ def read_poses(path):
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
     if frame.empty:
         raise InputError(path, "", "expected at least one pose, got none")
+    _refuse(path, frame, "pose_id", frame["pose_id"].duplicated(), "an id that no row before has")
     for name, limit in limits.items():
         if name not in frame:
             frame[name] = np.nan

@@ -238,6 +238,12 @@ def test_bad_motion(tmp_path, capsys, columns_, expected):
     assert expected in capsys.readouterr().err
 
 
+def test_an_id_stands_for_one_pose(tmp_path):
+    (tmp_path / "poses.csv").write_text("pose_id,y_m,yaw_rad\na,0,0\nb,0.001,0\na,0.002,0\n")
+    with pytest.raises(wr.InputError, match="pose_id, row 3: expected an id that no row before has, got 'a'"):
+        read_poses(tmp_path / "poses.csv")
+
+
 def test_a_patch_of_a_scene():
     (one,) = wr.patch(SCENES / "suspended_wheelset.yaml", y=0.003, vy=0.02)
     assert isinstance(one, wr.Patch) and one.side == "left" and one.friction == 0.3

@@ -4,16 +4,19 @@
 Exact patches are solved for creepages all over the disk: at places of nodes that come with the package, where runs have
 passed, as many of each range of contact angles; and at random ones, of the whole tread, of the flange and of wide
 contacts between them, of four pairs of profiles. The remainder beside the creep table at the ellipse of equal moments,
-or at those of a bent patch's parts, is fitted with quadratic B-splines, pose by pose, and the principal components over
-the poses are the modes: a family of contacts of little spin, and one of contacts of much (``FLANKS`` of
-`wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own. They come with the package
-(``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries, foreign modes are as good as a
-pair's own. Prints how well a node's few solutions give the remainder of poses that were kept back, over mu N in %, by
-contact angle: median, 95 % and 99 %.
+or at those of a bent patch's parts, is fitted with quadratic B-splines, pose by pose. A node is solved for a few
+creepages: those from which, all poses together, least squares tell most of the rest of the remainder. The principal
+components of what they tell are the modes (a regression of reduced rank): of a family of contacts of little spin, and
+one of contacts of much (``FLANKS`` of `wrcore.dynamics.pair_table`). Each of some coefficients of friction has its own.
+They come with the package (``wrcore/dynamics/tables/creep_modes.h5``) and serve all pairs: where one lobe carries,
+foreign modes are as good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were
+kept back, over mu N in %, by contact angle: median, 95 % and 99 %.
 
-Those for 0.3 and 0.12 that come with the package are made so, from nodes of the lattices before these; those for 0.05
-and 0.7 are of random poses of one pair alone. About the spin pole of a slender contact on the flange they err by more
-than modes for these alone would (worst of 16 rates, 40 poses, median and 95 %: 2.1 and 4.9 for 1.4 and 6.5 % of mu N).
+Those that come with the package are made so, from nodes of the lattices before these.
+
+References
+----------
+Izenman, J. Multivariate Anal. 5 (1975) 248 (regression of reduced rank).
 """
 
 import argparse
@@ -53,9 +56,8 @@ ANGLES = np.append(np.arange(0.0, 1.15, 0.1), 1.3)
 KEPT = 4
 """One of so many poses is kept back, and modes are tried on it."""
 
-SMOOTHING, NOISE = 1e-3, 2e-3
+SMOOTHING, NOISE = 1e-3, 1e-3
 """Weight of the splines' second differences, and error of a solution over mu N."""
-
 
 EVENED, FLOOR = 0.5, 5e-3
 """A pose counts for its remainder (root mean square, over mu N, and the second) to the power of 1 less the first: what
@@ -126,41 +128,54 @@ def train(numbers, remainder, points):
     own = mode_weights(weights, numbers[:, columns.LINEAR, None])[..., None]
     free = (remainder - (1.0 - own) * numbers[:, None, columns.FORCE : columns.FORCE + 3]) * weights[:, None] / own
     values, angles = weights[:, None] * splines(places), np.abs(numbers[:, columns.ANGLE])
-    families = [_family(values, free[some]) for some in (angles < columns.FLANKS[1], angles > columns.FLANKS[0])]
-    tables, shapes, priors = zip(*families, strict=True)
-    blocks = [one * prior / NOISE for one, prior in zip(shapes, priors, strict=True)]
-    chosen = _most_telling(blocks, np.hypot(*places.T) < 0.97)
-    seen = np.concatenate([one[chosen].reshape(-1, MODES) for one in shapes], axis=1)
-    return Modes(np.stack(tables), points[chosen], seen, np.concatenate(priors) / NOISE, weights[chosen])
+    weighed = _fitted(values, free)
+    sizes = np.sqrt(np.mean(np.einsum("nc,pqc->pnq", values, weighed) ** 2, axis=(1, 2)))
+    evened = (sizes + FLOOR) ** -EVENED
+    weighed *= (evened / np.sqrt(np.mean(evened**2)))[:, None, None]
+    fits = [weighed[some] for some in (angles < columns.FLANKS[1], angles > columns.FLANKS[0])]
+    seen = [np.einsum("nc,pqc->pnq", values, one) for one in fits]
+    chosen = _most_telling(seen, np.hypot(*places.T) < 0.97)
+    tables, shapes, gains = zip(*map(_family, fits, seen, [chosen, chosen]), strict=True)
+    return Modes(np.stack(tables), points[chosen], np.hstack(shapes), np.vstack(gains), weights[chosen])
 
 
-def _family(values, free):
-    """Table of modes, their values (n, 3, MODES) where splines have ``values``, and the size of their coefficients."""
+def _fitted(values, free):
+    """Coefficients (poses, 3, splines) of remainders, where splines have ``values``."""
     bends = np.diff(np.eye(CELLS + 2), 2, axis=0)
     smooth = np.vstack([np.kron(bends, np.eye(CELLS + 2)), np.kron(np.eye(CELLS + 2), bends)])
     normal = values.T @ values + SMOOTHING * smooth.T @ smooth + 1e-9 * np.eye(values.shape[1])
-    fits = np.einsum("cn,pnq->pqc", np.linalg.solve(normal, values.T), free)
-    seen = np.einsum("nc,pqc->pqn", values, fits).reshape(len(fits), -1)
-    weights = (np.sqrt(np.mean(seen**2, axis=1)) + FLOOR) ** -EVENED
-    parts, sizes, shapes = np.linalg.svd(weights[:, None] * seen, full_matrices=False)
-    weighed = parts[:, :MODES].T * weights / sizes[:MODES, None]
-    modes = (weighed @ fits.reshape(len(fits), -1)).reshape(MODES, 3, -1)
-    prior = np.sqrt(np.mean((seen @ shapes[:MODES].T) ** 2, axis=0))
-    table = modes.reshape(MODES, 3, CELLS + 2, CELLS + 2).transpose(2, 3, 1, 0).reshape(CELLS + 2, CELLS + 2, -1)
-    return table.astype(np.float32), np.einsum("nc,kqc->nqk", values, modes), prior
+    return np.einsum("cn,pnq->pqc", np.linalg.solve(normal, values.T), free)
 
 
 def _most_telling(families, allowed):
-    """Solutions after which the coefficients of all families are known best, one after the other (D-optimal)."""
-    known, chosen = [np.eye(MODES) for _ in families], []
+    """Solutions from which the rest of remainders (poses, n, 3) of all families is known best, one after the other."""
+    left = [seen.reshape(len(seen), -1).T @ seen.reshape(len(seen), -1) / len(seen) for seen in families]
+    shares, chosen = [1.0 / np.trace(one) for one in left], []
     for _ in range(SOLUTIONS):
-        gains = np.zeros(len(allowed))
-        for blocks, one in zip(families, known, strict=True):
-            gains += np.linalg.slogdet(np.eye(3) + blocks @ np.linalg.inv(one) @ blocks.transpose(0, 2, 1))[1]
-        gains[chosen] = -np.inf
-        chosen.append(int(np.argmax(np.where(allowed, gains, -np.inf))))
-        known = [one + blocks[chosen[-1]].T @ blocks[chosen[-1]] for blocks, one in zip(families, known, strict=True)]
+        told = np.zeros(len(allowed))
+        for one, share in zip(left, shares, strict=True):
+            at = one.reshape(len(one), -1, 3)
+            own = np.einsum("nanb->nab", one.reshape(-1, 3, len(allowed), 3)) + NOISE**2 * np.eye(3)
+            told += share * np.einsum("nab,nba->n", np.linalg.inv(own), np.einsum("kna,knb->nab", at, at))
+        told[chosen] = -np.inf
+        chosen.append(int(np.argmax(np.where(allowed, told, -np.inf))))
+        one = slice(3 * chosen[-1], 3 * chosen[-1] + 3)
+        left = [a - a[:, one] @ np.linalg.solve(a[one, one] + NOISE**2 * np.eye(3), a[one]) for a in left]
     return chosen
+
+
+def _family(fits, seen, chosen):
+    """Table of modes; their values (3 n, MODES) at the chosen solutions; and what these give their coefficients,
+    (MODES, 3 n): of what the solutions tell of the remainders, the principal components."""
+    at = seen[:, chosen].reshape(len(seen), -1)
+    known = at.T @ at + len(at) * NOISE**2 * np.eye(at.shape[1])
+    told = np.linalg.solve(known, at.T @ fits.reshape(len(fits), -1)).reshape(-1, *fits.shape[1:])
+    everywhere = np.linalg.solve(known, at.T @ seen.reshape(len(seen), -1))
+    parts, sizes, shapes = np.linalg.svd(at @ everywhere, full_matrices=False)
+    modes = np.einsum("pk,pn,nqc->kqc", parts[:, :MODES] / sizes[:MODES], at, told, optimize=True)
+    table = modes.reshape(MODES, 3, CELLS + 2, CELLS + 2).transpose(2, 3, 1, 0).reshape(CELLS + 2, CELLS + 2, -1)
+    own = shapes[:MODES].reshape(MODES, -1, 3)[:, chosen].reshape(MODES, -1)
+    return table.astype(np.float32), own.T, shapes[:MODES] @ everywhere.T
 
 
 def errors(modes, numbers, remainder, points):
