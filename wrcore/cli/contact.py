@@ -14,7 +14,7 @@ load by itself; neither: both are solved. Roll turns the wheelset about x first,
 
 POSES = columns(
     "IN.csv, a row per pose",
-    pose_id="any text",
+    pose_id="any text, no two alike",
     **as_runs("y_m", "yaw_rad"),
     roll_rad="optional",
     z_m="optional",

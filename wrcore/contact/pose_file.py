@@ -15,8 +15,8 @@ _WANTED = ("pose_id", "y_m", "yaw_rad")
 
 def read_poses(path):
     """Table (pandas.DataFrame) of a CSV file of poses: columns pose_id, y_m, yaw_rad and optionally roll_rad, z_m, s_m,
-    pitch_rad, V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. InputError names the
-    file, the column, the row and what was expected."""
+    pitch_rad, V_m_per_s, omega_rad_per_s, vy_m_per_s, yaw_rate_rad_per_s, mu; NaN where not given. No two rows have one
+    pose_id. InputError names the file, the column, the row and what was expected."""
     import pandas as pd
 
     frame = read_csv_table(path, "pose_id")
@@ -31,6 +31,7 @@ def read_poses(path):
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
     if frame.empty:
         raise InputError(path, "", "expected at least one pose, got none")
+    _refuse(path, frame, "pose_id", frame["pose_id"].isna(), "any text")
     _refuse(path, frame, "pose_id", frame["pose_id"].duplicated(), "an id that no row before has")
     for name, limit in limits.items():
         if name not in frame:

@@ -242,6 +242,9 @@ def test_an_id_stands_for_one_pose(tmp_path):
     (tmp_path / "poses.csv").write_text("pose_id,y_m,yaw_rad\na,0,0\nb,0.001,0\na,0.002,0\n")
     with pytest.raises(wr.InputError, match="pose_id, row 3: expected an id that no row before has, got 'a'"):
         read_poses(tmp_path / "poses.csv")
+    (tmp_path / "poses.csv").write_text("pose_id,y_m,yaw_rad\na,0,0\n,0.001,0\n")
+    with pytest.raises(wr.InputError, match="pose_id, row 2: expected any text, got nothing"):
+        read_poses(tmp_path / "poses.csv")
 
 
 def test_a_patch_of_a_scene():
