@@ -5,7 +5,7 @@ import pytest
 
 import wrcore as wr
 from wrcore.contact.patch.model import NO_TABLE, NODES, NUMBERS, SHARES
-from wrcore.dynamics import pair_cells, pair_store
+from wrcore.dynamics import pair_cells, pair_solver, pair_store
 from wrcore.dynamics.pair_cells import AXES, FINER, LEVELS, YAW, corner_of, key_of, locate
 from wrcore.dynamics.pair_table import look_shares_up, look_up, weigh
 from wrcore.dynamics.table_slopes import look_share_slopes_up
@@ -40,7 +40,7 @@ def test_a_node_of_several_lattices_is_solved_once():
     found = pair_cells.coarsest(nodes)
     assert found.tolist() == [[0, 25, 3, 150, 100, 10], [4, 25, 242, 2400, 1600, 80], [1, 25, 3, 300, 201, 9]]
     for one, other in zip(nodes, found, strict=True):
-        assert pair_store._place(*one) == pair_store._place(*other)
+        assert pair_solver.place_of(*one) == pair_solver.place_of(*other)
 
 
 @pytest.fixture(params=range(2))

@@ -26,6 +26,7 @@ from wrcore.dynamics.system import Equations
 from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
+from wrcore.integrate.integrator import integrate
 from wrcore.run.validity import LOOK_UP_ERRORS, look_up_errors
 from wrcore.scene.description import compile_scene, load_scene
 
@@ -651,15 +652,21 @@ def test_a_run_beside_the_exact_one():
 
 
 def test_each_rail_has_a_table_of_its_own_friction():
-    """Beside the exact solver, over what friction on the wheel's own rail bears."""
-    scene, changes = wr.example("suspended_wheelset"), {"contact.friction": {"left": 0.3, "right": 0.05}}
-    changes |= {"initial.y": 0.003, "integration.duration": 0.1}
-    table, exact = (wr.simulate(scene, **changes, **{"contact.patch": patch}) for patch in ("tabulated", "exact"))
-    for side, friction in (("left", 0.3), ("right", 0.05)):
-        one, other = (run[f"wheelset/{side}"] for run in (table, exact))
-        bound = friction * other.N_N[:, 0]
-        assert abs((one.Fx_N - other.Fx_N)[:, 0] / bound).max() < pair_store.WRONG[0][1]
-        assert abs(other.Fx_N[:, 0] / bound).max() > 0.1
+    """Beside the exact solver at the states of a run, over what friction on the wheel's own rail bears. At 0.05 modes
+    leave 0.8 % in 95 % of treads, at 0.3 a quarter of that."""
+    scene = wr.example("suspended_wheelset")
+    changes = {"contact.friction": {"left": 0.3, "right": 0.05}, "initial.y": 0.003}
+    models = [compile_scene(load_scene(scene, changes | {"contact.patch": one})) for one in ("tabulated", "exact")]
+    times = np.linspace(0.0, 0.1, 21)
+    run, equations = integrate(*models[0], times, "rodas4p2"), [Equations(model) for model, _ in models]
+    forces = np.empty((2, len(times), 2, 2))
+    for k, state in enumerate(run.states):
+        for one, rows in zip(equations, forces, strict=True):
+            one(times[k], state)
+            rows[k] = one.work.patches[0, :, 0][:, [reduction.FX, reduction.NORMAL]]
+    own, exact = forces[..., 0] / (np.array([0.3, 0.05]) * forces[1, ..., 1])
+    assert np.all(abs(own - exact).max(axis=0) < (3e-3, 1.3e-2))
+    assert np.all(abs(exact).max(axis=0) > 0.1)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 First table, per scene: what `auto` takes and errs (root mean squares against Tsit5 at 1e-9: lateral position of the
 wheelsets; normal force of the wheels over its mean, and over its standard deviation in time, its dynamic part), the
 cheapest of all methods and tolerances that keeps y to 1 um and N to 0.5 % (where `auto` errs more: that errs no
-more), and the ratio of their costs. The last column asks for 0.5 % of the dynamic part, too: the cost of the method of
-`auto`, at the tolerance that keeps that (in brackets), over that of the cheapest choice that does.
+more), and the ratio of their costs. The last column asks for 0.5 % of the dynamic part, too: the cost of `auto`, at the
+tolerance that keeps that (in brackets), over that of the cheapest choice that does.
 
-Cost: what was done, in evaluations, whatever the machine does beside (`LINEAR`, `CONTACTS`). Processor times are of one
-run each. The twin of the reference (RK45 at 1e-8) says how far its errors can be trusted. ``random N`` measures N
-random vehicles.
+Cost: what was done, in evaluations, whatever the machine does beside (:func:`wrcore.integrate.choice.work`). Processor
+times are of one run each. The twin of the reference (RK45 at 1e-8) says how far its errors can be trusted. ``random N``
+measures N random vehicles.
 
 Second table: the error of y that the default tolerance buys, by method and kind of scene: median and most. Left out are
 doubtful scenes and choices too dear for a scene.
@@ -23,6 +23,7 @@ from tests.integrate.scenes import SCENES, compiled, random_scene
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.track import track_poses
+from wrcore.integrate.choice import work, work_of
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulation import evaluated
@@ -35,16 +36,15 @@ KINDS = {"wheelset": "wheelsets", "trailer": "coach, straight", "metro": "metro 
          "loco": "locomotive", "R ": "curves", "ballast": "rails that give", "random": "random vehicles"}  # fmt: skip
 """Kinds of scenes by what their names hold; the last one counts."""
 REFERENCE, TWIN = ("tsit5", 1e-9), ("rk45", 1e-8)
-LINEAR, CONTACTS = 1.2, 3.0
-"""Price of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations of a coach or metro car."""
 TOO_DEAR = 2.5
 """A choice that takes this many times as many evaluations as `auto` is given up."""
 
 
 def cost(run):
     """What a run did, in evaluations."""
-    stages = len(ROSENBROCK[run.method].nodes) if run.method in ROSENBROCK else 0
-    return run.rhs_evaluations + LINEAR * stages * (run.steps + run.rejected) + CONTACTS * run.jacobians
+    if run.end is not None and len(run.end.notes):
+        return work_of(run.end)
+    return work(run.method, run.rhs_evaluations, run.steps + run.rejected, run.jacobians)
 
 
 class Measured:
@@ -82,19 +82,21 @@ class Measured:
         return np.array([y_error, gap / sure_normal.mean(), gap / np.sqrt(sure_normal.var(axis=0).mean())])
 
     def all_choices(self):
-        """Run all choices; the cheapest one within the bars, and the method of `auto` and the cheapest one within that
-        of the dynamic part, too (None where nothing is)."""
+        """Run all choices; the cheapest one within the bars, and the cheapest one and `auto` within that of the dynamic
+        part, too (None where nothing is)."""
         default = self.once(DEFAULT)
-        for method in METHODS:
-            most = round(TOO_DEAR * cost(default) / len((EXPLICIT | ROSENBROCK)[method].nodes))
+        for method in ("auto", *METHODS):
+            tableau = (EXPLICIT | ROSENBROCK)["rk4" if method == "auto" else method]
+            most = round(TOO_DEAR * cost(default) / len(tableau.nodes))
             for rtol in RTOLS:
                 if self.once((method, rtol), most).status == "stalled":
                     break  # tighter ones are dearer
         bars = np.maximum(BARS, self.found[DEFAULT][:2])
         self.doubtful = bool(np.any(self.doubt[:2] > 0.2 * bars))
-        enough = [choice for choice in self.found if np.all(self.found[choice][:2] <= bars)]
+        asked = [choice for choice in self.found if choice[0] != "auto" or choice == DEFAULT]
+        enough = [choice for choice in asked if np.all(self.found[choice][:2] <= bars)]
         strict = [choice for choice in self.found if np.all(self.found[choice] <= [*BARS, DYNAMIC])]
-        own = [choice for choice in strict if choice[0] == default.method]
+        own = [choice for choice in strict if choice[0] == "auto"]
         return [min(group, key=self.cost, default=None) for group in (enough, strict, own)]
 
     def cost(self, choice):

@@ -12,15 +12,7 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.integrate import engine
-from wrcore.integrate.choice import (
-    DAMPED,
-    HARDLY_DAMPED,
-    PASSAGE,
-    PER_METRE_ON_CHANGING_RAILS,
-    fastest_rate,
-    lateral_damping,
-    steps_on_changing_rails,
-)
+from wrcore.integrate.choice import fastest_rate
 from wrcore.integrate.integrator import METHODS, integrate
 from wrcore.integrate.reference import SOLVERS, integrate_function
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
@@ -198,62 +190,6 @@ KEPT = [
     "speed=45", "drive.controller.speed=45", "contact.friction=0.3",
     "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 20}}",
 ]  # fmt: skip
-
-
-def test_auto_takes_what_the_scene_needs(wheelset):
-    """Creep makes low speed stiff; at high speed a rough track, or wheelsets that hunt, ask for short steps anyway."""
-    assert integrate(*wheelset, [0.0, 0.01]).method == "rodas4p2"
-    rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 5}}"
-    curve = "track.path=[{transition: 40}, {curve: 300, radius: 300}]"
-    rails = "lateral: {stiffness: 1.8e+7, damping: 5e+4}, vertical: {stiffness: 8.1e+7, damping: 6e+4}"
-    ballast = f"track.support={{rail: {{{rails}}}}}"
-    for scene, overrides, expected in (
-        ("suspended_wheelset", ["speed=0.1"], "rodas4p2"),
-        ("suspended_wheelset", ["speed=40"], "rodas4p2"),  # below its critical speed: motion dies away
-        ("suspended_wheelset", ["speed=60"], "rk4"),
-        ("wheelset", ["speed=20"], "rk4"),  # nothing holds it
-        ("locomotive", [*KEPT, "drive.brakes=[]"], "rk4"),
-        ("locomotive", KEPT, "rodas4p2"),  # its brakes may bring it to a stop
-        ("locomotive", [*KEPT, "drive.brakes=[]", "drive.controller.speed={time: [0, 9], speed: [45, 0]}"], "rodas4p2"),
-        ("trailer_vehicle", ["speed=60"], "rodas4p2"),
-        ("trailer_vehicle", ["speed=60", rough], "rk4"),
-        ("trailer_vehicle", ["speed=15", rough], "rodas4p2"),
-        ("trailer_vehicle", ["speed=15", curve], "rodas4p2"),
-        ("suspended_wheelset", ["speed=50", ballast], "rodas4p2"),
-        ("suspended_wheelset", ["speed=50", ballast, rough], "rk4"),  # a whole Jacobian, and that in each step
-        ("metro_car", ["speed=60"], "rk4"),
-        ("crossing", [], "rk4"),  # impacts want short steps
-        ("crossing", ["integration.duration=20"], "rodas4p2"),  # most of the way is plain track
-        ("crossing", ["track.crossing.at=1000"], "rodas4p2"),  # far off
-    ):
-        loaded = load_scene(SCENES / f"{scene}.yaml", overrides)
-        end = loaded.data["integration"]["duration"]
-        assert integrate(*compile_scene(loaded), [0.0, 1e-3], end=end).method == expected, (scene, overrides)
-
-
-def test_auto_counts_the_impacts_on_the_way():
-    """As many in a run as it is long: none beyond its end; all on the way where no end is known."""
-    model, start = compile_scene(load_scene(SCENES / "crossing.yaml"))
-    (first, end), known = (5.5, 7.592), steps_on_changing_rails(model, start, 20.0)  # m
-    assert known == pytest.approx((PASSAGE + PER_METRE_ON_CHANGING_RAILS * (end - first)) / 20.0)
-    assert steps_on_changing_rails(model, start, 40.0) == pytest.approx(0.5 * known)
-    assert steps_on_changing_rails(model, start, first) == 0.0
-    assert steps_on_changing_rails(model, start, np.inf) == pytest.approx(known * 20.0 / end)
-
-
-def test_lateral_damping_of_lone_wheelsets():
-    # the suspended one is damped the less the nearer it is to its critical speed, 58 m/s; nothing damps the free one
-    for scene, speeds, least, most in (
-        ("suspended_wheelset", (1.0, 5.0, 20.0, 40.0), 1.1 * DAMPED, 0.6),
-        ("suspended_wheelset", (60.0, 75.0), HARDLY_DAMPED, 0.9 * DAMPED),
-        ("wheelset", (5.0, 20.0, 70.0), -1.0, HARDLY_DAMPED),
-    ):
-        for speed in speeds:
-            model, start = compile_scene(load_scene(SCENES / f"{scene}.yaml", {"speed": speed}))
-            equations = Equations(model)
-            counters = equations.work.counters.copy()
-            assert least < lateral_damping(model, equations, 0.0, start) < most, (scene, speed)
-            np.testing.assert_array_equal(equations.work.counters, counters)
 
 
 def test_auto_sees_a_stiff_damper(contact):  # noqa: F811
@@ -499,7 +435,7 @@ def test_many_runs_are_the_single_ones():
     many = simulate_many(scenes, progress=lambda items: (seen.append(item) or item for item in items))
     assert seen == scenes
     for runs in (many, simulate_many(scenes, threads=2)):
-        assert [run.settings["method_used"] for run in runs] == ["rodas4p2", "rodas4p2", "rk4"]
+        assert [run.settings["method_used"] for run in runs] == ["rodas4p2", "rodas4p2", "rodas4p2, rk4"]
         assert all(map(same, runs, single))
     assert not same(single[0], single[1])
 

@@ -1,56 +1,155 @@
-"""Which method ``auto`` takes: the fastest rate bounds an explicit step, the motion that of a Rosenbrock method.
+"""By which method a run by ``auto`` goes on: now and then it looks at what it costs, and tries the other.
 
-Measured on wheelsets, coach and metro car at 10 to 80 m/s, straight and in curves: where something excites motion on
-and on, Rodas4P2 takes six or seven steps per metre (nine on a flexible track), where wheelsets hunt from flange to
-flange many more, else few more than the longest step asks for. Whether lone wheelsets hunt on smooth straight track
-their equations tell, linearised where they begin. Where a light part on a stiff spring follows the motion of others,
-as many do not keep Rodas4 accurate: there its order drops. A step costs as much as six of Kutta's method, and more
-where the whole Jacobian is renewed each time. Where stability bounds the steps Kutta's method takes two thirds of the
-evaluations of Tsit5, and errs less.
-`python -m tests.integrate.auto` compares what comes of it with the cheapest choice of equal error.
+Rodas4P2 is for stiffness, Kutta's method for motion that wants short steps anyway: rough rails at speed, wheelsets that
+hunt from flange to flange, a crossing. Where it begins no run knows what it will meet, so it begins by Rodas4P2. What
+Kutta's method costs where stability bounds its steps is known beforehand, by the fastest rate (it takes two thirds of
+the evaluations of Tsit5 then, and errs less); all else is found by going on by the other method for a while, which is
+no waste: those steps are of the run. Work is counted, not timed, so that a run has the same bits on any machine, and
+notes are part of a checkpoint. `python -m tests.integrate.auto` compares what comes of it with the cheapest choice of
+equal error.
 """
 
 import math
 from contextlib import contextmanager
+from enum import IntEnum
 
 import numpy as np
 
-from wrcore.dynamics.body import EULER, OMEGA, STATE_SIZE, VELOCITY
-from wrcore.dynamics.contact_blocks import contacts_alone
 from wrcore.dynamics.contract import places
-from wrcore.dynamics.crossing import BEGIN, LAST, PERIOD, STEP, STRIDE
-from wrcore.dynamics.drive import lowest_speed
 from wrcore.dynamics.modes import ELLIPSES
-from wrcore.integrate.jacobian import plan_sweep
+from wrcore.integrate.engine import EVALUATIONS, JACOBIANS, REJECTED, STEPS, T
+from wrcore.integrate.tableaus import ROSENBROCK
 from wrcore.integrate.tolerances import pace, step_tolerances
 
-STABLE = 2.0
-"""Length of the steps of Kutta's method where stability bounds them, times the fastest rate as it is found here."""
+CHOICES = ("rodas4p2", "rk4")
+"""What ``auto`` goes by, in the beginning by the first."""
 
-EXPLICIT, STIFF, JACOBIAN = 4.0, 13.0, 11.0
-"""Cost in evaluations: a step of Kutta's method; one of Rodas4P2, six evaluations and their linear systems; its
-Jacobian, of which a step renews the contacts' part. Where it renews all, that costs the evaluations that it takes on
-top."""
+STABLE, EXPLICIT = 2.0, 4.0
+"""Length of the steps of Kutta's method where stability bounds them, times the fastest rate as it is found here; and
+evaluations that one takes."""
 
-STEPS_PER_METRE, ON_FLEXIBLE_TRACK, HUNTING = 6.5, 9.0, 40.0
-"""Of Rodas4P2, on irregular rails or with wheelsets that may hunt; and with those that do so from flange to flange."""
+LINEAR, CONTACTS = 0.6, 3.0
+"""Price of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations, as timed: both together
+4.8 a step of Rodas4P2 for a wheelset, 6 for a coach, 8.5 for a metro car."""
 
-DAMPED, HARDLY_DAMPED = 0.23, 0.02
-"""Damping ratios of lateral motion above which it dies away, and below which it grows to the flanges."""
+FIRST, LAST, APART = {"rodas4p2": 16, "rk4": 120}, {"rodas4p2": 320, "rk4": 1600}, 4.0
+"""Attempts by a method before the first look, and between two at most: there are so many times as many each time. Those
+by Kutta's method always try the other."""
 
-LONG_WAVE, DRIFT = 3.0, 0.01
-"""Of lateral motion angular frequency over the speed at most, rad/m (hunting is a wave of metres, a wheel on its
-contact vibrates faster), and growth without oscillation at least, 1/s."""
+GROWING, TRIED = 8, 16
+"""Attempts of a trial in which its steps find their length, and those that are judged."""
 
-ACROSS = [1, 2, EULER + 1, EULER + 3, VELOCITY + 1, VELOCITY + 2, OMEGA, OMEGA + 2]
-"""Lateral and vertical motion, roll and yaw, and their rates, among a body's states on straight track."""
+WORTH, HOPELESS = 0.9, 5.0
+"""Of what the method costs the other has to promise less, and what costs so many times as much while its steps still
+grow is tried no further."""
 
-PASSAGE, PER_METRE_ON_CHANGING_RAILS = 130.0, 45.0
-"""The same where a wheelset passes rails that change, a crossing or a switch: steps of its impact, and on its way."""
-
-PASSES, SETTLED, DISTURBANCE = 30, 10, 1e-8
+PASSES, SETTLING, DISTURBANCE = 30, 10, 1e-8
 """Evaluations for the fastest rate, those that count, and the size of the disturbance in m (velocities, angles: as in
 the tolerances)."""
+
+SETTLED, BEGINNING, ON_TRIAL = range(3)
+"""Phases between two looks."""
+
+
+class Note(IntEnum):
+    """Places in the notes of a run by ``auto``."""
+
+    DUE = 0
+    """Attempts at which the next look is due."""
+    INTERVAL = 1
+    """Attempts between it and the one before, trials left out."""
+    PHASE = 2
+    OTHER = 3
+    """What the other method was last seen to cost, evaluations per s."""
+    USED = 4
+    """Of which methods the run has made use: bit k for that at place k in `CHOICES`."""
+    WORK = 5
+    """All that was done up to the last look, in evaluations."""
+    SINCE = 6
+    """Time of the last look, s, and counters then, in three more places."""
+
+
+NOTES = Note.SINCE + 4
+
+
+def no_notes():
+    """Of a run by a method that was asked for: it never looks."""
+    return np.zeros(0)
+
+
+def first_notes(method, memory):
+    """Notes of a run that begins by a method."""
+    notes = np.zeros(NOTES)
+    notes[Note.OTHER] = np.inf
+    _mark(notes, memory, method, ON_TRIAL, GROWING)
+    return notes
+
+
+def used(notes, method):
+    """Methods that a run has made use of, by name."""
+    return ", ".join(m for k, m in enumerate(CHOICES) if int(notes[Note.USED]) >> k & 1) if len(notes) else method
+
+
+def attempts(counters):
+    """Steps that were tried so far."""
+    return int(counters[STEPS] + counters[REJECTED])
+
+
+def work(method, evaluations, tried, jacobians):
+    """What was done, in evaluations of the right-hand side: so many, attempts, and Jacobians."""
+    stages = len(ROSENBROCK[method].nodes) if method in ROSENBROCK else 0
+    return evaluations + LINEAR * stages * tried + CONTACTS * jacobians
+
+
+def work_of(checkpoint):
+    """What a run by ``auto`` that ended with a checkpoint did in all, in evaluations."""
+    notes = checkpoint.notes
+    return notes[Note.WORK] + work(checkpoint.method, *(_reached(checkpoint.memory) - notes[Note.SINCE :])[1:])
+
+
+def method_after(notes, method, model, equations, memory):
+    """The method by which a run at a look goes on; notes the look."""
+    other = CHOICES[1 - CHOICES.index(method)]
+    gone = _reached(memory) - notes[Note.SINCE :]
+    done, phase, interval = work(method, *gone[1:]), int(notes[Note.PHASE]), notes[Note.INTERVAL]
+    spent, later = done / gone[0] if gone[0] > 0.0 else np.inf, min(APART * interval, LAST[method])
+    notes[Note.WORK] += done
+    if phase != SETTLED and spent > notes[Note.OTHER] * (HOPELESS if phase == BEGINNING else 1.0):
+        notes[Note.OTHER] = spent
+        _mark(notes, memory, other, SETTLED, interval)  # where it came from
+        return other
+    if phase == BEGINNING:
+        _mark(notes, memory, method, ON_TRIAL, TRIED)
+    elif phase == ON_TRIAL:
+        _mark(notes, memory, method, SETTLED, FIRST[method])
+    elif min(notes[Note.OTHER], _promised(other, model, equations, memory)) < WORTH * spent:
+        notes[Note.OTHER], notes[Note.INTERVAL] = spent, later
+        _mark(notes, memory, other, BEGINNING, GROWING)
+        return other
+    else:
+        _mark(notes, memory, method, SETTLED, later)
+    return method
+
+
+def _promised(method, model, equations, memory):
+    """Evaluations per s that a method may take from here on, at least."""
+    if method in ROSENBROCK:
+        return 0.0
+    return EXPLICIT * fastest_rate(model, equations, memory.clock[T], memory.state) / STABLE
+
+
+def _reached(memory):
+    counters = memory.counters
+    return np.array([memory.clock[T], counters[EVALUATIONS], attempts(counters), counters[JACOBIANS]])
+
+
+def _mark(notes, memory, method, phase, ahead):
+    """Note where a run by a method is, and that the next look is due so many attempts ahead."""
+    if phase == SETTLED:
+        notes[Note.INTERVAL] = ahead
+    notes[Note.PHASE], notes[Note.DUE] = phase, attempts(memory.counters) + ahead
+    notes[Note.USED] = int(notes[Note.USED]) | 1 << CHOICES.index(method)
+    notes[Note.SINCE :] = _reached(memory)
 
 
 def fastest_rate(model, equations, t, state):
@@ -65,25 +164,7 @@ def fastest_rate(model, equations, t, state):
             direction = (equations(t, state + direction, ELLIPSES) - base) / unit
             size = math.sqrt(direction.dot(direction) / len(state))
             growths.append(size)
-    return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLED:], 1e-300)))))
-
-
-def lateral_damping(model, equations, t, state):
-    """Least damping ratio of the lateral motion of lone wheelsets on smooth straight track, in long waves, by their
-    equations linearised at a state; 1 where none is left to oscillate."""
-    unit, columns = _disturbances(model, state), []
-    across = (STATE_SIZE * model.bodies.wheelsets[:, None] + ACROSS).ravel()
-    with _undisturbed(equations.work):
-        base = equations(t, state, ELLIPSES)
-        for i in across:
-            moved = state.copy()
-            moved[i] += unit[i]
-            columns.append((equations(t, moved, ELLIPSES) - base)[across] / unit[i])
-    if not np.isfinite(columns).all():
-        return -1.0
-    rates = np.linalg.eigvals(columns)
-    rates = rates[(np.abs(rates.imag) < LONG_WAVE * model.speed) & (np.abs(rates) > DRIFT)]
-    return float(min(-rates.real / np.abs(rates), default=1.0))
+    return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLING:], 1e-300)))))
 
 
 def _disturbances(model, state):
@@ -99,47 +180,3 @@ def _undisturbed(work):
     yield
     for array, before in kept:
         array[:] = before
-
-
-def steps_on_changing_rails(model, start, distance):
-    """Steps of Rodas4P2 per metre over a distance (m), or, where it is infinite, up to where all wheelsets have passed,
-    for rails that change and wheels out of round."""
-    strides, passages, after = 0.0, 0.0, 0.0
-    for k, tables in enumerate(model.crossing.tables):
-        s, steps = start[STATE_SIZE * model.bodies.wheelsets[k]], [0.0, 0.0]
-        for (wheel, i), table in np.ndenumerate(tables):
-            laid = model.crossing.laid[k, wheel, i]
-            end = min(laid[BEGIN] + laid[STEP] * laid[LAST], s + distance)
-            if table >= 0 and laid[PERIOD] > 0.0:
-                strides = max(strides, 1.0 / laid[STRIDE])
-            elif table >= 0 and end > max(laid[BEGIN], s):
-                steps[wheel] += PASSAGE + PER_METRE_ON_CHANGING_RAILS * (end - max(laid[BEGIN], s))
-                after = max(after, end - s)
-        passages += max(steps)
-    over = distance if math.isfinite(distance) else after
-    return strides + (passages / over if passages > 0.0 else 0.0)
-
-
-def cheaper_method(model, equations, t, state, longest_step, end=math.inf):
-    """``rodas4p2`` or ``rk4``, whichever takes less for a run from a state at a time to its ``end`` (s), if that is
-    known, with steps up to ``longest_step`` (s)."""
-    bodies, slowest = model.bodies, min(lowest_speed(model), model.speed)
-    if not slowest > 0.0:  # creep gets ever stiffer towards standstill, wherever the run begins
-        return "rodas4p2"
-    rough, cost = model.track.irregularity.coefficients.shape[0] > 0, STIFF + JACOBIAN
-    lone = len(bodies.wheelsets) == len(bodies.mass)
-    changing = steps_on_changing_rails(model, state, model.speed * (end - t))
-    per_metre = STEPS_PER_METRE if rough or lone else 0.0
-    if rough and len(model.flexible_track.mass):
-        per_metre = ON_FLEXIBLE_TRACK
-    elif lone and not rough and model.track.tangent:
-        damping = lateral_damping(model, equations, t, state)
-        if damping > HARDLY_DAMPED:
-            per_metre = 0.0 if damping > DAMPED else STEPS_PER_METRE
-        else:
-            per_metre = HUNTING
-    steps = 1.0 / longest_step + (per_metre + changing) * model.speed
-    if (rough or changing) and not contacts_alone.py_func(model):  # on smooth rails wheelsets may take far fewer steps
-        cost += len(plan_sweep(model).starts)
-    rate = fastest_rate(model, equations, t, state) * model.speed / slowest
-    return "rk4" if EXPLICIT * rate / STABLE < cost * steps else "rodas4p2"

@@ -3,7 +3,8 @@
 =====================================================  =============================================================
 ``rk45``, ``tsit5``, ``rk23``, ``rk4``                 explicit pairs of order 5(4), 5(4), 3(2), 4(3), compiled
 ``rodas4``, ``rodas4p2``, ``ros34pw2``                 Rosenbrock methods of order 4(3), 4(3), 3(2), compiled
-``auto``                                               ``rodas4p2`` or ``rk4``: :mod:`wrcore.integrate.choice`
+``auto``                                               ``rodas4p2``, or ``rk4`` where that gets cheaper:
+                                                       :mod:`wrcore.integrate.choice`
 ``scipy_rk45``, ``_rk23``, ``_dop853``, ``_radau``,    scipy's solvers over the same right-hand side
 ``_bdf``, ``_lsoda``
 ``cvode``                                              SUNDIALS' BDF, if scikit-sundae is installed
@@ -21,6 +22,7 @@ failed        a number is not finite, or the step size fell below the resolution
 """
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from numba import typeof
@@ -31,9 +33,9 @@ from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, OUT_OF_RANGE, SOLVED
 from wrcore.errors import InputError
-from wrcore.integrate import engine
+from wrcore.integrate import choice, engine
 from wrcore.integrate.blocks import new_system
-from wrcore.integrate.choice import cheaper_method
+from wrcore.integrate.choice import CHOICES
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, factorise_again, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
@@ -61,7 +63,7 @@ CHUNK, FIRST_CHUNK, BREATH = 2000, 16, 0.5
 
 def integrate(
     model, start, times, method="auto", rtol=1e-4, atol=0.0, step=0.0, longest_step=0.05, derailed_y=np.inf,
-    progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None, end=None,
+    progress=None, chunk=CHUNK, stop=None, most_steps=0, equations=None,
 ):  # fmt: skip
     """Trajectory of a model's equations of motion at increasing output times (s), the last of which ends the run.
 
@@ -74,18 +76,15 @@ def integrate(
     Every ``chunk`` attempts, of no influence on the result, ``progress`` is called with the time reached and ``stop()``
     asked for a reason to end the run as stalled, or an empty string. ``most_steps`` bounds the steps tried, those
     before a checkpoint among them (references: the accepted ones; 0: no bound). ``equations``: those of this very
-    model, where they are at hand; these and ``step`` are for compiled methods only. ``end`` (s): of a run whose first
-    stretch this is, for the choice of ``auto``. An InputError if the start is none
-    of this model, or a checkpoint of a reference.
+    model, where they are at hand; these and ``step`` are for compiled methods only (with it ``auto`` keeps to its first
+    one). An InputError if the start is none of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
-    end = times[-1] if end is None else end
-    start, method, tolerances, equations = decided(
-        model, start, times[0], method, rtol, atol, longest_step, equations, end
-    )
+    start, method, looks = beginning(model, start, method, step)
     if method in REFERENCES:
         from wrcore.integrate.reference import integrate_by_reference
 
+        tolerances = step_tolerances(model, rtol, atol)
         rate = (
             model.contact.least_speed / HALF_GAUGE
             if may_drive(model)
@@ -94,10 +93,12 @@ def integrate(
         tolerances = tolerances[0] + rate * tolerances[1]  # theirs stay what they are
         return integrate_by_reference(model, start, times, method, tolerances, longest_step, derailed_y, progress, stop,
                                       most_steps)  # fmt: skip
-    run = Integration(model, start, times[0], method, tolerances, step, longest_step, derailed_y, equations)
+    run = Integration(
+        model, start, times[0], method, (rtol, atol), step, longest_step, derailed_y, equations, looks=looks
+    )
     record = run.record(times)
     outcome, given_up = run.advance(record, 0), ""  # compiles, or loads the kernel from the cache
-    before, started = run.memory.counters.copy(), time.perf_counter()
+    before, run.compiled_s, started = run.memory.counters.copy(), 0.0, time.perf_counter()
     headway = Headway(run.memory, most_steps, 0.0 if step else min(STALL_STEP, 0.1 * longest_step))
     attempts = min(FIRST_CHUNK, chunk)
     while outcome == engine.RUNNING and not given_up:
@@ -111,61 +112,69 @@ def integrate(
         if progress is not None:
             progress(min(run.memory.clock[engine.T], times[-1]))
         given_up = headway.lost() or (stop() if stop is not None else "")
-    wall = time.perf_counter() - started
+    wall = time.perf_counter() - started - run.compiled_s
     return run.trajectory(record, outcome, given_up, before, wall)
 
 
-def decided(model, start, t, method, rtol, atol, longest_step, equations=None, end=np.inf):
-    """A checked start, the method and the tolerances for it, and equations if the choice needed them; arguments as for
-    `integrate`, the time (s) in place of times, and the ``end`` (s) where it is known."""
-    start = _checked(start, model)
-    method = start.method if isinstance(start, Checkpoint) else method
-    if method == "auto":
-        equations = equations or Equations(model)
-        method = cheaper_method(model, equations, t, start, longest_step, end)
-    return start, method, step_tolerances(model, rtol, atol, method), equations
+def beginning(model, start, method, step=0.0):
+    """A checked start, the method that it goes by, and whether to look for a better one; arguments as for
+    `integrate`."""
+    start, looks = _checked(start, model), method == "auto" and step == 0.0
+    if isinstance(start, Checkpoint):
+        return start, start.method, looks
+    return start, CHOICES[0] if method == "auto" else method, looks
 
 
 def needed_last(model, method):
-    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method. ``auto`` is taken
-    for the method that it mostly is."""
+    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method, with ``auto`` the
+    first one."""
     if method in REFERENCES:
         return []
-    method = "rodas4p2" if method == "auto" else method
+    method = CHOICES[0] if method == "auto" else method
     with planning() as kernels:
-        start, tolerances = np.zeros(state_size(model)), step_tolerances(model, 0.0, 0.0, method)
-        equations = Equations(model)
+        start, equations = np.zeros(state_size(model)), Equations(model)
         before = len(kernels)
-        run = Integration(model, start, 0.0, method, tolerances, 0.0, 1.0, np.inf, equations)
+        run = Integration(model, start, 0.0, method, (0.0, 0.0), 0.0, 1.0, np.inf, equations)
         return [*kernels[before:], run.kernel(run.record(np.zeros(1)))]
 
 
 class Integration:
     """A run by a compiled method between two calls of `advance`: ``equations``, ``memory`` and the rest of what it
-    knows; arguments as for `integrate`, with the ``tolerances`` of `step_tolerances`."""
+    knows; arguments as for `integrate`, with the ``tolerance`` (rtol, atol). One that ``looks`` may change its method,
+    as the one of whose checkpoint it goes on. ``compiled_s``: what that took in the way of kernels, s."""
 
-    def __init__(self, model, start, t, method, tolerances, step, longest_step, derailed_y, equations=None):
+    def __init__(
+        self, model, start, t, method, tolerance, step, longest_step, derailed_y, equations=None, looks=False
+    ):  # fmt: skip
         goes_on = isinstance(start, Checkpoint)
-        tableau = EXPLICIT.get(method) or ROSENBROCK[method]
-        self.model, self.method, self.equations = model, method, equations or Equations(model)
+        self.model, self.equations, self.compiled_s, self._direct = model, equations or Equations(model), 0.0, False
+        self._tolerance, self._limits = tolerance, (float(step), float(longest_step), float(derailed_y))
         state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
-        self.memory = memory = new_memory(state, t, len(tableau.nodes), first_step)
-        stiff = method in ROSENBROCK
-        self.linear, self._system = (new_linear(self.equations), new_system(model)) if stiff else (None, None)
+        self.memory = memory = new_memory(state, t, 0, first_step)
         begin(self.equations.work)
         self.places = places(self.equations.work)
-        self._tableau = tableau
+        self._scratch = new_scratch(len(memory.state), len(self.places[0]))
+        self._take(method)
+        self.notes = choice.first_notes(method, memory) if looks and not goes_on else choice.no_notes()
         if goes_on:
-            self.go_on_from(start)
+            self.go_on_from(start if looks else replace(start, notes=self.notes))
             if not np.isfinite(memory.clock[: engine.ERROR]).all():
                 raise InputError("start", "checkpoint", f"expected finite times, got {memory.clock}")
             if step and step != memory.clock[engine.NEXT]:  # the grid of the steps begins anew
                 memory.clock[engine.NEXT] = step
                 self._begin_grid()
-        control = Control(tolerances, float(step), float(longest_step), float(derailed_y))
-        scratch = new_scratch(len(memory.state), len(self.places[0]))
-        self._kernel = advance_rosenbrock if stiff else advance_explicit
-        self._before = tableau, control, memory, scratch, *((self.linear, self._system) if stiff else ())
+
+    def _take(self, method):
+        """Go by a method, with a Jacobian, and stages, that nothing is known of yet."""
+        stiff, self.method = method in ROSENBROCK, method
+        self._tableau = ROSENBROCK[method] if stiff else EXPLICIT[method]
+        stages = np.zeros((len(self._tableau.nodes), len(self.memory.state)))
+        self.memory = self.memory._replace(stages=stages)
+        self.linear, self._system = (new_linear(self.equations), new_system(self.model)) if stiff else (None, None)
+        control = Control(step_tolerances(self.model, *self._tolerance, method), *self._limits)
+        self._kernel, self._plain = advance_rosenbrock if stiff else advance_explicit, None
+        self._before = self._tableau, control, self.memory, self._scratch
+        self._before += (self.linear, self._system) if stiff else ()
 
     def record(self, times):
         """A `Record` for output times (n,), s."""
@@ -173,28 +182,57 @@ class Integration:
 
     def advance(self, record, attempts):
         """Outcome of at most so many attempts to reach the end of a record."""
-        return self._kernel(*self._before, record, attempts, *self.equations.arguments)
+        if not len(self.notes):
+            return self._advance(record, attempts)
+        while True:
+            ahead = max(int(self.notes[choice.Note.DUE]) - choice.attempts(self.memory.counters), 0)
+            outcome = self._advance(record, min(attempts, ahead))
+            if outcome != engine.RUNNING or attempts < ahead:
+                return outcome
+            attempts -= ahead
+            self._look(record)
+
+    def _advance(self, record, attempts):
+        arguments = *self._before, record, attempts, *self.equations.arguments
+        if self._plain:
+            return self._plain(*arguments)
+        outcome = self._kernel(*arguments)
+        if self._direct:
+            self._plain = self._kernel.overloads[tuple(map(typeof, arguments))].entry_point
+        return outcome
+
+    def _look(self, record):
+        """Go on by another method where that is worth it."""
+        method = choice.method_after(self.notes, self.method, self.model, self.equations, self.memory)
+        if method != self.method:
+            begun = time.perf_counter()
+            self._take(method)
+            self._forget()
+            self._advance(record, 0)  # compiles, or loads the kernel from the cache
+            self.compiled_s += time.perf_counter() - begun
 
     def kernel(self, record):
         """The kernel that advances it, and the types that this takes with records of this very layout."""
         return self._kernel, tuple(map(typeof, (*self._before, record, 0, *self.equations.arguments)))
 
     def without_dispatch(self, record):
-        """`advance` for records of this very layout, without numba's search for the kernel by the arguments' types,
-        which costs five times as much as a call."""
-        self.advance(record, 0)  # compiles, or loads the kernel from the cache
-        kernel, types = self.kernel(record)
-        kernel = kernel.overloads[types].entry_point
-        before, after = self._before, self.equations.arguments
-        return lambda record, attempts: kernel(*before, record, attempts, *after)
+        """Have `advance` take records of this very layout only, without numba's search for the kernel by the arguments'
+        types, which costs five times as much as a call."""
+        self._direct = True
+        self._advance(record, 0)
 
     def begin_anew(self, t, state):
         """Begin again at a time (s) and a state (size,), which may have any rate: with the length of the next step."""
-        clock, counters = self.memory.clock, self.memory.counters
-        clock[[engine.T, engine.T_OLD]], clock[engine.ERROR], clock[engine.MATRIX_STEP] = t, 1.0, 0.0
-        counters[[engine.HAS_RATE, engine.RETRY, engine.SINCE_FULL]], counters[engine.AGE] = 0, -1
+        self.memory.clock[[engine.T, engine.T_OLD]] = t
         self.memory.state[:] = self.memory.old[:] = state
+        self._forget()
         self._begin_grid()
+
+    def _forget(self):
+        """Know nothing of the step before."""
+        clock, counters = self.memory.clock, self.memory.counters
+        clock[engine.ERROR], clock[engine.MATRIX_STEP] = 1.0, 0.0
+        counters[[engine.HAS_RATE, engine.RETRY, engine.SINCE_FULL]], counters[engine.AGE] = 0, -1
 
     def _begin_grid(self):
         """Let steps of a fixed length count from the time reached."""
@@ -203,10 +241,16 @@ class Integration:
 
     def checkpoint(self, t):
         """Where the run is, with the last output time (s); it changes with the run but for its places."""
-        return Checkpoint(self.method, float(t), self.memory, self.linear, *(place.copy() for place in self.places))
+        places = (place.copy() for place in self.places)
+        return Checkpoint(self.method, float(t), self.memory, self.linear, *places, notes=self.notes.copy())
 
     def go_on_from(self, checkpoint):
-        """Take over all numbers of a checkpoint of this model and method."""
+        """Take over all numbers of a checkpoint of this model."""
+        if checkpoint.method != self.method:
+            self._take(checkpoint.method)
+        if checkpoint.notes.shape not in ((0,), (choice.NOTES,)) or np.isnan(checkpoint.notes).any():
+            raise InputError("start", "checkpoint", f"expected 0 or {choice.NOTES} notes that are numbers")
+        self.notes = checkpoint.notes.copy()
         _take_over(self.memory, checkpoint.memory)
         _take_over(self.places, (checkpoint.arc_lengths, checkpoint.patches))
         _take_over(self.linear, checkpoint.linear, planned=True)
@@ -229,9 +273,9 @@ class Integration:
         last = times[reached - 1] if reached else times[0]
         completed = status == "completed"
         return Trajectory(
-            self.method, times[:reached], record.states[:reached], status, reason, int(counters[engine.STEPS]),
-            int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]), int(counters[engine.JACOBIANS]),
-            int(counters[engine.FACTORISATIONS]), int(work.counters[OUT_OF_RANGE]),
+            choice.used(self.notes, self.method), times[:reached], record.states[:reached], status, reason,
+            int(counters[engine.STEPS]), int(counters[engine.REJECTED]), int(counters[engine.EVALUATIONS]),
+            int(counters[engine.JACOBIANS]), int(counters[engine.FACTORISATIONS]), int(work.counters[OUT_OF_RANGE]),
             float(memory.clock[engine.SMALLEST]), wall, self.checkpoint(last),
             float(last if completed else memory.clock[engine.T]),
             (record.states[reached - 1] if completed else memory.state).copy(), int(counters[engine.COLLAPSES]),
@@ -249,7 +293,7 @@ class Headway:
         self.seen, self.t = self.attempts(), memory.clock[engine.T]
 
     def attempts(self):
-        return int(self.memory.counters[engine.STEPS] + self.memory.counters[engine.REJECTED])
+        return choice.attempts(self.memory.counters)
 
     def attempts_left(self):
         """Before the next look is due."""

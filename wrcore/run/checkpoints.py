@@ -12,7 +12,8 @@ from wrcore.integrate.engine import Memory
 from wrcore.integrate.rosenbrock import Linear
 from wrcore.integrate.trajectory import Checkpoint
 
-NO_PATCHES = np.zeros((0, 0, 0, MEMORY))  # of models without strips; files of before strips say nothing about them
+NOT_THERE = {"patches": np.zeros((0, 0, 0, MEMORY)), "notes": np.zeros(0)}
+"""What files of before there was such a thing are taken to hold."""
 
 
 class _Saved(NamedTuple):
@@ -22,13 +23,14 @@ class _Saved(NamedTuple):
     linear: Linear
     arc_lengths: np.ndarray
     patches: np.ndarray
+    notes: np.ndarray
 
 
 def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
     """Write a checkpoint into an empty group."""
     for name in ("method", "t", "model"):
         group.attrs[name] = getattr(checkpoint, name)
-    _write(group, _Saved(checkpoint.memory, checkpoint.linear, checkpoint.arc_lengths, checkpoint.patches))
+    _write(group, _Saved(*(getattr(checkpoint, name) for name in _Saved._fields)))
 
 
 def read_checkpoint(group: h5py.Group) -> Checkpoint:
@@ -52,8 +54,8 @@ def _read(group, kind):
     parts = {}
     for name, type_ in get_type_hints(kind).items():
         if type_ is np.ndarray:
-            given = name in group or name != "patches"
-            parts[name] = np.ascontiguousarray(group[name][()] if given else NO_PATCHES)
+            kept = group[name][()] if name in group or name not in NOT_THERE else NOT_THERE[name]
+            parts[name] = np.ascontiguousarray(kept)
         elif issubclass(type_, tuple):
             parts[name] = _read(group[name], type_) if name in group else None
         else:

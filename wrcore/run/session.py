@@ -21,7 +21,7 @@ from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError, check_number, one_of, short
 from wrcore.errors.checked_calls import Within, checked
 from wrcore.integrate import engine
-from wrcore.integrate.integrator import CHUNK, REFERENCES, STALL_STEP, Headway, Integration, decided
+from wrcore.integrate.integrator import CHUNK, REFERENCES, STALL_STEP, Headway, Integration, beginning
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.asked import Named, condition_of, on_grid, value_of
 from wrcore.run.checkpoints import model_fingerprint
@@ -92,13 +92,13 @@ class Session:
         self.scene, self._simulation, self._recorded = simulation.scene, simulation, record
         model = simulation.model = with_own_arrays(simulation.model)
         settings = self.scene.data["integration"]
-        how = settings["method"], settings["rtol"], settings["atol"], settings["longest_step"]
-        start, method, tolerances, equations = decided(model, simulation.start, begin, *how)
+        step, longest = settings["step"], settings["longest_step"]
+        start, method, looks = beginning(model, simulation.start, settings["method"], step)
         if method in REFERENCES:
             expected = f"expected a compiled method for a session, got {method}"
             raise InputError(self.scene.source, "integration.method", expected)
-        step, longest = settings["step"], settings["longest_step"]
-        self._run = Integration(model, start, begin, method, tolerances, step, longest, DERAILED_Y, equations)
+        tolerance = settings["rtol"], settings["atol"]
+        self._run = Integration(model, start, begin, method, tolerance, step, longest, DERAILED_Y, looks=looks)
         self._headway = Headway(
             self._run.memory, settings["most_steps"], 0.0 if step else min(STALL_STEP, 0.1 * longest)
         )
@@ -108,7 +108,7 @@ class Session:
         self._values = self._held = self._present_values()
         self.status, self.reason = "running", ""
         self._record = self._run.record(np.array([begin]))
-        self._advance = self._run.without_dispatch(self._record)
+        self._run.without_dispatch(self._record)
         self._history: Any = None  # the last step (time, state, inputs) and, before it, what was the history then
         self._self = object()
         self.time, self._state = begin, np.array(self._run.memory.state)
@@ -385,9 +385,9 @@ class Session:
             self._settle()
         record, given_up = self._record, ""
         record.times[0], record.reached[0] = t, 0
-        outcome = self._advance(record, CHUNK)
+        outcome = self._run.advance(record, CHUNK)
         while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
-            outcome = self._advance(record, min(CHUNK, self._headway.attempts_left()))
+            outcome = self._run.advance(record, min(CHUNK, self._headway.attempts_left()))
         if outcome == engine.COMPLETED:
             self.time, self._state = t, record.states[0].copy()
             self._keep(t, self._state)

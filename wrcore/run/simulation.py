@@ -130,7 +130,6 @@ class Simulation:
         trajectory = integrate(
             self.model, self.start, times, settings["method"], settings["rtol"], settings["atol"], settings["step"],
             settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
-            end=max(settings["duration"], times[-1]),
         )  # fmt: skip
         compiled = time.perf_counter() - self._began - trajectory.wall_s
         run = self.run_of(trajectory, begin, compiled, *self.channels(trajectory))

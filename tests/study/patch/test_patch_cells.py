@@ -11,7 +11,8 @@ from matplotlib.colors import to_hex
 from study.patch import cells
 from study.report.legible import save_figure
 from wrcore.dynamics.pair_cells import FINER, HARD, THIRDS, YAW, key_of
-from wrcore.dynamics.pair_store import _place, pair_of
+from wrcore.dynamics.pair_solver import place_of
+from wrcore.dynamics.pair_store import pair_of
 from wrcore.run.simulation import Simulation
 from wrcore.scene.description import load_scene
 
@@ -37,7 +38,7 @@ def test_what_becomes_of_a_cell(table):
 def test_ends_of_a_cell_are_its_nodes(table, row, node):
     """Yaw's nodes are the ends and the middle of a cell, so that there are two for each place."""
     found, (level, part, turn, *first) = table.iloc[row], node
-    low, high = _place(level, part, turn, *first), _place(level, part, turn, *np.add(first, 1))
+    low, high = place_of(level, part, turn, *first), place_of(level, part, turn, *np.add(first, 1))
     for n, (one, other) in enumerate((*(pair.ends for pair in (cells.ALONG, cells.SLOPE, cells.DEPTH)),)):
         assert (found[one], found[other]) == pytest.approx((low[n], high[n]), rel=1e-12)
     assert 0.5 * (found["yaw_low_rad"] + found["yaw_high_rad"]) == pytest.approx(low[3], abs=1e-15)

@@ -31,7 +31,8 @@ from wrcore.contact.patch.model import MODES
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.creep_modes import SHIPPED, Modes, mode_weights
 from wrcore.dynamics.pair_cells import node_of
-from wrcore.dynamics.pair_store import _place, _side_by_side, pair_of
+from wrcore.dynamics.pair_solver import place_of, side_by_side
+from wrcore.dynamics.pair_store import pair_of
 from wrcore.dynamics.pair_table import NARROW, WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
 
@@ -92,7 +93,7 @@ def visited_places(count, random):
     places = []
     for low, high in zip(ANGLES, ANGLES[1:], strict=False):
         inside = random.permutation(nodes[(angles >= low) & (angles < high)])
-        places += [_place(*node_of(int(node))) for node in inside[: count // (len(ANGLES) - 1)]]
+        places += [place_of(*node_of(int(node))) for node in inside[: count // (len(ANGLES) - 1)]]
     return places
 
 
@@ -116,7 +117,7 @@ def collect(poses, friction, points, seed=5):
         pair = pair_of(LoadedWheels(geometry_of().geometry, "tabulated")._at_work(friction).value)
         places = random_places(pair.contact.geometry, 2 * poses // len(PAIRS), random)
         places += visited_places(poses, random) if k == 0 else []
-        found += [one for one in _side_by_side(lambda place, pair=pair: pair.solve(place, points), places) if one]
+        found += [one for one in side_by_side(lambda place, pair=pair: pair.solve(place, points), places) if one]
     return (np.array(part) for part in zip(*found, strict=True))
 
 

@@ -1,13 +1,14 @@
 """Nodes of looked-up contact that come with the package: ``python -m study.patch.shipped_nodes [--more] [--out FILE]``.
 
-Scenes run on an empty table: those of `study.patch.look_up`, and examples at speeds, on tracks and from starts that a
-user may well try. What they meet is kept, a group per pair of profiles: nodes, and which cells may be looked up
-(``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what they meet
-besides is added.
+Scenes run on an empty table, by `METHODS`: those of `study.patch.look_up`, and examples at speeds, on tracks and from
+starts that a user may well try. What they meet is kept, a group per pair of profiles: nodes, and which cells may be
+looked up (``wrcore/dynamics/tables/nodes.h5``). With ``--more`` they begin with what comes with the package, and what
+they meet besides is added.
 """
 
 import argparse
 import tempfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,16 @@ import wrcore as wr
 from study.patch.look_up import ROUGH, SCENES
 from wrcore.dynamics import creep_modes, pair_store
 from wrcore.errors.checked_hdf5 import new_hdf5
+from wrcore.integrate.choice import CHOICES
 
 WIDER = {"track.path": [{"tangent": 5}, {"transition": 60}, {"curve": 100, "radius": 600, "cant": 0.1}]}
 NOTEBOOK = {"track.irregularity": {"spectrum": {"level": "low", "seed": 3, "length": 150.0, "begin": 15.0}}}
 SHARP = {"track.path": [{"tangent": 5}, {"transition": 50}, {"curve": 100, "radius": 400, "cant": 0.1}]}
+BEGIN = {}, {"initial.y": 0.003}
 MET = [
     *SCENES.values(),
-    *(("suspended_wheelset", {"speed": v, "initial.y": 0.003}) for v in (20.0, 30.0, 40.0, 50.0, 60.0)),
-    *(("trailer_vehicle", {"speed": v, "initial.y": 0.003}) for v in (20.0, 30.0, 40.0, 50.0, 60.0, 70.0)),
+    *(("suspended_wheelset", {"speed": v, **begin}) for v in (20.0, 30.0, 40.0, 50.0, 60.0) for begin in BEGIN),
+    *(("trailer_vehicle", {"speed": v, **begin}) for v in (20.0, 30.0, 40.0, 50.0, 60.0, 70.0) for begin in BEGIN),
     *((f"freight_wagon_{load}", {}) for load in ("empty", "laden")),
     *(("trailer_vehicle", {"speed": v, "integration.duration": 4.0, **ROUGH}) for v in (20.0, 40.0)),
     ("trailer_vehicle", {"speed": 25.0, "integration.duration": 6.0, **WIDER}),
@@ -36,6 +39,9 @@ MET = [
 ]
 """Examples and what is set in them."""
 
+METHODS = "auto", *CHOICES
+"""Of integration: attempts of each meet cells of their own."""
+
 
 def met(scenes, more=False):
     """`Pair` of each table with what scenes, (name, settings), meet on it, empty or with ``more`` as it ships."""
@@ -44,8 +50,9 @@ def met(scenes, more=False):
         pair_store.Pair._take_shipped = shared[0] if more else lambda _: None
         pair_store.table_folder, pair_store._PAIRS = (lambda: Path(folder)), pairs
         try:
-            for name, settings in scenes:
-                wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
+            for (name, settings), method in product(scenes, METHODS):
+                changes = {"integration.method": method, **settings, "contact.patch": "tabulated"}
+                wr.simulate(wr.example(name), **changes)
         finally:
             pair_store.Pair._take_shipped, pair_store.table_folder, pair_store._PAIRS = shared
         for pair in pairs.values():
