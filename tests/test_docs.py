@@ -162,10 +162,11 @@ def test_numbers_in_the_theory_are_those_of_the_code():
         "integration": [
             f"${choice.STABLE:g}/", f"{tolerances.LENGTH}\\ \\mathrm m",
             f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
-            f"first {choice.FIRST['rodas4p2']} steps and then {choice.APART:g} times",
+            f"{choice.GROWING} steps for their length and {choice.FIRST['rodas4p2']} more",
             f"{choice.LAST['rodas4p2']} at most",
             f"less than {choice.WORTH:g} of", f"over {choice.TRIED} steps, after {choice.GROWING} in which",
-            f"after {choice.FIRST['rk4']} steps, then {choice.APART:g} times as many, {choice.LAST['rk4']} at most",
+            f"{choice.FIRST['rk4']} steps after the trial, then {choice.APART['rk4']:g} times as many,",
+            f"{choice.LAST['rk4']} at most",
             f"for {choice.GROWING} steps if that costs {choice.HOPELESS:g} times",
             f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", f"`rodas4p2` {share['rodas4p2']:g} times",
             f"`rk4` {share['rk4']:g} times",

@@ -104,10 +104,11 @@ def main(folder):
         print(f"| {name} | {static:.1f} | {largest:.0f} | {air:.1f} | {low:.2f} |")
         if name in PICTURES:
             save_figure(plot_crossing(run, scene=scene), Path(folder) / PICTURES[name])
-    print("\n| cost of a metre on it, over rough track | rk4 | rodas4p2 |\n|---|---|---|")
+    methods = "rk4", "rodas4p2", "auto"
+    print(f"\n| cost of a metre on it, over rough track | {' | '.join(methods)} |\n|---|---|---|---|")
     for name in ("suspended wheelset, facing", "trailer vehicle, facing"):
-        costs = [cost(CASES[name] | {"integration.method": method}) for method in ("rk4", "rodas4p2")]
-        print(f"| {name} | {costs[0]:.1f} | {costs[1]:.1f} |")
+        costs = [f"{cost(CASES[name] | {'integration.method': method}):.1f}" for method in methods]
+        print(f"| {name} | {' | '.join(costs)} |")
     times = evaluations()
     print("\nA right-hand side, over that without a crossing: " + ", ".join(
         f"{name} {value / times['plain']:.2f}" for name, value in times.items()

@@ -17,6 +17,7 @@ import numpy as np
 
 from wrcore.dynamics.contract import places
 from wrcore.dynamics.modes import ELLIPSES
+from wrcore.errors import InputError
 from wrcore.integrate.engine import EVALUATIONS, JACOBIANS, REJECTED, STEPS, T
 from wrcore.integrate.tableaus import ROSENBROCK
 from wrcore.integrate.tolerances import pace, step_tolerances
@@ -32,9 +33,9 @@ LINEAR, CONTACTS = 0.6, 3.0
 """Price of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations, as timed: both together
 4.8 a step of Rodas4P2 for a wheelset, 6 for a coach, 8.5 for a metro car."""
 
-FIRST, LAST, APART = {"rodas4p2": 16, "rk4": 120}, {"rodas4p2": 320, "rk4": 1600}, 4.0
-"""Attempts by a method before the first look, and between two at most: there are so many times as many each time. Those
-by Kutta's method always try the other."""
+FIRST, LAST, APART = {"rodas4p2": 16, "rk4": 120}, {"rodas4p2": 320, "rk4": 1600}, {"rodas4p2": 2.0, "rk4": 4.0}
+"""Attempts by a method, once its steps have found their length and a trial is over, before the first look, and between
+two at most: there are so many times as many each time. Those by Kutta's method always try the other."""
 
 GROWING, TRIED = 8, 16
 """Attempts of a trial in which its steps find their length, and those that are judged."""
@@ -80,9 +81,24 @@ def no_notes():
 def first_notes(method, memory):
     """Notes of a run that begins by a method."""
     notes = np.zeros(NOTES)
-    notes[Note.OTHER] = np.inf
+    notes[Note.OTHER], notes[Note.INTERVAL] = np.inf, FIRST[method]
     _mark(notes, memory, method, ON_TRIAL, GROWING)
     return notes
+
+
+def checked_notes(checkpoint):
+    """Notes of a checkpoint, a copy; an InputError where no run has left them so."""
+    notes = no_notes() if checkpoint.notes is None else np.asarray(checkpoint.notes)
+    if notes.shape == (0,):
+        return no_notes()
+    expected = f"expected {NOTES} notes of a run by auto"
+    if notes.shape != (NOTES,) or notes.dtype != float or checkpoint.method not in CHOICES:
+        raise InputError("start", "checkpoint", f"{expected}, got {notes.dtype} {notes.shape} by {checkpoint.method}")
+    sane = notes[Note.PHASE] in (SETTLED, BEGINNING, ON_TRIAL) and notes[Note.USED] in (1.0, 2.0, 3.0)
+    sane = sane and notes[Note.INTERVAL] >= 1.0 and notes[Note.OTHER] >= 0.0
+    if not (sane and np.isfinite(np.delete(notes, Note.OTHER)).all()):
+        raise InputError("start", "checkpoint", f"{expected}, got {notes}")
+    return notes.copy()
 
 
 def used(notes, method):
@@ -102,7 +118,7 @@ def work(method, evaluations, tried, jacobians):
 
 
 def work_of(checkpoint):
-    """What a run by ``auto`` that ended with a checkpoint did in all, in evaluations."""
+    """What a run by ``auto`` that ended with a checkpoint did in all but its looks, in evaluations."""
     notes = checkpoint.notes
     return notes[Note.WORK] + work(checkpoint.method, *(_reached(checkpoint.memory) - notes[Note.SINCE :])[1:])
 
@@ -112,7 +128,7 @@ def method_after(notes, method, model, equations, memory):
     other = CHOICES[1 - CHOICES.index(method)]
     gone = _reached(memory) - notes[Note.SINCE :]
     done, phase, interval = work(method, *gone[1:]), int(notes[Note.PHASE]), notes[Note.INTERVAL]
-    spent, later = done / gone[0] if gone[0] > 0.0 else np.inf, min(APART * interval, LAST[method])
+    spent, later = done / gone[0] if gone[0] > 0.0 else np.inf, min(APART[method] * interval, LAST[method])
     notes[Note.WORK] += done
     if phase != SETTLED and spent > notes[Note.OTHER] * (HOPELESS if phase == BEGINNING else 1.0):
         notes[Note.OTHER] = spent

@@ -76,8 +76,8 @@ def integrate(
     Every ``chunk`` attempts, of no influence on the result, ``progress`` is called with the time reached and ``stop()``
     asked for a reason to end the run as stalled, or an empty string. ``most_steps`` bounds the steps tried, those
     before a checkpoint among them (references: the accepted ones; 0: no bound). ``equations``: those of this very
-    model, where they are at hand; these and ``step`` are for compiled methods only (with it ``auto`` keeps to its first
-    one). An InputError if the start is none of this model, or a checkpoint of a reference.
+    model, where they are at hand; these and ``step`` are for compiled methods only (with it ``auto`` stays by one
+    method). An InputError if the start is none of this model, or a checkpoint of a reference.
     """
     times = np.ascontiguousarray(times, float)
     start, method, looks = beginning(model, start, method, step)
@@ -126,16 +126,15 @@ def beginning(model, start, method, step=0.0):
 
 
 def needed_last(model, method):
-    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method, with ``auto`` the
-    first one."""
+    """Kernels that a run compiles last, each with its types: those of the Jacobian and of the method, or of both that
+    ``auto`` may go by."""
     if method in REFERENCES:
         return []
-    method = CHOICES[0] if method == "auto" else method
     with planning() as kernels:
         start, equations = np.zeros(state_size(model)), Equations(model)
-        before = len(kernels)
-        run = Integration(model, start, 0.0, method, (0.0, 0.0), 0.0, 1.0, np.inf, equations)
-        return [*kernels[before:], run.kernel(run.record(np.zeros(1)))]
+        before, methods = len(kernels), CHOICES if method == "auto" else (method,)
+        runs = [Integration(model, start, 0.0, one, (0.0, 0.0), 0.0, 1.0, np.inf, equations) for one in methods]
+        return [*kernels[before:], *(run.kernel(run.record(np.zeros(1))) for run in runs)]
 
 
 class Integration:
@@ -187,8 +186,8 @@ class Integration:
         while True:
             ahead = max(int(self.notes[choice.Note.DUE]) - choice.attempts(self.memory.counters), 0)
             outcome = self._advance(record, min(attempts, ahead))
-            if outcome != engine.RUNNING or attempts < ahead:
-                return outcome
+            if outcome != engine.RUNNING or attempts <= ahead:
+                return outcome  # the last step may be asked for outputs yet: it looks when it goes on
             attempts -= ahead
             self._look(record)
 
@@ -248,9 +247,7 @@ class Integration:
         """Take over all numbers of a checkpoint of this model."""
         if checkpoint.method != self.method:
             self._take(checkpoint.method)
-        if checkpoint.notes.shape not in ((0,), (choice.NOTES,)) or np.isnan(checkpoint.notes).any():
-            raise InputError("start", "checkpoint", f"expected 0 or {choice.NOTES} notes that are numbers")
-        self.notes = checkpoint.notes.copy()
+        self.notes = choice.checked_notes(checkpoint)
         _take_over(self.memory, checkpoint.memory)
         _take_over(self.places, (checkpoint.arc_lengths, checkpoint.patches))
         _take_over(self.linear, checkpoint.linear, planned=True)

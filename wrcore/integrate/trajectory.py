@@ -1,6 +1,6 @@
 """What an integration leaves behind: states at the output times, where it can be taken up again, why it ended."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,8 +22,8 @@ class Checkpoint:
     """(k,): of the wheelsets, m: where the search for the next ones starts."""
     patches: np.ndarray
     """Solutions of patches on strips, from which the next ones start (:mod:`wrcore.contact.patch.model`)."""
-    notes: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """Of a run by ``auto``: what it has seen (:mod:`wrcore.integrate.choice`); none of other methods."""
+    notes: np.ndarray | None = None
+    """Of a run by ``auto``: what it has seen (:mod:`wrcore.integrate.choice`); of other methods none, or of no size."""
     model: str = ""
     """Fingerprint of the model, where a scene's run left it (:func:`wrcore.run.checkpoints.model_fingerprint`)."""
 

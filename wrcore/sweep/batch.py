@@ -161,7 +161,9 @@ def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
         for part in path:
             inner[part] = inner = dict(inner[part])
         inner[last] = value
-    return dataclasses.replace(scene, data=data)
+    changed = dataclasses.replace(scene, data=data)
+    vars(changed)["alike"] = scene.alike  # made of parts that are shared
+    return changed
 
 
 def _run(task: _Task, measures: list[str]) -> _Outcome:
