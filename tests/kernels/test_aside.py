@@ -62,18 +62,18 @@ def test_a_kernel_that_is_needed_last_is_compiled_by_another_process_or_here(tmp
 @pytest.mark.parametrize(
     ("scene", "settings"),
     [
-        ("suspended_wheelset", {}),
-        ("suspended_wheelset", {"contact.patch": "tabulated"}),
+        ("suspended_wheelset", {"contact.patch": "moment", "speed": 80.0, "integration.duration": 0.3}),
+        ("suspended_wheelset", {"contact.patch": "tabulated", "integration.method": "rodas4p2"}),
         ("trailer_vehicle", {"integration.method": "tsit5"}),
     ],
 )
 def test_what_is_planned_is_what_a_run_compiles(scene, settings):
     scene = load_scene(example(scene), {"integration.duration": 1e-3, **settings})
-    simulation = Simulation(scene)
-    planned = needed_last(simulation.model, scene.data["integration"]["method"])
-    simulation.advance(output_times(0.0, 1e-3, 1e3))
-    explicit = scene.data["integration"]["method"] == "tsit5"
-    assert [kernel.form for kernel, _ in planned] == (["called"] if explicit else ["addressed", "called"])
+    simulation, integration = Simulation(scene), scene.data["integration"]
+    planned = needed_last(simulation.model, integration["method"])
+    simulation.advance(output_times(0.0, integration["duration"], 1e3))
+    forms = {"tsit5": ["called"], "rodas4p2": ["addressed", "called"], "auto": ["addressed", "called", "called"]}
+    assert [kernel.form for kernel, _ in planned] == forms[integration["method"]]
     for kernel, types in planned:
         assert types in kernel.overloads
 
