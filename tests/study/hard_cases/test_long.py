@@ -9,7 +9,7 @@ from tests.conftest import SCENES
 from wrcore.errors.checked_hdf5 import sign
 
 VEHICLES = {"suspended wheelset": {"scene": str(SCENES / "suspended_wheelset.yaml")}}
-CHANGES = {"speed": 60.0, "contact.creep.model": "she"}
+CHANGES = {"speed": 60.0, "contact.creep.model": "she", "integration.method": "rk4"}
 
 
 def checks(duration=40.0):
