@@ -55,6 +55,16 @@ def check_rail_history(equations, times, states):
     return forces
 
 
+def motion_history(equations, times, states):
+    """`WheelMotion` of all wheels (n, k, 2, 15), by `Equations`, whose scratch arrays are overwritten, at n times (s)
+    and states."""
+    motions = np.empty((len(times), *equations.work.motions.shape))
+    for t, state, found in zip(times, states, motions, strict=True):
+        equations(t, state)
+        found[:] = equations.work.motions
+    return motions
+
+
 def drive_history(equations, times, states):
     """What motors, brakes and the speed controller did at n times (s) and states, by `Equations`, whose scratch arrays
     are overwritten: torques on the wheelsets along their axles (N m) and relative rotation rates about these (rad/s),

@@ -17,7 +17,8 @@ from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.dynamics.energy import energy_channels
 from wrcore.dynamics.flexible_track import track_places
-from wrcore.dynamics.outputs import check_rail_history, drive_history, evaluations_at
+from wrcore.dynamics.motion import MOTION
+from wrcore.dynamics.outputs import check_rail_history, drive_history, evaluations_at, motion_history
 from wrcore.dynamics.system import Equations, Model, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
@@ -57,6 +58,15 @@ def counters_of(trajectory: Trajectory, begin: float = 0.0) -> dict[str, Any]:
     """Counters of a trajectory from a time (s) on by the names that they have in runs and sweeps."""
     simulated = float(trajectory.t[-1]) - begin if len(trajectory.t) else 0.0
     return {name: getattr(trajectory, attribute) for name, attribute in COUNTERS.items()} | {"simulated_s": simulated}
+
+
+ON_RAIL = tuple(
+    f"on_rail_{name}" for name in (
+        "y_m", "z_m", "axle_x", "axle_y", "axle_z", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s",
+        "wy_rad_per_s", "wz_rad_per_s", "bend_y_per_m", "bend_z_per_m", "friction",
+    )
+)  # fmt: skip
+"""Channels of a wheel's `WheelMotion` but for its side, in its order."""
 
 
 class ArcLengths(NamedTuple):
@@ -177,6 +187,7 @@ class Simulation:
         if len(states):
             self.arc_lengths = ArcLengths(equations.work.arc_lengths.copy(), poses[-1, :, 0].copy())
         groups = self._of_bodies(range(len(model.bodies.mass)), states, evaluations, poses, axes)
+        self._add_wheel_motions(groups, trajectory, equations)
         self._add_check_rails(groups, trajectory, equations)
         if energies is not None:
             groups["energy"] = energies
@@ -201,6 +212,7 @@ class Simulation:
         if bodies:
             evaluations = evaluated(self.model, trajectory, self._from_here(equations))
             groups = self._of_bodies(bodies, trajectory.states, evaluations, *self._poses(trajectory.states, bodies))
+            self._add_wheel_motions(groups, trajectory, equations)
             self._add_check_rails(groups, trajectory, equations)
         if any(group.startswith(("drive/", "control/")) for group in asked):
             groups |= self._drive_channels(trajectory, equations)
@@ -267,6 +279,17 @@ class Simulation:
         """Channels of the displacements of rails and sleeper under the k-th wheelset, m and rad."""
         places = track_places(self.model)[k, : len(self.model.flexible_track.mass)]
         return dict(zip(TRACK_CHANNELS, states[:, places].T, strict=False))
+
+    def _add_wheel_motions(self, groups, trajectory, equations):
+        """Add channels of how wheels lie and move on their rails to those of wheels of known groups, if asked for."""
+        if not self._wants("wheel_motion"):
+            return
+        motions = motion_history(self._from_here(equations), trajectory.t, trajectory.states)
+        for k, body in enumerate(self.model.bodies.wheelsets):
+            name = self.scene.vehicle.body_names[body]
+            for i, side in enumerate(SIDES if name in groups else ()):
+                wheel = groups.setdefault(f"{name}/{side}", {})
+                wheel |= dict(zip(ON_RAIL, motions[:, k, i, MOTION.y :].T, strict=True))
 
     def _add_check_rails(self, groups, trajectory, equations):
         """Add channels of the forces of check rails, if there are any, to those of wheelsets."""

@@ -129,6 +129,16 @@ def as_scene(scene: Source) -> Scene:
     return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
+def scene_of(run: Any, scene: Source | None, asker: str) -> Scene:
+    """The scene of a run: what stands for it, or read anew by what the run says; ``asker`` is named in errors."""
+    if scene is not None:
+        return as_scene(scene)
+    try:
+        return load_scene(run.scene)
+    except InputError as error:
+        raise InputError(asker, "scene", f"expected that of the run, as its files are not here ({error})") from None
+
+
 @checked
 def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
     """Read and check a scene.

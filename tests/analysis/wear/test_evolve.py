@@ -264,6 +264,20 @@ def test_smoothing_turns_no_wave_over(wave):
     assert np.dot(smooth(ridges, 3e-3)[inside], ridges[inside]) > -1e-9
 
 
+def test_a_plan_with_exact_patches_wears_what_its_runs_lose(tmp_path):
+    """A step of a coarse exact run: its books balance, and its deepest place is not the ellipses'."""
+    run = {"speed": 40, "integration.duration": 0.3, "initial.y": 0.003}
+    exact = {"contact.patch": "exact", "contact.resolution": "coarse"}
+    plan = PLAN | {"distance": 1e5, "scenes": [{"share": 1.0, "set": run}], "set": exact}
+    found = {name: ev.evolve(plan | {"patches": name}, tmp_path / name) for name in ("ellipse", "exact")}
+    volumes = [table["worn_volume_m3"].sum() for table in found.values()]
+    assert volumes[1] == pytest.approx(volumes[0], rel=0.03)
+    (_, new), (_, now) = (read_points(file_of(tmp_path / "exact", "profile", step)) for step in (0, 1))
+    assert np.sum(now - new) * POINTS * 2 * np.pi * 0.46 == pytest.approx(volumes[1], rel=2e-3)
+    other = read_points(file_of(tmp_path / "ellipse", "profile", 1))[1]
+    assert np.abs(now - other).max() > 0.05 * (now - new).max()
+
+
 def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
     folder, _ = worn
     for changes, says in (
@@ -271,6 +285,11 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
+        ({"patches": "strips"}, "patches: expected 'ellipse' or 'exact'"),
+        (
+            {"patches": "exact", "set": {"contact.patch": "moment"}},
+            "scenes.0.set: .*contact.patch: expected exact or tab",
+        ),
         ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
         ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),

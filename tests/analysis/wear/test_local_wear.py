@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 
 from tests.analysis.assessment.test_assess import synthetic
+from tests.conftest import SCENES
+from wrcore.analysis.contact.patch import patch as wr_patch
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
 from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
+from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
 from wrcore.errors import InputError
+from wrcore.geometry.standards import named_profile
 from wrcore.run.derived import creep_work
+from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
 
 G, NU, MU = 8.2e10, 0.28, 0.3
 RADIUS = 0.46
@@ -215,3 +221,56 @@ def test_what_cannot_be_worn_is_refused():
     for width in (-1.0, 0.0, np.nan):
         with pytest.raises(InputError, match="width: expected a number, at least 1e-06 and at most 0.1 m"):
             local_wear(worn_run(), width=width)
+
+
+def exact_run(**changes):
+    scene = load_scene(SCENES / "suspended_wheelset.yaml", {
+        "contact.patch": "exact", "contact.resolution": "coarse", "integration.duration": 0.1, "output.rate": 100.0,
+        "output.channels": ["pose", "velocity", "contact", "wheel_motion"], "initial.y": 0.004, "speed": 40.0,
+    } | changes)  # fmt: skip
+    return scene, simulate(scene)
+
+
+def test_exact_patches_lose_what_the_forces_of_an_exact_run_work():
+    """Volumes and work of both ways agree, and so does where they are lost, but for what an ellipse does not know."""
+    scene, run = exact_run()
+    over_ellipses, found = local_wear(run, 0.02), local_wear(run, 0.02, patches="exact", scene=scene)
+    for wheel, ellipse in over_ellipses.items():
+        exact = found[wheel]
+        assert exact.work == pytest.approx(ellipse.work, rel=0.02)
+        assert exact.volume == pytest.approx(ellipse.volume, rel=0.02)
+        radius = run["wheelset"].z_m.mean()
+        assert np.sum(exact.wheel_depth) * BIN * 2.0 * np.pi * radius == pytest.approx(exact.volume, rel=1e-3)
+        assert np.sum(exact.rail_depth) * BIN == pytest.approx(exact.volume, rel=1e-12)
+        middles = []
+        for wear in (ellipse, exact):
+            u = 0.5 * (wear.wheel_edges[1:] + wear.wheel_edges[:-1])
+            middles.append(u @ wear.wheel_depth / wear.wheel_depth.sum())
+        assert middles[1] == pytest.approx(middles[0], abs=1.5e-3)
+
+
+def test_exact_patches_work_where_a_uniform_grid_says():
+    """A centred wheel on 60E1: half of the work is done in the eighth of its wide patch that is next to the flange."""
+    pair = WheelsetOnTrack.alike(named_profile("S1002", "wheel"), named_profile("60E1", "rail", 1 / 40))
+    shares = []
+    for method, resolution in (("exact", "coarse"), ("exact", "middle"), ("grid", "middle")):
+        (patch,) = wr_patch(pair, load=5.5e4, method=method, resolution=resolution)
+        low, high, work = patch.s - 0.5 * patch.ds, patch.s + 0.5 * patch.ds, patch.friction_work * patch.cell_area
+        ends = np.linspace(*patch.extent[2:], 9)
+        parts = (
+            np.clip(np.minimum(high, ends[1:, None]) - np.maximum(low, ends[:-1, None]), 0.0, None) / patch.ds @ work
+        )
+        shares.append(np.cumsum(parts) / parts.sum())
+    assert 0.4 < shares[-1][0] < 0.55
+    np.testing.assert_allclose(shares[0], shares[-1], atol=0.08)
+    np.testing.assert_allclose(shares[1], shares[-1], atol=0.06)
+
+
+def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
+    scene, run = exact_run(**{"contact.patch": "moment"})
+    with pytest.raises(InputError, match=r"contact.patch: expected exact or tabulated where patches are exact.*moment"):
+        local_wear(run, patches="exact", scene=scene)
+    exact = load_scene(scene, {"contact.patch": "exact"})
+    for law in ({"t_gamma": [[0, 0], [100, 1e-12]]}, "braghin"):
+        with pytest.raises(InputError, match=r"local_wear: law: expected"):
+            local_wear(run, law=law, patches="exact", scene=exact)

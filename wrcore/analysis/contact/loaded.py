@@ -17,7 +17,7 @@ from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import DETECTIONS, axle_direction, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.patch import solve
-from wrcore.contact.patch.gap import frame_of_overlaps, group_end
+from wrcore.contact.patch.gap import UR, U, frame_of_overlaps, group_end
 from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model, strip_work
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
@@ -51,6 +51,8 @@ _LEVEL = 1e-10  # step in roll that ends the search for it, rad
 
 _MOST_ROLLS = 25
 
+SIDES_BY_SIGN = {sign: side for side, sign in SIDES.items()}
+
 
 class Rolling(NamedTuple):
     """Motion of a wheelset: speed V > 0 and lateral velocity (m/s), rates of rolling (NaN: free) and yaw (rad/s)."""
@@ -78,6 +80,8 @@ class Found(NamedTuple):
     """Force of the pressure, N, and mean of the longitudinal rigid slip over it."""
     patch: Patch = None
     """With its fields, where the model has them and they were asked for."""
+    places: np.ndarray = None
+    """(3, strips): places of its strips' middles on the wheel's and the rail's profile, and their lateral widths, m."""
     on_grid: bool = False
     on_fixed: bool = False
     """Whether a grid, or fixed strips, stood in."""
@@ -93,14 +97,14 @@ class LoadedWheels:
     """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
 
     Strips and grids have a ``resolution`` (coarse, middle, fine) and a rigid ``slip`` (of the real surfaces, or one set
-    of creepages); where strips find no solution a grid takes over.
+    of creepages); where strips find no solution a grid takes over. They may have ``more`` of a `ContactModel`.
     """
 
     refines = True
     """Whether a patch that strips do not solve is solved anew on finer grids."""
 
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
-                 poisson_ratio=0.28, detection="spatial"):  # fmt: skip
+                 poisson_ratio=0.28, detection="spatial", **more):  # fmt: skip
         known = {"patch": (model, MODELS), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS),
                  "detection": (detection, ("planar", "spatial"))}  # fmt: skip
         for name, (value, names) in known.items():
@@ -120,7 +124,7 @@ class LoadedWheels:
             REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, SLOWEST, strips,
         )  # fmt: skip
         if strips.strips:
-            contact = with_fallback(contact)
+            contact = with_fallback(contact._replace(**more))
         self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
         self._rolling = {}
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(COUNTERS, np.int64)
@@ -140,6 +144,12 @@ class LoadedWheels:
             for one in found:
                 one.row[columns.FX : columns.MZ + 1], one.row[columns.XI : columns.PHI + 1] = 0.0, math.nan
         return found
+
+    def in_motion(self, m, fields=False):
+        """The same of a wheel in the `WheelMotion` of a run, for strips."""
+        side, motion = SIDES_BY_SIGN[m.side], Motion(*m[MOTION.vx : MOTION.wz + 1], abs(m.vx))
+        pose = side, m.y, m.z, math.asin(m.ez), math.atan2(-m.ex, m.ey)
+        return list(self._on_strips(self._still_handle, as_left(m), pose, motion, m.friction, fields))
 
     def _at_work(self, looked_up=0.0):
         """The contact that rolls: exact, by the creep table, or looked up in a pair's table for a coefficient of
@@ -207,12 +217,12 @@ class LoadedWheels:
             on_grid, on_fixed = self._counters[[ON_GRID, ON_FIXED]] > before[[ON_GRID, ON_FIXED]]
             if on_grid and not self.refines:
                 x, a, b = out[0, [columns.X, columns.SEMI_A, columns.SEMI_B]]
-                yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, None, True)
+                yield Found(out[0].copy(), (x - a, x + a, 2.0 * b), found.load, found.xi, on_grid=True)
             elif fields is not None and (self.always or on_grid):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
-                patch = self._fields(out[0], found.load, pose, friction) if fields else None
-                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, patch, False, on_fixed)
+                has = (self._fields(out[0], found.load, pose, friction), self._places()) if fields else (None, None)
+                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, *has, on_fixed=on_fixed)
             first = last
 
     def _fields(self, row, load, pose, friction):
@@ -244,6 +254,12 @@ class LoadedWheels:
             tuple(map(float, ends)), pose[1:],
         )  # fmt: skip
 
+    def _places(self):
+        """`Found.places` of the strips solved last."""
+        count, gap = self._work.solved[0], self._work.normal.gap
+        own, rail, (centre, width) = gap[:count, U], gap[:count, UR], self._work.strips[:2, :count]
+        return np.array([own, rail, width * (rail[-1] - rail[0]) / (centre[-1] - centre[0])])
+
     def _on_grid(self, row, left, first, last, pose, motion, friction):
         """`Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""
         side, y, z, roll, yaw = pose
@@ -274,7 +290,7 @@ class LoadedWheels:
         row[columns.FX : columns.MZ + 1] = patch.fx, patch.fs, patch.mn + mean_s * patch.fx - mean_x * patch.fs
         x_min, x_max, s_min, s_max = patch.extent
         extent = origin[0] + x_min, origin[0] + x_max, s_max - s_min
-        return Found(row, extent, patch.normal, math.nan, patch, True)
+        return Found(row, extent, patch.normal, math.nan, patch, on_grid=True)
 
     def placed(self, sides, y, yaw, known, load, how, told):
         """Roll, and height of the wheelset by side, in a pose: what is NaN of ``known``, its roll and z, is sought for

@@ -22,7 +22,7 @@ from wrcore.errors.checked_calls import Within, checked
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.run.results import load_run
 from wrcore.run.run import Run
-from wrcore.scene.description import Scene, Source, as_scene, load_scene
+from wrcore.scene.description import Scene, Source, as_scene, scene_of
 
 
 @checked
@@ -68,7 +68,7 @@ def draw(
     if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".h5", ".hdf5"):
         source = load_run(source)
     if isinstance(source, Run):
-        return animate(source, _scene_of(source, scene), factor, begin, end)
+        return animate(source, scene_of(source, scene, "draw"), factor, begin, end)
     options: dict[str, Any] = {"scene": scene, "factor": factor, "begin": begin or None}
     for name, value in options.items():
         if value is not None:
@@ -80,13 +80,3 @@ def draw(
             raise InputError("draw", source, f"expected a folder of evolve, with {TABLE}")
         return plot_evolution(profiles_over_distance(source), pd.DataFrame(rows_of(Path(source))))
     return plot_vehicle(as_scene(source))
-
-
-def _scene_of(run, scene):
-    """The scene of a run."""
-    if scene is not None:
-        return as_scene(scene)
-    try:
-        return load_scene(run.scene)
-    except InputError as error:
-        raise InputError("draw", "scene", f"expected that of the run, as its files are not here ({error})") from None

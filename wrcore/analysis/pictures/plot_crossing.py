@@ -14,7 +14,7 @@ from wrcore.errors.checked_calls import checked
 from wrcore.geometry.profile import SPACING
 from wrcore.geometry.track import SIDES
 from wrcore.run.run import Run
-from wrcore.scene.description import Source, as_scene, load_scene
+from wrcore.scene.description import Source, scene_of
 
 LEAST = 1.0
 """Load of a patch that is drawn, N."""
@@ -60,7 +60,7 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     >>> [axes.get_ylabel() for axes in wr.plot_crossing(wr.simulate(scene), scene=scene).axes]
     ['height / mm', 'radius / mm', 'load / kN', 'share', 'y / mm']
     """
-    scene = as_scene(scene) if scene is not None else load_scene(run.scene)
+    scene = scene_of(run, scene, "plot_crossing")
     if not scene.crossings:
         raise InputError("plot_crossing", "run", "expected a run with track.crossing")
     if not 0 <= stretch < len(scene.crossings):

@@ -26,7 +26,7 @@ import numpy as np
 import pandas as pd
 
 from wrcore.analysis.wear import worn_profiles, worn_rails
-from wrcore.analysis.wear.local_wear import BIN, local_wear
+from wrcore.analysis.wear.local_wear import BIN, law_on_cells, local_wear
 from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear.wear_laws import check_friction, wear_law
 from wrcore.analysis.wear.worn_profiles import file_of, points_of, read_points, write_points
@@ -66,10 +66,15 @@ def load_wear_plan(
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
     wear_law(data["law"], name)
-    scenes = []
+    scenes: list[Scene] = []
+    output: dict[str, Any] = {"output.rate": data["rate"]}
+    if data["patches"] == "exact":
+        output["output.channels"] = ["pose", "velocity", "contact", "wheel_motion"]
     for i, part in enumerate(data["scenes"]):
         try:
-            scene = load_scene(path, {**part.get("set", {}), **data["set"], "output.rate": data["rate"]})
+            scene = load_scene(path, {**part.get("set", {}), **data["set"], **output})
+            if data["patches"] == "exact":
+                law_on_cells(data["law"], scene, name)
         except InputError as error:
             raise InputError(name, f"scenes.{i}.set", str(error)) from None
         if data["begin"] >= scene.data["integration"]["duration"]:
@@ -292,14 +297,15 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
     laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
-        run = simulate(load_scene(scene, changes), progress=False if quiet else None)
+        present = load_scene(scene, changes)
+        run = simulate(present, progress=False if quiet else None)
     except InputError as error:
         raise InputError(path, f"scenes.{place}", str(error)) from None
     if run.status != "completed":
         expected = f"expected a run to its end on this wheel, got {run.status}: {run.reason}"
         raise InputError(path, f"scenes.{place}", expected)
     simulated = time.thread_time()
-    wheels = local_wear(run, data["begin"], data["law"])
+    wheels = local_wear(run, data["begin"], data["law"], patches=data["patches"], scene=present)
     rise = sum(worn_profiles.onto_points(u, w.wheel_edges, w.wheel_depth) for w in wheels.values()) / len(wheels)
     volume = sum(wheel.volume for wheel in wheels.values()) / len(wheels)
     mass = sum(2.0 * scene.vehicle.nominal_wheel_load(body) for body in scene.vehicle.bodies.wheelsets) / GRAVITY

@@ -2,8 +2,9 @@
 
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
-forces and creepages (:mod:`wrcore.run.derived`). A wear law (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what
-is lost per metre rolled and area of contact.
+forces and creepages (:mod:`wrcore.run.derived`). Or the real patch says it, solved exactly where the wheel was and as
+it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend. A wear law
+(:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
 
@@ -15,20 +16,28 @@ ordinate, volumes exact sums.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any
+from functools import partial
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from wrcore.analysis.assessment.wheels import late_in, way_shares, wheelsets_of
-from wrcore.analysis.wear.wear_laws import Sliding, check_friction, wear_law
+from wrcore.analysis.contact.in_run import WheelInRun
+from wrcore.analysis.contact.loaded import GRIDS
+from wrcore.analysis.wear.wear_laws import DENSITY, LAWS, Sliding, check_friction, wear_law
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
-from wrcore.errors import InputError
-from wrcore.errors.checked_calls import Within, checked
+from wrcore.errors import InputError, one_of
+from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import rolling_speed
 from wrcore.run.run import Run
+from wrcore.scene.description import Scene, Source, scene_of
 from wrcore.scene.friction import read_friction
+
+PATCHES = "ellipse", "exact"
+"""Where friction works."""
 
 BIN = 2.5e-4  # width of the bins of depth over a profile, m
 STRIPS, STEPS = 25, 20  # strips across and steps along a patch
@@ -68,6 +77,9 @@ def local_wear(
     begin: float = 0.0,
     law: str | dict[str, Any] = "sheffield",
     width: Annotated[float, Within(1e-6, 0.1, "m")] = BIN,
+    patches: Annotated[str, OneOf(PATCHES)] = "ellipse",
+    resolution: Annotated[str, OneOf(GRIDS)] = "coarse",
+    scene: Source | None = None,
 ) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
@@ -81,6 +93,14 @@ def local_wear(
         See :func:`wrcore.analysis.wear.wear_laws.wear_law`.
     width : float
         Of the bins, 1e-6 to 0.1 m.
+    patches : {"ellipse", "exact"}
+        Where friction works: over the ellipses of equal moments, or over the real patches, solved anew, some
+        milliseconds each. These want a run with ``contact.patch`` exact or tabulated, whose motion is theirs, and the
+        channels ``wheel_motion``; laws are then "sheffield" and "energy".
+    resolution : {"coarse", "middle", "fine"}
+        Of exact patches.
+    scene : Scene, str, Path or dict, optional
+        That of the run, for exact patches; left out: read anew by what the run says of it.
 
     Returns
     -------
@@ -90,8 +110,8 @@ def local_wear(
     Raises
     ------
     InputError
-        For an unknown law, a run without wheels or their contacts, nothing after ``begin``, or Archard's law with
-        friction that is not one number.
+        For an unknown law, a run without wheels or their contacts, nothing after ``begin``, Archard's law with
+        friction that is not one number, or what exact patches do not take.
 
     Examples
     --------
@@ -110,34 +130,87 @@ def local_wear(
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")
     check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
-    return {(name, side): _wheel_wear(run, name, side, late, loss, width) for name, side in wheels}
+    over = partial(_on_ellipses, run, late, loss)
+    if patches == "exact":
+        own = scene_of(run, scene, "local_wear")
+        over = partial(_on_exact_patches, run, late, law_on_cells(law, own, "local_wear"), own, resolution)
+    return {(name, side): _wheel_wear(run, name, late, over(name, side), width) for name, side in wheels}
 
 
-def _wheel_wear(run, name, side, late, loss, width):
+def law_on_cells(law: str | dict[str, Any], scene: Scene, asker: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Loss (kg per metre rolled and m^2) over friction's work per area on exact patches of a scene; an InputError for
+    what these do not take, in the name of the ``asker``."""
+    own = scene.data["contact"]["patch"]
+    if own not in ("exact", "tabulated"):
+        expected = "expected exact or tabulated where patches are exact: others move a wheelset in another way"
+        raise InputError(asker, "contact.patch", f"{expected}, got {own}")
+    if not isinstance(law, str) or law not in LAWS:
+        raise InputError(asker, "law", f"{one_of(LAWS, law)}, where patches are exact")
+    return LAWS[law]
+
+
+class Strips(NamedTuple):
+    """What strips of patches lose, over all output times that count; (k,) each."""
+
+    time: np.ndarray
+    """Number of the output time among those."""
+    wheel: np.ndarray
+    rail: np.ndarray
+    """(2, k): ends on the profiles, m."""
+    lost: np.ndarray
+    """Volume per metre rolled, m^2."""
+    work: np.ndarray
+    """Friction's, N."""
+
+
+NOTHING = Strips(np.zeros(0, int), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0), np.zeros(0))
+"""Of a wheel in the air."""
+
+
+def _wheel_wear(run, name, late, strips, width):
+    """`WheelWear` of the strips of a wheel."""
+    share, radius = way_shares(run, name, late)[strips.time], run[name]["z_m"][late][strips.time]
+    lost = strips.lost * share
+
+    def depth(ends, volume):  # spread evenly over a strip's width on the profile; the ordinate changes over du
+        edges, area = _gathered(ends[0], ends[1], volume, width)
+        return edges, area / width
+
+    wheel, rail = depth(strips.wheel, lost / (2.0 * np.pi * radius)), depth(strips.rail, lost)
+    return WheelWear(wheel[0], wheel[1], rail[0], rail[1], float(np.sum(lost)), float(np.sum(strips.work * share)))
+
+
+def _on_ellipses(run, late, loss, name, side):
+    """`Strips` of the ellipses of a wheel."""
     contact, body, outwards, scene = run[f"{name}/{side}"], run[name], SIDES[side], run.scene
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
     rows = {name: contact[name][late][there] for name in _NEEDED}
     times = np.nonzero(there)[0]
-    radius = body["z_m"][late][times]
     speed = np.broadcast_to(rolling_speed(body, scene["speed"]), late.shape)[late][times]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
     friction = read_friction(scene["contact"]["friction"], "scene").largest
     places, dy, dx, work = friction_work(rows, friction, **scene["contact"]["material"])
-    share = way_shares(run, name, late)[times][:, None]
     taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
-    across = np.sum(taken * dx[..., None], axis=-1) * share  # m per passage, mean over the way
-    volume = float(np.sum(across * dy))
     slope = np.cos(rows["contact_angle_rad"])[:, None]
-    low, high = (outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0))
-    low, high = np.minimum(low, high), np.maximum(low, high)
+    ends = np.sort([outwards * (places + side * 0.5 * dy) * slope for side in (-1.0, 1.0)], axis=0)
+    across = np.repeat(times, places.shape[1])
+    wheel, rail = (rows[f"u_{own}_m"][:, None] + ends for own in ("wheel", "rail"))
+    amounts = (np.ravel(np.sum(each, axis=-1) * dx * dy) for each in (taken, work))
+    return Strips(across, wheel.reshape(2, -1), rail.reshape(2, -1), *amounts)
 
-    def depth(u, factor):  # a strip's volume spread evenly over its width on the profile; the ordinate changes over du
-        edges, area = _gathered(u[:, None] + low, u[:, None] + high, across * dy * factor[:, None], width)
-        return edges, area / width
 
-    wheel, rail = depth(rows["u_wheel_m"], 1.0 / (2.0 * np.pi * radius)), depth(rows["u_rail_m"], np.ones_like(radius))
-    spent = float(np.sum(work * (dx * dy * share)[..., None]))
-    return WheelWear(wheel[0], wheel[1], rail[0], rail[1], volume, spent)
+def _on_exact_patches(run, late, law, scene, resolution, name, side):
+    """`Strips` of the exact patches of a wheel, by a law over friction's work."""
+    solved, parts = WheelInRun(run, scene, name, side, resolution, "local_wear"), []
+    for time, i in enumerate(np.flatnonzero(late).tolist()):
+        for patch, places in ((found.patch, found.places) for found in solved.at(i)):
+            if places is None:  # on a grid, whose plane is flat
+                places = _on_plane(patch, run[f"{name}/{side}"], i)
+            own, rail, width = places
+            area, work, half = patch.cell_area, patch.friction_work, 0.5 * np.array([-width, width])
+            amounts = (np.sum((q * area).reshape(len(own), -1), axis=1) for q in (law(work) / DENSITY, work))
+            parts.append(Strips(np.full(len(own), time), own + half, rail + half, *amounts))
+    return Strips(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))) if parts else NOTHING
 
 
 _NEEDED = {"a_m", "b_m", "N_N", "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m", "u_wheel_m", "u_rail_m",
@@ -176,9 +249,17 @@ def friction_work(rows, friction, shear_modulus, poisson_ratio, strips=STRIPS, s
     return y, dy, dx, work * scale[:, None, None]
 
 
+def _on_plane(patch, contact, i):
+    """As `Found.places` of the cells of a grid, about the patch of the run at the i-th output time that leans as it."""
+    k, outwards = int(np.nanargmin(np.abs(contact["contact_angle_rad"][i] - patch.contact_angle))), SIDES[patch.side]
+    aside = outwards * (patch.s - patch.centroid[1]) * np.cos(patch.contact_angle)
+    return np.array([
+        contact["u_wheel_m"][i, k] + aside, contact["u_rail_m"][i, k] + aside, patch.ds * np.cos(patch.contact_angle)
+    ])  # fmt: skip
+
+
 def _gathered(low, high, amount, width):
     """Bins of a width that hold amounts spread evenly from ``low`` to ``high``: edges, and what is in each."""
-    low, high, amount = (np.ravel(np.broadcast_to(part, amount.shape)) for part in (low, high, amount))
     if amount.size == 0:
         return np.array([0.0, width]), np.zeros(1)
     first = np.floor(low.min() / width)

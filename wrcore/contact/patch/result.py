@@ -103,6 +103,15 @@ class Patch:
         return self.pressure > 0.0
 
     @property
+    def friction_work(self) -> np.ndarray:
+        """Friction's work in each cell per metre rolled and area, N/m^2, shape (n,): traction times slip, by one factor
+        such that it adds up to what the forces do on the creepages."""
+        work = -(self.traction_x * self.slip_x + self.traction_s * self.slip_s)
+        total = work @ self.cell_area
+        known = -(self.fx * self.xi + self.fs * self.eta + self.mn * self.phi)
+        return work * max(known, 0.0) / total if total > 0.0 else np.zeros(work.shape)
+
+    @property
     def p_max(self) -> float:
         """Greatest pressure, Pa; of a grid: the greatest mean of a cell."""
         return float(self.pressure.max(initial=0.0)) if math.isnan(self.peak) else self.peak

@@ -1,0 +1,105 @@
+"""Patches of a run solved anew: the run's own forces, places on both profiles, refusals."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import SCENES
+from wrcore.analysis.contact.in_run import WheelInRun, patch_in_run
+from wrcore.errors import InputError
+from wrcore.geometry.track import SIDES
+from wrcore.run.simulate import simulate
+from wrcore.run.simulation import ON_RAIL
+from wrcore.scene.description import load_scene
+
+CHANNELS = ["pose", "velocity", "contact", "wheel_motion"]
+SHORT = {"contact.patch": "exact", "contact.resolution": "coarse", "integration.duration": 0.02, "output.rate": 200.0,
+         "output.channels": CHANNELS}  # fmt: skip
+ROUGH = {"track.irregularity": {"spectrum": {"level": "high", "seed": 5, "length": 100.0, "begin": -20.0}},
+         "speed": 60.0, "initial.y": 0.003, "initial.yaw": 0.002}  # fmt: skip
+CURVE = {"track.path": [{"transition": 1.0}, {"curve": 300.0, "radius": 300.0}], "speed": 20.0,
+         "initial.y": 0.003, "integration.duration": 0.08, "output.rate": 50.0}  # fmt: skip
+SCENE_OF = {
+    "rough track": ROUGH,
+    "curve": CURVE,
+    "rails that differ in friction": {"initial.y": 0.002, "contact.friction": {"left": 0.3, "right": 0.1}},
+    "rails that give": {"track.support": {"rail": {
+        "lateral": {"stiffness": 1.8e7, "damping": 5e4}, "vertical": {"stiffness": 8.1e7, "damping": 6e4}}},
+        "initial.y": 0.003},
+}  # fmt: skip
+
+
+def run_of(changes):
+    scene = load_scene(SCENES / "suspended_wheelset.yaml", SHORT | changes)
+    run = simulate(scene)
+    assert run.status == "completed", run.reason
+    return scene, run
+
+
+@pytest.mark.parametrize("name", SCENE_OF)
+def test_an_exact_run_is_solved_to_its_own_forces(name):
+    """Its motion on its rail is all that a patch depends on: on rough track, in curves, on rails that give."""
+    scene, run = run_of(SCENE_OF[name])
+    for side in SIDES:
+        wheel, rows = WheelInRun(run, scene, "wheelset", side, "coarse", "test"), run[f"wheelset/{side}"]
+        for i in range(1, len(run.t)):
+            found, there = wheel.at(i), rows.N_N[i] > 0.0
+            assert len(found) == there.sum()
+            bound = np.nanmax(rows.on_rail_friction[i] * np.nansum(rows.N_N[i]))
+            for one, k in zip(found, np.flatnonzero(there), strict=True):
+                assert one.patch.normal == pytest.approx(rows.N_N[i, k], rel=3e-3)
+                assert one.patch.fx == pytest.approx(rows.Fx_N[i, k], abs=5e-3 * bound)
+                assert one.patch.fs == pytest.approx(rows.Fy_N[i, k], abs=5e-3 * bound)
+                assert one.patch.contact_angle == pytest.approx(rows.contact_angle_rad[i, k], abs=1e-3)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_strips_lie_where_wheel_and_rail_meet(side):
+    """Both profiles' places of a strip are one place of the track, and about the run's own contact point."""
+    scene, run = run_of({"initial.y": 0.003})
+    wheel, rows, outwards = (
+        WheelInRun(run, scene, "wheelset", side, "middle", "test"),
+        run[f"wheelset/{side}"],
+        SIDES[side],
+    )
+    pair = scene.pair(side)
+    for i in range(len(run.t)):
+        (found,) = wheel.at(i)
+        own, rail, width = found.places
+        roll = run["wheelset"].roll_rad[i]
+        lateral = pair.half_distance + own + outwards * (run["wheelset"].y_m[i] + np.sin(roll) * run["wheelset"].z_m[i])
+        np.testing.assert_allclose(lateral, pair.rail_distance + rail, atol=2e-5)
+        assert (width > 0.0).all() and width.sum() == pytest.approx(np.ptp(own), rel=0.2)
+        assert own.min() < rows.u_wheel_m[i, 0] < own.max() and rail.min() < rows.u_rail_m[i, 0] < rail.max()
+
+
+def test_a_patch_of_a_run_by_ellipses_carries_its_load():
+    scene, run = run_of({"contact.patch": "moment", "initial.y": 0.003})
+    t = float(run.t[2])
+    (patch,) = patch_in_run(run, t, "wheelset", "right", scene=scene)
+    assert patch.side == "right" and patch.normal == pytest.approx(np.nansum(run["wheelset/right"].N_N[2]), rel=2e-3)
+    assert patch.friction_work.min() > -1e-6 * patch.friction_work.max()
+    power = -(patch.fx * patch.xi + patch.fs * patch.eta + patch.mn * patch.phi)
+    assert patch.friction_work @ patch.cell_area == pytest.approx(power, rel=1e-12) and power > 0.0
+
+
+def test_scenes_that_do_not_ask_have_none_of_its_channels():
+    _, run = run_of({"contact.patch": "moment", "output.channels": ["contact"]})
+    assert not set(ON_RAIL) & run["wheelset/left"].keys()
+
+
+def test_refusals():
+    scene, run = run_of({"contact.patch": "moment", "output.channels": ["pose", "contact"]})
+    cases = [
+        ({"t": 1.0}, "patch_in_run: t: expected a time of the run, got 1 s"),
+        ({"wheelset": "bogie"}, "patch_in_run: wheelset: expected a wheelset of the run with contacts, got 'bogie'"),
+        ({}, "patch_in_run: output.channels: expected contact and wheel_motion among them"),
+        ({"scene": None}, "patch_in_run: scene: expected that of the run, as its files are not here"),
+    ]
+    for changes, message in cases:
+        with pytest.raises(InputError, match=message):
+            patch_in_run(**{"run": run, "t": 0.0, "wheelset": "wheelset", "scene": scene} | changes)
+    polygons = {side: {"out_of_round": {"polygon": [{"order": 10, "amplitude": 2e-5}]}} for side in SIDES}
+    _, run = run_of({"contact.patch": "moment"})
+    shaped = load_scene(scene, {f"wheel.{side}": shape for side, shape in polygons.items()})
+    with pytest.raises(InputError, match="expected rails and wheels that are the same everywhere"):
+        patch_in_run(run, 0.0, "wheelset", scene=shaped)

@@ -1,0 +1,90 @@
+"""What ellipses err by in local wear: ``python -m study.wear.patches FOLDER [PLAN] [--resolution middle]``.
+
+Each scene of a plan (config/wear/main_line.yaml) runs on its new wheels with contact that is looked up; what the first
+wheelset's wheels lose is found over the ellipses of equal moments and over the exact patches of the same motion. Prints
+a row per scene and wheel, and draws the depths.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wrcore.analysis.pictures.style import save_figure, styled
+from wrcore.analysis.wear.evolve import load_wear_plan
+from wrcore.analysis.wear.local_wear import PATCHES, local_wear
+from wrcore.geometry.track import SIDES
+from wrcore.run.simulate import simulate
+
+WIDTH = 5e-4
+"""Of the bins, m."""
+U = WIDTH * np.arange(-120, 80)
+"""Places on a wheel's profile, m."""
+
+
+def depths(wear):
+    """Depth (m per m) over `U`."""
+    middles = 0.5 * (wear.wheel_edges[1:] + wear.wheel_edges[:-1])
+    return np.interp(U, middles, wear.wheel_depth, 0.0, 0.0)
+
+
+def compared(scene, begin, law, resolution):
+    """Of both wheels of the first wheelset, by way (`PATCHES`): depths, volume (m^3/m), processor time (s)."""
+    run, found = simulate(scene), {}
+    assert run.status == "completed", run.reason
+    for patches in PATCHES:
+        began = time.process_time()
+        worn = local_wear(run, begin, law, WIDTH, patches, resolution, scene)
+        seconds = time.process_time() - began
+        wheels = [worn[scene.vehicle.wheelset_names[0], side] for side in SIDES]
+        found[patches] = [(depths(wheel), wheel.volume, seconds) for wheel in wheels]
+    return found
+
+
+@styled
+def figure_of(found):
+    """Depths over the profile, a row per scene, left and right wheel."""
+    figure = Figure(figsize=(7.2, 1.7 * len(found)), layout="constrained")
+    rows = figure.subplots(len(found), 2, squeeze=False, sharex=True)
+    for axes, (name, ways) in zip(rows, found.items(), strict=True):
+        for k, (one, side) in enumerate(zip(axes, SIDES, strict=True)):
+            for patches, line in zip(PATCHES, ("--", "-"), strict=True):
+                one.plot(1e3 * U, 1e12 * ways[patches][k][0], line, label=patches)
+            one.set_title(f"{name}, {side}", fontsize="small")
+            one.set_xlim(-45.0, 25.0)
+        axes[0].set_ylabel("depth / µm per 1000 km")
+    for one in rows[-1]:
+        one.set_xlabel("u, to the field side / mm")
+    rows[0, 0].legend()
+    return figure
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("plan", nargs="?", default="config/wear/main_line.yaml")
+    parser.add_argument("--resolution", default="coarse")
+    asked = parser.parse_args()
+    data, scenes = load_wear_plan(asked.plan, {"patches": "exact", "set": {"contact.patch": "tabulated"}})
+    head = ["scene", "wheel", "deepest, exact over ellipse", "at u, mm: ellipse", "exact",
+            "largest deviation, % of the deepest", "volume, %", "processor time, s: ellipse", "exact"]  # fmt: skip
+    print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
+    found = {}
+    for scene in scenes:
+        path = scene.data["track"]["path"]
+        curve = "straight" if path == "tangent" else f"R {path[1]['radius']:g} m"
+        name = f"{curve}, {scene.data['speed']:g} m/s, gauge {1e3 * scene.data['track']['gauge']:g} mm"
+        found[name] = ways = compared(scene, data["begin"], data["law"], asked.resolution)
+        for k, side in enumerate(SIDES):
+            (flat, volume, took), (real, other, longer) = (ways[patches][k] for patches in PATCHES)
+            deviation = np.abs(real - flat).max() / real.max()
+            print(f"| {name} | {side} | {real.max() / flat.max():.2f} | {1e3 * U[flat.argmax()]:.1f} |"
+                  f" {1e3 * U[real.argmax()]:.1f} | {100 * deviation:.0f} | {100 * (other / volume - 1):+.1f} |"
+                  f" {took:.2f} | {longer:.1f} |", flush=True)  # fmt: skip
+    save_figure(figure_of(found), asked.folder / "wear_patches.png")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""Exact contact at the output times of a run, whatever its own patches were: ``wr.patch_in_run``.
+
+Where a wheel lay on its rail and how it moved there are the channels ``wheel_motion``; of the run's contact the wheel
+keeps the sum of its normal forces: it is raised or lowered until its exact patches carry that.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from wrcore.analysis.contact.loaded import GRIDS, Found, LoadedWheels
+from wrcore.contact.patch.result import Patch
+from wrcore.contact.reduction import NORMAL
+from wrcore.contact.statics import height_of_zero
+from wrcore.dynamics.motion import WheelMotion
+from wrcore.errors import InputError
+from wrcore.errors.checked_calls import OneOf, checked
+from wrcore.geometry.track import SIDES
+from wrcore.run.run import Run
+from wrcore.run.simulation import ON_RAIL
+from wrcore.scene.description import Scene, Source, scene_of
+from wrcore.scene.friction import read_friction
+
+CARRIED = 1e-3
+"""Relative error of F^(2/3) that ends the search for a height."""
+
+
+class WheelInRun:
+    """A wheel of a run of a scene, solved exactly at its output times; ``asker`` is named in errors.
+
+    An InputError where the run has no ``wheel_motion``, or rails or wheels that change along the track or the rim.
+    """
+
+    def __init__(self, run: Run, scene: Scene, wheelset: str, side: str, resolution: str, asker: str) -> None:
+        wheel = run.groups.get(f"{wheelset}/{side}", {})
+        if not {*ON_RAIL, "N_N"} <= wheel.keys():
+            expected = f"expected contact and wheel_motion among them for the exact patches of {wheelset}/{side}"
+            raise InputError(asker, "output.channels", expected)
+        if any((scene.crossings, scene.out_of_round, scene.corrugation)):
+            raise InputError(asker, "run", "expected rails and wheels that are the same everywhere for exact patches")
+        contact = scene.data["contact"]
+        friction = read_friction(contact["friction"], scene.source)
+        pair = scene.pair(side, scene.vehicle.wheelset_names.index(wheelset))
+        self._wheels = LoadedWheels(
+            pair.geometry, "exact", resolution, contact["slip"], **contact["material"],
+            detection="planar" if scene.detection == "planar" else "spatial", friction_ratio=friction.ratio,
+            friction_decay=friction.decay, friction_factors=friction.factors,
+        )  # fmt: skip
+        self._motions = np.column_stack([np.full(len(run.t), SIDES[side]), *(wheel[name] for name in ON_RAIL)])
+        self._loads = np.nansum(wheel["N_N"].reshape(len(run.t), -1), axis=1)
+
+    def at(self, i: int) -> list[Found]:
+        """Patches, with their fields, at the i-th output time; none where the wheel is in the air."""
+        goal = max(float(self._loads[i]), 0.0) ** (2.0 / 3.0)
+        m = WheelMotion(*self._motions[i].tolist())
+
+        def excess(z):
+            force = sum(found.row[NORMAL] for found in self._wheels.in_motion(m._replace(z=z, friction=0.0)))
+            rest = max(force, 0.0) ** (2.0 / 3.0) - goal
+            return 0.0 if abs(rest) < CARRIED * goal else rest
+
+        z = height_of_zero(excess, m.z) if goal else np.nan
+        return [] if np.isnan(z) else self._wheels.in_motion(m._replace(z=z), fields=True)
+
+
+@checked
+def patch_in_run(
+    run: Run,
+    t: float,
+    wheelset: str,
+    side: Annotated[str, OneOf(SIDES)] = "left",
+    resolution: Annotated[str, OneOf(GRIDS)] = "middle",
+    scene: Source | None = None,
+) -> list[Patch]:
+    """Exact contact patches of a wheel at a time of a run, whatever patches the run itself went by.
+
+    Parameters
+    ----------
+    run : Run
+        Of a scene whose ``output.channels`` ask for ``contact`` and ``wheel_motion``.
+    t : float
+        Time, s; the nearest output time counts.
+    wheelset : str
+        Name of a wheelset.
+    side : {"left", "right"}
+    resolution : {"coarse", "middle", "fine"}
+    scene : Scene, str, Path or dict, optional
+        That of the run; left out: read anew by what the run says of it.
+
+    Returns
+    -------
+    list of Patch
+        From the flange to the field side; empty where the wheel is in the air. Together they carry the normal force
+        that the wheel had in the run, at its place and motion on its rail.
+
+    Raises
+    ------
+    InputError
+        For a time beyond the run, a wheel that it does not have, missing channels, and rails or wheels that change
+        along the track or the rim.
+
+    Examples
+    --------
+    >>> import wrcore as wr
+    >>> scene = wr.example("suspended_wheelset")
+    >>> run = wr.simulate(scene, integration__duration=0.1, output__channels=["pose", "contact", "wheel_motion"])
+    >>> (tread,) = wr.patch_in_run(run, 0.05, "wheelset", scene=scene)
+    >>> round(1e-3 * tread.normal), tread.side
+    (54, 'left')
+    """
+    if not len(run.t) or not run.t[0] <= t <= run.t[-1]:
+        raise InputError("patch_in_run", "t", f"expected a time of the run, got {t:g} s")
+    if wheelset not in run.groups or f"{wheelset}/{side}" not in run.groups:
+        raise InputError("patch_in_run", "wheelset", f"expected a wheelset of the run with contacts, got {wheelset!r}")
+    wheel = WheelInRun(run, scene_of(run, scene, "patch_in_run"), wheelset, side, resolution, "patch_in_run")
+    return [found.patch for found in wheel.at(int(np.argmin(np.abs(run.t - t))))]
