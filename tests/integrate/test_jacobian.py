@@ -184,7 +184,7 @@ def test_stages_are_solved_as_a_dense_system_would_be(moving):
     omegas = state[: 13 * n].reshape(n, 13)[:, 10:]
     axles = np.array([matrix_of(part[3:7])[:, 1] for part in state[: 13 * n].reshape(n, 13)])
     frames = omegas - np.sum(omegas * axles, axis=1, keepdims=True) * axles  # a wheelset's frame does not spin
-    jacobian, system = refreshed(moving), new_system(model)
+    jacobian, system = refreshed(moving), new_system(moving[-1])
     size, rate = 12 * n + internal_states(model), jacobian.turn[0]
     matrix = np.zeros((size + n,) * 2)  # last the lengths of p
     for b in range(n):
@@ -229,7 +229,6 @@ def test_patches_that_are_solved_get_none():
 
 
 def test_a_singular_system_is_reported(moving):
-    model = moving[0]
     jacobian = new_jacobian(moving[-1])  # of zeros: with sigma = 0 nothing is left
-    assert not factorise(jacobian, new_system(model), 0.0)
-    assert factorise(jacobian, new_system(model), 1.0)
+    assert not factorise(jacobian, new_system(moving[-1]), 0.0)
+    assert factorise(jacobian, new_system(moving[-1]), 1.0)

@@ -193,7 +193,8 @@ def initial_state(scene, model, at_rest=None, shared=None):
     model = undriven(model)
     y, yaw, moved = float(data["initial"]["y"]), float(data["initial"]["yaw"]), data["initial"]["bodies"]
     state = _moving(model, at_rest)
-    level = model._replace(track=TrackModel(True, model.track.path, model.track.irregularity))
+    track = model.track
+    level = model if track.tangent else model._replace(track=TrackModel(True, track.path, track.irregularity))
     for k, sides in enumerate(_geometries(model)):
         if y or yaw:
             _put_onto_rails(scene, model, k, sides, y, yaw, at_rest, state)
@@ -298,17 +299,19 @@ def _balanced(vehicle, model, equations, state):
         return new, np.concatenate([rates[..., 9:11], about[..., None]], axis=-1)
 
     for unknown in (3, 2):  # without friction no rolling rate balances anything: it stays as it is
-        found = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
+        found, balanced = _improved(standing, stands, np.diag([1e-8, 1e-8, 1e-7 * model.speed])[:unknown])
         if np.all(np.abs(found[:, 2] - stands[:, 2]) < LARGEST_SLIP * np.abs(stands[:, 2])):
             break
-    return cleared(model, standing(found[None])[0][0])
+    return cleared(model, balanced)
 
 
 def _improved(standing, stands, steps):
-    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve.
-    Slopes serve again for as long as a step leaves less than a tenth; what is left below ``ROUNDING`` is rounding."""
+    """The stands after Newton's steps in the unknowns whose difference steps are given, as long as these improve, and
+    the state there. Slopes serve again for as long as a step leaves less than a tenth; what is left below ``ROUNDING``
+    is rounding."""
     unknown, slopes = slice(len(steps)), None
-    left = standing(stands[None])[1][0, :, unknown]
+    states, left = standing(stands[None])
+    left = left[0, :, unknown]
     for _ in range(20):
         if slopes is None:
             ends = standing(stands + np.concatenate([steps, -steps])[:, None])[1]
@@ -319,16 +322,17 @@ def _improved(standing, stands, steps):
             new[:, unknown] -= np.linalg.solve(slopes, left[..., None])[..., 0]
         except np.linalg.LinAlgError:
             break
-        still_left = standing(new[None])[1][0, :, unknown]
+        moved, still_left = standing(new[None])
+        still_left = still_left[0, :, unknown]
         part = np.max(np.abs(still_left)) / np.max(np.abs(left))
         if not part < 1.0:
             break
-        stands, left = new, still_left
+        stands, states, left = new, moved, still_left
+        if np.max(np.abs(left)) < ROUNDING:
+            break
         if part > 0.1:
-            if np.max(np.abs(left)) < ROUNDING:
-                break
             slopes = None
-    return stands
+    return stands, states[0]
 
 
 def _on_path(path, s, speed, part):

@@ -77,6 +77,8 @@ def no_drive():
 
 def undriven(model):
     """The model without motors, brakes, controller and control laws: its state ends with that of force elements."""
+    if not (len(model.drive.rows) or len(model.drive.control) or len(model.controls.rows)):
+        return model
     none = model.controls._make(array[:0] for array in model.controls)
     return model._replace(drive=no_drive(), torques=0, samples=0, controls=none)
 

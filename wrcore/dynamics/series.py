@@ -17,14 +17,17 @@ def equations_of(model, shared=None):
     next call, which takes them away."""
     if shared is None:
         return Equations(model)
-    key = "equations", threading.get_ident(), *structure(model)
-    if key not in shared:
-        equations, new = Equations(model), workspace(model)
-        shared[key] = equations, list(zip(_arrays(equations.work), _arrays(new), strict=True))
-        return equations
-    equations, scratch = shared[key]
-    handle = equations.arguments[1]
-    handle.renew(with_kernels_of(model, handle.value))
+    thread = "equations", threading.get_ident()
+    last, equations, scratch = shared.get(thread, (None, None, ()))
+    if model is not last:
+        key = *thread, *structure(model)
+        if key not in shared:
+            equations, new = Equations(model), workspace(model)
+            shared[key] = equations, list(zip(_arrays(equations.work), _arrays(new), strict=True))
+        else:
+            equations, scratch = shared[key]
+            equations.turn_to(with_kernels_of(model, equations.arguments[1].value))
+        shared[thread] = model, *shared[key]
     for array, values in scratch:
         array[...] = values
     return equations

@@ -375,8 +375,20 @@ class Equations:
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work
         model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
-        state = np.empty(0)
+        state, self._planned = np.empty(0), {}
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state, FRESH), model, work
+
+    def planned(self, plan):
+        """What a function of the model plans, found once: good for all models of this structure."""
+        if plan not in self._planned:
+            self._planned[plan] = plan(self.arguments[1].value)
+        return self._planned[plan]
+
+    def turn_to(self, model):
+        """Be the equations of another model of the same structure, with all its kernels."""
+        if len(model.drive.rows) or len(model.controls.rows):  # what they act on may be another body
+            self._planned.clear()
+        self.arguments[1].renew(model)
 
     def __call__(self, t, state, mode=FRESH):
         """Rate of a state, shape (size,), at a time (s), in a mode of `wrcore.dynamics.modes`."""

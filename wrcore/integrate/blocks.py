@@ -95,9 +95,9 @@ def plan_elimination(model):
     )  # fmt: skip
 
 
-def new_system(model):
-    """Allocate the system of a model."""
-    pattern, n = plan_elimination(model), len(model.bodies.mass)
+def new_system(equations):
+    """Allocate the system of a model's equations."""
+    pattern, n = equations.planned(plan_elimination), len(equations.arguments[1].value.bodies.mass)
     m, entries = len(pattern.order), len(pattern.state_bodies)
     return System(
         pattern, np.zeros((n, 2, 3, 3)), np.zeros((n, 2, 3, 3)), np.zeros((pattern.place.max() + 1, 6, 6)),

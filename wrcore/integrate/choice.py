@@ -17,10 +17,12 @@ import numpy as np
 
 from wrcore.dynamics.contract import places
 from wrcore.dynamics.modes import ELLIPSES
+from wrcore.dynamics.system import derivatives_at
 from wrcore.errors import InputError
 from wrcore.integrate.engine import EVALUATIONS, JACOBIANS, REJECTED, STEPS, T
 from wrcore.integrate.tableaus import ROSENBROCK
 from wrcore.integrate.tolerances import pace, step_tolerances
+from wrcore.kernels.jit import jit
 
 CHOICES = ("rodas4p2", "rk4")
 """What ``auto`` goes by, in the beginning by the first."""
@@ -171,16 +173,40 @@ def _mark(notes, memory, method, phase, ahead):
 def fastest_rate(model, equations, t, state):
     """Largest absolute eigenvalue (1/s) of the equations of motion at a state, roughly, by the power method; NaN where
     the state's rate is not finite. Counters and places of ``equations`` stay as they are."""
-    unit, direction, growths = _disturbances(model, state), np.random.default_rng(0).normal(size=len(state)), []
+    grow, arguments = power_method(model, equations, t, state)
     with _undisturbed(equations.work):
-        base = equations(t, state, ELLIPSES)
-        size = math.sqrt(direction.dot(direction) / len(state))
-        for _ in range(PASSES):
-            direction *= unit / (size or 1.0)
-            direction = (equations(t, state + direction, ELLIPSES) - base) / unit
-            size = math.sqrt(direction.dot(direction) / len(state))
-            growths.append(size)
-    return float(np.exp(np.mean(np.log(np.maximum(growths[-SETTLING:], 1e-300)))))
+        grow(*arguments)
+    return float(np.exp(np.mean(np.log(np.maximum(arguments[0][-SETTLING:], 1e-300)))))
+
+
+def power_method(model, equations, t, state):
+    """The kernel of `fastest_rate`, and its arguments, the first of which it fills with the growth of each pass."""
+    direction, scratch = np.random.default_rng(0).normal(size=len(state)), np.empty((3, len(state)))
+    return _grow, (np.empty(PASSES), _disturbances(model, state), direction, scratch, t, state, *equations.arguments)
+
+
+@jit(allocates=False)
+def _grow(growths, unit, direction, scratch, t, state, equations, model, work):
+    base, there, rate = scratch[0], scratch[1], scratch[2]
+    derivatives_at(equations, t, state, model, work, base, ELLIPSES)
+    size = _mean_size(direction)
+    for k in range(growths.shape[0]):
+        for i in range(state.shape[0]):
+            direction[i] *= unit[i] / (size or 1.0)
+            there[i] = state[i] + direction[i]
+        derivatives_at(equations, t, there, model, work, rate, ELLIPSES)
+        for i in range(state.shape[0]):
+            direction[i] = (rate[i] - base[i]) / unit[i]
+        growths[k] = size = _mean_size(direction)
+
+
+@jit(allocates=False)
+def _mean_size(vector):
+    """Root of the mean square."""
+    total = 0.0
+    for value in vector:
+        total += value * value
+    return math.sqrt(total / vector.shape[0])
 
 
 def _disturbances(model, state):

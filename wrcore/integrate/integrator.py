@@ -134,7 +134,9 @@ def needed_last(model, method):
         start, equations = np.zeros(state_size(model)), Equations(model)
         before, methods = len(kernels), CHOICES if method == "auto" else (method,)
         runs = [Integration(model, start, 0.0, one, (0.0, 0.0), 0.0, 1.0, np.inf, equations) for one in methods]
-        return [*kernels[before:], *(run.kernel(run.record(np.zeros(1))) for run in runs)]
+        looks = [choice.power_method(model, equations, 0.0, start)] if method == "auto" else []
+        looks = [(kernel, tuple(map(typeof, arguments))) for kernel, arguments in looks]
+        return [*kernels[before:], *(run.kernel(run.record(np.zeros(1))) for run in runs), *looks]
 
 
 class Integration:
@@ -169,7 +171,7 @@ class Integration:
         self._tableau = ROSENBROCK[method] if stiff else EXPLICIT[method]
         stages = np.zeros((len(self._tableau.nodes), len(self.memory.state)))
         self.memory = self.memory._replace(stages=stages)
-        self.linear, self._system = (new_linear(self.equations), new_system(self.model)) if stiff else (None, None)
+        self.linear, self._system = (new_linear(self.equations), new_system(self.equations)) if stiff else (None, None)
         control = Control(step_tolerances(self.model, *self._tolerance, method), *self._limits)
         self._kernel, self._plain = advance_rosenbrock if stiff else advance_explicit, None
         self._before = self._tableau, control, self.memory, self._scratch

@@ -41,9 +41,8 @@ class Linear(NamedTuple):
 
 def new_linear(equations):
     """Plan the Jacobian of a model's equations and allocate its arrays."""
-    model = equations.arguments[1].value
-    sweep = plan_sweep(model)
-    return Linear(sweep, joined_bodies(model), new_jacobian(equations), np.zeros(int(np.diff(sweep.starts).max())))
+    sweep, joined = equations.planned(plan_sweep), equations.planned(joined_bodies)
+    return Linear(sweep, joined, new_jacobian(equations), np.zeros(int(np.diff(sweep.starts).max())))
 
 
 @jit(allocates=False)

@@ -288,8 +288,7 @@ class Simulation:
         for k, body in enumerate(self.model.bodies.wheelsets):
             name = self.scene.vehicle.body_names[body]
             for i, side in enumerate(SIDES if name in groups else ()):
-                wheel = groups.setdefault(f"{name}/{side}", {})
-                wheel |= dict(zip(ON_RAIL, motions[:, k, i, MOTION.y :].T, strict=True))
+                groups[f"{name}/{side}"] |= dict(zip(ON_RAIL, motions[:, k, i, MOTION.y :].T, strict=True))
 
     def _add_check_rails(self, groups, trajectory, equations):
         """Add channels of the forces of check rails, if there are any, to those of wheelsets."""

@@ -207,6 +207,8 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
         raise InputError(source, "track.path", expected)
     check_bodies(data["initial"]["bodies"], vehicle, source)
     read_friction(data["contact"]["friction"], source, folder)
+    if "contact" not in (wanted := data["output"]["channels"]) and "wheel_motion" in wanted:
+        raise InputError(source, "output.channels", "expected contact beside wheel_motion")
     read_controls(data, vehicle, folder, source)
     read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
     digests |= digests_of_files(vehicle.data["elements"], folder)

@@ -5,6 +5,7 @@ import pytest
 
 from tests.analysis.assessment.test_assess import synthetic
 from tests.conftest import SCENES
+from wrcore.analysis.contact.in_run import WheelInRun
 from wrcore.analysis.contact.patch import patch as wr_patch
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
 from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
@@ -237,7 +238,7 @@ def test_exact_patches_lose_what_the_forces_of_an_exact_run_work():
     over_ellipses, found = local_wear(run, 0.02), local_wear(run, 0.02, patches="exact", scene=scene)
     for wheel, ellipse in over_ellipses.items():
         exact = found[wheel]
-        assert exact.work == pytest.approx(ellipse.work, rel=0.02)
+        assert exact.work == pytest.approx(ellipse.work, rel=1e-9)  # both are the run's own
         assert exact.volume == pytest.approx(ellipse.volume, rel=0.02)
         radius = run["wheelset"].z_m.mean()
         assert np.sum(exact.wheel_depth) * BIN * 2.0 * np.pi * radius == pytest.approx(exact.volume, rel=1e-3)
@@ -266,11 +267,43 @@ def test_exact_patches_work_where_a_uniform_grid_says():
     np.testing.assert_allclose(shares[1], shares[-1], atol=0.06)
 
 
+def test_mirrored_scenes_wear_mirrored_wheels_on_exact_patches():
+    moved = {y: {"initial.y": y, "initial.yaw": y, "integration.duration": 0.03} for y in (0.0066, -0.0066)}
+    (one, run), (other, mirrored) = (exact_run(**changes) for changes in moved.values())
+    left = local_wear(run, patches="exact", scene=one)["wheelset", "left"]
+    right = local_wear(mirrored, patches="exact", scene=other)["wheelset", "right"]
+    assert right.volume == pytest.approx(left.volume, rel=1e-3)
+    lost = [np.cumsum(wear.wheel_depth) / np.sum(wear.wheel_depth) for wear in (left, right)]
+    np.testing.assert_allclose(left.wheel_edges, right.wheel_edges, atol=1e-12)
+    np.testing.assert_allclose(lost[0], lost[1], atol=2e-3)  # two runs, whose steps are not mirrored to the bit
+
+
+def test_a_patch_on_a_grid_wears_where_its_strips_do(monkeypatch):
+    scene, run = exact_run(**{"integration.duration": 0.02})
+    strips = local_wear(run, patches="exact", scene=scene)["wheelset", "right"]
+    at = WheelInRun.at
+
+    def on_grids(wheel, i):
+        wheel._wheels.always = True
+        return at(wheel, i)
+
+    monkeypatch.setattr(WheelInRun, "at", on_grids)
+    grids = local_wear(run, patches="exact", scene=scene)["wheelset", "right"]
+    assert grids.work == pytest.approx(strips.work, rel=1e-9)  # the run's own
+    middles = []
+    for wear in (strips, grids):
+        for edges, depth in ((wear.wheel_edges, wear.wheel_depth), (wear.rail_edges, wear.rail_depth)):
+            middles.append(0.5 * (edges[1:] + edges[:-1]) @ depth / depth.sum())
+    assert middles[:2] == pytest.approx(middles[2:], abs=5e-4)
+
+
 def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
-    scene, run = exact_run(**{"contact.patch": "moment"})
+    scene, run = exact_run(**{"contact.patch": "moment", "integration.duration": 0.02})
     with pytest.raises(InputError, match=r"contact.patch: expected exact or tabulated where patches are exact.*moment"):
         local_wear(run, patches="exact", scene=scene)
-    exact = load_scene(scene, {"contact.patch": "exact"})
+    with pytest.raises(InputError, match="local_wear: scene: expected that of the run, but contact of it differ"):
+        local_wear(run, patches="exact", scene=load_scene(scene, {"contact.patch": "exact"}))
+    exact, run = exact_run(**{"integration.duration": 0.02})
     for law in ({"t_gamma": [[0, 0], [100, 1e-12]]}, "braghin"):
         with pytest.raises(InputError, match=r"local_wear: law: expected"):
             local_wear(run, law=law, patches="exact", scene=exact)

@@ -1,7 +1,8 @@
 """Exact contact at the output times of a run, whatever its own patches were: ``wr.patch_in_run``.
 
 Where a wheel lay on its rail and how it moved there are the channels ``wheel_motion``; of the run's contact the wheel
-keeps the sum of its normal forces: it is raised or lowered until its exact patches carry that.
+keeps the sum of its normal forces: it is raised or lowered until its exact patches carry that (where no height does, as
+they step by more, it stays).
 """
 
 from __future__ import annotations
@@ -23,8 +24,14 @@ from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene, Source, scene_of
 from wrcore.scene.friction import read_friction
 
+PARTS = "vehicle", "wheel", "rail", "track", "contact"
+"""Of a scene, on which contact hangs."""
+
 CARRIED = 1e-3
 """Relative error of F^(2/3) that ends the search for a height."""
+
+ROUNDING = 1e-9
+"""Of times, s."""
 
 
 class WheelInRun:
@@ -33,7 +40,8 @@ class WheelInRun:
     An InputError where the run has no ``wheel_motion``, or rails or wheels that change along the track or the rim.
     """
 
-    def __init__(self, run: Run, scene: Scene, wheelset: str, side: str, resolution: str, asker: str) -> None:
+    def __init__(self, run: Run, scene: Source | None, wheelset: str, side: str, resolution: str, asker: str) -> None:
+        scene = scene_in_run(run, scene, asker)
         wheel = run.groups.get(f"{wheelset}/{side}", {})
         if not {*ON_RAIL, "N_N"} <= wheel.keys():
             expected = f"expected contact and wheel_motion among them for the exact patches of {wheelset}/{side}"
@@ -61,8 +69,19 @@ class WheelInRun:
             rest = max(force, 0.0) ** (2.0 / 3.0) - goal
             return 0.0 if abs(rest) < CARRIED * goal else rest
 
-        z = height_of_zero(excess, m.z) if goal else np.nan
-        return [] if np.isnan(z) else self._wheels.in_motion(m._replace(z=z), fields=True)
+        if not goal:
+            return []
+        z = height_of_zero(excess, m.z)
+        return self._wheels.in_motion(m if np.isnan(z) else m._replace(z=z), fields=True)
+
+
+def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:
+    """The scene of a run; an InputError in the name of the ``asker`` for one that differs in what contact hangs on."""
+    scene = scene_of(run, scene, asker)
+    other = [part for part in PARTS if scene.data.get(part) != run.scene.get(part)]
+    if other:
+        raise InputError(asker, "scene", f"expected that of the run, but {' and '.join(other)} of it differ")
+    return scene
 
 
 @checked
@@ -98,21 +117,22 @@ def patch_in_run(
     Raises
     ------
     InputError
-        For a time beyond the run, a wheel that it does not have, missing channels, and rails or wheels that change
-        along the track or the rim.
+        For a time beyond the run, a wheel that it does not have, missing channels, another scene than the run's, and
+        rails or wheels that change along the track or the rim.
 
     Examples
     --------
     >>> import wrcore as wr
-    >>> scene = wr.example("suspended_wheelset")
-    >>> run = wr.simulate(scene, integration__duration=0.1, output__channels=["pose", "contact", "wheel_motion"])
+    >>> channels = {"output.channels": ["pose", "contact", "wheel_motion"], "integration.duration": 0.1}
+    >>> scene = wr.load_scene(wr.example("suspended_wheelset"), channels)
+    >>> run = wr.simulate(scene)
     >>> (tread,) = wr.patch_in_run(run, 0.05, "wheelset", scene=scene)
     >>> round(1e-3 * tread.normal), tread.side
     (54, 'left')
     """
-    if not len(run.t) or not run.t[0] <= t <= run.t[-1]:
+    if not len(run.t) or not run.t[0] - ROUNDING <= t <= run.t[-1] + ROUNDING:
         raise InputError("patch_in_run", "t", f"expected a time of the run, got {t:g} s")
     if wheelset not in run.groups or f"{wheelset}/{side}" not in run.groups:
         raise InputError("patch_in_run", "wheelset", f"expected a wheelset of the run with contacts, got {wheelset!r}")
-    wheel = WheelInRun(run, scene_of(run, scene, "patch_in_run"), wheelset, side, resolution, "patch_in_run")
+    wheel = WheelInRun(run, scene, wheelset, side, resolution, "patch_in_run")
     return [found.patch for found in wheel.at(int(np.argmin(np.abs(run.t - t))))]

@@ -81,7 +81,7 @@ class Found(NamedTuple):
     patch: Patch = None
     """With its fields, where the model has them and they were asked for."""
     places: np.ndarray = None
-    """(3, strips): places of its strips' middles on the wheel's and the rail's profile, and their lateral widths, m."""
+    """(2, 2, strips): both ends of its strips on the wheel's and on the rail's profile, m."""
     on_grid: bool = False
     on_fixed: bool = False
     """Whether a grid, or fixed strips, stood in."""
@@ -221,12 +221,16 @@ class LoadedWheels:
             elif fields is not None and (self.always or on_grid):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
-                has = (self._fields(out[0], found.load, pose, friction), self._places()) if fields else (None, None)
+                back = left.vx < 0.0
+                has = self._fields(out[0], found.load, pose, friction, back), self._places() if fields else None
+                has = has if fields else (None, None)
                 yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, *has, on_fixed=on_fixed)
             first = last
 
-    def _fields(self, row, load, pose, friction):
-        """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid."""
+    def _fields(self, row, load, pose, friction, back):
+        """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid; a wheel that rolls
+        ``back`` was solved turned round."""
+        turn = -1.0 if back else 1.0
         work, settings, sign = self._work, self._still.strips, SIDES[pose[0]]
         count, slender, _ = work.solved
         rolling, library = (work.slender, settings.slender) if slender else (work.rolling, settings.library)
@@ -237,13 +241,13 @@ class LoadedWheels:
         centre, width, half, middle, window = work.strips[list(rows), :count]
         even = solve.even_length(half, width, window)  # strips as rectangles with the areas they have
         longer = load / work.sums[solve.LOAD] * (half / even)[:, None]
-        edges = middle[:, None] + even[:, None] * library.panels.edges
+        edges = middle[:, None] + turn * even[:, None] * library.panels.edges
         like, mean_x, mean_s = np.ones(pressure.shape), work.sums[solve.MEAN_X], work.sums[solve.MEAN_S]
         slips = slides > 0.0
         cells = (
             0.5 * (edges[:, 1:] + edges[:, :-1]) - mean_x, sign * like * (centre - mean_s)[:, None],
-            edges[:, :-1] - edges[:, 1:], like * width[:, None], pressure * longer, tx * longer, sign * ts * longer,
-            np.where(slips, sx, 0.0), np.where(slips, sign * ss, 0.0), ~slips,
+            turn * (edges[:, :-1] - edges[:, 1:]), like * width[:, None], pressure * longer, tx * longer,
+            turn * sign * ts * longer, np.where(slips, sx, 0.0), np.where(slips, turn * sign * ss, 0.0), ~slips,
         )  # fmt: skip
         s_ends = sorted(sign * (work.sums[k] - mean_s) for k in (solve.S_MIN, solve.S_MAX))
         ends = (*(work.sums[k] - mean_x for k in (solve.X_MIN, solve.X_MAX)), *s_ends)
@@ -255,14 +259,22 @@ class LoadedWheels:
         )  # fmt: skip
 
     def _places(self):
-        """`Found.places` of the strips solved last."""
-        count, gap = self._work.solved[0], self._work.normal.gap
-        own, rail, (centre, width) = gap[:count, U], gap[:count, UR], self._work.strips[:2, :count]
-        return np.array([own, rail, width * (rail[-1] - rail[0]) / (centre[-1] - centre[0])])
+        """`Found.places` of the strips solved last: their places are those of their middles, the ends lie between."""
+        count = self._work.solved[0]
+        centre, width = self._work.strips[:2, :count]
+        known = np.r_[centre[0] - width[0], centre, centre[-1] + width[-1]]
+        ends = centre + 0.5 * np.array([-width, width])
+        found = []
+        for u in self._work.normal.gap[:count, [U, UR]].T:
+            first, last = (u[1] - u[0]) / (centre[1] - centre[0]), (u[-1] - u[-2]) / (centre[-1] - centre[-2])
+            found.append(np.interp(ends, known, np.r_[u[0] - first * width[0], u, u[-1] + last * width[-1]]))
+        return np.array(found)
 
     def _on_grid(self, row, left, first, last, pose, motion, friction):
         """`Found` of a patch on grids, in the plane of its overlaps; the creepages are those of the strips."""
         side, y, z, roll, yaw = pose
+        if left.vx < 0.0:
+            raise InputError("contact", "motion", "expected a wheel that rolls ahead where strips find no solution")
         sign, depth = SIDES[side], self._rows[first:last, PENETRATION].max()
         frame = frame_of_overlaps(self.geometry, make_pose(*left[:6], self.spatial), self._rows, first, last)
         angle = sign * math.atan2(frame.sine, frame.cosine)

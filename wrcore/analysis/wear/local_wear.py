@@ -3,7 +3,8 @@
 Over each patch of each output time FASTSIM says where friction works: q = tau s, the tangential traction times the
 local slip, N/m^2, per metre rolled. Scaled by one factor a patch, its integral is the creep work of the run's own
 forces and creepages (:mod:`wrcore.run.derived`). Or the real patch says it, solved exactly where the wheel was and as
-it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend. A wear law
+it moved (:mod:`wrcore.analysis.contact.in_run`), strip by strip along both profiles, however these bend, scaled by one
+factor a wheel. A wear law
 (:mod:`wrcore.analysis.wear.wear_laws`) turns q into what is lost per metre rolled and area of contact.
 
 A wheel meets a patch once a revolution, a rail once a passage. A strip of the patch across which q is known thus takes
@@ -24,16 +25,16 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from wrcore.analysis.assessment.wheels import late_in, way_shares, wheelsets_of
-from wrcore.analysis.contact.in_run import WheelInRun
+from wrcore.analysis.contact.in_run import WheelInRun, scene_in_run
 from wrcore.analysis.contact.loaded import GRIDS
 from wrcore.analysis.wear.wear_laws import DENSITY, LAWS, Sliding, check_friction, wear_law
 from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
-from wrcore.run.derived import rolling_speed
+from wrcore.run.derived import creep_work, rolling_speed
 from wrcore.run.run import Run
-from wrcore.scene.description import Scene, Source, scene_of
+from wrcore.scene.description import Scene, Source
 from wrcore.scene.friction import read_friction
 
 PATCHES = "ellipse", "exact"
@@ -132,7 +133,7 @@ def local_wear(
     check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
     over = partial(_on_ellipses, run, late, loss)
     if patches == "exact":
-        own = scene_of(run, scene, "local_wear")
+        own = scene_in_run(run, scene, "local_wear")
         over = partial(_on_exact_patches, run, late, law_on_cells(law, own, "local_wear"), own, resolution)
     return {(name, side): _wheel_wear(run, name, late, over(name, side), width) for name, side in wheels}
 
@@ -165,6 +166,8 @@ class Strips(NamedTuple):
 
 NOTHING = Strips(np.zeros(0, int), np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0), np.zeros(0))
 """Of a wheel in the air."""
+
+_WORKING = "Fx_N", "Fy_N", "Mz_Nm", "xi", "eta", "phi_per_m"
 
 
 def _wheel_wear(run, name, late, strips, width):
@@ -202,14 +205,17 @@ def _on_ellipses(run, late, loss, name, side):
 def _on_exact_patches(run, late, law, scene, resolution, name, side):
     """`Strips` of the exact patches of a wheel, by a law over friction's work."""
     solved, parts = WheelInRun(run, scene, name, side, resolution, "local_wear"), []
+    known = creep_work(*(run[f"{name}/{side}"][part] for part in _WORKING))[2]
     for time, i in enumerate(np.flatnonzero(late).tolist()):
-        for patch, places in ((found.patch, found.places) for found in solved.at(i)):
+        found = solved.at(i)
+        total = sum(float(one.patch.friction_work @ one.patch.cell_area) for one in found)
+        for patch, places in ((one.patch, one.places) for one in found if total > 0.0):
             if places is None:  # on a grid, whose plane is flat
                 places = _on_plane(patch, run[f"{name}/{side}"], i)
-            own, rail, width = places
-            area, work, half = patch.cell_area, patch.friction_work, 0.5 * np.array([-width, width])
-            amounts = (np.sum((q * area).reshape(len(own), -1), axis=1) for q in (law(work) / DENSITY, work))
-            parts.append(Strips(np.full(len(own), time), own + half, rail + half, *amounts))
+            area, work = patch.cell_area, patch.friction_work * max(known[i], 0.0) / total
+            count = places.shape[-1]
+            amounts = (np.sum((q * area).reshape(count, -1), axis=1) for q in (law(work) / DENSITY, work))
+            parts.append(Strips(np.full(count, time), *places, *amounts))
     return Strips(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))) if parts else NOTHING
 
 
@@ -253,9 +259,8 @@ def _on_plane(patch, contact, i):
     """As `Found.places` of the cells of a grid, about the patch of the run at the i-th output time that leans as it."""
     k, outwards = int(np.nanargmin(np.abs(contact["contact_angle_rad"][i] - patch.contact_angle))), SIDES[patch.side]
     aside = outwards * (patch.s - patch.centroid[1]) * np.cos(patch.contact_angle)
-    return np.array([
-        contact["u_wheel_m"][i, k] + aside, contact["u_rail_m"][i, k] + aside, patch.ds * np.cos(patch.contact_angle)
-    ])  # fmt: skip
+    ends = aside + 0.5 * np.cos(patch.contact_angle) * np.array([-patch.ds, patch.ds])
+    return np.array([contact[f"u_{own}_m"][i, k] + ends for own in ("wheel", "rail")])
 
 
 def _gathered(low, high, amount, width):
