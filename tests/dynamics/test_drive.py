@@ -11,6 +11,7 @@ from tests.dynamics.test_system import body_state, contact, make_model, run  # n
 from wrcore.dynamics.drive import BRAKE, GRIP, MOTOR, TIME, no_drive, undriven
 from wrcore.dynamics.energy import energy_balance
 from wrcore.dynamics.schedule import pack_schedules, scheduled
+from wrcore.dynamics.series import with_kernels_of
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
@@ -37,6 +38,20 @@ def turning(contact, kind, table):  # noqa: F811
     model = make_model(contact, [50.0, 80.0], [[30.0, 20.0, 30.0], [40.0, 60.0, 50.0]], gravity=0.0)
     rows = np.array([[0, 1, 0, kind, 0, TIME, 0]])
     return model._replace(drive=no_drive()._replace(rows=rows, lever=np.ones(1), tables=pack_schedules([table])))
+
+
+def test_what_is_planned_for_equations_is_found_once_and_anew_for_another_drive(contact):  # noqa: F811
+    model, seen = turning(contact, MOTOR, np.array([[0.0, 1.0]])), []
+
+    def plan(model):
+        seen.append(tuple(model.drive.rows[0]))
+        return len(seen)
+
+    equations = Equations(model)
+    assert equations.planned(plan) == equations.planned(plan) == 1
+    other = model._replace(drive=model.drive._replace(rows=np.array([[1, 0, 0, MOTOR, 0, TIME, 0]])))
+    equations.turn_to(with_kernels_of(other, equations.arguments[1].value))
+    assert equations.planned(plan) == 2 and seen[0] != seen[1]
 
 
 def test_a_brake_stops_two_bodies_like_the_closed_solution(contact):  # noqa: F811

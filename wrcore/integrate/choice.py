@@ -185,7 +185,7 @@ def power_method(model, equations, t, state):
     return _grow, (np.empty(PASSES), _disturbances(model, state), direction, scratch, t, state, *equations.arguments)
 
 
-@jit(allocates=False)
+@jit(allocates=False, nogil=True)
 def _grow(growths, unit, direction, scratch, t, state, equations, model, work):
     base, there, rate = scratch[0], scratch[1], scratch[2]
     derivatives_at(equations, t, state, model, work, base, ELLIPSES)
