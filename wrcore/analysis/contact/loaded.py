@@ -221,10 +221,11 @@ class LoadedWheels:
             elif fields is not None and (self.always or on_grid):
                 yield self._on_grid(out[0].copy(), left, first, last, pose, motion, friction)._replace(slip=found.xi)
             else:
-                back = left.vx < 0.0
-                has = self._fields(out[0], found.load, pose, friction, back), self._places() if fields else None
-                has = has if fields else (None, None)
-                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, *has, on_fixed=on_fixed)
+                has = {"on_fixed": on_fixed}
+                if fields:
+                    has |= {"patch": self._fields(out[0], found.load, pose, friction, left.vx < 0.0)}
+                    has |= {"places": self._places()}
+                yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, **has)
             first = last
 
     def _fields(self, row, load, pose, friction, back):
