@@ -17,6 +17,6 @@ def test_depths_are_put_onto_one_profile():
 def test_the_picture_has_a_row_per_scene_and_both_ways():
     ways = {patches: [(1e-11 * np.exp(-((U / 0.01) ** 2)), 1e-12, 0.1)] * 2 for patches in PATCHES}
     figure = figure_of({"straight": ways, "R 800 m": ways})
-    assert len(figure.axes) == 4 and figure.axes[0].get_ylabel() == "depth / µm per 1000 km"
+    assert len(figure.axes) == 4 and figure.get_supylabel() == "depth / µm per 1000 km"
     assert [line.get_label() for line in figure.axes[0].lines] == list(PATCHES)
     assert figure.axes[0].lines[0].get_ydata().max() == 1e12 * ways["ellipse"][0][0].max()

@@ -54,7 +54,7 @@ def figure_of(found):
                 one.plot(1e3 * U, 1e12 * ways[patches][k][0], line, label=patches)
             one.set_title(f"{name}, {side}", fontsize="small")
             one.set_xlim(-45.0, 25.0)
-        axes[0].set_ylabel("depth / µm per 1000 km")
+    figure.supylabel("depth / µm per 1000 km", fontsize="medium")
     for one in rows[-1]:
         one.set_xlabel("u, to the field side / mm")
     rows[0, 0].legend()
