@@ -33,6 +33,7 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
 from wrcore.run.derived import creep_work, rolling_speed
+from wrcore.run.progress import counted
 from wrcore.run.run import Run
 from wrcore.scene.description import Scene, Source
 from wrcore.scene.friction import read_friction
@@ -135,6 +136,7 @@ def local_wear(
     if patches == "exact":
         own = scene_in_run(run, scene, "local_wear")
         over = partial(_on_exact_patches, run, late, law_on_cells(law, own, "local_wear"), own, resolution)
+        wheels = counted(wheels, unit="wheel")
     return {(name, side): _wheel_wear(run, name, late, over(name, side), width) for name, side in wheels}
 
 
