@@ -3,7 +3,7 @@
 WEAR = config["wear"]
 CORE["wear"] = CORE["simulation"] + sources(
     "analysis/wear/evolve", "analysis/wear/worn_profiles", "analysis/wear/worn_rails", "analysis/wear/local_wear", "analysis/wear/wear_laws",
-    "analysis/pictures/plot_wear", *VEHICLE, *STYLE, "study/wear"
+    "analysis/contact/in_run", "analysis/contact/loaded", "analysis/pictures/plot_wear", *VEHICLE, *STYLE, "study/wear"
 )  # fmt: skip
 
 
