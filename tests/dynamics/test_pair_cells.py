@@ -37,8 +37,8 @@ def test_finer_steps_where_a_cell_is_too_coarse():
 
 def test_a_node_of_several_lattices_is_solved_once():
     nodes = np.array([(4, 25, 243, 2400, 1600, 80), (4, 25, 242, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)])
-    found = pair_cells.coarsest(nodes)
-    assert found.tolist() == [[0, 25, 3, 150, 100, 10], [4, 25, 242, 2400, 1600, 80], [1, 25, 3, 300, 201, 9]]
+    found = [pair_cells.node_of(code) for code in pair_cells.node_codes(nodes).tolist()]
+    assert found == [(0, 25, 3, 150, 100, 10), (4, 25, 242, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)]
     for one, other in zip(nodes, found, strict=True):
         assert pair_solver.place_of(*one) == pair_solver.place_of(*other)
 

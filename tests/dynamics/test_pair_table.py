@@ -601,6 +601,17 @@ def test_nodes_of_the_package_are_those_of_today(own_cache, monkeypatch):
     assert not shipped_pair(**{"contact.friction": 0.29})._known
 
 
+def test_cells_of_the_package_count_as_no_time_of_solving(own_cache, monkeypatch):
+    """However many are put together, no line says that any is solved."""
+    monkeypatch.undo()
+    monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    pair = shipped_pair()
+    for key in [key for key, (_, state) in pair._known.items() if state > 0][:20]:
+        pair._fill(key)
+    assert pair._ready >= 10 and pair._spent == 0.0
+
+
 @pytest.mark.parametrize("name, speed", [
     ("suspended_wheelset", 60.0), ("trailer_vehicle", 50.0), ("freight_wagon_empty", 20.0),
     ("freight_wagon_laden", 20.0), ("metro_car", 30.0),

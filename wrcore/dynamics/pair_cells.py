@@ -74,24 +74,24 @@ def steps_of(level):
 
 
 PART_CODE = 512 * 8192 * 8192 * 512
-"""What one part of the profile more adds to a `node_code`."""
+"""What one part of the profile more adds to one of `node_codes`."""
 
 
-def node_code(level, part, turn, i, j, k):
-    """One number for a node; in yaw it lies in the middle of a cell (odd) or at its end. `node_of` reads it."""
-    return (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
-
-
-def coarsest(nodes):
-    """Nodes (n, 6), see `node_code`, each in the coarsest lattice that has it."""
-    nodes = nodes.copy()
-    for level in range(nodes[:, 0].max(), 0, -1):
-        deep, thirds = 2 ** (HALVED[level] - HALVED[level - 1]), 3 ** (THIRDS[level] - THIRDS[level - 1])
-        ratios = np.array([thirds, 2, 2, deep])
-        coarser = (nodes[:, 0] == level) & (nodes[:, 2:] % ratios == 0).all(axis=1)
-        nodes[coarser, 2:] //= ratios
-        nodes[coarser, 0] -= 1
-    return nodes
+@jit
+def node_codes(nodes):
+    """One number for each node (n, 6): level, part of the profile, place in yaw, where it lies in the middle of a cell
+    (odd) or at its end, and in the lattice. `node_of` reads it. A node counts as one of the coarsest lattice that has
+    it."""
+    codes = np.empty(len(nodes), np.int64)
+    for n in range(len(nodes)):
+        level, part, turn, i, j, k = nodes[n]
+        while level > 0:
+            deep, thirds = 2 ** (HALVED[level] - HALVED[level - 1]), 3 ** (THIRDS[level] - THIRDS[level - 1])
+            if turn % thirds or i % 2 or j % 2 or k % deep:
+                break
+            level, turn, i, j, k = level - 1, turn // thirds, i // 2, j // 2, k // deep
+        codes[n] = (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
+    return codes
 
 
 def node_of(code):

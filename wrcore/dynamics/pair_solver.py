@@ -23,9 +23,8 @@ from wrcore.dynamics.pair_cells import (
     YAW,
     YAWS,
     Place,
-    coarsest,
     corner_of,
-    node_code,
+    node_codes,
     node_of,
     steps_of,
 )
@@ -55,11 +54,11 @@ class PairSolver:
         return Handle(self.contact._replace(strips=with_tables(self.contact.strips)))
 
     def _numbers(self, nodes):
-        """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_cells.node_code`, solved side by
+        """Numbers (n, NUMBERS) of nodes (n, 6) of one part, see `wrcore.dynamics.pair_cells.node_codes`, solved side by
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
-        first, codes = nodes[0, 1].item(), node_code(*coarsest(nodes).T).tolist()
+        first, codes = nodes[0, 1].item(), node_codes(nodes).tolist()
         parts = self._parts_of(codes)
         keys = [code + (part - first) * PART_CODE for code, part in zip(codes, parts, strict=True)]
         new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
@@ -94,7 +93,8 @@ class PairSolver:
         lost = np.isnan(own[:, 0])
         if lost.sum() > (4 if level + 1 == LEVELS else 0):
             return None
-        own[lost] = own[~lost].mean(axis=0)
+        if lost.any():
+            own[lost] = own[~lost].mean(axis=0)
         beyond = self._numbers(nodes_at(*where, _BEYOND + first))
         alone = np.isnan(beyond[:, 0])
         beyond[alone] = 2.0 * own[_NEAR[alone]] - own[_ACROSS[alone]]
@@ -111,7 +111,7 @@ class PairSolver:
         yawed = rows[32:].reshape(8, 2, NUMBERS)
         yawed[:, 0], yawed[:, 1] = right - left, left + right - 2.0 * middle
         lost = np.isnan(yawed[..., 0]).any(axis=1)
-        if lost.sum() <= 4:
+        if 0 < lost.sum() <= 4:
             yawed[lost] = yawed[~lost].mean(axis=0)
         return not np.isnan(rows[:, 0]).any()
 

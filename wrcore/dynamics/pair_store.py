@@ -26,10 +26,9 @@ from wrcore.dynamics.pair_cells import (
     HARD,
     LEVELS,
     THIRDS,
-    coarsest,
     corner_of,
     key_of,
-    node_code,
+    node_codes,
     steps_of,
 )
 from wrcore.dynamics.pair_solver import CORNERS, UNKNOWN, PairSolver, nodes_at
@@ -103,7 +102,8 @@ class Pair(PairSolver):
                 if own != key and own in self.cells:
                     self._others.add(key)
                     self._list(key, self.cells[own])
-            self._spent += time.monotonic() - begin
+            if key not in self._known:
+                self._spent += time.monotonic() - begin
             if time.monotonic() > self._next_written:
                 self.write()
 
@@ -112,7 +112,7 @@ class Pair(PairSolver):
         corners. So cells of neighbouring parts are one."""
         level, part, turn, *first = corner_of(key)
         corners = nodes_at(level % LEVELS, part, 2 * turn + 1, CORNERS + first)
-        own = sorted(one % BESIDE for one in self._parts_of(node_code(*coarsest(corners).T).tolist()))[4]
+        own = sorted(one % BESIDE for one in self._parts_of(node_codes(corners).tolist()))[4]
         return key_of(level, own + part // BESIDE * BESIDE, turn, *first)
 
     def _solved(self, key):
