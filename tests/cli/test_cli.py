@@ -159,3 +159,11 @@ def test_a_shell_that_completes_is_handed_the_parser(monkeypatch, capsys):
     assert main(["profiles"]) == 0 and asked == []
     monkeypatch.setenv("_ARGCOMPLETE", "1")
     assert main(["profiles"]) == 0 and [whole.prog for whole in asked] == ["wrcore"]
+
+
+def test_a_reader_that_has_enough_ends_it_without_a_word():
+    """As ``wrcore keys scene | head`` does."""
+    command = [sys.executable, "-m", "wrcore", "keys", "scene"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT) as running:
+        running.stdout.close()
+        assert running.stderr.read() == b"" and running.wait() == 141

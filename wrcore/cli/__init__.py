@@ -7,6 +7,7 @@ what was expected.
 import os
 import sys
 from contextlib import suppress
+from signal import SIGPIPE
 
 from wrcore import __version__
 from wrcore.cli import (
@@ -66,10 +67,15 @@ def main(arguments=None):
             argcomplete.autocomplete(whole)
     try:
         options = whole.parse_args(arguments)
-        return options.run(options)
+        status = options.run(options)
+        sys.stdout.flush()
+        return status
     except InputError as error:
         print(f"wrcore: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # who reads has enough, as ``head`` has; nothing more is written when Python ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + SIGPIPE
     except OSError as error:  # a disk that fills up, a file that goes away
         print(f"wrcore: {InputError(error.filename or '', '', error.strerror or error)}", file=sys.stderr)
         return 2

@@ -24,6 +24,12 @@ def digest_of_file(path: str | os.PathLike[str]) -> str:
         return ""
 
 
+def digest_of_all(digests: Mapping[str, str]) -> str:
+    """One digest of several files' names and digests, by path, wherever they lie; empty of none."""
+    each = sorted(f"{os.path.basename(path)} {digest}" for path, digest in digests.items())
+    return hashlib.sha256("\n".join(each).encode()).hexdigest() if each else ""
+
+
 def check_unchanged(digests: Mapping[str, str]) -> None:
     """InputError for the first file, of several by path, that no longer is what its digest says."""
     for path, digest in digests.items():

@@ -23,6 +23,7 @@ from wrcore.dynamics.system import Equations, Model, independent_at, workspace
 from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
+from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.irregularity import irregularity_end
 from wrcore.geometry.track import SIDES
 from wrcore.integrate.integrator import integrate, needed_last
@@ -152,7 +153,7 @@ class Simulation:
         scene, settings = self.scene, self.scene.data["integration"]
         counters = counters_of(trajectory, begin) | {"compile_s": compiled}
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
-        record["method_used"] = trajectory.method
+        record |= {"method_used": trajectory.method, "files_sha256": digest_of_all(scene.files)}
         end = trajectory.end and replace(trajectory.end, model=self.mark)
         return Run(
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,

@@ -113,6 +113,17 @@ def test_scenes_that_do_not_ask_have_none_of_its_channels():
     assert not set(ON_RAIL) & run["wheelset/left"].keys()
 
 
+def test_a_profile_that_was_edited_since_is_refused(tmp_path):
+    profile, u = tmp_path / "wheel.csv", np.linspace(-0.06, 0.04, 201)
+    points = np.column_stack([u, load_scene(SCENES / "suspended_wheelset.yaml").wheel(u)])
+    np.savetxt(profile, points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
+    scene, run = run_of({"contact.patch": "moment", "wheel.profile": str(profile)})
+    assert patch_in_run(run, 0.0, "wheelset", scene=load_scene(scene))
+    profile.write_text(profile.read_text() + "\n")
+    with pytest.raises(InputError, match="patch_in_run: scene: expected the files of the run, but of .*wheel.csv"):
+        patch_in_run(run, 0.0, "wheelset", scene=load_scene(scene))
+
+
 def test_refusals():
     scene, run = run_of({"contact.patch": "moment", "output.channels": ["pose", "contact"]})
     other = load_scene(scene, {"rail.inclination": "1/20"})

@@ -18,6 +18,7 @@ from wrcore.contact.statics import height_of_zero
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
+from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.track import SIDES
 from wrcore.run.run import Run
 from wrcore.run.simulation import ON_RAIL
@@ -81,6 +82,9 @@ def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:
     other = [part for part in PARTS if scene.data.get(part) != run.scene.get(part)]
     if other:
         raise InputError(asker, "scene", f"expected that of the run, but {' and '.join(other)} of it differ")
+    if digest_of_all(scene.files) != run.settings.get("files_sha256", ""):
+        expected = f"expected the files of the run, but of {', '.join(scene.files)} some hold something else now"
+        raise InputError(asker, "scene", expected)
     return scene
 
 
