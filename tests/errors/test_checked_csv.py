@@ -37,3 +37,9 @@ def test_files_of_any_editor(read, content):
 def test_other_files_are_one_clear_line(read, content, says):
     with pytest.raises(InputError, match=says):
         read(content)
+
+
+def test_names_are_text_whatever_they_say(read):
+    frame = read("y_m,pose_id\nNA,NA\n0,null\n,\n1\n")
+    assert frame["pose_id"].tolist() == ["NA", "null", "", ""]
+    assert frame["y_m"].isna().tolist() == [True, False, True, False]

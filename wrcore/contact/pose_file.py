@@ -31,7 +31,7 @@ def read_poses(path):
             raise InputError(path, name, f"unknown column; expected {', '.join(known)}")
     if frame.empty:
         raise InputError(path, "", "expected at least one pose, got none")
-    _refuse(path, frame, "pose_id", frame["pose_id"].isna(), "any text")
+    _refuse(path, frame, "pose_id", frame["pose_id"] == "", "any text")
     _refuse(path, frame, "pose_id", frame["pose_id"].duplicated(), "an id that no row before has")
     for name, limit in limits.items():
         if name not in frame:
@@ -53,7 +53,10 @@ def read_poses(path):
 
 def _refuse(path, frame, name, bad, expected):
     """Name the first row that is bad."""
+    import pandas as pd
+
     if bad.any():
         row = int(np.argmax(bad.to_numpy()))
-        given = "nothing" if frame[name].isna().iloc[row] else repr(str(frame[name].iloc[row]))
+        given = frame[name].iloc[row]
+        given = "nothing" if pd.isna(given) or given == "" else repr(str(given))
         raise InputError(path, f"{name}, row {row + 1}", f"expected {expected}, got {given}")
