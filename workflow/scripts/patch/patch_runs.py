@@ -9,7 +9,7 @@ sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
 settings, source = snakemake.params.settings, snakemake.input.scene
 table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
 changes = snakemake.params.overrides
-own = any(change.startswith("contact.creep.tolerance=") for change in changes)  # builds, or finds, a table of its own
+own = any(change.startswith("contact.creep.planes=") for change in changes)  # builds, or finds, a table of its own
 row = model_runs(
     source, [*([] if own else [f"contact.creep.table={table}"]), *changes], **settings, start=snakemake.params.start
 )
