@@ -330,20 +330,21 @@ def announce(text):
 
 
 def _creep(scene, progress):
-    """Data of the scene's creep law; only the law ``table`` and patches that are looked up load (or build) a table.
+    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table.
 
     What is looked up lies beside one creep table, whichever the scene names: that for which nodes come with the
     package."""
     contact = scene.data["contact"]
     creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
     factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
-    if creep["model"] != "table" and contact["patch"] != "tabulated":
+    if creep["model"] != "table":
         law = None if creep["model"] in LAWS else own_law(creep["model"], Path(scene.source).parent)
         return creep_data(nu, factors=factors, law=law)
-    if "table" in creep and contact["patch"] != "tabulated":
+    looked_up = contact["patch"] == "tabulated"
+    if "table" in creep and not looked_up:
         table = load_table(creep["table"])
     else:
-        tolerance = DEFAULT_TOLERANCE if contact["patch"] == "tabulated" else creep["tolerance"]
+        tolerance = DEFAULT_TOLERANCE if looked_up else creep["tolerance"]
         if not kept_tables(nu, creep["planes"], tolerance):
             announce(f"building a creep table ({creep['planes']}, {tolerance:g}): some ten seconds, once")
         table = ensure_table(nu, creep["planes"], tolerance, progress)
