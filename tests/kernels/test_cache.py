@@ -188,3 +188,9 @@ def test_a_cached_table_is_what_its_name_says(wanted, monkeypatch, capsys, damag
 
 
 original = table_module.build_table
+
+
+def test_numba_without_compilation_is_one_clear_line():
+    command = [sys.executable, "-c", "import wrcore.kernels.jit"]
+    done = subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True)
+    assert "NUMBA_DISABLE_JIT: expected it unset: kernels hand" in done.stderr.splitlines()[-1]

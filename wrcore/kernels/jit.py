@@ -10,7 +10,11 @@ from numba.core import types
 from numba.extending import intrinsic
 from numba.np import linalg
 
+from wrcore.errors import InputError
 from wrcore.kernels.forms import KernelCache, KernelCompiler, KernelDispatcher
+
+if numba.config.DISABLE_JIT:
+    raise InputError("NUMBA_DISABLE_JIT", "", "expected it unset: kernels hand each other addresses of compiled code")
 
 _ensured, linalg.ensure_blas = linalg.ensure_blas, lambda: None
 from numba.np import arraymath  # noqa: E402, F401  it would import scipy.linalg, a tenth of every start, to see it is there
