@@ -178,7 +178,7 @@ class Pair(PairSolver):
     def _take(self, codes, numbers, parts):
         """Take nodes."""
         self._solved_at = dict(zip(codes.tolist(), numbers, strict=True)) | self._solved_at
-        self._parts = dict(parts.tolist()) | self._parts
+        self._parts = dict(zip(*parts.T.tolist(), strict=True)) | self._parts
 
     def _read(self):
         """Take what the file knows."""

@@ -39,6 +39,8 @@ MET = [
 ]
 """Examples and what is set in them."""
 
+COMPRESSION = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
+
 METHODS = "auto", *CHOICES
 """Of integration: attempts of each meet cells of their own."""
 
@@ -80,7 +82,8 @@ def write(pairs, path):
     with new_hdf5(path) as file:
         for k, pair in enumerate(pairs):
             for name, array in known(pair).items():
-                file.create_dataset(f"{k}/{name}", data=array, compression="gzip", compression_opts=9, shuffle=True)
+                chunks = (len(array), 4) if name == "numbers" else True  # read in half the time of h5py's own choice
+                file.create_dataset(f"{k}/{name}", data=array, chunks=chunks, **COMPRESSION)
 
 
 def main():
