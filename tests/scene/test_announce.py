@@ -1,11 +1,13 @@
 """One line on stderr before work that takes long, terminal or not."""
 
+import time
+
 import pytest
 
 from tests.conftest import SCENES
 from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
-from wrcore.kernels.told import warn_once
+from wrcore.kernels.told import told_if_long, warn_once
 from wrcore.scene import description
 from wrcore.scene.description import _creep, announce, load_scene
 
@@ -45,7 +47,10 @@ def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
 
 def test_no_line_where_none_is_wanted(monkeypatch, capsys):
     monkeypatch.setenv("WRCORE_PROGRESS", "0")
+    monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
     announce("work")
+    with told_if_long("work that takes long"):
+        time.sleep(0.05)
     assert capsys.readouterr().err == ""
 
 

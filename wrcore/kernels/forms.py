@@ -188,15 +188,15 @@ _COMPILING = "compiling, once: about half a minute for a scene of a new kind, a 
 def _rarely_collected():
     """Let Python look for cycles a hundredth as often: what a compiler makes of small objects is alive until it ends,
     and looking took it a tenth of its time. One thread after the other, as they compile: else one would take for usual
-    what another one has set. What takes long is told, but with ``WRCORE_PROGRESS=0``."""
+    what another one has set. What takes long is told."""
     global _compiling
     with global_compiler_lock:
         before = gc.get_threshold()
-        silent = _compiling or os.environ.get("WRCORE_PROGRESS") == "0"
+        within = _compiling > 0
         _compiling += 1
         gc.set_threshold(before[0] and max(before[0], 100_000), *before[1:])
         try:
-            with nullcontext() if silent else told_if_long(_COMPILING):
+            with nullcontext() if within else told_if_long(_COMPILING):
                 yield
         finally:
             gc.set_threshold(*before)

@@ -1,6 +1,7 @@
 """What is said of work that takes long, and of what goes wrong where nothing can be raised."""
 
 import _thread
+import os
 from contextlib import contextmanager
 from functools import cache
 from threading import Timer
@@ -29,7 +30,10 @@ def handed_on(outcome):
 
 @contextmanager
 def told_if_long(text, spent=0.0):
-    """Say a line once what is done takes long, with the time ``spent`` before (s)."""
+    """Say a line once what is done takes long, with the time ``spent`` before (s); none with ``WRCORE_PROGRESS=0``."""
+    if os.environ.get("WRCORE_PROGRESS") == "0":
+        yield
+        return
     timer = Timer(max(PATIENCE - spent, 0.0), warn_once, [text])
     timer.daemon = True
     timer.start()
