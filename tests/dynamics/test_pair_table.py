@@ -686,17 +686,24 @@ def test_each_rail_has_a_table_of_its_own_friction():
 
 
 @pytest.mark.parametrize(
-    ("miss", "state"),
+    ("miss", "state", "coarse"),
     [
-        ((1e-3, 1e-3, 0.02, 0.2), 1),
-        ((4e-3, 1e-3, 0.02, 0.0), -1),
-        ((1e-3, 0.02, 0.02, 0.0), -1),
-        ((1e-3, 1e-3, 0.04, 0.0), -1),
+        ((1e-3, 1e-3, 0.02, 0.2), 1, 1),
+        ((4e-3, 1e-3, 0.02, 0.0), -1, 1),
+        ((1e-3, 0.02, 0.02, 0.0), -1, 1),
+        ((1e-3, 1e-3, 0.04, 0.0), -1, 1),
+        ((0.02, 1e-3, 0.02, 0.0), -1, -1),
+        ((1e-3, 0.04, 0.02, 0.0), -1, -1),
     ],
 )
-def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(own_cache, monkeypatch, miss, state):
+@pytest.mark.parametrize("resolution", ["coarse", "middle", "fine"])
+def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(
+    own_cache, monkeypatch, miss, state, coarse, resolution
+):
     """But for what modes leave, which no lattice mends: that is told only."""
-    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), {"contact.patch": "tabulated"}))
+    state = coarse if resolution == "coarse" else state
+    changes = {"contact.patch": "tabulated", "contact.resolution": resolution}
+    model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), changes))
     monkeypatch.setattr(pair_store.Pair, "_rows_of", lambda *_: np.zeros((48, NUMBERS), np.float32))
     monkeypatch.setattr(pair_store.Pair, "_add_yaw", lambda *_: True)
     monkeypatch.setattr(pair_store.Pair, "_miss", lambda *_: miss)

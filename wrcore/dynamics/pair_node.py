@@ -226,21 +226,18 @@ def solve_place(contact, handle, works, place, points):
     _part_numbers(numbers, sums)
     # what is added to rolling without slip in the mean, over the creepages of saturation
     free = rolling_slip(numbers, place[1], place[3], half, radius, 0.0, 0.0)
-    turning = np.array([free.wx, free.wy, free.wz])
-    c, limit = math.sqrt(a * b), contact.friction * normal
+    c, limit, at_slip = math.sqrt(a * b), contact.friction * normal, tuple(slip)
     kalker = coefficients_at(math.log(a / b), contact.creep.table.kalker)[:2]
     unit = contact.shear_modulus * c * c / limit
 
     def exact_and_table(points, factors):
         """Forces (n, 3) of both, over mu N and mu N c; the table's creepages are those times factors."""
-        creepages = 3.0 * points / (kalker * factors)
-        velocities = np.tile([*([0.0, free.vy, free.vz] - np.cross(turning, slip)), *turning], (len(points), 1))
-        velocities[:, :2] += creepages / (unit * np.array([1.0, cosine]))
-        found = forces_at(velocities)
-        moment, table = found[:, 3:] - np.cross(slip, found[:, :3]), np.zeros((len(points), 3))
-        across, turn = found[:, 1] * cosine + found[:, 2] * sine, moment[:, 2] * cosine - moment[:, 1] * sine
-        base_forces(handle, numbers, place[1], place[3], creepages / unit, factors, limit, table)
-        return np.stack([found[:, 0], across, turn / c], axis=1) / limit, table
+        creepages = 3.0 * points / (kalker * factors * unit)
+        velocities, exact, table = np.empty((len(points), 6)), np.empty((len(points), 3)), np.empty((len(points), 3))
+        slide(free, at_slip, cosine, creepages, velocities)
+        along_normal(forces_at(velocities), at_slip, cosine, sine, c, limit, exact)
+        base_forces(handle, numbers, place[1], place[3], creepages, factors, limit, table)
+        return exact, table
 
     exact, table = exact_and_table(AT_REST, np.ones(2))
     of_exact, of_table = (np.diag(force[[0, 2]] - force[[1, 3]]) for force in (exact, table))
@@ -280,6 +277,30 @@ def rolling_slip(numbers, slope, yaw, half, radius, xi, eta):
     wx, wy, wz = rate * yaw, rate * across, rate * slope
     cosine, sine, rise = math.cos(numbers[columns.ANGLE]), math.sin(numbers[columns.ANGLE]), wx * y - wy * x
     return Slip(xi, eta, wz * cosine - wy * sine, (eta - rise * sine) / cosine, rise, wx, wy, wz)
+
+
+@jit(allocates=False, nogil=True)
+def slide(free, slip, cosine, creepages, velocities):
+    """Fill ``velocities`` (n, 6) of a wheelset at V = 1 m/s: ``free`` (`Slip`) of rolling, with ``creepages`` (n, 2) at
+    the place of the ``slip``."""
+    x, y, z = slip
+    for k in range(len(creepages)):
+        velocities[k, 0] = free.wz * y - free.wy * z + creepages[k, 0]
+        velocities[k, 1] = free.vy + free.wx * z - free.wz * x + creepages[k, 1] / cosine
+        velocities[k, 2] = free.vz + free.wy * x - free.wx * y
+        velocities[k, 3], velocities[k, 4], velocities[k, 5] = free.wx, free.wy, free.wz
+
+
+@jit(allocates=False, nogil=True)
+def along_normal(wrenches, slip, cosine, sine, c, limit, forces):
+    """Fill ``forces`` (n, 3), over mu N and mu N c, with creep forces and moment about the place of the ``slip`` of
+    ``wrenches`` (n, 6) about the wheelset's centre."""
+    x, y, z = slip
+    for k in range(len(wrenches)):
+        fx, fy, fz = wrenches[k, 0], wrenches[k, 1], wrenches[k, 2]
+        turn_y, turn_z = wrenches[k, 4] - z * fx + x * fz, wrenches[k, 5] - x * fy + y * fx
+        forces[k, 0], forces[k, 1] = fx / limit, (fy * cosine + fz * sine) / limit
+        forces[k, 2] = (turn_z * cosine - turn_y * sine) / (c * limit)
 
 
 @jit(allocates=False, nogil=True)

@@ -18,6 +18,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from wrcore.contact.patch.model import NODES, NUMBERS, PairTable
+from wrcore.contact.patch.rolling import LEVELS as RESOLUTIONS
 from wrcore.dynamics.creep_modes import SHIPPED, creep_modes
 from wrcore.dynamics.pair_cells import (
     BESIDE,
@@ -38,10 +39,13 @@ from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.told import PATIENCE, handed_on, told_if_long, warn_once
 
-WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.03), (2e-3, 0.015, 0.03), (0.1, 0.3, 0.3)
+NONSENSE = 0.1, 0.3, 0.3
+WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.03), (2e-3, 0.015, 0.03), NONSENSE
+COARSE = (0.01, 0.03, 0.2), (0.01, 0.03, 0.2), (0.02, 0.05, 0.3), (0.02, 0.05, 0.3), NONSENSE
 """Errors in the middle of a cell of each lattice, of N, of the creep force over mu N and of p_max, from which on it is
-left to the next lattice, and in the end to the solver. The finest lattice is where a lobe is born: forces bend there,
-and steps through solutions would be as small as they can. Only nonsense is refused in it."""
+left to the next lattice, and in the end to the solver; and those at the coarse resolution. The finest lattice is where
+a lobe is born: forces bend there, and steps through solutions would be as small as they can. Only nonsense is refused
+in it."""
 
 SEAMED = 0.1, 0.2, 0.3
 """The same of what a cell that is left to the next lattice may miss to have a share near its neighbours."""
@@ -68,6 +72,7 @@ class Pair(PairSolver):
         self._keys, self._states = np.zeros(SLOTS, np.int64), np.zeros(SLOTS, np.int32)
         self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 4), np.float32)
         self.cells, self.misses, self._known, self._others, self._ready = {}, {}, {}, set(), 0
+        self._wrong = COARSE if contact.strips.strips == RESOLUTIONS["coarse"].strips else WRONG
         self._spent, self._next_written = 0.0, time.monotonic() + PATIENCE
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
@@ -126,7 +131,7 @@ class Pair(PairSolver):
         level = corner_of(key)[0]
         if level >= LEVELS:
             return self._left(key)
-        rows, wrong = self._rows_of(key), WRONG[level]
+        rows, wrong = self._rows_of(key), self._wrong[level]
         self.misses[key] = miss = UNKNOWN if rows is None else self._miss(key, rows)
         if np.less(miss[:3], wrong).all() and self._add_yaw(key, rows):
             self.misses[key] = miss = tuple(np.maximum(miss, self._miss(key, rows, 0.5)))

@@ -8,8 +8,8 @@ from threading import Timer
 
 from wrcore.kernels.cache import warn
 
-_AFTER = 0.02
-"""Ctrl-C in a call from a kernel is said again so much later, s."""
+_AFTER = 0.2
+"""Ctrl-C in a call from a kernel is said again so much later, s: after the call, however busy the machine is."""
 
 PATIENCE = 3.0
 """Work takes this long before it says so, s."""

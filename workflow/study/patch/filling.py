@@ -15,6 +15,7 @@ import pandas as pd
 import wrcore as wr
 from study.patch.look_up import ROUGH
 from study.patch.shipped_nodes import SHARP
+from wrcore.contact.patch.model import RESOLUTIONS
 from wrcore.dynamics import pair_store
 from wrcore.dynamics.pair_cells import LEVELS, corner_of
 
@@ -31,14 +32,15 @@ SCENES = {
 """Example scenes and what is set in them."""
 
 
-def waited(name, settings):
+def waited(name, settings, resolution="middle"):
     """Row of a run's new nodes and cells, and seconds: on the clock and of processors."""
+    looked_up = {"contact.patch": "tabulated", "contact.resolution": resolution}
     pairs, shared = {}, (pair_store.table_folder, pair_store._PAIRS)
     with tempfile.TemporaryDirectory() as folder:
         pair_store.table_folder, pair_store._PAIRS = (lambda: Path(folder)), pairs
         try:
             wall, processor = time.perf_counter(), time.process_time()
-            run = wr.simulate(wr.example(name), **settings, **{"contact.patch": "tabulated"})
+            run = wr.simulate(wr.example(name), **settings, **looked_up)
             wall, processor = time.perf_counter() - wall, time.process_time() - processor
             (pair,) = pairs.values()
             at_hand = len(pair_store.Pair(pair.contact, "at_hand")._solved_at)
@@ -59,10 +61,12 @@ def main():
     """Print a table of the scenes that are asked for, or all."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("scenes", nargs="*", help="parts of their names")
-    words = parser.parse_args().scenes
+    parser.add_argument("--resolution", choices=RESOLUTIONS, default="middle")
+    asked = parser.parse_args()
+    words, resolution = asked.scenes, asked.resolution
     wanted = {name: scene for name, scene in SCENES.items() if not words or any(word in name for word in words)}
-    waited("suspended_wheelset", {"contact.friction": 0.27, "integration.duration": 0.01})  # compiles
-    table = pd.DataFrame({name: waited(*scene) for name, scene in wanted.items()}).T
+    waited("suspended_wheelset", {"contact.friction": 0.27, "integration.duration": 0.01}, resolution)  # compiles
+    table = pd.DataFrame({name: waited(*scene, resolution) for name, scene in wanted.items()}).T
     print(table.to_markdown(floatfmt=".1f"))
 
 

@@ -17,6 +17,7 @@ import wrcore as wr
 from study.patch.look_up import CURVE, ROUGH
 from study.patch.look_up_errors import errors, worn
 from wrcore.contact import reduction
+from wrcore.contact.patch.model import RESOLUTIONS
 from wrcore.dynamics.system import Equations
 from wrcore.dynamics.wheel import SOLVED
 from wrcore.integrate.integrator import integrate
@@ -45,11 +46,12 @@ def with_hollow(changes, folder):
     return changes | {"wheel.profile": {"points": str(path)}}
 
 
-def visited(scene, changes, duration, count):
-    """Rows of both models, and which of them were solved, of a run at ``count`` times."""
+def visited(scene, changes, duration, count, resolution="middle"):
+    """Rows of both models, and which of them were solved, of a run at ``count`` times, looked up at a resolution."""
     models = {}
-    for patch in ("tabulated", "exact"):
-        models[patch], start = compile_scene(load_scene(wr.example(scene), **{"contact.patch": patch, **changes}))
+    for patch, level in (("tabulated", resolution), ("exact", "middle")):
+        contact = {"contact.patch": patch, "contact.resolution": level}
+        models[patch], start = compile_scene(load_scene(wr.example(scene), {**contact, **changes}))
     times = np.linspace(0.0, duration, count)
     states = integrate(models["tabulated"], start, times, "rodas4p2", 1e-4, 1e-7).states
     equations = {patch: Equations(model) for patch, model in models.items()}
@@ -73,13 +75,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("scenes", nargs="*", default=list(SCENES), help="some of: " + ", ".join(SCENES))
     parser.add_argument("--pairs", nargs="*", default=list(PAIRS), help="some of: " + "; ".join(PAIRS))
+    parser.add_argument("--resolution", choices=RESOLUTIONS, default="middle", help="of what is looked up")
     parser.add_argument("--count", type=int, default=100, help="of times in a run")
     chosen = parser.parse_args()
     for pair in chosen.pairs:
         for name in chosen.scenes:
             scene, settings, duration = SCENES[name]
             with tempfile.TemporaryDirectory() as folder:
-                rows, solved = visited(scene, settings | with_hollow(PAIRS[pair], folder), duration, chosen.count)
+                rows, solved = visited(
+                    scene, settings | with_hollow(PAIRS[pair], folder), duration, chosen.count, chosen.resolution
+                )
             found = errors(rows["exact"][~solved], rows["tabulated"][~solved])
             told = {name: "/".join(f"{q:.2g}" for q in np.percentile(e, [50, 95, 100])) for name, e in found.items()}
             line = {"pair": pair, "run": name, "wheels": len(solved), "solved, %": 100.0 * solved.mean(), **told}
