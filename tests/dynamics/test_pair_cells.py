@@ -1,5 +1,7 @@
 """Cells of looked-up contact: which one a lobe lies in, and that lattices go over into each other."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,8 @@ from wrcore.scene.description import compile_scene, load_scene
 
 U, FINEST = 0.011, 2
 """Place on the wheel's profile, and the finest lattice that these tables have."""
+
+OWN = pair_store.Pair._own
 
 
 def test_finer_steps_where_a_cell_is_too_coarse():
@@ -63,6 +67,33 @@ def patchwork(request, tmp_path, monkeypatch):
     monkeypatch.setattr(pair_store.Pair, "_own", lambda _, key: key)
     model, _ = compile_scene(load_scene(wr.example("suspended_wheelset"), **{"contact.patch": "tabulated"}))
     return pair_store.Pair(model.contact, "patchwork")
+
+
+@pytest.mark.parametrize("order", list(permutations(range(20, 24))))
+@pytest.mark.parametrize("patchwork", [0], indirect=True)
+def test_cells_that_stand_for_each_other_are_one_whichever_is_asked_first(order, patchwork, monkeypatch):
+    """Lobes of part 20 are found in 21, of 21 in 22, of 22 in 23 and of 23 in 22: all are cells of part 22, and so is
+    what they leave to the next lattice."""
+    found, solved = {20: 21, 21: 22, 22: 23, 23: 22}, []
+
+    def nearer(_, key):
+        level, part, *cell = corner_of(key)
+        return key_of(level, found[part], *cell)
+
+    def solve(pair, key):
+        level, part, *cell = corner_of(key)
+        solved.append((level, part))
+        pair.misses[key] = pair.misses[key_of(level - LEVELS, part, *cell)] if level else 4 * (0.0,)
+        return FINER if level == 0 else pair_cells.HARD, None
+
+    monkeypatch.setattr(pair_store.Pair, "_own", OWN)
+    monkeypatch.setattr(pair_store.Pair, "_nearer", nearer)
+    monkeypatch.setattr(pair_store.Pair, "_solved", solve)
+    table = patchwork.table()
+    for part in order:
+        for level, state in ((0, FINER), (LEVELS, pair_cells.HARD)):
+            assert pair_cells._filled(table, key_of(level, part, 4, 300, 200, 9)) == state
+    assert solved == [(0, 22), (LEVELS, 22)]
 
 
 def number_at(table, place):

@@ -88,14 +88,13 @@ class PairSolver:
         has no solution. In the finest lattice up to four corners without take the mean of the others. Where a node
         beyond has none, a straight line goes on."""
         level, part, turn, *first = corner_of(key)
-        where = level % LEVELS, part, 2 * turn + 1
-        rows, own = np.zeros((NODES, NUMBERS), np.float32), self._numbers(nodes_at(*where, CORNERS + first))
+        where, rows = (level % LEVELS, part, 2 * turn + 1), np.zeros((NODES, NUMBERS), np.float32)
+        own, beyond = np.split(self._numbers(nodes_at(*where, np.vstack([CORNERS, _BEYOND]) + first)), [len(CORNERS)])
         lost = np.isnan(own[:, 0])
         if lost.sum() > (4 if level + 1 == LEVELS else 0):
             return None
         if lost.any():
             own[lost] = own[~lost].mean(axis=0)
-        beyond = self._numbers(nodes_at(*where, _BEYOND + first))
         alone = np.isnan(beyond[:, 0])
         beyond[alone] = 2.0 * own[_NEAR[alone]] - own[_ACROSS[alone]]
         rows[_OWN_ROWS], rows[_BEYOND_ROWS] = own, beyond
@@ -136,14 +135,17 @@ class PairSolver:
         finally:
             self._works.put(works)
 
-    def _miss(self, key, rows, turn=0.0):
-        """Errors in the middle of a cell, ``turn`` off in yaw: of N, over mu N of the creep force and of its slopes at
-        rest, and of p_max, see `LIGHT`; and what modes leave of the creep force there, over mu N. Where the middle has
-        no solution the finest lattice's is held against a corner."""
-        level, part, at, *first = corner_of(key)
-        node = level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first)
-        place, found, weights = place_of(*node), np.zeros(NUMBERS), np.empty(NODES)
-        exact, left = self._at_place(place)
+    def _middle(self, key, turn=0.0):
+        """`_at_place` in the middle of a cell, ``turn`` off in yaw."""
+        return self._at_place(_middle_of(key, turn))
+
+    def _miss(self, key, rows, middle, turn=0.0):
+        """Errors in the ``middle`` of a cell, ``turn`` off in yaw: of N, over mu N of the creep force and of its slopes
+        at rest, and of p_max, see `LIGHT`; and what modes leave of the creep force there, over mu N. Where the middle
+        has no solution the finest lattice's is held against a corner."""
+        level, _, _, *first = corner_of(key)
+        place, found, weights = _middle_of(key, turn), np.zeros(NUMBERS), np.empty(NODES)
+        exact, left = middle
         if np.isnan(exact[0]):
             if level + 1 < LEVELS:
                 return UNKNOWN
@@ -161,6 +163,12 @@ class PairSolver:
 
 
 UNKNOWN = 4 * (math.nan,)
+
+
+def _middle_of(key, turn):
+    """Place of the middle of a cell, ``turn`` off in yaw."""
+    level, part, at, *first = corner_of(key)
+    return place_of(level, part, 2 * at + 1 + turn, *(n + 0.5 for n in first))
 
 
 def _ends():

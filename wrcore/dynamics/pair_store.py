@@ -11,6 +11,7 @@ import ctypes
 import hashlib
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from threading import Lock
 from weakref import WeakValueDictionary
@@ -113,8 +114,16 @@ class Pair(PairSolver):
                 self.write()
 
     def _own(self, key):
-        """The cell for which a cell stands: that of the part of the profile in which its lobe lies, at most of its
-        corners. So cells of neighbouring parts are one."""
+        """The cell for which a cell stands, whichever of those that stand for each other is asked first: cells of
+        neighbouring parts are one."""
+        met = [key]
+        while (other := self._nearer(met[-1])) not in met:
+            met.append(other)
+        return min(met[met.index(other) :])
+
+    def _nearer(self, key):
+        """The cell of the part of the profile in which a cell's lobe lies, at most of its corners; that part's own
+        search may end in a third one."""
         level, part, turn, *first = corner_of(key)
         corners = nodes_at(level % LEVELS, part, 2 * turn + 1, CORNERS + first)
         own = sorted(one % BESIDE for one in self._parts_of(node_codes(corners).tolist()))[4]
@@ -131,12 +140,17 @@ class Pair(PairSolver):
         level = corner_of(key)[0]
         if level >= LEVELS:
             return self._left(key)
-        rows, wrong = self._rows_of(key), self._wrong[level]
-        self.misses[key] = miss = UNKNOWN if rows is None else self._miss(key, rows)
-        if np.less(miss[:3], wrong).all() and self._add_yaw(key, rows):
-            self.misses[key] = miss = tuple(np.maximum(miss, self._miss(key, rows, 0.5)))
+        wrong = self._wrong[level]
+        with ThreadPoolExecutor(1) as beside:  # its middle, while its nodes are solved
+            middle, rows = beside.submit(self._middle, key), self._rows_of(key)
+            self.misses[key] = miss = UNKNOWN if rows is None else self._miss(key, rows, middle.result())
             if np.less(miss[:3], wrong).all():
-                return 1, rows
+                middle = beside.submit(self._middle, key, 0.5)
+                if self._add_yaw(key, rows):
+                    miss = tuple(np.maximum(miss, self._miss(key, rows, middle.result(), 0.5)))
+                    self.misses[key] = miss
+                    if np.less(miss[:3], wrong).all():
+                        return 1, rows
         return HARD if level + 1 == LEVELS else FINER, None
 
     def _left(self, key):

@@ -4,7 +4,7 @@ import math
 
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
-from wrcore.contact.patch.strips import BEND, assemble, place_strips
+from wrcore.contact.patch.strips import BEND, MAX_WINDOWS, assemble, place_strips
 from wrcore.contact.patch.windows import active_runs, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
@@ -50,10 +50,12 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
 @jit(allocates=False, fastmath=FUSED)
 def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution):
     """Windows from fixed strips. Returns their number and leaves c and Q of the fixed strips at the nodes as the next
-    guesses."""
+    guesses. Where more lobes carry than there may be windows: 0, and no steps are left."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     windows, found, largest, _ = _fixed_strips(geometry, pose, frame, values, work, stretches, 2)
-    if windows == 0:
+    if found > MAX_WINDOWS:
+        work.left[0] = 0
+    if windows == 0 or found > MAX_WINDOWS:
         return 0
     total, squares = 0.0, 1e-300
     for i in range(work.start[windows]):
@@ -174,11 +176,12 @@ def _active_set(work, strips, kinds, n, offset):
 
 @jit(allocates=False)
 def _widened(work, found, low, high, by):
-    """Windows of the runs, wider by ``by`` at either end; those that meet are one. Returns their number."""
+    """Windows of the runs, wider by ``by`` at either end; those that meet are one, and all where they are too many.
+    Returns their number."""
     windows = 0
     for k in range(found):
         first, last = max(work.fresh[0, k] - by, low), min(work.fresh[1, k] + by, high)
-        if windows > 0 and first <= work.high[windows - 1]:
+        if windows > 0 and (first <= work.high[windows - 1] or found > MAX_WINDOWS):
             work.high[windows - 1] = last
         else:
             work.low[windows], work.high[windows] = first, last

@@ -135,6 +135,7 @@ def newton(geometry, pose, frame, values, work, windows, kinds, bold, most, tole
     for k in range(windows):
         work.stride[0, k] = work.stride[1, k] = 0.0
     for step in range(most):
+        work.left[0] -= 1
         place_strips(geometry, pose, frame, work, windows)
         largest = top_squares(work, windows)
         if kinds == 2:

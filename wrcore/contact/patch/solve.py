@@ -43,7 +43,10 @@ _STRIPS_FROM = 4 + 3 * MAX_WINDOWS
 _REACH = 0.5
 """A window's tips may lie this share of its width from those of the first guess for a solution to start from."""
 
-_STEPS = 24
+_STEPS, _ALL_STEPS = 24, 250
+"""Of Newton's iteration for one set of windows, and for all of a patch: 99 of 100 that find a solution take at most 30
+to 50 in all, on a flange under 230 kN one took 231; those that find none would take up to 450."""
+
 _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
 
@@ -81,9 +84,11 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 _remember(frame, work, windows, memory)
                 return windows, frame
         windows = guess_windows(work, stretches, resolution)
-    memory[0] = 0.0
+    memory[0], work.left[0] = 0.0, _ALL_STEPS
     for born in (_BORN, _HARDLY):
         for extra in _OTHER_NUMBERS:
+            if work.left[0] <= 0:
+                break
             strips = resolution + extra
             if extra != 0:
                 windows = guess_windows(work, stretches, strips)
@@ -103,6 +108,8 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
     ``born``: see `newborn`. Returns the number of windows, 0 where no solution was found, and of attempts."""
     bold, again = False, False
     for attempt in range(_ROUNDS):
+        if work.left[0] <= 0:
+            break
         if attempt == 1 or again:
             windows = windows_from_fixed(geometry, pose, frame, values, work, stretches, resolution)
         if windows == 0:

@@ -28,6 +28,9 @@ from wrcore.kernels.jit import FUSED, jit
 
 MAX_STRIPS = 64
 MAX_WINDOWS = 4
+MAX_RUNS = 3 * MAX_WINDOWS
+"""Runs of strips in contact that are told apart; lobes may be more than windows."""
+
 MAX_UNKNOWNS = 3 * MAX_STRIPS + 2 * MAX_WINDOWS
 
 POINTS = np.cos((np.arange(4) + 0.5) * math.pi / 4.0)
@@ -68,7 +71,7 @@ class NormalWork(NamedTuple):
     guessed: np.ndarray
     """(MAX_WINDOWS + 1,): number of windows of the first guess, 0: of no use, and their numbers of strips."""
     fresh: np.ndarray
-    """(2, MAX_WINDOWS + 1): tips of windows to be, m."""
+    """(2, MAX_RUNS + 1): tips of windows to be, m."""
     tops: np.ndarray
     """(MAX_WINDOWS,): largest c of each window, m^2."""
     measure: np.ndarray
@@ -109,6 +112,8 @@ class NormalWork(NamedTuple):
     more: np.ndarray
     """(3,): widths of windows count this many times where strips are counted, 1 or `windows.MORE`; the weight that the
     solution with MORE has in the mean of both (found with 1); and this weight of the first guess."""
+    left: np.ndarray
+    """(1,): steps of Newton's iteration that are left to a patch."""
 
 
 def normal_work():
@@ -116,12 +121,12 @@ def normal_work():
     n, m = MAX_STRIPS, MAX_WINDOWS
     return NormalWork(
         np.zeros((NODE_ROWS, MAX_PATCHES * NODES)), np.zeros(MAX_PATCHES, np.int64), np.zeros(m), np.zeros(m),
-        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, m + 1)), np.zeros(m),
+        *(np.zeros(m + 1, np.int64) for _ in range(2)), np.zeros((2, MAX_RUNS + 1)), np.zeros(m),
         np.zeros(MAX_PATCHES * NODES), np.zeros(1, np.int64), np.zeros((2, m)), np.zeros(n, np.int64),
         *np.zeros((2, n)), np.zeros((4, n)), *np.zeros((2, n)), *np.zeros((3, n)), np.zeros((n, GAP_ROWS)),
         np.zeros((2, n)), np.zeros((4, 4)),
         *(np.zeros((MAX_UNKNOWNS, MAX_UNKNOWNS + 1)) for _ in range(2)), np.zeros(n, np.bool_), np.zeros(n),
-        np.array([1.0, 0.0, 0.0, 0.0]),
+        np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(1, np.int64),
     )  # fmt: skip
 
 

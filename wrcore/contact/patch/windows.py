@@ -9,7 +9,16 @@ import math
 from wrcore.contact.normal import hertz_ellipse
 from wrcore.contact.patch.gap import CREST, NODE_CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
 from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
-from wrcore.contact.patch.strips import GUESS, MAX_STRIPS, MAX_WINDOWS, WEIGHT, WIDENED, gap_under_load, place_strips
+from wrcore.contact.patch.strips import (
+    GUESS,
+    MAX_RUNS,
+    MAX_STRIPS,
+    MAX_WINDOWS,
+    WEIGHT,
+    WIDENED,
+    gap_under_load,
+    place_strips,
+)
 from wrcore.contact.reduction import CURVATURE_X, CURVATURE_Y
 from wrcore.kernels.jit import FUSED, jit
 
@@ -177,7 +186,7 @@ def active_runs(work, windows):
     for i in range(work.start[windows]):
         if inside and (not work.active[i] or work.window[i] != work.window[i - 1]):
             found, inside = found + 1, False
-        if work.active[i] and found < MAX_WINDOWS:
+        if work.active[i] and found < MAX_RUNS:
             largest = max(largest, work.square[i])
             if not inside:
                 work.fresh[0, found], inside = work.centre[i] - 0.5 * work.width[i], True
@@ -192,7 +201,7 @@ def drop_starved(work, windows, resolution):
     for i in range(work.start[windows]):
         top = work.tops[work.window[i]]
         work.active[i] = work.square[i] > FAINT * top and top > NEGLIGIBLE * largest
-    return take_fresh(work, active_runs(work, windows)[0], largest, resolution)
+    return take_fresh(work, min(active_runs(work, windows)[0], MAX_WINDOWS), largest, resolution)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -231,7 +240,7 @@ def take_fresh(work, found, largest, resolution):
 @jit(allocates=False, fastmath=FUSED)
 def newborn(values, work, windows, stretches, resolution, least):
     """Windows where the loaded surfaces interpenetrate outside the windows, by ``least`` of the deepest penetration,
-    are added. Returns the new number."""
+    are added. Returns the new number; 0, and leaves no steps, where there may be no more."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     depth = 0.0
     for i in range(count):
@@ -248,7 +257,10 @@ def newborn(values, work, windows, stretches, resolution, least):
             before, after = 0.7 * work.width[work.start[k]], 0.7 * work.width[work.start[k + 1] - 1]
             free = free and not work.low[k] - before < s < work.high[k] + after
         inside = free and gap_under_load(values, work, windows, s, nodes[NODE_CREST, i], gap) < -least * depth
-        if inside and open_at < 0 and found < MAX_WINDOWS:
+        if inside and open_at < 0 and found == MAX_WINDOWS:
+            work.left[0] = 0
+            return 0
+        if inside and open_at < 0:
             open_at = i
             lows[found] = s - 0.5 * abs(nodes[S, max(i, 1)] - nodes[S, max(i, 1) - 1])
         if open_at >= 0 and (not inside or i == count - 1):
