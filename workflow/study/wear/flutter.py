@@ -14,6 +14,7 @@ import numpy as np
 from wrcore.analysis.wear.evolve import load_wear_plan
 from wrcore.analysis.wear.worn_profiles import file_of
 from wrcore.analysis.wear.worn_rails import laid_rails
+from wrcore.errors import InputError
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
@@ -36,6 +37,8 @@ def flutter(t, normal, angle):
 def worn_scene(plan, folder, step, place, changes):
     """Scene of a plan, by its place, on the wheels and rails of the start of a step."""
     _, scenes = load_wear_plan(plan, {"set": changes, "rate": 1000.0})
+    if not 0 <= place < len(scenes):
+        raise InputError(plan, "scenes", f"expected a scene from 0 to {len(scenes) - 1}, got {place}")
     wheel = {"wheel.profile": {"points": str(file_of(folder, "profile", step).resolve()), "unit": "m"}}
     laid = laid_rails(folder, step, place, scenes[place]).changes
     return load_scene(scenes[place], {**wheel, **laid, "output.channels": ["pose", "contact"]})
@@ -52,16 +55,22 @@ def main():
     parser.add_argument("--begin", type=float, default=4.0, help="s")
     parser.add_argument("--duration", type=float, default=6.0, help="s")
     asked = parser.parse_args()
+    if not 0.0 <= asked.begin < asked.duration:
+        parser.error(f"--begin: expected less than the duration of {asked.duration:g} s, got {asked.begin:g} s")
     head = ["contact", "wheel", "patches", "changes, 1/s", "steepest angle, rad", "its deviation", "its steps, 1/s",
             "processor time, s"]  # fmt: skip
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     for patch in asked.patches:
         changes = {"contact.patch": patch, "contact.resolution": asked.resolution}
-        scene = worn_scene(asked.plan, asked.folder, asked.step, asked.scene, changes)
+        try:
+            scene = worn_scene(asked.plan, asked.folder, asked.step, asked.scene, changes)
+        except InputError as error:
+            parser.error(str(error))
         began = time.process_time()
         run = simulate(scene, **{"integration.duration": asked.duration})
         seconds = time.process_time() - began
-        assert run.status == "completed", run.reason
+        if run.status != "completed":
+            parser.exit(1, f"{patch}: expected a run to its end, got {run.status}: {run.reason}\n")
         late = run.t > asked.begin
         for side in SIDES:
             wheel = run[f"{scene.vehicle.wheelset_names[0]}/{side}"]
