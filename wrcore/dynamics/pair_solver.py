@@ -88,13 +88,14 @@ class PairSolver:
         has no solution. In the finest lattice up to four corners without take the mean of the others. Where a node
         beyond has none, a straight line goes on."""
         level, part, turn, *first = corner_of(key)
-        where, rows = (level % LEVELS, part, 2 * turn + 1), np.zeros((NODES, NUMBERS), np.float32)
-        own, beyond = np.split(self._numbers(nodes_at(*where, np.vstack([CORNERS, _BEYOND]) + first)), [len(CORNERS)])
+        where = level % LEVELS, part, 2 * turn + 1
+        rows, own = np.zeros((NODES, NUMBERS), np.float32), self._numbers(nodes_at(*where, CORNERS + first))
         lost = np.isnan(own[:, 0])
         if lost.sum() > (4 if level + 1 == LEVELS else 0):
             return None
         if lost.any():
             own[lost] = own[~lost].mean(axis=0)
+        beyond = self._numbers(nodes_at(*where, _BEYOND + first))
         alone = np.isnan(beyond[:, 0])
         beyond[alone] = 2.0 * own[_NEAR[alone]] - own[_ACROSS[alone]]
         rows[_OWN_ROWS], rows[_BEYOND_ROWS] = own, beyond

@@ -334,7 +334,7 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
     else:
         finer = work.normal.more
         share = finer[WEIGHT]
-        counters[ON_FIXED] += finer[FIXED] > 0.0
+        fixed = finer[FIXED]
         found = roll_patch(model, m, pose, frame, windows, depth, speed, friction, 1.0, work)
         if share > 0.0:  # the mean with more strips
             finer[WIDENED] = MORE
@@ -345,7 +345,8 @@ def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, me
                     work.wrench[0, k] *= 1.0 - share
                     work.wrench[1, k] *= 1.0 - share
                 more = roll_patch(model, m, pose, frame, windows, depth, speed, friction, share, work)
-                found = _mean(found, more, share)
+                found, fixed = _mean(found, more, share), max(fixed, finer[FIXED])
+        counters[ON_FIXED] += fixed > 0.0
     z = with_rail_along(model.geometry, LIFT, frame.ur, 1.0, frame.z - m.z)
     lean, total = lean_of(model.geometry, pose, frame), work.wrench[0]
     fill_row(model.geometry, lean, frame, frame.ur + model.geometry.rail_distance - m.y, z, found, work.wrench, out)

@@ -64,14 +64,16 @@ def main():
         changes = {"contact.patch": patch, "contact.resolution": asked.resolution}
         try:
             scene = worn_scene(asked.plan, asked.folder, asked.step, asked.scene, changes)
+            began = time.process_time()
+            run = simulate(scene, **{"integration.duration": asked.duration})
         except InputError as error:
             parser.error(str(error))
-        began = time.process_time()
-        run = simulate(scene, **{"integration.duration": asked.duration})
         seconds = time.process_time() - began
         if run.status != "completed":
             parser.exit(1, f"{patch}: expected a run to its end, got {run.status}: {run.reason}\n")
         late = run.t > asked.begin
+        if late.sum() < 2:
+            parser.error(f"--begin: expected output times after it, got {asked.begin:g} s")
         for side in SIDES:
             wheel = run[f"{scene.vehicle.wheelset_names[0]}/{side}"]
             normal, angle = (value[late].reshape(late.sum(), -1) for value in (wheel.N_N, wheel.contact_angle_rad))

@@ -77,13 +77,14 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
     windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
     if moved > _SETTLED:
         return 0
-    kept = first = 0
+    kept = first = lobe = 0
     for k in range(windows):
         end = work.start[k + 1]
         for i in range(first, end):
             if not work.active[i]:
                 continue
-            work.centre[kept], work.width[kept], work.window[kept] = work.centre[i], work.width[i], k
+            lobe += int(i > 0 and (i == first or not work.active[i - 1]))  # ends at tips of its own
+            work.centre[kept], work.width[kept], work.window[kept] = work.centre[i], work.width[i], lobe
             work.share[kept], work.square[kept] = work.load[i] / work.square[i], work.square[i]
             work.middle[kept] = work.middle[i]
             for q in range(GAP_ROWS):

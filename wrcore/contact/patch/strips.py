@@ -28,8 +28,8 @@ from wrcore.kernels.jit import FUSED, jit
 
 MAX_STRIPS = 64
 MAX_WINDOWS = 4
-MAX_RUNS = 3 * MAX_WINDOWS
-"""Runs of strips in contact that are told apart; lobes may be more than windows."""
+MAX_RUNS = 16
+"""Runs of strips in contact, as many as 32 fixed strips may have: lobes may be more than windows."""
 
 MAX_UNKNOWNS = 3 * MAX_STRIPS + 2 * MAX_WINDOWS
 
@@ -110,10 +110,11 @@ class NormalWork(NamedTuple):
     load: np.ndarray
     """Fixed strips in contact and their loads."""
     more: np.ndarray
-    """(3,): widths of windows count this many times where strips are counted, 1 or `windows.MORE`; the weight that the
-    solution with MORE has in the mean of both (found with 1); and this weight of the first guess."""
+    """(4,): widths of windows count this many times where strips are counted, 1 or `windows.MORE`; the weight that the
+    solution with MORE has in the mean of both (found with 1); this weight of the first guess; and not 0 where strips
+    are fixed."""
     left: np.ndarray
-    """(1,): steps of Newton's iteration that are left to a patch."""
+    """(1,): steps of Newton's iteration that are left to a patch; none below 1."""
 
 
 def normal_work():

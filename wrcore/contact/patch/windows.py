@@ -240,7 +240,7 @@ def take_fresh(work, found, largest, resolution):
 @jit(allocates=False, fastmath=FUSED)
 def newborn(values, work, windows, stretches, resolution, least):
     """Windows where the loaded surfaces interpenetrate outside the windows, by ``least`` of the deepest penetration,
-    are added. Returns the new number; 0, and leaves no steps, where there may be no more."""
+    are added. Returns the new number; -1 where there may be no more."""
     nodes, count = work.nodes, work.ends[stretches - 1]
     depth = 0.0
     for i in range(count):
@@ -258,8 +258,7 @@ def newborn(values, work, windows, stretches, resolution, least):
             free = free and not work.low[k] - before < s < work.high[k] + after
         inside = free and gap_under_load(values, work, windows, s, nodes[NODE_CREST, i], gap) < -least * depth
         if inside and open_at < 0 and found == MAX_WINDOWS:
-            work.left[0] = 0
-            return 0
+            return -1
         if inside and open_at < 0:
             open_at = i
             lows[found] = s - 0.5 * abs(nodes[S, max(i, 1)] - nodes[S, max(i, 1) - 1])
