@@ -12,6 +12,7 @@ Ferreira, Flores, Marques, On the utilization of simplified methodologies for th
 Marques et al., Mechanism and Machine Theory 149 (2020) 103825 (spatial search by wheel strips).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,15 +71,63 @@ WIDE = 10
 """Overlaps of at least this many scan nodes are integrated over them, narrower ones over the profiles' own nodes, and
 those that hold fewer than so many even of these by Gauss-Legendre between their edges."""
 
+_AS_ONE = 0.5
+"""Overlaps become one row, where rows are short, if the rail turns by less (rad) between them."""
+
+
+@jit(allocates=False)
+def _take_out(patches, k):
+    """Take the k-th row out of full ones; the others stay in order."""
+    for i in range(k, MAX_PATCHES - 1):
+        for column in range(PATCH_COLUMNS):
+            patches[i, column] = patches[i + 1, column]
+
+
+@jit(allocates=False)
+def _join_shallowest(geometry, pose, outside, beyond, depth, patches):
+    """Make one row of the shallowest overlap and the nearer one of its neighbours, where all rows are taken by moments
+    and another overlap follows from ``outside`` to ``beyond``, of a ``depth``. Returns the row that is free for that
+    one now, MAX_PATCHES where it has become part of the last row, -1 where the rail turns too much between both."""
+    last, shallowest = MAX_PATCHES - 1, MAX_PATCHES
+    for k in range(MAX_PATCHES):
+        if patches[k, PENETRATION] < depth:
+            shallowest, depth = k, patches[k, PENETRATION]
+    first = max(shallowest - 1, 0)
+    if 0 < shallowest < MAX_PATCHES:
+        after = outside if shallowest == last else patches[shallowest + 1, OUTSIDE]
+        if after - patches[shallowest, BEYOND] < patches[shallowest, OUTSIDE] - patches[first, BEYOND]:
+            first = shallowest
+    start, begin, end = patches[first, OUTSIDE], patches[first, BEYOND], beyond
+    turn = math.atan(gap_at(geometry, pose, outside)[1])
+    if first < last:
+        turn, end = math.atan(gap_at(geometry, pose, patches[first + 1, OUTSIDE])[1]), patches[first + 1, BEYOND]
+    if abs(turn - math.atan(gap_at(geometry, pose, begin)[1])) > _AS_ONE:
+        return -1
+    middle = 0.5 * (start + end)
+    shift = fine_cell_shift(geometry, middle, strip_point(geometry, pose, middle)[0])
+    m0, m1, m2, middle, _ = fine_sums(geometry, pose, shift, start, end)
+    if not patch_from_moments(geometry, pose, middle, m0, m1, m2, patches[first]):
+        return -1
+    patches[first, OUTSIDE], patches[first, BEYOND] = start, end
+    if first < last:
+        _take_out(patches, first + 1)
+    return last if first < last else MAX_PATCHES
+
 
 @jit(allocates=False)
 def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepest, depth, m0, m1, m2, nodes, patches,
                  count):  # fmt: skip
-    """Reduce one overlap and store its patch; when all rows are taken the shallowest patch gives way to a deeper one.
+    """Reduce one overlap and store its patch; when all rows are taken the shallowest one becomes one with its neighbour
+    (`_join_shallowest`), or gives way to a deeper one.
 
     ``outside`` and ``beyond`` are points without overlap next to its ``first`` and ``last`` strip, ``deepest`` and
     ``depth`` (along the normal) its deepest strip; m0, m1, m2 are sums of g^2 over its ``nodes`` scan nodes, positions
     counted from ``first``."""
+    if count == MAX_PATCHES and reduction == MOMENT and not leaves_cells(pose):
+        free = _join_shallowest(geometry, pose, outside, beyond, depth, patches)
+        if free == MAX_PATCHES:
+            return count
+        count = free if free >= 0 else count
     if count == MAX_PATCHES:
         shallowest = 0
         for k in range(1, MAX_PATCHES):
@@ -87,9 +136,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
         if depth <= patches[shallowest, PENETRATION]:
             return count
         count -= 1
-        for k in range(shallowest, count):  # the others stay in order
-            for column in range(PATCH_COLUMNS):
-                patches[k, column] = patches[k + 1, column]
+        _take_out(patches, shallowest)
     row = patches[count]
     if reduction == MOMENT:
         if nodes >= WIDE:

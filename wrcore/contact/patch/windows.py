@@ -7,7 +7,7 @@ that does not depend on where its iteration started.
 import math
 
 from wrcore.contact.normal import hertz_ellipse
-from wrcore.contact.patch.gap import CREST, NODE_CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
+from wrcore.contact.patch.gap import CREST, GAP, NODE_CREST, NODE_GAP, NODE_SHAPE, NODE_SHARE, NODE_SQUARE, UR, S, U
 from wrcore.contact.patch.newton import FAINT, NEGLIGIBLE, top_squares
 from wrcore.contact.patch.strips import (
     GUESS,
@@ -275,3 +275,24 @@ def newborn(values, work, windows, stretches, resolution, least):
             j -= 1
         lows[j + 1], highs[j + 1] = low, high
     return take_fresh(work, found, top_squares(work, windows), resolution)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def overlooked(work, windows, stretches):
+    """What strips overlook: by which share of the deepest penetration the gap at a node between two strips of a window
+    leaves the parabola through theirs and the next one's, at most."""
+    nodes, count, least, most = work.nodes, work.ends[stretches - 1], -1e-300, 0.0
+    centre, strip, last = work.centre, 0, work.start[windows] - 1
+    for k in range(count):
+        s, gap = nodes[S, k], nodes[NODE_GAP, k]
+        least = min(least, gap)
+        while strip < last and centre[strip + 1] < s:
+            strip += 1
+        if strip < last and centre[strip] < s and work.window[strip] == work.window[strip + 1]:
+            i, j = strip, strip + 1
+            n = j + 1 if j < last and work.window[j + 1] == work.window[j] else i - 1
+            rise = (work.gap[j, GAP] - work.gap[i, GAP]) / (centre[j] - centre[i])
+            bend = (work.gap[n, GAP] - work.gap[j, GAP]) / (centre[n] - centre[j]) - rise
+            bend *= (s - centre[j]) / (centre[n] - centre[i])
+            most = max(most, abs(gap - work.gap[i, GAP] - (s - centre[i]) * (rise + bend)))
+    return -most / least
