@@ -1,8 +1,9 @@
 """Whether a worn wheel flutters on a worn rail: ``python -m study.wear.flutter FOLDER STEP [--scene 5]``.
 
-A scene of a plan runs on the wheels and rails that ``wrcore evolve PLAN --out FOLDER`` has at the start of a step, with
-each patch model. Prints of the first wheelset's wheels how many patches carry, how often a second their number changes,
-the steepest contact angle among them, and how often a second it steps by more than `STEP` between output times.
+A scene of a plan runs with ``moment`` on the wheels and rails that ``wrcore evolve PLAN --out FOLDER`` has at the start
+of a step, and goes on from there with each patch model. Prints of the first wheelset's wheels how many patches carry,
+how often a second their number changes, and of the resultant of their normal forces its mean size and angle, how much
+both go to and fro, and how often a second the angle rises through its mean.
 """
 
 import argparse
@@ -19,19 +20,18 @@ from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
-STEP = 0.05
-"""Of the contact angle, rad."""
-
 
 def flutter(t, normal, angle):
-    """Mean number of patches, changes of it (1/s), mean and standard deviation of the steepest contact angle (rad) and
-    its steps (1/s), from times (n,), s, normal forces (n, m), N, and contact angles (n, m), rad, of a wheel's patches;
-    NaN: none."""
-    carries = np.nan_to_num(normal) > 0.0
-    count, steepest = carries.sum(axis=1), np.where(carries, np.abs(angle), 0.0).max(axis=1)
-    whole = t[-1] - t[0]
-    steps = np.abs(np.diff(steepest)) > STEP
-    return count.mean(), np.count_nonzero(np.diff(count)) / whole, steepest.mean(), steepest.std(), steps.sum() / whole
+    """Mean number of patches, changes of it (1/s), mean and standard deviation of the resultant normal force (N) and of
+    its angle (rad), and how often that rises through its mean (1/s), from times (n,), s, normal forces (n, m), N, and
+    contact angles (n, m), rad, of a wheel's patches; NaN: none."""
+    force, angle = np.nan_to_num(normal), np.nan_to_num(angle)
+    across, up = (force * np.sin(angle)).sum(axis=1), (force * np.cos(angle)).sum(axis=1)
+    count, size, turned = (force > 0.0).sum(axis=1), np.hypot(across, up), np.abs(np.arctan2(across, up))
+    above, whole = turned > turned.mean(), t[-1] - t[0]
+    rises = np.count_nonzero(above[1:] & ~above[:-1]) / whole
+    changes = np.count_nonzero(np.diff(count)) / whole
+    return count.mean(), changes, size.mean(), size.std(), turned.mean(), turned.std(), rises
 
 
 def worn_scene(plan, folder, step, place, changes):
@@ -52,34 +52,47 @@ def main():
     parser.add_argument("--scene", type=int, default=5, help="its place in the plan")
     parser.add_argument("--patches", nargs="+", default=["moment", "exact"])
     parser.add_argument("--resolution", default="coarse")
-    parser.add_argument("--begin", type=float, default=4.0, help="s")
-    parser.add_argument("--duration", type=float, default=6.0, help="s")
+    parser.add_argument("--begin", type=float, default=4.0, help="s with moment, before")
+    parser.add_argument("--duration", type=float, default=0.15, help="s with each model from there")
+    parser.add_argument("--settle", type=float, default=0.03, help="s of these that do not count")
     asked = parser.parse_args()
-    if not 0.0 <= asked.begin < asked.duration:
-        parser.error(f"--begin: expected less than the duration of {asked.duration:g} s, got {asked.begin:g} s")
-    head = ["contact", "wheel", "patches", "changes, 1/s", "steepest angle, rad", "its deviation", "its steps, 1/s",
-            "processor time, s"]  # fmt: skip
+    if not 0.0 <= asked.settle < asked.duration:
+        parser.error(f"--settle: expected less than the duration of {asked.duration:g} s, got {asked.settle:g} s")
+    begin, asked_of = None, (asked.plan, asked.folder, asked.step, asked.scene)
+    settings = {
+        one: {"contact.patch": one, "contact.resolution": asked.resolution} for one in (*asked.patches, "moment")
+    }
+    try:
+        scenes = {patch: worn_scene(*asked_of, changes) for patch, changes in settings.items()}
+    except InputError as error:
+        parser.error(str(error))
+    head = ["contact", "wheel", "patches", "changes, 1/s", "normal force, kN", "its deviation", "its angle, rad",
+            "its deviation", "its rises, 1/s", "processor time, s"]  # fmt: skip
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
-    for patch in asked.patches:
-        changes = {"contact.patch": patch, "contact.resolution": asked.resolution}
+    for patch in ("moment", *asked.patches):
+        began, scene = time.process_time(), scenes[patch]
         try:
-            scene = worn_scene(asked.plan, asked.folder, asked.step, asked.scene, changes)
-            began = time.process_time()
-            run = simulate(scene, **{"integration.duration": asked.duration})
+            if begin is None:
+                run = simulate(scene, **{"integration.duration": asked.begin})
+            else:
+                run = simulate(scene, start=begin, **{"integration.duration": asked.duration})
         except InputError as error:
             parser.error(str(error))
         seconds = time.process_time() - began
         if run.status != "completed":
             parser.exit(1, f"{patch}: expected a run to its end, got {run.status}: {run.reason}\n")
-        late = run.t > asked.begin
+        if begin is None:
+            begin = run.end_state
+            continue
+        late = run.t >= run.t[0] + asked.settle
         if late.sum() < 2:
-            parser.error(f"--begin: expected output times after it, got {asked.begin:g} s")
+            parser.error(f"--settle: expected output times after it, got {asked.settle:g} s")
         for side in SIDES:
             wheel = run[f"{scene.vehicle.wheelset_names[0]}/{side}"]
             normal, angle = (value[late].reshape(late.sum(), -1) for value in (wheel.N_N, wheel.contact_angle_rad))
-            count, changed, mean, deviation, steps = flutter(run.t[late], normal, angle)
-            print(f"| {patch} | {side} | {count:.2f} | {changed:.0f} | {mean:.3f} | {deviation:.3f} | {steps:.0f} |"
-                  f" {seconds:.1f} |", flush=True)  # fmt: skip
+            count, changed, size, spread, turned, swing, rises = flutter(run.t[late], normal, angle)
+            print(f"| {patch} | {side} | {count:.2f} | {changed:.0f} | {1e-3 * size:.1f} | {1e-3 * spread:.1f} |"
+                  f" {turned:.3f} | {swing:.3f} | {rises:.0f} | {seconds:.1f} |", flush=True)  # fmt: skip
 
 
 if __name__ == "__main__":
