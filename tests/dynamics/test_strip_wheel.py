@@ -192,13 +192,14 @@ def test_a_wheel_with_waves_carries_on_all_of_them(height, length, y, load, fixe
     assert found.row[columns.P_MAX] == pytest.approx(expected.row[columns.P_MAX], rel=peak)
 
 
-def test_nothing_steps_where_a_wheel_with_waves_moves_across():
+@pytest.mark.parametrize(("height", "length", "load"), [(40, 4.0, 3e4), (20, 3.5, 3e4)])
+def test_nothing_steps_where_a_wheel_with_waves_moves_across(height, length, load):
     """More overlaps than rows come and go, and waves shorter than strips: N stepped by a quarter."""
-    wheels = LoadedWheels(_pair_with_waves(40, 4.0), "exact", "coarse")
-    z, at = wheels.height("left", 0.0, 3e4), np.arange(-1e-3, 1e-3, 2e-5)
+    wheels = LoadedWheels(_pair_with_waves(height, length), "exact", "coarse")
+    z, at = wheels.height("left", 0.0, load), np.arange(-1e-3, 1e-3, 2e-5)
     normal = np.array([sum(one.row[columns.NORMAL] for one in wheels.at_height("left", y, z)) for y in at])
     assert normal.max() > 3.0 * normal.min()
-    assert np.abs(np.diff(normal)).max() < 0.05 * normal.mean()
+    assert np.all(np.abs(np.diff(normal, n=2)) < 0.1 * normal[1:-1])  # beside its slope
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ from wrcore.contact.scan import (
     strip_gap,
     strip_place,
 )
-from wrcore.contact.strip import gap_at, make_pose, strip_point
+from wrcore.contact.strip import changes_along, gap_at, make_pose, strip_point
 from wrcore.errors import InputError, one_of
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit, rarely_called
@@ -123,7 +123,7 @@ def _add_overlap(geometry, pose, reduction, outside, first, last, beyond, deepes
     ``outside`` and ``beyond`` are points without overlap next to its ``first`` and ``last`` strip, ``deepest`` and
     ``depth`` (along the normal) its deepest strip; m0, m1, m2 are sums of g^2 over its ``nodes`` scan nodes, positions
     counted from ``first``."""
-    if count == MAX_PATCHES and reduction == MOMENT and not leaves_cells(pose):
+    if count == MAX_PATCHES and reduction == MOMENT and not (leaves_cells(pose) or changes_along(geometry)):
         free = _join_shallowest(geometry, pose, outside, beyond, depth, patches)
         if free == MAX_PATCHES:
             return count

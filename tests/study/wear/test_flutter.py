@@ -25,6 +25,11 @@ def test_a_wheel_that_stays_on_one_patch():
     assert flutter(t, 1e4 * still, 0.1 * still) == pytest.approx(expected, abs=1e-8)
 
 
+def test_an_angle_that_swings_through_zero_is_not_folded():
+    t, angle = np.linspace(0.0, 1.0, 5), np.array([[-0.1], [0.02], [-0.1], [0.02], [-0.1]])
+    assert flutter(t, np.full((5, 1), 1e4), angle)[4:] == pytest.approx((0.052, np.std(angle), 2.0), abs=1e-8)
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [

@@ -27,7 +27,8 @@ def flutter(t, normal, angle):
     contact angles (n, m), rad, of a wheel's patches; NaN: none."""
     force, angle = np.nan_to_num(normal), np.nan_to_num(angle)
     across, up = (force * np.sin(angle)).sum(axis=1), (force * np.cos(angle)).sum(axis=1)
-    count, size, turned = (force > 0.0).sum(axis=1), np.hypot(across, up), np.abs(np.arctan2(across, up))
+    count, size, turned = (force > 0.0).sum(axis=1), np.hypot(across, up), np.arctan2(across, up)
+    turned *= np.copysign(1.0, turned.mean())  # of left and right wheels alike
     above, whole = turned > turned.mean(), t[-1] - t[0]
     rises = np.count_nonzero(above[1:] & ~above[:-1]) / whole
     changes = np.count_nonzero(np.diff(count)) / whole

@@ -279,20 +279,25 @@ def newborn(values, work, windows, stretches, resolution, least):
 
 @jit(allocates=False, fastmath=FUSED)
 def overlooked(work, windows, stretches):
-    """What strips overlook: by which share of the deepest penetration the gap at a node between two strips of a window
-    leaves the parabola through theirs and the next one's, at most."""
-    nodes, count, least, most = work.nodes, work.ends[stretches - 1], -1e-300, 0.0
+    """What strips overlook: by which share of the deepest penetration the gap at nodes between two strips of a window
+    leaves the parabola through theirs and the next one's, in the mean. Slender windows have sharp ends on flanges, and
+    no room for waves."""
+    nodes, count, least, total, looked = work.nodes, work.ends[stretches - 1], -1e-300, 0.0, 1
     centre, strip, last = work.centre, 0, work.start[windows] - 1
+    top_squares(work, windows)
     for k in range(count):
         s, gap = nodes[S, k], nodes[NODE_GAP, k]
         least = min(least, gap)
         while strip < last and centre[strip + 1] < s:
             strip += 1
-        if strip < last and centre[strip] < s and work.window[strip] == work.window[strip + 1]:
+        window = work.window[strip]
+        slender = SLENDER_WINDOW * (work.high[window] - work.low[window]) < 2.0 * math.sqrt(work.tops[window])
+        if strip < last and centre[strip] < s and window == work.window[strip + 1] and not slender:
             i, j = strip, strip + 1
-            n = j + 1 if j < last and work.window[j + 1] == work.window[j] else i - 1
+            n = j + 1 if j < last and work.window[j + 1] == window else i - 1
             rise = (work.gap[j, GAP] - work.gap[i, GAP]) / (centre[j] - centre[i])
             bend = (work.gap[n, GAP] - work.gap[j, GAP]) / (centre[n] - centre[j]) - rise
             bend *= (s - centre[j]) / (centre[n] - centre[i])
-            most = max(most, abs(gap - work.gap[i, GAP] - (s - centre[i]) * (rise + bend)))
-    return -most / least
+            total += abs(gap - work.gap[i, GAP] - (s - centre[i]) * (rise + bend))
+            looked += 1
+    return -total / (looked * least)
