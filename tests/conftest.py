@@ -6,9 +6,11 @@ import shutil
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
 from wrcore.scene import description
 
@@ -105,3 +107,11 @@ def no_new_tables():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(description, "ensure_table", lambda *_: table)
         yield table
+
+
+def pair_with_waves(height, length):
+    """S1002 with waves (µm high, mm long) on UIC60."""
+    u = np.arange(-0.04, 0.0301, 2e-4)
+    wheel, rail = named_profile("S1002", "wheel"), named_profile("UIC60-MBench", "rail", 1 / 40)
+    waves = 1e-6 * height * np.cos(2e3 * np.pi * u / length) * (abs(u) < 0.025)
+    return WheelOnRail(ProfileCurve.from_points(u, wheel(u) + waves, "wheel", "waves"), rail).geometry

@@ -8,15 +8,19 @@ import pytest
 
 from study.contact.surface import rail_surface, wheel_surface, wheelset_transform
 from study.paper.tables import rigid_contact as geometry_table
-from tests.conftest import DATA, SCENES
+from tests.conftest import DATA, SCENES, pair_with_waves
 from wrcore.analysis.contact.poses import loaded_poses
 from wrcore.contact.detection import axle_direction, detect, find_patches, planar_error_bound
 from wrcore.contact.normal import contact_modulus, hertz_table
 from wrcore.contact.reduction import (
+    BEYOND,
+    COSINE,
+    CURVATURE_Y,
     MAX_PATCHES,
     MAXIMUM,
     MOMENT,
     NORMAL,
+    OUTSIDE,
     PATCH_COLUMNS,
     PENETRATION,
     SEMI_A,
@@ -230,6 +234,32 @@ def test_cone_on_circle_has_hertz_curvatures():
         assert p.u_rail_m == pytest.approx(-0.3 * math.sin(math.atan(0.05)), abs=1e-7)
         assert p.curvature_x_per_m == pytest.approx(0.5 * math.cos(math.atan(0.05)) / radius, rel=1e-6)
         assert p.curvature_y_per_m == pytest.approx(0.5 / 0.3, rel=1e-5)
+
+
+@pytest.mark.parametrize(("height", "length"), [(40, 3.0), (40, 6.0), (20, 3.5), (10, 2.5)])
+def test_overlaps_beyond_the_third_are_part_of_the_rows(height, length):
+    """Rows by moments hold all overlaps, in order, each once, and together their integral of g^2."""
+    geometry, many = pair_with_waves(height, length), 0
+    u, rows = np.arange(-0.03, 0.03, 1e-5), np.empty((MAX_PATCHES, PATCH_COLUMNS))
+    for y in np.arange(-1.5e-3, 1.5e-3, 2.5e-4):
+        for z in np.arange(0.45980, 0.45988, 4e-6):
+            count = find_patches(geometry, 1.0, y, z, 0.0, 1.0, 0.0, True, MOMENT, rows)
+            pose = make_pose(1.0, y, z, 0.0, 1.0, 0.0, True)
+            gap = np.minimum([gap_at(geometry, pose, at)[0] for at in u], 0.0)
+            overlaps = np.count_nonzero((gap[1:] < 0.0) & (gap[:-1] == 0.0))
+            many += overlaps > MAX_PATCHES
+            if overlaps <= MAX_PATCHES:
+                continue
+            found = rows[:count]
+            assert count == MAX_PATCHES and np.all(np.diff(found[:, U_WHEEL]) > 0.0)
+            assert np.all(found[1:, OUTSIDE] >= found[:-1, BEYOND])
+            inside = (found[:, None, OUTSIDE] < u) & (u < found[:, None, BEYOND])
+            assert np.all(inside.sum(axis=0)[gap < 0.0] == 1)
+            cosine = found[:, COSINE]
+            depth = found[:, PENETRATION] / cosine
+            square = depth**2 * np.sqrt(depth * cosine**3 / found[:, CURVATURE_Y]) / 0.9375
+            assert square.sum() == pytest.approx((gap**2).sum() * 1e-5, rel=0.01)
+    assert many > 10
 
 
 def test_no_contact_when_lifted_and_nothing_invented(benchmark_pair):

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-import wrcore as wr
 from study.patch.rolling import solve_patch
-from tests.conftest import SCENES
+from tests.conftest import SCENES, pair_with_waves
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.analysis.contact.loaded import LoadedWheels
@@ -15,12 +14,10 @@ from wrcore.contact import reduction as columns
 from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import strip_model, strip_work
 from wrcore.contact.strip import make_pose
-from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.strip_wheel import solve_on_grid
 from wrcore.dynamics.system import Equations
-from wrcore.geometry.profile import ProfileCurve
 from wrcore.kernels.handles import Handle
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
@@ -163,14 +160,6 @@ def test_fixed_strips_are_told(benchmark_pair):
     assert [(bool(one.on_fixed), one.on_grid) for one in (*pressed_in, *usual)] == [(True, False), (False, False)]
 
 
-def _pair_with_waves(height, length):
-    """S1002 with waves (µm high, mm long) on UIC60."""
-    u = np.arange(-0.04, 0.0301, 2e-4)
-    wheel, rail = wr.named_profile("S1002", "wheel"), wr.named_profile("UIC60-MBench", "rail", 1 / 40)
-    waves = 1e-6 * height * np.cos(2e3 * np.pi * u / length) * (abs(u) < 0.025)
-    return WheelOnRail(ProfileCurve.from_points(u, wheel(u) + waves, "wheel", "waves"), rail).geometry
-
-
 @pytest.mark.parametrize(
     ("height", "length", "y", "load", "fixed", "off", "peak"),
     [(20, 4.0, 0.0, 8e4, True, 6e-3, 0.1), (20, 3.0, 0.0, 8e4, True, 0.015, 0.25),
@@ -182,7 +171,7 @@ def _pair_with_waves(height, length):
 def test_a_wheel_with_waves_carries_on_all_of_them(height, length, y, load, fixed, off, peak):
     """On more lobes than there are windows, or than rows for overlaps, and between strips wider than the waves: normal
     force, width and greatest pressure are those of the grid; without what would be lost it is 12 to 26 %."""
-    pair = _pair_with_waves(height, length)
+    pair = pair_with_waves(height, length)
     wheels, grid = LoadedWheels(pair, "exact", "coarse"), LoadedWheels(pair, "grid", "middle")
     z = wheels.height("left", y, load)
     ((found,), (expected,)) = (one.at_height("left", y, z, fields=True) for one in (wheels, grid))
@@ -195,7 +184,7 @@ def test_a_wheel_with_waves_carries_on_all_of_them(height, length, y, load, fixe
 @pytest.mark.parametrize(("height", "length", "load"), [(40, 4.0, 3e4), (20, 3.5, 3e4)])
 def test_nothing_steps_where_a_wheel_with_waves_moves_across(height, length, load):
     """More overlaps than rows come and go, and waves shorter than strips: N stepped by a quarter."""
-    wheels = LoadedWheels(_pair_with_waves(height, length), "exact", "coarse")
+    wheels = LoadedWheels(pair_with_waves(height, length), "exact", "coarse")
     z, at = wheels.height("left", 0.0, load), np.arange(-1e-3, 1e-3, 2e-5)
     normal = np.array([sum(one.row[columns.NORMAL] for one in wheels.at_height("left", y, z)) for y in at])
     assert normal.max() > 3.0 * normal.min()
