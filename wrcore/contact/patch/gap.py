@@ -14,21 +14,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.geometry import SCAN_STEP
-from wrcore.contact.reduction import (
-    ANGLE,
-    BEYOND,
-    COSINE,
-    CURVATURE_Y,
-    OUTSIDE,
-    PENETRATION,
-    SINE,
-    U_RAIL,
-    U_WHEEL,
-    X,
-    Y,
-    Z,
-)
+from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, SINE, U_RAIL, U_WHEEL, X, Y, Z
 from wrcore.contact.strip import (
     AHEAD,
     BEND,
@@ -249,12 +235,8 @@ def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends)
             if gap_at(geometry, pose, high)[0] > 0.0:
                 break
             high += 0.3 * width
-        joined = row[OUTSIDE] < low - SCAN_STEP or row[BEYOND] > high + SCAN_STEP  # of several overlaps
-        if joined:
-            low, high = min(low, row[OUTSIDE]), max(high, row[BEYOND])
         if k + 1 < last:
-            middle = 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL])
-            high = min(high, max(middle, row[BEYOND]) if joined else middle)
+            high = min(high, 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL]))
         low = max(low, stop)
         stop = high
         step = (high - low) / (NODES - 1)
