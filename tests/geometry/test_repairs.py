@@ -9,7 +9,7 @@ from wrcore.errors import InputError
 from wrcore.geometry.irregularity import read_irregularity
 from wrcore.geometry.profile_files import read_profile
 from wrcore.geometry.standards import named_profile
-from wrcore.kernels.cache import warn
+from wrcore.kernels.cache import _say_once
 
 U = np.linspace(-0.060, 0.055, 1151)
 POINTS = 1e3 * U, 1e3 * named_profile("S1002", "wheel")(U)
@@ -19,7 +19,7 @@ RAIL = named_profile("UIC60-MBench", "rail", 1 / 40)
 @pytest.fixture
 def said(capsys):
     """What has been said on standard error since the last time."""
-    warn.cache_clear()
+    _say_once.cache_clear()
     return lambda: capsys.readouterr().err
 
 

@@ -11,7 +11,7 @@ import pytest
 from wrcore.creep import table as table_module
 from wrcore.creep.table import ensure_table, table_path
 from wrcore.kernels import cache as cache_module
-from wrcore.kernels.cache import cache_root, source_digest, warn
+from wrcore.kernels.cache import _say_once, cache_root, source_digest, untold, warn
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def wanted(tmp_path, monkeypatch):
     """A folder to be the cache; the answers of this process are forgotten before and after."""
     monkeypatch.setenv("WRCORE_CACHE", str(tmp_path / "cache"))
     cache_module._prepared.cache_clear()
-    warn.cache_clear()
+    _say_once.cache_clear()
     return tmp_path / "cache"
 
 
@@ -194,3 +194,12 @@ def test_numba_without_compilation_is_one_clear_line():
     command = [sys.executable, "-c", "import wrcore.kernels.jit"]
     done = subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True)
     assert "NUMBA_DISABLE_JIT: expected it unset: kernels hand" in done.stderr.splitlines()[-1]
+
+
+def test_what_is_untold_is_told_later(wanted, capsys):
+    with untold():
+        warn("a worn profile")
+    assert capsys.readouterr().err == ""
+    warn("a worn profile")
+    warn("a worn profile")
+    assert capsys.readouterr().err == "wrcore: a worn profile\n"

@@ -36,6 +36,10 @@ LARGEST_REST = 1e-6 * GRAVITY
 LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
 """The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
 
+LARGEST_REST_BETWEEN_PATCHES = 0.1 * GRAVITY
+"""The same where wheels or rails differ, as worn ones do, and no place is better: with `moment` forces step by 10 to
+20 % where overlaps merge."""
+
 LARGEST_SLIP, LARGEST_SHIFT = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
 
@@ -63,13 +67,18 @@ def rest(scene, model):
     level = frictionless(model)._replace(track=track, speed=REST_SPEED)
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
     limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
-    for offset in (0.0, *(START_OFFSETS if model.contact.geometries else ())):
+    found, unlike = [], model.contact.geometries
+    for offset in (0.0, *(START_OFFSETS if unlike else ())):
         try:
             equilibrium = solve_equilibrium(level, _standing(scene, model, offset))
         except np.linalg.LinAlgError as error:
             raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
         if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
             return equilibrium
+        found.append(equilibrium)
+    equilibrium = min(found, key=lambda one: (np.any(one.wheel_loads <= 0.0), one.residual))
+    if unlike and equilibrium.residual < LARGEST_REST_BETWEEN_PATCHES and np.all(equilibrium.wheel_loads > 0.0):
+        return equilibrium
     raise InputError(
         scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
         f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",

@@ -13,7 +13,8 @@ import stat
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 
@@ -145,9 +146,27 @@ def _remove_own(root, process):
         shutil.rmtree(root, ignore_errors=True)
 
 
-@cache
+_UNTOLD = ContextVar("untold", default=False)
+
+
+@contextmanager
+def untold():
+    """Warn of nothing meanwhile in this thread: of files that nobody but a run itself has written."""
+    before = _UNTOLD.set(True)
+    try:
+        yield
+    finally:
+        _UNTOLD.reset(before)
+
+
 def warn(text):
     """Say something on standard error, once."""
+    if not _UNTOLD.get():
+        _say_once(text)
+
+
+@cache
+def _say_once(text):
     say(text)
 
 

@@ -1,5 +1,6 @@
 """Profiles over a distance: flange numbers of S1002, books that balance, resumption, refusals."""
 
+import math
 import os
 import shutil
 from contextlib import contextmanager
@@ -12,10 +13,22 @@ import yaml
 from tests.conftest import SCENES
 from wrcore.analysis.wear import evolve as ev
 from wrcore.analysis.wear import wear_folder
-from wrcore.analysis.wear.worn_profiles import POINTS, file_of, flange, hollow, limits_reached, read_points, smooth
-from wrcore.analysis.wear.worn_rails import laid_rails, rail_file
+from wrcore.analysis.wear.worn_profiles import (
+    POINTS,
+    file_of,
+    flange,
+    hollow,
+    limits_reached,
+    read_points,
+    smooth,
+    smooth_along,
+)
+from wrcore.analysis.wear.worn_rails import FACE_SLOPE, laid_rails, rail_file, worn_down
+from wrcore.analysis.wear.worn_rails import POINTS as RAIL_POINTS
 from wrcore.cli import main
 from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.kernels.cache import untold
 from wrcore.scene.description import load_scene
 
 PLAN = {
@@ -264,6 +277,27 @@ def test_smoothing_turns_no_wave_over(wave):
     assert np.dot(smooth(ridges, 3e-3)[inside], ridges[inside]) > -1e-9
 
 
+@pytest.mark.parametrize("slope", [0.0, 2.7, 8.0])
+def test_smoothing_along_a_face_spreads_over_its_own_length(slope):
+    """What one point of a straight face loses is spread as on level ground: as far along the face, the sum kept."""
+    u = POINTS * np.arange(400)
+    values = np.zeros(400)
+    values[200] = 1.0
+    spread = smooth_along(u, slope * u, values, 3e-3)
+    along = math.hypot(1.0, slope) * (u - u[200])
+    assert spread.sum() == pytest.approx(1.0) and abs((spread * along).sum()) < 1e-5
+    level = math.sqrt((smooth(values, 3e-3) * (u - u[200]) ** 2).sum())
+    own = math.hypot(1.0, slope) * POINTS / math.sqrt(12.0)  # a point of the face is a bin as wide as this, standard
+    assert math.sqrt((spread * along**2).sum()) == pytest.approx(math.hypot(level, own), rel=0.15)
+
+
+def test_smoothing_along_keeps_a_depth_that_is_the_same_everywhere(curves):
+    """Normal to the profile, over the whole of a new rail but its very ends."""
+    u, f = read_points(rail_file(curves["left"][0], 0, 0, "left"))
+    fall = 1e-4 * np.hypot(1.0, np.gradient(f, u))
+    np.testing.assert_allclose(smooth_along(u, f, fall, 3e-3)[4:-6], fall[4:-6], rtol=0.02)
+
+
 def test_a_plan_with_exact_patches_wears_what_its_runs_lose(tmp_path):
     """A step of a coarse exact run: its books balance, and its deepest place is not the ellipses'."""
     run = {"speed": 40, "integration.duration": 0.3, "initial.y": 0.003}
@@ -332,7 +366,7 @@ def test_rails_lose_what_the_traffic_takes(curves):
         taken = ev.rail_wear(folder).iloc[step]
         for side in ("left", "right"):
             loss = rail_loss(folder, step + 1, side, step)
-            assert np.sum(loss) * POINTS == pytest.approx(taken[f"{side}_m2_per_Mt"] * tonnes, rel=1e-6)
+            assert np.sum(loss) * RAIL_POINTS == pytest.approx(taken[f"{side}_m2_per_Mt"] * tonnes, rel=1e-6)
             assert loss.min() > -1e-12 and loss.max() > 1e-7
 
 
@@ -349,6 +383,53 @@ def test_a_mirrored_curve_wears_mirrored_rails(curves):
         np.testing.assert_allclose(rail_loss(there, 3, other), loss, atol=1e-3 * loss.max())
     np.testing.assert_allclose(mirrored["worn_m"], table["worn_m"], rtol=1e-3)
     assert rail_loss(here, 3, "right").sum() > 2.0 * rail_loss(here, 3, "left").sum()  # the outer rail of a left curve
+
+
+def test_the_gauge_face_of_a_stored_rail_goes_on(curves, capsys):
+    """Also of one that has lost 2 mm of its corner, down to a flank of 70 degrees, where a new curve has ended."""
+    _, (scene,) = ev.load_wear_plan(curved(400))
+    u, f = read_points(rail_file(curves["left"][0], 0, 0, "left"))
+    new, gauge = scene.pair().rail, slice(0, u.size // 2)
+    flank = -0.010 + 2.75 * (u - np.interp(-0.010, f[gauge], u[gauge]) - 2e-3)
+    with untold():
+        stored, worn = (ProfileCurve.from_points(u, z, "rail", trim=True) for z in (f, np.minimum(f, flank)))
+    assert capsys.readouterr().err == ""
+    both = new.u[(new.u > stored.u[0]) & (new.u < stored.u[-1]) & (np.abs(new.df) < 3.0)]
+    np.testing.assert_allclose(stored(both), new(both), atol=1e-6)
+    assert new.f[0] > -0.0145 and stored.f[0] < -0.016
+    assert worn.f[0] < -0.019 and worn(worn.u[0], 1) == pytest.approx(2.75, abs=0.1)
+
+
+def gauge_corner(flank):
+    """A level rail whose gauge face falls with a slope from u = 0 to 15 mm below its top, and level ground there."""
+    u = RAIL_POINTS * np.arange(-300, 300)
+    return u, np.clip(flank * u, -0.015, 0.0)
+
+
+def test_a_face_that_moves_on_leaves_no_groove():
+    """By half a mm, five points, over a foot that loses as much: both move along their normals, as a straight face and
+    level ground do, but for the corner between them."""
+    u, f = gauge_corner(6.0)
+    now = worn_down(u, f, 5e-4 * np.hypot(1.0, np.gradient(f, u)))
+    moved = np.clip(6.0 * u - 5e-4 * math.hypot(1.0, 6.0), -0.0155, -0.0005)
+    straight = (np.abs(u + 0.0025) > 8e-4) & (np.abs(u) > 8e-4)
+    np.testing.assert_allclose(now[straight], moved[straight], atol=1e-9)
+    assert np.diff(now).min() > -1e-12 and now.min() > -0.0155 - 1e-9
+
+
+def test_what_wears_little_falls_by_just_that():
+    u, f = gauge_corner(2.7)
+    u, f = u[f > -0.015], f[f > -0.015]
+    fall = 2e-5 * np.exp(-(((u + 0.003) / 2e-3) ** 2)) * np.hypot(1.0, np.gradient(f, u))
+    np.testing.assert_allclose(f - worn_down(u, f, fall), fall, atol=1e-15)
+
+
+def test_a_gauge_face_keeps_no_lip_and_is_no_steeper_than_a_curve_can_be():
+    u, f = gauge_corner(6.0)
+    groove = np.where((u > -0.0026) & (u < -0.0021), 5e-3, 0.0)
+    now = worn_down(u, f - groove, np.zeros(u.size))
+    assert np.diff(now).min() > -1e-12 and np.diff(now).max() <= FACE_SLOPE * RAIL_POINTS * (1.0 + 1e-9)
+    np.testing.assert_array_equal(now[u > -0.0015], f[u > -0.0015])
 
 
 def test_worn_rails_keep_their_place(curves):

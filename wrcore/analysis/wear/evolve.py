@@ -39,6 +39,7 @@ from wrcore.errors.input_files import check_unchanged
 from wrcore.errors.new_files import appearing, held
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
+from wrcore.kernels.cache import untold
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import Scene, load_scene
 from wrcore.sweep.plan import digest_of_plan
@@ -278,8 +279,11 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
             if worn.laid:
-                fall = {side: worn_profiles.smooth(worn.falls[side], data["smoothing"]) for side in SIDES}
-                depths = [worn_profiles.across(u, f, fall[side]) for side, (u, f) in worn.laid.points.items()]
+                rails_of, width = worn.laid.points, data["smoothing"]
+                fall = {
+                    side: worn_profiles.smooth_along(u, f, worn.falls[side], width) for side, (u, f) in rails_of.items()
+                }
+                depths = [worn_profiles.across(u, f, fall[side]) for side, (u, f) in rails_of.items()]
                 fastest = max(fastest, *depths)
                 falls.append(fall)
             for name, seconds in zip(("simulate", "wear"), worn.seconds, strict=True):
@@ -294,10 +298,12 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
 def _scene_wear(data, folder, step, u, quiet, place, scene):
     began = time.thread_time()
     path = file_of(folder, "profile", step).resolve()
-    laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
+    with untold():
+        laid = worn_rails.laid_rails(folder, step, place, scene) if data["rails"] else None
     changes = {"wheel.profile": {"points": str(path), "unit": "m"}} | (laid.changes if laid else {})
     try:
-        present = load_scene(scene, changes)
+        with untold():
+            present = load_scene(scene, changes)
         run = simulate(present, progress=False if quiet else None)
     except InputError as error:
         raise InputError(path, f"scenes.{place}", str(error)) from None

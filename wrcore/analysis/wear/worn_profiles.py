@@ -8,7 +8,7 @@ import numpy as np
 from wrcore.errors import InputError
 from wrcore.errors.new_files import appearing
 
-POINTS = 2.5e-4  # distance of the points of a stored profile, m
+POINTS = 2.5e-4  # distance of the points of a stored wheel, m
 
 
 def flange(curve):
@@ -53,6 +53,16 @@ def smooth(values, width):
     return _mean(_mean(values, width / math.sqrt(2.0)), width / math.sqrt(2.0))
 
 
+def smooth_along(u, f, values, width):
+    """As `smooth`, over a width along the profile u, f (n,), m: a side face of a rail is many times as deep as wide."""
+    edges = edges_of(u)
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(edges), np.diff(np.interp(edges, u, f))))])
+    even = POINTS * np.arange(int(arc[-1] / POINTS) + 2)  # the last one beyond the profile's end
+    area = np.concatenate([[0.0], np.cumsum(values)])
+    spread = smooth(np.diff(np.interp(even, arc, area)), width)
+    return np.diff(np.interp(arc, even, np.concatenate([[0.0], np.cumsum(spread)])))
+
+
 def _mean(values, width):
     """Mean over a width (m) around each point; what would go beyond the ends stays at them."""
     half = int(round(0.5 * width / POINTS))
@@ -70,15 +80,21 @@ def across(u, f, loss):
     return float(np.max(loss / np.sqrt(1.0 + np.gradient(f, u) ** 2)))
 
 
-def points_of(curve):
+def points_of(curve, spacing=POINTS):
     """The curve at the points that are stored."""
-    u = POINTS * np.arange(np.ceil(curve.u[0] / POINTS - 1e-9), np.floor(curve.u[-1] / POINTS + 1e-9) + 1)
+    u = spacing * np.arange(np.ceil(curve.u[0] / spacing - 1e-9), np.floor(curve.u[-1] / spacing + 1e-9) + 1)
     return u, curve(np.clip(u, curve.u[0], curve.u[-1]))
+
+
+def spacing_of(u):
+    """Distance of stored points, m."""
+    return (u[-1] - u[0]) / (len(u) - 1)
 
 
 def edges_of(u):
     """Edges of the bins around stored points."""
-    return np.append(u - 0.5 * POINTS, u[-1] + 0.5 * POINTS)
+    half = 0.5 * spacing_of(u)
+    return np.append(u - half, u[-1] + half)
 
 
 def onto_points(u, edges, depth):
@@ -87,7 +103,7 @@ def onto_points(u, edges, depth):
     """
     area = np.concatenate([[0.0], np.cumsum(depth * np.diff(edges))])
     inner = np.interp(edges_of(u)[1:-1], edges, area)
-    return np.diff(np.concatenate([[0.0], inner, area[-1:]])) / POINTS
+    return np.diff(np.concatenate([[0.0], inner, area[-1:]])) / spacing_of(u)
 
 
 def file_of(folder, kind, step):
@@ -108,5 +124,5 @@ def read_points(path):
     except (OSError, ValueError) as error:
         raise InputError(path, "", f"expected a profile that an earlier step has written: {error}") from None
     if points.shape[1] != 2 or not np.isfinite(points).all() or np.ptp(np.diff(points[:, 0])) > 1e-6 * POINTS:
-        raise InputError(path, "", f"expected a profile that an earlier step has written, points every {POINTS:g} m")
+        raise InputError(path, "", "expected a profile that an earlier step has written, points equally far apart")
     return points[:, 0], points[:, 1]

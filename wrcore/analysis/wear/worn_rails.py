@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, write_points
 from wrcore.geometry.profile import ProfileCurve
@@ -30,6 +31,34 @@ class LaidRails(NamedTuple):
 
 DEPTH = 0.010  # below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge
 
+POINTS = 1e-4
+"""Distance of the points of a stored rail, m: its gauge face is steep."""
+
+FACE, FACE_SLOPE = 3e-4, 8.0
+"""Width (m) and slope of the gauge face of a stored rail below its curve. That of 60E1 stands at 87 to 89 degrees and
+takes up so much from 14 to 22 mm below the top, which no curve f(u) follows (`ProfileCurve`); this one stands at 83."""
+
+
+def with_gauge_face(u, f):
+    """Points of a new rail (n,), m, with those of its gauge face: where a corner is worn to a flank of 70 degrees, each
+    mm across reaches 3 mm further down, below the end of a new rail's curve."""
+    below = POINTS * np.arange(round(FACE / POINTS), 0, -1)
+    return np.append(u[0] - below, u), np.append(f[0] - FACE_SLOPE * below, f)
+
+
+def worn_down(u, f, fall):
+    """Points of a rail that has fallen by ``fall`` (n,), m.
+
+    None falls further below the lowest within its depth, normal to the profile, than that: a face that moves on by
+    several points leaves level ground behind it, no groove, and nothing beyond the ends. On the gauge face, from
+    `DEPTH` below the top, lips go, and what would be steeper than `FACE_SLOPE` is filled up."""
+    depth = fall / np.hypot(1.0, np.gradient(f, u))
+    around = 2 * math.ceil(depth.max() / POINTS) + 1
+    now = np.maximum(f - fall, minimum_filter1d(f, around, mode="constant", cval=-math.inf) - depth)
+    face = slice(0, np.argmax(now > now.max() - DEPTH))
+    now[face] = np.minimum.accumulate(now[face][::-1])[::-1]
+    return FACE_SLOPE * u + np.maximum.accumulate((now - FACE_SLOPE * u)[::-1])[::-1]
+
 
 def _new_rails(scene):
     return {side: scene.pair(side).rail for side in SIDES}
@@ -39,7 +68,7 @@ def lay_rails(folder, scenes):
     """Store the new rails of all scenes."""
     for place, scene in enumerate(scenes):
         for side, rail in _new_rails(scene).items():
-            write_points(rail_file(folder, 0, place, side), *points_of(rail))
+            write_points(rail_file(folder, 0, place, side), *with_gauge_face(*points_of(rail, POINTS)))
 
 
 def rail_file(folder, step, place, side):
@@ -79,7 +108,8 @@ def next_rails(folder, step, falls, length, renewed):
     for place, fall in enumerate(falls):
         for side in SIDES:
             u, f = read_points(rail_file(folder, 0 if renewed else step, place, side))
-            write_points(rail_file(folder, step + 1, place, side), u, f if renewed else f - fall[side] * length)
+            now = f if renewed else worn_down(u, f, fall[side] * length)
+            write_points(rail_file(folder, step + 1, place, side), u, now)
 
 
 def to_renewal(gone, renewal):
