@@ -13,6 +13,7 @@ import numpy as np
 
 from wrcore.contact import reduction
 from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
+from wrcore.dynamics.modes import WARM
 from wrcore.dynamics.suspension import pack_elements
 from wrcore.dynamics.system import Equations, frictionless, internal_states
 from wrcore.geometry.irregularity import irregularity_at
@@ -88,7 +89,7 @@ def solve_equilibrium(model, state, iterations=50):
     for _ in range(iterations):
         rows = STEP * np.eye(len(unknown))[unknown]
         states = displaced(state, model, np.vstack([rows, -rows]))
-        values = _accelerations(equations.at(0.0, np.vstack([states, state])), model)[:, unknown]
+        values = _accelerations(equations.at(0.0, np.vstack([states, state]), WARM), model)[:, unknown]
         residual = float(np.max(np.abs(values[-1])))
         if residual < RESIDUAL and not residual < 0.1 * before:
             break
@@ -109,7 +110,7 @@ def _improved(state, step, model, equations, residual):
     """The state after the longest of the step, its half, its quarter, ... that comes closer to equilibrium, or None."""
     for halvings in range(12):
         new = displaced(state, model, step[None, :] * 0.5**halvings)[0]
-        rates = equations.at(0.0, new[None, :])
+        rates = equations.at(0.0, new[None, :], WARM)
         if np.max(np.abs(_accelerations(rates, model)[:, _unknowns(model)])) < residual:
             return new
     return None

@@ -234,6 +234,15 @@ class KernelDispatcher(CPUDispatcher):
 
     form = "called"
 
+    @property
+    def _cache(self):
+        """Made for those that are called: a process imports hundreds of kernels and calls some."""
+        if self._own_cache is None:
+            self._own_cache = KernelCache(self.py_func)
+        return self._own_cache
+
+    _own_cache = None
+
     def compile(self, sig):
         with _rarely_collected():
             return super().compile(sig)

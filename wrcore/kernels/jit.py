@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 from numba.np import linalg
 
 from wrcore.errors import InputError
-from wrcore.kernels.forms import KernelCache, KernelCompiler, KernelDispatcher
+from wrcore.kernels.forms import KernelCompiler, KernelDispatcher
 
 if numba.config.DISABLE_JIT:
     raise InputError("NUMBA_DISABLE_JIT", "", "expected it unset: kernels hand each other addresses of compiled code")
@@ -46,7 +46,6 @@ def jit(function=None, *, allocates=True, **options):
         settings["_nrt"] = False
     dispatcher = numba.njit(function, pipeline_class=KernelCompiler, **settings)
     dispatcher.__class__ = KernelDispatcher
-    dispatcher._cache = KernelCache(function)
     return dispatcher
 
 

@@ -24,6 +24,7 @@ from wrcore.contact.patch.grading import grade
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
 from wrcore.contact.patch.strips import FIXED, MAX_WINDOWS, WEIGHT, place_strips
 from wrcore.contact.patch.windows import (
+    count_again,
     drop_starved,
     guess_squares,
     guess_windows,
@@ -49,8 +50,10 @@ N is off by 1 to 29 % of waves that leave more, and fixed strips stand in."""
 _OTHER_NUMBERS = 0, 4, -1, 2
 """Strips by which a window's number differs in turn, where no solution was found."""
 
-_STRIPS_FROM = 4 + 3 * MAX_WINDOWS
-"""Where a memory holds its strips."""
+_GUESSED = 4 + 3 * MAX_WINDOWS
+"""Where a memory holds of how many windows the first guess was, and from the next place on its strips."""
+
+_STRIPS_FROM = _GUESSED + 1
 
 _REACH = 0.5
 """A window's tips may lie this share of its width from those of the first guess for a solution to start from."""
@@ -87,18 +90,20 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
     guess_squares(hertz, patches, first, work, stretches)
     grade(work, stretches)
-    windows = guess_windows(work, stretches, resolution)
+    guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     left = _ALL_STEPS
-    if _resume(frame, memory, work, windows):
+    if _resume(frame, memory, work, guessed, resolution):
+        windows = int(memory[0])
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
             place_strips(geometry, pose, frame, work, windows)
             if newborn(values, work, windows, stretches, resolution, _BORN) == windows:
                 if overlooked(work, windows, stretches) <= _OVERLOOKED:
-                    _remember(frame, work, windows, memory)
+                    _remember(frame, work, windows, guessed, memory)
                     return windows, frame
                 left = 0
+    if memory[0] > 0.0:
         windows = guess_windows(work, stretches, resolution)
     memory[0], work.left[0] = 0.0, left
     for born in (_BORN, _HARDLY):
@@ -108,10 +113,10 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
             strips = resolution + extra
             if extra != 0:
                 windows = guess_windows(work, stretches, strips)
-            found, attempts = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds, born)
+            found = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds, born)
             if found > 0:
-                if attempts == 1 and extra == 0 and born == _BORN:
-                    _remember(frame, work, found, memory)
+                if extra == 0 and born == _BORN:
+                    _remember(frame, work, found, guessed, memory)
                 return found, frame
             if found < 0:
                 break
@@ -124,7 +129,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
 def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolution, kinds, born):
     """Solution without memory: from the guess if there is one, then from fixed strips, repaired where it must be;
     ``born``: see `newborn`. Returns the number of windows, 0 where no solution was found, -1 where it wants more than
-    there may be or strips overlook too much, and of attempts."""
+    there may be or strips overlook too much."""
     bold, again = False, False
     for attempt in range(_ROUNDS):
         if work.left[0] <= 0:
@@ -151,15 +156,15 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
             if more == windows and overlooked(work, windows, stretches) > _OVERLOOKED:
                 more = work.left[0] = -1
             if more == windows or more < 0:
-                return more, attempt + 1
+                return more
             windows = more
-    return 0, _ROUNDS
+    return 0
 
 
 @jit(allocates=False)
-def _remember(frame, work, windows, memory):
+def _remember(frame, work, windows, guessed, memory):
     """Note what a warm start wants to know of the solution."""
-    memory[0], memory[1], memory[2], memory[3] = windows, frame.x, frame.ur, frame.z
+    memory[0], memory[1], memory[2], memory[3], memory[_GUESSED] = windows, frame.x, frame.ur, frame.z, guessed
     for k in range(windows):
         at = 4 + 3 * k
         memory[at], memory[at + 1], memory[at + 2] = work.start[k + 1], work.low[k], work.high[k]
@@ -169,19 +174,24 @@ def _remember(frame, work, windows, memory):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _resume(frame, memory, work, windows):
-    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near enough."""
-    if windows == 0 or memory[0] != windows:
+def _resume(frame, memory, work, guessed, resolution):
+    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near enough; if it
+    had others than the guess, it does where that was of as many as this one, and they want as many strips."""
+    windows = int(memory[0])
+    if windows == 0 or guessed == 0 or memory[_GUESSED] != guessed:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
     shift, old_first = y * frame.cosine + z * frame.sine, 0
     for k in range(windows):
         low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
         reach = _REACH * (high - low)
-        if abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach:
+        if windows == guessed and (abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach):
             return False
     for k in range(windows):
         work.low[k], work.high[k] = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
+    if windows != guessed and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
+        return False
+    for k in range(windows):
         old_end, first, end = int(memory[4 + 3 * k]), work.start[k], work.start[k + 1]
         ratio = (old_end - old_first) / (end - first)
         for i in range(first, end):

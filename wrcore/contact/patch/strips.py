@@ -47,7 +47,7 @@ BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 """What the second of Galerkin's conditions makes of a parabola t^2."""
 
 
-MEMORY = 4 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
+MEMORY = 5 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
 """Numbers that a warm start wants of a solution: windows (0: none), x, ur, z of its frame's origin; ends in strips and
 tips of its windows; Q, c and X of its strips."""
 

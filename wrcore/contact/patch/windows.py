@@ -238,6 +238,26 @@ def take_fresh(work, found, largest, resolution):
 
 
 @jit(allocates=False, fastmath=FUSED)
+def count_again(work, windows, counts, strips, resolution):
+    """Number the strips of windows that are not those of the first guess, from the solution they had: ``counts``: of
+    each window the end of its strips (then two numbers more), ``strips``: of each strip three numbers, c the second.
+    Whether they want as many as they had."""
+    work.more[WEIGHT], first = 0.0, 0
+    for k in range(windows):
+        end, largest = int(counts[3 * k]), 0.0
+        for i in range(first, end):
+            largest = max(largest, strips[3 * i + 1])
+        width, length = work.high[k] - work.low[k], 2.0 * math.sqrt(largest)
+        work.start[k + 1] = count_strips(width, length, resolution, work.more)
+        first = end
+    _number(work, windows)
+    for k in range(windows):
+        if work.start[k + 1] != int(counts[3 * k]):
+            return False
+    return True
+
+
+@jit(allocates=False, fastmath=FUSED)
 def newborn(values, work, windows, stretches, resolution, least):
     """Windows where the loaded surfaces interpenetrate outside the windows, by ``least`` of the deepest penetration,
     are added. Returns the new number; -1 where there may be no more."""
