@@ -83,8 +83,9 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     and their `Frame`.
 
     ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
-    if it fits (its first number 0: none), which leaves the result the same to the square of the iteration's tolerance;
-    filled with this one."""
+    if it fits (its first number 0: none); filled with this one. It leaves the result the same to the square of the
+    iteration's tolerance while windows are those of the first guess; where others are wanted and several sets fit, as
+    between lobes of worn wheels, it keeps its own: N then differs by up to 1 % from that without it, and steps less."""
     work.more[FIXED] = 0.0
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
@@ -92,7 +93,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     grade(work, stretches)
     guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
-    left = _ALL_STEPS
+    work.left[0] = left = _ALL_STEPS
     if _resume(frame, memory, work, guessed, resolution):
         windows = int(memory[0])
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)

@@ -1,7 +1,7 @@
 """Windows of strips, one per lobe of contact: first guesses from the overlaps, and repairs after a solution.
 
-What the windows are depends on the pose alone: they start from the overlaps, and every repair follows from a solution
-that does not depend on where its iteration started.
+Without a memory of the last solution what the windows are depends on the pose alone: they start from the overlaps. With
+one they stay, where others fit as well (`wrcore.contact.patch.solve.solve_patch`).
 """
 
 import math
