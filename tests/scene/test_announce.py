@@ -5,7 +5,7 @@ import time
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.kernels.cache import warn
+from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import told_if_long, warn_once
 from wrcore.scene import description
@@ -37,7 +37,7 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
 def test_compiling_is_told_once_when_it_takes_long(monkeypatch, capsys):
     monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
     monkeypatch.setattr("wrcore.kernels.told.PATIENCE", 0.0)
-    for each in (warn, warn_once):
+    for each in (_say_once, warn_once):
         each.cache_clear()
     for factor in (2.0, 3.0):
         assert jit(lambda x, factor=factor: factor * x + 1.0, cache=False)(1.0) == factor + 1.0
