@@ -3,11 +3,14 @@
 import copy
 import pickle
 
+import h5py
 import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from wrcore.contact.patch.strips import MEMORY
 from wrcore.errors import InputError
+from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.run.results import load_run
 from wrcore.run.simulate import simulate
 from wrcore.run.state import State
@@ -101,3 +104,14 @@ def test_what_is_made_of_a_state_knows_its_time():
     for other in (state + 0.1, state.copy(), copy.copy(state), copy.deepcopy(state), pickle.loads(pickle.dumps(state))):
         assert (other.t, other.frame, other.vehicle) == (2.0, 40.0, ("vehicle", "body"))
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(state)), state)
+
+
+def test_patches_of_an_earlier_version_start_from_nothing(first, tmp_path):
+    """Its checkpoint knew less of each of them."""
+    with h5py.File(tmp_path / "end.h5", "w") as file:
+        write_checkpoint(file, first.end)
+        del file["patches"]
+        file["patches"] = np.ones((1, 2, 3, 4))
+        read = read_checkpoint(file)
+    assert read.patches.shape == (1, 2, 3, MEMORY) and not read.patches.any()
+    assert read.t == first.end.t and np.array_equal(read.memory.state, first.end.memory.state)

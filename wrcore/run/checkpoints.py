@@ -36,6 +36,8 @@ def write_checkpoint(group: h5py.Group, checkpoint: Checkpoint) -> None:
 def read_checkpoint(group: h5py.Group) -> Checkpoint:
     """Read what `write_checkpoint` wrote; KeyError where something is missing."""
     saved = _read(group, _Saved)
+    if saved.patches.shape[-1] != MEMORY:  # of an earlier version: patches start from nothing
+        saved = saved._replace(patches=np.zeros((*saved.patches.shape[:-1], MEMORY)))
     return Checkpoint(str(group.attrs["method"]), float(group.attrs["t"]), *saved, str(group.attrs.get("model", "")))
 
 
