@@ -370,6 +370,14 @@ def test_rails_lose_what_the_traffic_takes(curves):
             assert loss.min() > -1e-12 and loss.max() > 1e-7
 
 
+def test_rails_that_were_stored_otherwise_are_not_gone_on_with(curves, monkeypatch):
+    """As those of an earlier version, which had no gauge face."""
+    folder, _ = curves["left"]
+    monkeypatch.setattr(ev.worn_rails, "FACE", 0.0)
+    with pytest.raises(InputError, match="a folder of this plan"):
+        ev.evolve(curved(400), folder)
+
+
 def test_renewed_rails_are_new(curves):
     folder, _ = curves["left"]
     for side in ("left", "right"):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, write_points
+from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, spacing_of, write_points
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 
@@ -53,7 +53,7 @@ def worn_down(u, f, fall):
     several points leaves level ground behind it, no groove, and nothing beyond the ends. On the gauge face, from
     `DEPTH` below the top, lips go, and what would be steeper than `FACE_SLOPE` is filled up."""
     depth = fall / np.hypot(1.0, np.gradient(f, u))
-    around = 2 * math.ceil(depth.max() / POINTS) + 1
+    around = 2 * math.ceil(depth.max() / spacing_of(u)) + 1
     now = np.maximum(f - fall, minimum_filter1d(f, around, mode="constant", cval=-math.inf) - depth)
     face = slice(0, np.argmax(now > now.max() - DEPTH))
     now[face] = np.minimum.accumulate(now[face][::-1])[::-1]
