@@ -12,8 +12,8 @@ from wrcore.contact.detection import axle_direction, find_patches
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.contact.wheel_on_rail import WheelOnRail
+from wrcore.dynamics.lift import lift_of
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.strip_wheel import lift_of
 from wrcore.geometry.standards import named_profile
 from wrcore.kernels.handles import Handle
 from wrcore.kernels.jit import jit

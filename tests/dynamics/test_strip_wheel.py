@@ -16,7 +16,7 @@ from wrcore.contact.patch.model import strip_model, strip_work
 from wrcore.contact.strip import make_pose
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.motion import WheelMotion
-from wrcore.dynamics.strip_wheel import solve_on_grid
+from wrcore.dynamics.strip_patch import solve_on_grid
 from wrcore.dynamics.system import Equations
 from wrcore.kernels.handles import Handle
 from wrcore.run.simulate import simulate

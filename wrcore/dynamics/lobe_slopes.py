@@ -27,6 +27,7 @@ from wrcore.dynamics.contact_slopes import (
     slip_slope,
     slope_of_falling,
 )
+from wrcore.dynamics.lift import lift_of, lift_share
 from wrcore.dynamics.modes import PATCHES_ONLY
 from wrcore.dynamics.motion import as_left, motion_of
 from wrcore.dynamics.pair_cells import AXES, FIRST, STEPS, locate
@@ -50,7 +51,6 @@ from wrcore.dynamics.pair_table import (
     lobe_end,
     of_two,
 )
-from wrcore.dynamics.strip_wheel import lift_of, lift_share
 from wrcore.dynamics.table_slopes import look_share_slopes_up, look_slopes_up, remainder_slopes, weigh_slopes
 from wrcore.dynamics.tabulated_wheel import lifted_place
 from wrcore.dynamics.wheel import contact_of, falling, press_wheels

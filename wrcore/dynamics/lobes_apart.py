@@ -23,8 +23,8 @@ from wrcore.dynamics.coupled_lobes import (
     slip_of_others,
     tilt_back,
 )
+from wrcore.dynamics.lift import lifted
 from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end
-from wrcore.dynamics.strip_wheel import lifted
 from wrcore.dynamics.tabulated_wheel import UNLISTED, lifted_place, look_lobe_up, look_only_lobe_up, roll_lobe
 from wrcore.kernels.jit import FUSED, jit
 

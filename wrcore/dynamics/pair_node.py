@@ -20,7 +20,7 @@ from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.dynamics.pair_cells import PART
 from wrcore.dynamics.pair_table import WIDE, Slip, base_force, lobe_end, log_depth_of, root_share, tabulated_force
-from wrcore.dynamics.strip_wheel import library_of, roll_patch, solve_overlaps
+from wrcore.dynamics.strip_patch import library_of, roll_patch, solve_overlaps
 from wrcore.kernels.jit import jit
 
 SUMS = 33

@@ -10,11 +10,13 @@ from wrcore.contact.patch.gap import Frame
 from wrcore.contact.patch.model import ELLIPSES, KERNEL, LOAD, LOBES, MODEL, strip_work, with_tables
 from wrcore.contact.reduction import PATCH_COLUMNS
 from wrcore.contact.strip import Pose
+from wrcore.dynamics.lift import Lift
 from wrcore.dynamics.lobes_apart import look_lobes_up
 from wrcore.dynamics.modes import FRESH
 from wrcore.dynamics.motion import MOTION, WheelMotion
 from wrcore.dynamics.pair_store import WITHOUT, with_pair
-from wrcore.dynamics.strip_wheel import Lift, add_group, solve_on_grid
+from wrcore.dynamics.strip_patch import solve_on_grid
+from wrcore.dynamics.strip_wheel import add_group
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import COUNTERS, alone, wheel_wrenches
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of

@@ -18,6 +18,7 @@ from wrcore.contact.reduction import MAX_PATCHES
 from wrcore.contact.strip import changed_here, make_pose
 from wrcore.dynamics import pair_table as columns
 from wrcore.dynamics.coupled_lobes import CELL, END, NORMAL, SLIP_ETA, SLIP_XI
+from wrcore.dynamics.lift import lift_of
 from wrcore.dynamics.pair_cells import locate
 from wrcore.dynamics.pair_table import (
     APART,
@@ -32,15 +33,8 @@ from wrcore.dynamics.pair_table import (
     tabulated_force,
     weigh,
 )
-from wrcore.dynamics.strip_wheel import (
-    NOTHING,
-    ROWLESS,
-    UNSOLVED,
-    Solution,
-    copy_deepest,
-    fill_row,
-    lift_of,
-)
+from wrcore.dynamics.strip_patch import NOTHING, Solution, fill_row
+from wrcore.dynamics.strip_wheel import ROWLESS, UNSOLVED, copy_deepest
 from wrcore.dynamics.wheel import OUT_OF_RANGE, SOLVED, falling
 from wrcore.kernels.handles import call_address, call_c
 from wrcore.kernels.jit import FUSED, jit

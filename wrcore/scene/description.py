@@ -30,14 +30,15 @@ from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
 from wrcore.dynamics.track import TrackModel
 from wrcore.dynamics.wheel import ContactModel
-from wrcore.errors import InputError, short
+from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
-from wrcore.errors.checked_yaml import name_of_function, parse_value, read_source, validate
+from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.cache import say
+from wrcore.scene.changes import changes_of, of_a_change, set_at
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossings, seen_by_wheels, warn_of_rigid_rails
@@ -175,14 +176,13 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
         source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
     else:
         source, folder, data = read_source(scene, "scene")
-    texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
-    asked = [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
+    asked = changes_of(overrides, changes)
     for option, key, value in asked:
-        _set(data, key, value, option)
+        set_at(data, key, value, option)
     try:
         return _checked(data, source, folder)
     except InputError as error:
-        raise _of_a_change(error, source, asked) from None
+        raise of_a_change(error, source, asked) from None
 
 
 def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
@@ -219,69 +219,6 @@ def _alike(vehicle, wheel, rail, track):
     """The `WheelOnRail` of either side of every wheelset where all are alike."""
     distance = track.rail_distance(rail)
     return (WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, distance),) * 2
-
-
-def _of_a_change(error, source, asked):
-    """The error of a scene's file, or of a change where that is what is wrong."""
-    for option, key, _ in reversed(asked):
-        near = f"{error.field}.".startswith(f"{key}.") or f"{key}.".startswith(f"{error.field}.")
-        if error.source == source and near:
-            return InputError(option, error.field, error.expected)
-    return error
-
-
-def _pair(text):
-    """Key path and value of ``key.path=value``."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise InputError("--set", text, "expected key.path=value")
-    return key.strip(), parse_value(value)
-
-
-WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.parameters")
-"""Ends of the key paths at which a mapping stands for one value."""
-
-
-def _flat(changes, prefix=""):
-    """Pairs of a key path and a plain value; mappings are entered, but for those at `WHOLE`."""
-    for key, value in changes.items():
-        path = prefix + str(key).replace("__", ".")
-        if isinstance(value, Mapping) and not path.endswith(WHOLE):
-            yield from _flat(value, f"{path}.")
-        else:
-            try:
-                yield path, json.loads(json.dumps(value, default=_plain))
-            except (ValueError, RecursionError):  # what contains itself, and numbers of thousands of digits
-                raise InputError("changes", path, f"expected a value as YAML holds it, got {short(value)}") from None
-
-
-def _plain(value):
-    """Numbers and arrays of numpy, paths and functions as YAML holds them."""
-    if callable(value):
-        return name_of_function(value) or repr(value)
-    return value.tolist() if isinstance(value, np.generic | np.ndarray) else str(value)
-
-
-def _set(data, key, value, source):
-    """Set the value at a path of keys, or take the key out for None; a number means one of a list."""
-    *path, last = key.split(".")
-    for part in path:
-        data = data[_place(data, part, key, source)] if isinstance(data, list) else data.setdefault(part, {})
-        if not isinstance(data, dict | list):
-            raise InputError(source, key, f"expected a key below a mapping, but {part!r} holds a value")
-    if value is None and isinstance(data, dict):
-        if last not in data:
-            raise InputError(source, key, "expected a key that the scene has, to take it out")
-        del data[last]
-        return
-    data[_place(data, last, key, source) if isinstance(data, list) else last] = value
-
-
-def _place(items, part, key, source):
-    """The place in a list that a part of a key path says."""
-    if not part.isdecimal() or int(part) >= len(items):
-        raise InputError(source, key, f"expected the number of one of {len(items)} in the list, from 0, got {part!r}")
-    return int(part)
 
 
 def _check_creep(contact, source, folder):
