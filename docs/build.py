@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 GUIDES = (
     "first_result", "bring_your_own", "scenes", "tracks", "crossings", "vehicle_files", "own_physics", "freight_wagon",
     "co_simulation", "fmi", "sweeps", "clusters", "arrays", "assessment", "wear", "how_runs_end", "accuracy", "limits",
-    "patch", "stability", "response", "cost", "comparison", "gallery", "evidence", "versions",
+    "patch", "looked_up", "stability", "response", "cost", "comparison", "gallery", "evidence", "versions",
 )  # fmt: skip
 """Pages of `reports/` in reading order; others follow."""
 
