@@ -27,6 +27,11 @@ RESIDUAL = 1e-9
 tenth of what was left before it: what is soft still moves far, in y and roll, while they are all but zero."""
 
 
+NEAR, NOTHING_LEFT = 1e-3, 0.01
+"""Of an equilibrium at a step of a force: how far the next one lies by the slopes, m and rad, and the part of the
+residual that it leaves."""
+
+
 @dataclass(frozen=True)
 class Equilibrium:
     """Vehicle at rest relative to the moving frame."""
@@ -36,6 +41,8 @@ class Equilibrium:
     """(k, 2): vertical force of the rails on left and right wheels, N: wheelsets as in ``model.bodies.wheelsets``."""
     residual: float
     """Largest acceleration left, m/s^2 or rad/s^2, but for that of a wheelset about its axle."""
+    at_a_step: bool = False
+    """Whether forces step there, if something is left: by their slopes a move by less than `NEAR` would mend it."""
 
 
 def displaced(state, model, displacements):
@@ -85,7 +92,7 @@ def solve_equilibrium(model, state, iterations=50):
     equations = Equations(model)
     unknown = _unknowns(model)
     size = int(unknown.sum())
-    residual = before = np.inf
+    residual, before, at_a_step = np.inf, np.inf, False
     for _ in range(iterations):
         rows = STEP * np.eye(len(unknown))[unknown]
         states = displaced(state, model, np.vstack([rows, -rows]))
@@ -99,11 +106,13 @@ def solve_equilibrium(model, state, iterations=50):
         weights = 1.0 / np.maximum(largest, 1e-9 * np.max(largest))  # nothing acts in a row of zeros
         step = np.zeros(len(unknown))
         step[unknown] = np.linalg.lstsq(weights[:, None] * slopes, -weights * values[-1], rcond=1e-11)[0]
+        left = np.max(np.abs(values[-1] + slopes @ step[unknown]))
+        at_a_step = bool(np.max(np.abs(step)) < NEAR and left < NOTHING_LEFT * residual)
         better = _improved(state, step, model, equations, residual)
         if better is None:
             break
         state = better
-    return Equilibrium(state, wheel_loads(equations, state), residual)
+    return Equilibrium(state, wheel_loads(equations, state), residual, at_a_step)
 
 
 def _improved(state, step, model, equations, residual):

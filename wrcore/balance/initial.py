@@ -26,6 +26,7 @@ from wrcore.dynamics.system import frictionless, independent_at, internal_states
 from wrcore.dynamics.track import TrackModel
 from wrcore.errors import InputError
 from wrcore.geometry.path import frame_turn, track_frame
+from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Handle
 from wrcore.vehicle.description import GRAVITY
 from wrcore.vehicle.train import repeated_equilibrium
@@ -36,9 +37,9 @@ LARGEST_REST = 1e-6 * GRAVITY
 LARGEST_REST_ON_STRIPS = 0.02 * GRAVITY
 """The same for patches on strips: forces step by up to 1 % where their number changes, and rest may lie at a step."""
 
-LARGEST_REST_BETWEEN_PATCHES = 0.1 * GRAVITY
-"""The same where wheels or rails differ, as worn ones do, and no place is better: with `moment` forces step by 10 to
-20 % where overlaps merge."""
+LARGEST_REST_AT_A_STEP = 0.1 * GRAVITY
+"""The same where wheels or rails differ, as worn ones do, and a force steps at the only places of rest: with `moment`
+by 10 to 20 % where overlaps merge."""
 
 LARGEST_SLIP, LARGEST_SHIFT = 0.01, 5e-3
 """Steady running is sought at rolling rates within this part of pure rolling, this near to static equilibrium (m)."""
@@ -67,21 +68,28 @@ def rest(scene, model):
     level = frictionless(model)._replace(track=track, speed=REST_SPEED)
     expected = "expected a vehicle that rests on its wheels near its nominal position, got"
     limit = LARGEST_REST_ON_STRIPS if model.contact.strips.strips else LARGEST_REST
-    found, unlike = [], model.contact.geometries
+    unlike, found, faults = model.contact.geometries, [], []
     for offset in (0.0, *(START_OFFSETS if unlike else ())):
         try:
             equilibrium = solve_equilibrium(level, _standing(scene, model, offset))
         except np.linalg.LinAlgError as error:
-            raise InputError(scene.source, "vehicle", f"{expected} none: {error}") from None
-        if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
-            return equilibrium
-        found.append(equilibrium)
-    equilibrium = min(found, key=lambda one: (np.any(one.wheel_loads <= 0.0), one.residual))
-    if unlike and equilibrium.residual < LARGEST_REST_BETWEEN_PATCHES and np.all(equilibrium.wheel_loads > 0.0):
-        return equilibrium
+            faults.append(InputError(scene.source, "vehicle", f"{expected} none: {error}"))
+        except InputError as error:  # no place for its wheels there
+            faults.append(error)
+        else:
+            if equilibrium.residual < limit and np.all(equilibrium.wheel_loads > 0.0):
+                return equilibrium
+            found.append(equilibrium)
+    at_a_step = [one for one in found if unlike and one.at_a_step and np.all(one.wheel_loads > 0.0)]
+    best = min(at_a_step, key=lambda one: one.residual, default=None)
+    if best is not None and best.residual < LARGEST_REST_AT_A_STEP:
+        warn(f"{scene.source}: at rest a contact force steps, and accelerations of {best.residual:.2g} m/s^2 are left")
+        return best
+    if not found:
+        raise faults[0]
     raise InputError(
-        scene.source, "vehicle", f"{expected} accelerations of {equilibrium.residual:.2g} m/s^2 and a least wheel"
-        f" load of {np.min(equilibrium.wheel_loads, initial=np.inf):.6g} N",
+        scene.source, "vehicle", f"{expected} accelerations of {found[0].residual:.2g} m/s^2 and a least wheel"
+        f" load of {np.min(found[0].wheel_loads, initial=np.inf):.6g} N",
     )  # fmt: skip
 
 

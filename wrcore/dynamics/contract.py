@@ -2,7 +2,8 @@
 
 ===================================  ===================================================================================
 `begin`, `places`                    what a run knows beside its state: where the next searches start
-`before_attempt`, `after_rejection`  keep that before a step is tried; undo what wild stages have made of it
+`kept_size`                          numbers that are kept of it before a step is tried
+`before_attempt`, `after_rejection`  keep them; undo what stages of a step that was none have made of it
 `outside`, `why_outside`             whether, and why, a state ends the run
 `touching`                           contacts of the last evaluation: more of them after a step are an impact in it
 `turn_rate`                          of axes in which a steady motion rests
@@ -34,17 +35,32 @@ def begin(work):
     work.strips.memory[...] = 0.0
 
 
+def kept_size(model, work):
+    """Numbers of `before_attempt`: solutions are kept where all patches are solved, a millisecond each; what is looked
+    up is quicker than to copy them."""
+    solved = model.contact.strips.strips and not model.contact.strips.looked_up
+    return work.arc_lengths.size + (work.strips.memory.size if solved else 0)
+
+
 @jit(allocates=False)
 def before_attempt(work, kept):
-    """Keep in ``kept`` (k,) where searches start."""
-    copy_into(kept, work.arc_lengths)
+    """Keep in ``kept`` (`kept_size`,) where searches start."""
+    arcs = work.arc_lengths.shape[0]
+    copy_into(kept[:arcs], work.arc_lengths)
+    if kept.shape[0] > arcs:
+        copy_into(kept[arcs:], work.strips.memory.reshape(-1))
 
 
 @jit(allocates=False)
 def after_rejection(work, kept):
-    """Undo arc lengths that wild stages have found. The search for a wheelset's arc length starts from the last one. On
-    a circle that its path goes round more than once, one that a wild stage has led to another lap would be kept."""
-    for k in range(work.arc_lengths.shape[0]):
+    """Undo arc lengths that wild stages have found, and solutions that any have. The search for a wheelset's arc length
+    starts from the last one. On a circle that its path goes round more than once, one that a wild stage has led to
+    another lap would be kept. Where several sets of windows fit, a patch keeps its own: that of a step that was tried
+    in vain would be no part of the motion."""
+    arcs = work.arc_lengths.shape[0]
+    if kept.shape[0] > arcs:
+        copy_into(work.strips.memory.reshape(-1), kept[arcs:])
+    for k in range(arcs):
         if abs(work.arc_lengths[k] - kept[k]) > WILD or math.isnan(work.arc_lengths[k]):
             work.arc_lengths[k] = kept[k]
 

@@ -175,6 +175,9 @@ def strip_wrenches(model, motions, patches, counts, bounds, wrenches, counters, 
                     copy_into(rows[kept], work.out)
                     kept += 1
                 first = last
+            if mode & WARM:
+                for unmet in range(group, work.memory.shape[2]):
+                    work.memory[i, wheel, unmet, 0] = 0.0
             if seen.side < 0.0:
                 mirror(rows, kept, wrench)
             counts[i, wheel], bounds[i, wheel] = kept, bound

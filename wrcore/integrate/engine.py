@@ -83,7 +83,7 @@ class Scratch(NamedTuple):
     slope: np.ndarray  # (n,)
     defect: np.ndarray  # (n,)
     still: np.ndarray  # (n,): zeros
-    places: np.ndarray  # (k,): where searches started before the attempt
+    places: np.ndarray  # (k,): where searches started before the attempt, see `wrcore.dynamics.contract.kept_size`
 
 
 class Record(NamedTuple):

@@ -28,7 +28,7 @@ import numpy as np
 from numba import typeof
 
 from wrcore.dynamics.blame import blame
-from wrcore.dynamics.contract import begin, places, why_outside
+from wrcore.dynamics.contract import begin, kept_size, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
 from wrcore.dynamics.wheel import ON_FIXED, ON_GRID, OUT_OF_RANGE, SOLVED
@@ -154,7 +154,7 @@ class Integration:
         self.memory = memory = new_memory(state, t, 0, first_step)
         begin(self.equations.work)
         self.places = places(self.equations.work)
-        self._scratch = new_scratch(len(memory.state), len(self.places[0]))
+        self._scratch = new_scratch(len(memory.state), kept_size(model, self.equations.work))
         self._take(method)
         self.notes = choice.first_notes(method, memory) if looks and not goes_on else choice.no_notes()
         if goes_on:

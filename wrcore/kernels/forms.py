@@ -134,13 +134,15 @@ class KernelCache(FunctionCache):
     def __init__(self, function, form="called"):
         self._form, self._function = form, function
         self._impl_class = _LinkedFile if form == "linked" else _MachineCode
-        before, mask = numba.config.CACHE_DIR, os.umask(0o077)  # folders that it makes are closed to others
+        before, folder = numba.config.CACHE_DIR, os.path.join(_FOLDER, aside.linked) if form == "linked" else _FOLDER
         try:
-            numba.config.CACHE_DIR = os.path.join(_FOLDER, aside.linked) if form == "linked" else _FOLDER
+            numba.config.CACHE_DIR = folder
             super().__init__(function)
         finally:
             numba.config.CACHE_DIR = before
-            os.umask(mask)
+        for made in (folder, self.cache_path):  # closed to others, whatever the process's mask
+            if made.startswith(_FOLDER + os.sep):
+                os.chmod(made, 0o700)
 
     def _index_key(self, *args):
         return (self._form, *super()._index_key(*args))
@@ -240,6 +242,11 @@ class KernelDispatcher(CPUDispatcher):
         if self._own_cache is None:
             self._own_cache = KernelCache(self.py_func)
         return self._own_cache
+
+    @_cache.setter
+    def _cache(self, cache):
+        """Numba sets one where it makes a dispatcher from a pickle."""
+        self._own_cache = cache
 
     _own_cache = None
 

@@ -22,8 +22,18 @@ from wrcore.analysis.wear.worn_profiles import (
     read_points,
     smooth,
     smooth_along,
+    write_points,
 )
-from wrcore.analysis.wear.worn_rails import FACE_SLOPE, laid_rails, rail_file, worn_down
+from wrcore.analysis.wear.worn_rails import (
+    FACE_SLOPE,
+    filled,
+    laid_rails,
+    lay_rails,
+    next_rails,
+    rail_file,
+    softened,
+    worn_down,
+)
 from wrcore.analysis.wear.worn_rails import POINTS as RAIL_POINTS
 from wrcore.cli import main
 from wrcore.errors import InputError
@@ -291,6 +301,14 @@ def test_smoothing_along_a_face_spreads_over_its_own_length(slope):
     assert math.sqrt((spread * along**2).sum()) == pytest.approx(math.hypot(level, own), rel=0.15)
 
 
+def test_smoothing_along_keeps_the_sum_at_the_ends():
+    u = np.linspace(0.0, 0.03, 301)
+    for place in (0, 2, 298, 300):
+        loss = np.zeros(301)
+        loss[place] = 1e-6
+        assert smooth_along(u, 0.2 * u, loss, 2e-3).sum() == pytest.approx(1e-6, rel=1e-9)
+
+
 def test_smoothing_along_keeps_a_depth_that_is_the_same_everywhere(curves):
     """Normal to the profile, over the whole of a new rail but its very ends."""
     u, f = read_points(rail_file(curves["left"][0], 0, 0, "left"))
@@ -396,15 +414,16 @@ def test_a_mirrored_curve_wears_mirrored_rails(curves):
 def test_the_gauge_face_of_a_stored_rail_goes_on(curves, capsys):
     """Also of one that has lost 2 mm of its corner, down to a flank of 70 degrees, where a new curve has ended."""
     _, (scene,) = ev.load_wear_plan(curved(400))
-    u, f = read_points(rail_file(curves["left"][0], 0, 0, "left"))
+    u, f = read_points(rail_file(curves["left"][0], 0, 0, "left", "laid"))
     new, gauge = scene.pair().rail, slice(0, u.size // 2)
     flank = -0.010 + 2.75 * (u - np.interp(-0.010, f[gauge], u[gauge]) - 2e-3)
     with untold():
-        stored, worn = (ProfileCurve.from_points(u, z, "rail", trim=True) for z in (f, np.minimum(f, flank)))
+        ground = softened(u, filled(u, np.minimum(f, flank)))
+        stored, worn = (ProfileCurve.from_points(u, z, "rail") for z in (f, ground))
     assert capsys.readouterr().err == ""
     both = new.u[(new.u > stored.u[0]) & (new.u < stored.u[-1]) & (np.abs(new.df) < 3.0)]
     np.testing.assert_allclose(stored(both), new(both), atol=1e-6)
-    assert new.f[0] > -0.0145 and stored.f[0] < -0.016
+    assert new.f[0] > -0.0145 and stored.f[0] < -0.0155
     assert worn.f[0] < -0.019 and worn(worn.u[0], 1) == pytest.approx(2.75, abs=0.1)
 
 
@@ -417,10 +436,10 @@ def gauge_corner(flank):
 def test_a_face_that_moves_on_leaves_no_groove():
     """By half a mm, five points, over a foot that loses as much: both move along their normals, as a straight face and
     level ground do, but for the corner between them."""
-    u, f = gauge_corner(6.0)
+    u, f = gauge_corner(4.0)
     now = worn_down(u, f, 5e-4 * np.hypot(1.0, np.gradient(f, u)))
-    moved = np.clip(6.0 * u - 5e-4 * math.hypot(1.0, 6.0), -0.0155, -0.0005)
-    straight = (np.abs(u + 0.0025) > 8e-4) & (np.abs(u) > 8e-4)
+    moved = np.clip(4.0 * u - 5e-4 * math.hypot(1.0, 4.0), -0.0155, -0.0005)
+    straight = (np.abs(u + 0.00375) > 8e-4) & (np.abs(u) > 8e-4)
     np.testing.assert_allclose(now[straight], moved[straight], atol=1e-9)
     assert np.diff(now).min() > -1e-12 and now.min() > -0.0155 - 1e-9
 
@@ -438,6 +457,39 @@ def test_a_gauge_face_keeps_no_lip_and_is_no_steeper_than_a_curve_can_be():
     now = worn_down(u, f - groove, np.zeros(u.size))
     assert np.diff(now).min() > -1e-12 and np.diff(now).max() <= FACE_SLOPE * RAIL_POINTS * (1.0 + 1e-9)
     np.testing.assert_array_equal(now[u > -0.0015], f[u > -0.0015])
+
+
+def ground_down(folder, scene, low, high, steps):
+    """Grind 0.1 mm a step off the left rail, between two depths below its top (m)."""
+    for step in range(steps):
+        u, f = read_points(rail_file(folder, step, 0, "left"))
+        band = (u < 0.0) & (f < f.max() - low) & (f > f.max() - high)
+        fall = smooth_along(u, f, np.where(band, 1e-4 * np.hypot(1.0, np.gradient(f, u)), 0.0), 2e-3)
+        next_rails(folder, step, [{"left": fall, "right": np.zeros(fall.size)}], 1.0, False)
+    return laid_rails(folder, steps, 0, scene)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.008, 0.014), (0.009, 0.015), (0.005, 0.020)])
+def test_a_corner_that_is_ground_down_keeps_its_face(tmp_path, low, high):
+    """Where a sharp edge was left, a spline turned too far and the curve ended, or nothing could be laid."""
+    _, (scene,) = ev.load_wear_plan(curved(400))
+    lay_rails(tmp_path, [scene])
+    laid = ground_down(tmp_path, scene, low, high, 20)
+    curve, f = load_scene(scene, laid.changes).pair("left").rail, laid.points["left"][1]
+    assert curve.f[0] == pytest.approx(f[0] - f.max(), abs=5e-4) and f[0] - f.max() < -0.015
+    assert np.abs(curve.df).max() < 10.0
+
+
+def test_a_stored_rail_that_a_curve_cannot_follow_is_refused(tmp_path):
+    _, (scene,) = ev.load_wear_plan(curved(400))
+    lay_rails(tmp_path, [scene])
+    path = rail_file(tmp_path, 0, 0, "left", "laid")
+    u, f = read_points(path)
+    depth = f.max() - f
+    edge = (u < 0.0) & (depth > 0.009) & (depth < 0.013)
+    write_points(path, u, np.where(edge, f.max() - 0.013, f))
+    with pytest.raises(InputError, match=r"laid_0_left_000.csv.*gauge face that a curve f\(u\) follows"):
+        laid_rails(tmp_path, 0, 0, scene)
 
 
 def test_worn_rails_keep_their_place(curves):

@@ -206,7 +206,8 @@ def profile_row(scene, folder, step, gone):
     turned), flange measures Sh_m, Sd_m, qR_m (EN 15313, recalled), hollow_m and equivalent_conicity (3 mm).
     """
     u, now = read_points(file_of(folder, "profile", step))
-    curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")
+    with untold():
+        curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")
     new = read_points(file_of(folder, "profile", 0))[1]
     vehicle = scene.vehicle
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)
@@ -324,5 +325,5 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
 def plan_mark(data, scenes):
     """What a folder belongs to: a digest of plan, scenes, all files that they read, version, and the rails' form."""
     files = {path: digest for scene in scenes for path, digest in scene.files.items()}
-    stored = [worn_rails.POINTS, worn_rails.FACE, worn_rails.FACE_SLOPE] if data["rails"] else []
+    stored = [worn_rails.POINTS, worn_rails.FACE, worn_rails.FACE_SLOPE, worn_rails.EDGE] if data["rails"] else []
     return digest_of_plan([data, [scene.data for scene in scenes], *stored], files)

@@ -57,7 +57,7 @@ def smooth_along(u, f, values, width):
     """As `smooth`, over a width along the profile u, f (n,), m: a side face of a rail is many times as deep as wide."""
     edges = edges_of(u)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(edges), np.diff(np.interp(edges, u, f))))])
-    even = POINTS * np.arange(int(arc[-1] / POINTS) + 2)  # the last one beyond the profile's end
+    even = np.linspace(0.0, arc[-1], round(arc[-1] / POINTS) + 1)
     area = np.concatenate([[0.0], np.cumsum(values)])
     spread = smooth(np.diff(np.interp(even, arc, area)), width)
     return np.diff(np.interp(arc, even, np.concatenate([[0.0], np.cumsum(spread)])))

@@ -11,9 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from wrcore.analysis.wear.worn_profiles import file_of, onto_points, points_of, read_points, spacing_of, write_points
+from wrcore.errors import InputError
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 
@@ -24,19 +25,29 @@ class LaidRails(NamedTuple):
     changes: dict
     """Of the scene's keys."""
     points: dict
-    """u and f of the stored points of each side, m."""
+    """u and f of the points of each side that wheels run on, m; stored ones have the same u."""
     shifts: dict
     """What brings u of a run to that of the points, m: a run counts from the rail's highest point."""
 
 
-DEPTH = 0.010  # below its top, m, where a worn rail's place is held: stored points end above the depth of the gauge
+DEPTH = 0.010
+"""Below its top, m, where a worn rail's place is held: a new rail's curve ends above the depth of the gauge."""
 
 POINTS = 1e-4
 """Distance of the points of a stored rail, m: its gauge face is steep."""
 
-FACE, FACE_SLOPE = 3e-4, 8.0
+FACE, FACE_SLOPE = 3e-4, 7.0
 """Width (m) and slope of the gauge face of a stored rail below its curve. That of 60E1 stands at 87 to 89 degrees and
-takes up so much from 14 to 22 mm below the top, which no curve f(u) follows (`ProfileCurve`); this one stands at 83."""
+takes up so much from 14 to 22 mm below the top, which no curve f(u) follows (`ProfileCurve`); this one stands at 82."""
+
+EDGE = 0.1
+"""Turn of a profile at a stored point, rad, from which it is an edge: a gauge corner of 13 mm turns by less. A spline
+turns too far beside one that is steep, and the curve would end there."""
+
+LEFT_OUT = 1e-3
+"""Height of a stored rail's face that a curve may not follow, m."""
+
+_PASSES = 4
 
 
 def with_gauge_face(u, f):
@@ -46,18 +57,33 @@ def with_gauge_face(u, f):
     return np.append(u[0] - below, u), np.append(f[0] - FACE_SLOPE * below, f)
 
 
+def filled(u, f):
+    """Ordinates (n,), m, of a rail that is nowhere steeper than its face."""
+    return FACE_SLOPE * u + np.maximum.accumulate((f - FACE_SLOPE * u)[::-1])[::-1]
+
+
+def softened(u, f):
+    """Ordinates (n,), m, of a rail as it is laid: means over some 0.3 mm about its edges."""
+    turns = np.abs(np.diff(np.arctan(np.diff(f) / np.diff(u))))
+    near = maximum_filter1d(np.pad(turns > EDGE, 1), 2 * _PASSES + 1)
+    soft = f.copy()
+    for _ in range(_PASSES):
+        soft[1:-1] = 0.25 * (soft[:-2] + soft[2:]) + 0.5 * soft[1:-1]
+    return np.where(near, soft, f)
+
+
 def worn_down(u, f, fall):
     """Points of a rail that has fallen by ``fall`` (n,), m.
 
-    None falls further below the lowest within its depth, normal to the profile, than that: a face that moves on by
-    several points leaves level ground behind it, no groove, and nothing beyond the ends. On the gauge face, from
-    `DEPTH` below the top, lips go, and what would be steeper than `FACE_SLOPE` is filled up."""
+    None falls further below the lowest around it, within what the deepest place loses, than by its own depth normal to
+    the profile: a face that moves on by several points leaves level ground behind it, no groove, and nothing beyond the
+    ends. Lips go from `DEPTH` below the top on, and what would be steeper than `FACE_SLOPE` is filled up."""
     depth = fall / np.hypot(1.0, np.gradient(f, u))
     around = 2 * math.ceil(depth.max() / spacing_of(u)) + 1
     now = np.maximum(f - fall, minimum_filter1d(f, around, mode="constant", cval=-math.inf) - depth)
     face = slice(0, np.argmax(now > now.max() - DEPTH))
     now[face] = np.minimum.accumulate(now[face][::-1])[::-1]
-    return FACE_SLOPE * u + np.maximum.accumulate((now - FACE_SLOPE * u)[::-1])[::-1]
+    return filled(u, now)
 
 
 def _new_rails(scene):
@@ -68,21 +94,31 @@ def lay_rails(folder, scenes):
     """Store the new rails of all scenes."""
     for place, scene in enumerate(scenes):
         for side, rail in _new_rails(scene).items():
-            write_points(rail_file(folder, 0, place, side), *with_gauge_face(*points_of(rail, POINTS)))
+            _store(folder, 0, place, side, *with_gauge_face(*points_of(rail, POINTS)))
 
 
-def rail_file(folder, step, place, side):
-    """Path of a scene's rail at the start of a step."""
-    return file_of(folder, f"rail_{place}_{side}", step)
+def _store(folder, step, place, side, u, f):
+    """Store a rail: what is left of it, and what wheels run on."""
+    write_points(rail_file(folder, step, place, side), u, f)
+    write_points(rail_file(folder, step, place, side, "laid"), u, softened(u, f))
+
+
+def rail_file(folder, step, place, side, kind="rail"):
+    """Path of a scene's rail at the start of a step, the "rail" of which wear takes or the one that is "laid"."""
+    return file_of(folder, f"{kind}_{place}_{side}", step)
 
 
 def laid_rails(folder, step, place, scene):
     """`LaidRails` of a scene as they lie at the start of a step; ``place`` is the scene's in the plan."""
     changes, points, shifts, gauge = {}, {}, {}, 0.0
     for side, new in _new_rails(scene).items():
-        path = rail_file(folder, step, place, side)
+        path = rail_file(folder, step, place, side, "laid")
         u, f = points[side] = read_points(path)
         curve = ProfileCurve.from_points(u, f, "rail", str(path))
+        missing = np.min(curve.f) - np.max(curve.f) - (f[0] - f.max())
+        if missing > LEFT_OUT:
+            got = f"got edges at which the curve ends {1e3 * missing:.1f} mm above its last point"
+            raise InputError(path, "points", f"expected a gauge face that a curve f(u) follows, {got}")
         first = curve.outline.curve(0.0)
         shifts[side] = float(u[np.argmin(np.abs(f[: len(f) // 2] - f.max() - first[1]))] - first[0])
         gauge += scene.track.rail_distance(new) + shifts[side] - curve.gauge_offset(DEPTH)
@@ -109,7 +145,7 @@ def next_rails(folder, step, falls, length, renewed):
         for side in SIDES:
             u, f = read_points(rail_file(folder, 0 if renewed else step, place, side))
             now = f if renewed else worn_down(u, f, fall[side] * length)
-            write_points(rail_file(folder, step + 1, place, side), u, now)
+            _store(folder, step + 1, place, side, u, now)
 
 
 def to_renewal(gone, renewal):

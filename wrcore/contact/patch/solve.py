@@ -19,10 +19,10 @@ import math
 import numpy as np
 
 from wrcore.contact.patch.fixed import solve_fixed, windows_from_fixed
-from wrcore.contact.patch.gap import HEIGHT, TILT, UR, U, frame_of_overlaps, look_over_overlaps, unroll
+from wrcore.contact.patch.gap import HEIGHT, TILT, UR, S, U, frame_of_overlaps, look_over_overlaps, unroll
 from wrcore.contact.patch.grading import grade
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
-from wrcore.contact.patch.strips import FIXED, MAX_WINDOWS, WEIGHT, place_strips
+from wrcore.contact.patch.strips import FIXED, MAX_WINDOWS, WEIGHT, WIDENED, place_strips
 from wrcore.contact.patch.windows import (
     count_again,
     drop_starved,
@@ -51,12 +51,20 @@ _OTHER_NUMBERS = 0, 4, -1, 2
 """Strips by which a window's number differs in turn, where no solution was found."""
 
 _GUESSED = 4 + 3 * MAX_WINDOWS
-"""Where a memory holds of how many windows the first guess was, and from the next place on its strips."""
+"""Where a memory holds of how many windows the first guess was, then by how many strips more than usual they were
+solved, and from there on its strips."""
 
-_STRIPS_FROM = _GUESSED + 1
+_EXTRA, _STRIPS_FROM = _GUESSED + 1, _GUESSED + 2
+
+_IN_VAIN = -1.0
+"""First number of a memory where no windows were found."""
 
 _REACH = 0.5
-"""A window's tips may lie this share of its width from those of the first guess for a solution to start from."""
+"""A window's tips may lie this share of its width from those of the first guess, or from an overlap, for a solution to
+start from."""
+
+_NEARBY = 5e-5
+"""Windows are sought anew so far, m, from where none were found."""
 
 _STEPS, _ALL_STEPS = 24, 250
 """Of Newton's iteration for one set of windows, and after which a patch gets no further set: 99 of 100 that find a
@@ -84,8 +92,9 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
 
     ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
     if it fits (its first number 0: none); filled with this one. It leaves the result the same to the square of the
-    iteration's tolerance while windows are those of the first guess; where others are wanted and several sets fit, as
-    between lobes of worn wheels, it keeps its own: N then differs by up to 1 % from that without it, and steps less."""
+    iteration's tolerance where one set of windows fits; where several do, as between lobes of worn wheels, it keeps its
+    own: N then differs by up to 1.5 % from that without it (0.5 % where both are as many as the first guess has), and
+    steps less."""
     work.more[FIXED] = 0.0
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
     stretches = look_over_overlaps(geometry, pose, frame, patches, first, last, work.nodes, work.ends)
@@ -94,16 +103,22 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     work.left[0] = left = _ALL_STEPS
-    if _resume(frame, memory, work, guessed, resolution):
+    if memory[0] < 0.0 and memory[_GUESSED] == guessed and _moved(frame, memory) < _NEARBY:
+        work.more[WEIGHT], work.more[FIXED], work.guessed[0], work.left[0] = 0.0, 1.0, 0, 0
+        return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
+    usual = resolution + int(memory[_EXTRA])
+    if memory[0] > 0.0 and usual != resolution:
+        windows = guess_windows(work, stretches, usual)
+    if _resume(frame, memory, work, guessed, stretches, usual):
         windows = int(memory[0])
         status = newton(geometry, pose, frame, values, work, windows, kinds, False, _STEPS, _TOLERANCE)
         if status == CONVERGED:
             place_strips(geometry, pose, frame, work, windows)
-            if newborn(values, work, windows, stretches, resolution, _BORN) == windows:
+            if newborn(values, work, windows, stretches, usual, _BORN) == windows:
                 if overlooked(work, windows, stretches) <= _OVERLOOKED:
-                    _remember(frame, work, windows, guessed, memory)
+                    _remember(frame, work, windows, guessed, usual - resolution, memory)
                     return windows, frame
-                left = 0
+                left = 0 if windows == guessed else _ALL_STEPS  # others may overlook less
     if memory[0] > 0.0:
         windows = guess_windows(work, stretches, resolution)
     memory[0], work.left[0] = 0.0, left
@@ -116,14 +131,23 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 windows = guess_windows(work, stretches, strips)
             found = _solve_cold(geometry, pose, frame, values, work, stretches, windows, strips, kinds, born)
             if found > 0:
-                if extra == 0 and born == _BORN:
-                    _remember(frame, work, found, guessed, memory)
+                if born == _BORN and (extra == 0 or work.more[WIDENED] == 1.0):
+                    _remember(frame, work, found, guessed, extra, memory)
                 return found, frame
             if found < 0:
                 break
         windows = work.guessed[0] = 0
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
+    if work.more[WIDENED] == 1.0:  # not of the second of two solutions
+        memory[0], memory[1], memory[2], memory[3], memory[_GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
     return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
+
+
+@jit(allocates=False)
+def _moved(frame, memory):
+    """How far a patch's frame is from where it was, m."""
+    y, z = memory[2] - frame.ur, memory[3] - frame.z
+    return math.sqrt(y * y + z * z)
 
 
 @jit(allocates=False)
@@ -163,9 +187,10 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
 
 
 @jit(allocates=False)
-def _remember(frame, work, windows, guessed, memory):
+def _remember(frame, work, windows, guessed, extra, memory):
     """Note what a warm start wants to know of the solution."""
     memory[0], memory[1], memory[2], memory[3], memory[_GUESSED] = windows, frame.x, frame.ur, frame.z, guessed
+    memory[_EXTRA] = extra
     for k in range(windows):
         at = 4 + 3 * k
         memory[at], memory[at + 1], memory[at + 2] = work.start[k + 1], work.low[k], work.high[k]
@@ -175,22 +200,24 @@ def _remember(frame, work, windows, guessed, memory):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _resume(frame, memory, work, guessed, resolution):
-    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near enough; if it
-    had others than the guess, it does where that was of as many as this one, and they want as many strips."""
+def _resume(frame, memory, work, guessed, stretches, resolution):
+    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near those of the
+    guess; if they are others, if the guess was of as many as this one, they lie where surfaces overlap, and want
+    about as many strips as they had."""
     windows = int(memory[0])
-    if windows == 0 or guessed == 0 or memory[_GUESSED] != guessed:
+    if windows <= 0 or guessed == 0 or memory[_GUESSED] != guessed:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
-    shift, old_first = y * frame.cosine + z * frame.sine, 0
+    shift, old_first, others = y * frame.cosine + z * frame.sine, 0, windows != guessed
     for k in range(windows):
         low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
         reach = _REACH * (high - low)
-        if windows == guessed and (abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach):
+        if not (_overlap_near(work, stretches, low, reach) and _overlap_near(work, stretches, high, reach)):
             return False
+        others = others or abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach
     for k in range(windows):
         work.low[k], work.high[k] = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
-    if windows != guessed and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
+    if others and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
         return False
     for k in range(windows):
         old_end, first, end = int(memory[4 + 3 * k]), work.start[k], work.start[k + 1]
@@ -207,6 +234,18 @@ def _resume(frame, memory, work, guessed, resolution):
         old_first = old_end
     work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
     return True
+
+
+@jit(allocates=False)
+def _overlap_near(work, stretches, s, reach):
+    """Whether a place is within ``reach`` of an overlap, m."""
+    first = 0
+    for stretch in range(stretches):
+        end = work.ends[stretch]
+        if work.nodes[S, first] - reach < s < work.nodes[S, end - 1] + reach:
+            return True
+        first = end
+    return False
 
 
 @jit(allocates=False)

@@ -47,9 +47,10 @@ BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 """What the second of Galerkin's conditions makes of a parabola t^2."""
 
 
-MEMORY = 5 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
-"""Numbers that a warm start wants of a solution: windows (0: none), x, ur, z of its frame's origin; ends in strips and
-tips of its windows; Q, c and X of its strips."""
+MEMORY = 6 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
+"""Numbers that a warm start wants of a solution: windows (0: none; below: none were found), x, ur, z of its frame's
+origin; ends in strips and tips of its windows; windows of the first guess, and strips more than usual; Q, c and X of
+its strips."""
 
 
 WIDENED, WEIGHT, GUESS, FIXED = range(4)

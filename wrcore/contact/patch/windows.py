@@ -31,6 +31,9 @@ _USUAL = 16
 MORE = 1.05
 """Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
 
+_ABOUT = 4
+"""Strips by which a window's number may differ from what it wants: where it steps, a solution would not stay."""
+
 _STEPS = (1.0 / SLENDER_WINDOW, 1.2, 1.8)
 """Widths over lengths at which the number of strips steps."""
 
@@ -239,20 +242,17 @@ def take_fresh(work, found, largest, resolution):
 
 @jit(allocates=False, fastmath=FUSED)
 def count_again(work, windows, counts, strips, resolution):
-    """Number the strips of windows that are not those of the first guess, from the solution they had: ``counts``: of
+    """Number the strips of windows that are not those of the first guess as in the solution they had: ``counts``: of
     each window the end of its strips (then two numbers more), ``strips``: of each strip three numbers, c the second.
-    Whether they want as many as they had."""
-    work.more[WEIGHT], first = 0.0, 0
+    Whether each still wants about as many."""
+    work.more[WEIGHT], largest = 0.0, 0.0
+    for i in range(int(counts[3 * (windows - 1)])):
+        largest = max(largest, strips[3 * i + 1])
+    work.start[0] = 0
     for k in range(windows):
-        end, largest = int(counts[3 * k]), 0.0
-        for i in range(first, end):
-            largest = max(largest, strips[3 * i + 1])
-        width, length = work.high[k] - work.low[k], 2.0 * math.sqrt(largest)
-        work.start[k + 1] = count_strips(width, length, resolution, work.more)
-        first = end
-    _number(work, windows)
-    for k in range(windows):
-        if work.start[k + 1] != int(counts[3 * k]):
+        work.start[k + 1] = int(counts[3 * k])
+        wanted = count_strips(work.high[k] - work.low[k], 2.0 * math.sqrt(largest), resolution, work.more)
+        if abs(wanted - work.start[k + 1] + work.start[k]) > _ABOUT:
             return False
     return True
 
