@@ -60,8 +60,8 @@ _IN_VAIN = -1.0
 """First number of a memory where no windows were found."""
 
 _REACH = 0.5
-"""A window's tips may lie this share of its width from those of the first guess, or from an overlap, for a solution to
-start from."""
+"""A window's tips may lie this share of its width from those of the first guess, or beyond all overlaps, for a solution
+to start from."""
 
 _NEARBY = 5e-5
 """Windows are sought anew so far, m, from where none were found."""
@@ -202,17 +202,18 @@ def _remember(frame, work, windows, guessed, extra, memory):
 @jit(allocates=False, fastmath=FUSED)
 def _resume(frame, memory, work, guessed, stretches, resolution):
     """Move the last solution to the new frame, and to the first guess's strips, if its windows are near those of the
-    guess; if they are others, if the guess was of as many as this one, they lie where surfaces overlap, and want
-    about as many strips as they had."""
+    guess; if they are others, if the guess was of as many as this one, they lie among the overlaps, and want about as
+    many strips as they had."""
     windows = int(memory[0])
     if windows <= 0 or guessed == 0 or memory[_GUESSED] != guessed:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
     shift, old_first, others = y * frame.cosine + z * frame.sine, 0, windows != guessed
+    first_place, last_place = _outermost(work, stretches)
     for k in range(windows):
         low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
         reach = _REACH * (high - low)
-        if not (_overlap_near(work, stretches, low, reach) and _overlap_near(work, stretches, high, reach)):
+        if low < first_place - reach or high > last_place + reach:
             return False
         others = others or abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach
     for k in range(windows):
@@ -237,15 +238,13 @@ def _resume(frame, memory, work, guessed, stretches, resolution):
 
 
 @jit(allocates=False)
-def _overlap_near(work, stretches, s, reach):
-    """Whether a place is within ``reach`` of an overlap, m."""
-    first = 0
+def _outermost(work, stretches):
+    """Ends of what was looked over, m."""
+    low, high, first = math.inf, -math.inf, 0
     for stretch in range(stretches):
         end = work.ends[stretch]
-        if work.nodes[S, first] - reach < s < work.nodes[S, end - 1] + reach:
-            return True
-        first = end
-    return False
+        low, high, first = min(low, work.nodes[S, first]), max(high, work.nodes[S, end - 1]), end
+    return low, high
 
 
 @jit(allocates=False)
