@@ -60,8 +60,7 @@ _IN_VAIN = -1.0
 """First number of a memory where no windows were found."""
 
 _REACH = 0.5
-"""A window's tips may lie this share of its width from those of the first guess, or beyond all overlaps, for a solution
-to start from."""
+"""A window's tips may lie this share of its width beyond all overlaps for a solution to start from."""
 
 _NEARBY = 5e-5
 """Windows are sought anew so far, m, from where none were found."""
@@ -201,24 +200,22 @@ def _remember(frame, work, windows, guessed, extra, memory):
 
 @jit(allocates=False, fastmath=FUSED)
 def _resume(frame, memory, work, guessed, stretches, resolution):
-    """Move the last solution to the new frame, and to the first guess's strips, if its windows are near those of the
-    guess; if they are others, if the guess was of as many as this one, they lie among the overlaps, and want about as
-    many strips as they had."""
+    """Move the last solution to the new frame if the first guess was of as many windows as this one, and its own lie
+    among the overlaps: to the guess's strips if they are as many, else if they want as many strips as they had."""
     windows = int(memory[0])
     if windows <= 0 or guessed == 0 or memory[_GUESSED] != guessed:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
-    shift, old_first, others = y * frame.cosine + z * frame.sine, 0, windows != guessed
+    shift, old_first = y * frame.cosine + z * frame.sine, 0
     first_place, last_place = _outermost(work, stretches)
     for k in range(windows):
         low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
         reach = _REACH * (high - low)
         if low < first_place - reach or high > last_place + reach:
             return False
-        others = others or abs(low - work.low[k]) > reach or abs(high - work.high[k]) > reach
     for k in range(windows):
         work.low[k], work.high[k] = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
-    if others and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
+    if windows != guessed and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
         return False
     for k in range(windows):
         old_end, first, end = int(memory[4 + 3 * k]), work.start[k], work.start[k + 1]

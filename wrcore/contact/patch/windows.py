@@ -31,9 +31,6 @@ _USUAL = 16
 MORE = 1.05
 """Where a window this many times as wide would have more strips a patch is the mean of both solutions."""
 
-_ABOUT = 4
-"""Strips by which a window's number may differ from what it wants: where it steps, a solution would not stay."""
-
 _STEPS = (1.0 / SLENDER_WINDOW, 1.2, 1.8)
 """Widths over lengths at which the number of strips steps."""
 
@@ -244,7 +241,7 @@ def take_fresh(work, found, largest, resolution):
 def count_again(work, windows, counts, strips, resolution):
     """Number the strips of windows that are not those of the first guess as in the solution they had: ``counts``: of
     each window the end of its strips (then two numbers more), ``strips``: of each strip three numbers, c the second.
-    Whether each still wants about as many."""
+    Whether each still wants as many."""
     work.more[WEIGHT], largest = 0.0, 0.0
     for i in range(int(counts[3 * (windows - 1)])):
         largest = max(largest, strips[3 * i + 1])
@@ -252,7 +249,7 @@ def count_again(work, windows, counts, strips, resolution):
     for k in range(windows):
         work.start[k + 1] = int(counts[3 * k])
         wanted = count_strips(work.high[k] - work.low[k], 2.0 * math.sqrt(largest), resolution, work.more)
-        if abs(wanted - work.start[k + 1] + work.start[k]) > _ABOUT:
+        if wanted != work.start[k + 1] - work.start[k]:
             return False
     return True
 
