@@ -3,6 +3,7 @@
 import gc
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.errors import TypingError
 
+from wrcore.contact.normal import hertz_ellipse
 from wrcore.kernels import forms
 from wrcore.kernels.forms import KernelDispatcher
 from wrcore.kernels.handles import Kernel
@@ -206,3 +208,11 @@ def test_kernels_of_edited_sources_are_not_kept(tmp_path):
     assert kept(tmp_path / "as_read")[1] > 0
     message, count = kept(tmp_path / "edited", "edited")
     assert "edited" in message and count == 0
+
+
+def test_a_kernel_that_was_pickled_serves_another_process(tmp_path):
+    path = tmp_path / "kernel.pkl"
+    path.write_bytes(pickle.dumps(hertz_ellipse))
+    code = "import pickle, sys; print(pickle.load(open(sys.argv[1], 'rb')).py_func.__name__)"
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("hertz_ellipse\n", "")

@@ -27,7 +27,7 @@ RESIDUAL = 1e-9
 tenth of what was left before it: what is soft still moves far, in y and roll, while they are all but zero."""
 
 
-NEAR, NOTHING_LEFT = 1e-3, 0.01
+NEAR, NOTHING_LEFT = 0.02, 0.01
 """Of an equilibrium at a step of a force: how far the next one lies by the slopes, m and rad, and the part of the
 residual that it leaves."""
 

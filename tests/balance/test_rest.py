@@ -1,0 +1,56 @@
+"""Where vehicles rest on wheels or rails that differ: from which places it is sought, and what counts as rest."""
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.conftest import ROOT, SCENES
+from wrcore.balance import initial
+from wrcore.balance.equilibrium import Equilibrium
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.scene.description import compile_scene, load_scene
+
+UNLIKE = {"rail.left": {"profile": "54E1", "inclination": 0.025}}
+
+
+def wheelset(**changes):
+    return load_scene(SCENES / "suspended_wheelset.yaml", {"contact.patch": "moment", **changes})
+
+
+@pytest.mark.parametrize("rails", [{}, UNLIKE])
+def test_a_vehicle_that_nothing_holds_is_refused(tmp_path, rails):
+    """Two axle boxes push a wheelset of 1813 kg ahead with 1 kN, and no spring holds it."""
+    vehicle = read_yaml(ROOT / "config" / "vehicles" / "suspended_wheelset.yaml")
+    for box in vehicle["elements"]:
+        if box["kind"] == "spring_damper":
+            box["stiffness"][0], box["preload"][0] = 0.0, 500.0
+    path = tmp_path / "vehicle.yaml"
+    path.write_text(yaml.safe_dump(vehicle))
+    with pytest.raises(InputError, match=r"rests on its wheels .* accelerations of 0\.[56]"):
+        compile_scene(wheelset(**{"vehicle.parameters": str(path)}, **rails))
+
+
+RESIDUALS = 0.5, 0.3, np.nan, 0.1, 9.0, 0.4, 0.2, 0.05, 0.9
+"""Of the nine places to begin from, m/s^2."""
+
+
+@pytest.mark.parametrize("fault", [None, np.linalg.LinAlgError("singular"), InputError("a", "b", "expected a place")])
+def test_a_step_of_a_force_is_the_last_place_to_rest_at(monkeypatch, capsys, fault):
+    """The eighth place lies at none, the third has no number, one has no equilibrium."""
+    scene, begun = wheelset(**UNLIKE), []
+    model, state = compile_scene(scene)
+
+    def solved(*_):
+        begun.append(len(begun))
+        if fault and begun[-1] == 5:
+            raise fault
+        return Equilibrium(state, np.full((1, 2), 5e4), RESIDUALS[begun[-1]], at_a_step=begun[-1] != 7)
+
+    monkeypatch.setattr(initial, "solve_equilibrium", solved)
+    assert initial.rest(scene, model).residual == 0.1 and len(begun) == 9
+    capsys.readouterr()
+    begun.clear()
+    monkeypatch.setattr(initial, "LARGEST_REST_AT_A_STEP", 0.09)
+    with pytest.raises(InputError, match="got accelerations of 0.5 m/s"):
+        initial.rest(scene, model)
