@@ -14,7 +14,20 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
-from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, SINE, U_RAIL, U_WHEEL, X, Y, Z
+from wrcore.contact.reduction import (
+    ANGLE,
+    BEYOND,
+    COSINE,
+    CURVATURE_Y,
+    OUTSIDE,
+    PENETRATION,
+    SINE,
+    U_RAIL,
+    U_WHEEL,
+    X,
+    Y,
+    Z,
+)
 from wrcore.contact.strip import (
     AHEAD,
     BEND,
@@ -235,8 +248,13 @@ def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends)
             if gap_at(geometry, pose, high)[0] > 0.0:
                 break
             high += 0.3 * width
+        if gap_at(geometry, pose, low)[0] < 0.0:  # an overlap over several lobes, of which the deepest is narrow
+            low = min(low, row[OUTSIDE])
+        if gap_at(geometry, pose, high)[0] < 0.0:
+            high = max(high, row[BEYOND])
         if k + 1 < last:
-            high = min(high, 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL]))
+            middle = 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL])
+            high = min(high, max(middle, row[BEYOND]))
         low = max(low, stop)
         stop = high
         step = (high - low) / (NODES - 1)
