@@ -83,7 +83,8 @@ def rest(scene, model):
     at_a_step = [one for one in found if unlike and one.at_a_step and np.all(one.wheel_loads > 0.0)]
     best = min(at_a_step, key=lambda one: one.residual, default=None)
     if best is not None and best.residual < LARGEST_REST_AT_A_STEP:
-        warn(f"{scene.source}: at rest a contact force steps, and accelerations of {best.residual:.2g} m/s^2 are left")
+        left = f"accelerations of up to {LARGEST_REST_AT_A_STEP:.2g} m/s^2 are left"  # one line for all such
+        warn(f"{scene.source}: the vehicle rests where a contact force steps, and {left}")
         return best
     if not found:
         raise faults[0]
