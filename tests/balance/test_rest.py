@@ -52,5 +52,5 @@ def test_a_step_of_a_force_is_the_last_place_to_rest_at(monkeypatch, capsys, fau
     capsys.readouterr()
     begun.clear()
     monkeypatch.setattr(initial, "LARGEST_REST_AT_A_STEP", 0.09)
-    with pytest.raises(InputError, match="got accelerations of 0.5 m/s"):
+    with pytest.raises(InputError, match="got accelerations of 0.05 m/s"):
         initial.rest(scene, model)

@@ -88,9 +88,10 @@ def rest(scene, model):
         return best
     if not found:
         raise faults[0]
+    nearest = min(found, key=lambda one: (np.any(one.wheel_loads <= 0.0), np.nan_to_num(one.residual, nan=np.inf)))
     raise InputError(
-        scene.source, "vehicle", f"{expected} accelerations of {found[0].residual:.2g} m/s^2 and a least wheel"
-        f" load of {np.min(found[0].wheel_loads, initial=np.inf):.6g} N",
+        scene.source, "vehicle", f"{expected} accelerations of {nearest.residual:.2g} m/s^2 and a least wheel"
+        f" load of {np.min(nearest.wheel_loads, initial=np.inf):.6g} N",
     )  # fmt: skip
 
 

@@ -396,6 +396,14 @@ def test_rails_that_were_stored_otherwise_are_not_gone_on_with(curves, monkeypat
         ev.evolve(curved(400), folder)
 
 
+@pytest.mark.parametrize("kind", ["rail", "laid"])
+def test_edited_rails_are_not_gone_on_with(curves, tmp_path, kind):
+    folder = shutil.copytree(curves["left"][0], tmp_path / "edited")
+    text(rail_file(folder, 1, 0, "left", kind), lambda t: t.replace("0.0100", "0.0101", 1))
+    with pytest.raises(InputError, match=f"{kind}_0_left_001.csv.*changed since"):
+        ev.evolve(curved(400), folder)
+
+
 def test_renewed_rails_are_new(curves):
     folder, _ = curves["left"]
     for side in ("left", "right"):

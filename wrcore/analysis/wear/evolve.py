@@ -325,5 +325,5 @@ def _scene_wear(data, folder, step, u, quiet, place, scene):
 def plan_mark(data, scenes):
     """What a folder belongs to: a digest of plan, scenes, all files that they read, version, and the rails' form."""
     files = {path: digest for scene in scenes for path, digest in scene.files.items()}
-    stored = [worn_rails.POINTS, worn_rails.FACE, worn_rails.FACE_SLOPE, worn_rails.EDGE] if data["rails"] else []
-    return digest_of_plan([data, [scene.data for scene in scenes], *stored], files)
+    form = [getattr(worn_rails, name) for name in ("POINTS", "FACE", "FACE_SLOPE", "EDGE", "PASSES")]
+    return digest_of_plan([data, [scene.data for scene in scenes], *(form if data["rails"] else [])], files)

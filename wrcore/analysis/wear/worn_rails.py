@@ -47,7 +47,8 @@ turns too far beside one that is steep, and the curve would end there."""
 LEFT_OUT = 1e-3
 """Height of a stored rail's face that a curve may not follow, m."""
 
-_PASSES = 4
+PASSES = 4
+"""Of the means that soften an edge, over a point and its neighbours."""
 
 
 def with_gauge_face(u, f):
@@ -65,9 +66,9 @@ def filled(u, f):
 def softened(u, f):
     """Ordinates (n,), m, of a rail as it is laid: means over some 0.3 mm about its edges."""
     turns = np.abs(np.diff(np.arctan(np.diff(f) / np.diff(u))))
-    near = maximum_filter1d(np.pad(turns > EDGE, 1), 2 * _PASSES + 1)
+    near = maximum_filter1d(np.pad(turns > EDGE, 1), 2 * PASSES + 1)
     soft = f.copy()
-    for _ in range(_PASSES):
+    for _ in range(PASSES):
         soft[1:-1] = 0.25 * (soft[:-2] + soft[2:]) + 0.5 * soft[1:-1]
     return np.where(near, soft, f)
 
