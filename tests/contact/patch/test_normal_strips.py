@@ -191,8 +191,8 @@ def test_an_overlap_over_several_lobes_is_looked_over_to_its_end(waves, load, y)
     assert patch.normal_force == pytest.approx(grid.pressure.sum() * grid.dx * grid.ds, rel=5e-3)
 
 
-def test_a_solution_of_another_place_is_no_start():
-    """Of as many windows, guessed from as many: three lobes at y = 1.5 mm, 2 mm beside three others."""
+def test_a_solution_of_another_place_changes_nothing():
+    """3 mm beside, on several lobes there: whether it is started from or not."""
     contact = NormalContact(pair_with_waves(20, 6), MODULUS, "coarse")
     for y, other in ((-1.25e-3, 1.75e-3), (1.75e-3, -1.25e-3)):
         _, z = contact.at_load("left", y, 60e3)
