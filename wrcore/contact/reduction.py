@@ -112,7 +112,7 @@ def edge_by_newton(geometry, pose, u, low, high):
 
 
 @jit(allocates=False)
-def _edge_by_bracket(geometry, pose, outside, inside):
+def edge_by_bracket(geometry, pose, outside, inside):
     """Zero of the gap between a point outside and one inside an overlap (Illinois steps), or the rail's end."""
     high, low = gap_at(geometry, pose, outside)[0], gap_at(geometry, pose, inside)[0]
     while high >= 0.5 and abs(outside - inside) > _EDGE_TOLERANCE:  # the rail ends between the two
@@ -156,9 +156,9 @@ def edges_of_overlap(geometry, pose, outside, first, last, beyond, deepest):
         start = edge_by_newton(geometry, pose, u - half, outside, u)
         end = edge_by_newton(geometry, pose, u + half, u, beyond)
     if not start == start:
-        start = _edge_by_bracket(geometry, pose, outside, first)
+        start = edge_by_bracket(geometry, pose, outside, first)
     if not end == end:
-        end = _edge_by_bracket(geometry, pose, beyond, last)
+        end = edge_by_bracket(geometry, pose, beyond, last)
     return start, end
 
 

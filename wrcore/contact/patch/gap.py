@@ -27,6 +27,7 @@ from wrcore.contact.reduction import (
     X,
     Y,
     Z,
+    edge_by_bracket,
 )
 from wrcore.contact.strip import (
     AHEAD,
@@ -145,8 +146,6 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
         row = patches[k]
         slope = gap_at(geometry, pose, row[U_WHEEL])[1]
         width = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
-        low = 0.5 * (row[U_WHEEL] + patches[k - 1, U_WHEEL]) if k > first else -1e9
-        high = 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL]) if k + 1 < last else 1e9
         for direction in (-1.0, 1.0):
             step = direction * _REACH * width / _ANGLE_NODES
             for i in range(2 * _ANGLE_NODES):
@@ -154,7 +153,7 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
                 ur, z, _, slope, _, along = strip_point(geometry, pose, u)
                 f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
                 depth = f - z
-                if not low < u < high or (i >= _ANGLE_NODES and depth <= 0.0):
+                if not row[OUTSIDE] < u < row[BEYOND] or (i >= _ANGLE_NODES and depth <= 0.0):
                     break
                 if depth > 0.0:
                     both = 0.5 * (wheel_slope(pose, slope, along) + df)
@@ -229,42 +228,28 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
 
 @jit(allocates=False)
+def _edges_of(geometry, pose, row):
+    """u of both ends of an overlap, m; where its middle is not in contact those of points next to it."""
+    low, high, u = row[OUTSIDE], row[BEYOND], row[U_WHEEL]
+    if gap_at(geometry, pose, u)[0] < 0.0:
+        low, high = edge_by_bracket(geometry, pose, low, u), edge_by_bracket(geometry, pose, high, u)
+    return low, high
+
+
+@jit(allocates=False)
 def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends):
     """Gap at nodes over the overlaps of a patch, outwards: fills s, gap (m), A (1/m) and x of the least gap (m) of
     ``nodes`` (NODE_ROWS, n), and ``ends`` with the number of nodes up to the end of each stretch of equal steps in u.
     Returns the number of stretches."""
-    count = stretches = 0
-    stop = -1e9
+    count = 0
     for k in range(first, last):
-        row = patches[k]
-        slope = gap_at(geometry, pose, row[U_WHEEL])[1]
-        width = math.sqrt(row[PENETRATION] / (row[CURVATURE_Y] * (1.0 + slope * slope)))
-        low, high = row[U_WHEEL] - _REACH * width, row[U_WHEEL] + _REACH * width
-        for _ in range(6):
-            if gap_at(geometry, pose, low)[0] > 0.0:
-                break
-            low -= 0.3 * width
-        for _ in range(6):
-            if gap_at(geometry, pose, high)[0] > 0.0:
-                break
-            high += 0.3 * width
-        if gap_at(geometry, pose, low)[0] < 0.0:  # an overlap over several lobes, of which the deepest is narrow
-            low = min(low, row[OUTSIDE])
-        if gap_at(geometry, pose, high)[0] < 0.0:
-            high = max(high, row[BEYOND])
-        if k + 1 < last:
-            middle = 0.5 * (row[U_WHEEL] + patches[k + 1, U_WHEEL])
-            high = min(high, max(middle, row[BEYOND]))
-        low = max(low, stop)
-        stop = high
-        step = (high - low) / (NODES - 1)
-        for i in range(NODES):
-            u = low + i * step
+        low, high = _edges_of(geometry, pose, patches[k])
+        for i in range(NODES):  # the first and the last half a step outside
+            u = low + (high - low) * (i - 0.5) / (NODES - 2)
             _fill_node(geometry, pose, frame, u, nodes, count)
             count += 1
-        ends[stretches] = count
-        stretches += 1
-    return stretches
+        ends[k - first] = count
+    return last - first
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
