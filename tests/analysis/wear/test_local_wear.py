@@ -298,8 +298,8 @@ def test_a_patch_on_a_grid_wears_where_its_strips_do(monkeypatch):
 
 
 def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
-    scene, run = exact_run(**{"contact.patch": "moment", "integration.duration": 0.02})
-    with pytest.raises(InputError, match=r"contact.patch: expected exact or tabulated where patches are exact.*moment"):
+    scene, run = exact_run(**{"contact.patch": "maximum", "integration.duration": 0.02})
+    with pytest.raises(InputError, match=r"contact.patch: expected exact, tabulated or moment where .*got maximum"):
         local_wear(run, patches="exact", scene=scene)
     with pytest.raises(InputError, match="local_wear: scene: expected that of the run, but contact of it differ"):
         local_wear(run, patches="exact", scene=load_scene(scene, {"contact.patch": "exact"}))

@@ -97,8 +97,9 @@ def local_wear(
         Of the bins, 1e-6 to 0.1 m.
     patches : {"ellipse", "exact"}
         Where friction works: over the ellipses of equal moments, or over the real patches, solved anew, some
-        milliseconds each. These want a run with ``contact.patch`` exact or tabulated, whose motion is theirs, and the
-        channels ``wheel_motion``; laws are then "sheffield" and "energy".
+        milliseconds each. These want the channels ``wheel_motion`` of a run with ``contact.patch`` exact or tabulated,
+        whose motion is theirs, or moment, whose motion is near it (`reports/wear.md` says how near); laws are then
+        "sheffield" and "energy".
     resolution : {"coarse", "middle", "fine"}
         Of exact patches.
     scene : Scene, str, Path or dict, optional
@@ -144,8 +145,8 @@ def law_on_cells(law: str | dict[str, Any], scene: Scene, asker: str) -> Callabl
     """Loss (kg per metre rolled and m^2) over friction's work per area on exact patches of a scene; an InputError for
     what these do not take, in the name of the ``asker``."""
     own = scene.data["contact"]["patch"]
-    if own not in ("exact", "tabulated"):
-        expected = "expected exact or tabulated where patches are exact: others move a wheelset in another way"
+    if own == "maximum":
+        expected = "expected exact, tabulated or moment where patches are exact: others move a wheelset in another way"
         raise InputError(asker, "contact.patch", f"{expected}, got {own}")
     if not isinstance(law, str) or law not in LAWS:
         raise InputError(asker, "law", f"{one_of(LAWS, law)}, where patches are exact")
