@@ -16,9 +16,9 @@ from wrcore.contact.patch.grid import grid_normal
 from wrcore.contact.patch.solve import even_length
 from wrcore.contact.patch.strips import FIXED, MEMORY
 from wrcore.contact.patch.surfaces import ContactPlane
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_WHEEL
 from wrcore.contact.statics import height_at_load
-from wrcore.contact.strip import make_pose
+from wrcore.contact.strip import gap_at, make_pose
 from wrcore.contact.wheel_on_rail import WheelOnRail
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.standards import named_profile
@@ -189,6 +189,28 @@ def test_an_overlap_over_several_lobes_is_looked_over_to_its_end(waves, load, y)
     plane = ContactPlane(*patch.origin, math.cos(patch.contact_angle), math.sin(patch.contact_angle))
     grid = grid_normal(contact.geometry, pose, plane, MODULUS, 32, 64)
     assert patch.normal_force == pytest.approx(grid.pressure.sum() * grid.dx * grid.ds, rel=5e-3)
+
+
+def test_an_overlap_is_looked_over_from_edge_to_edge(benchmark_pair):
+    """Not into the next one, nor past the profile's end, where gaps of metres are: where a flank is steep 1.4 widths of
+    the parabola of equal moments lead there."""
+    nodes, ends, looked = np.empty((gap.NODE_ROWS, 3 * gap.NODES)), np.empty(3, np.int64), 0
+    for pair in (benchmark_pair, pair_with_waves(20, 6), pair_with_waves(30, 3)):
+        contact = NormalContact(pair, MODULUS)
+        for y in np.arange(-4e-3, 9e-3, 1e-3):
+            count, pose = contact.overlaps(y, height(pair, y, 120e3), axle_direction(0.0, 0.0))
+            last = gap.group_end(pair, contact._patches, count, 0)
+            frame = gap.frame_of_overlaps(pair, pose, contact._patches, 0, last)
+            gap.look_over_overlaps(pair, pose, frame, contact._patches, 0, last, nodes, ends)
+            for row, stretch in zip(
+                contact._patches[:last], np.split(nodes[gap.NODE_GAP], ends[:last])[:last], strict=True
+            ):
+                depth = row[PENETRATION]
+                if gap_at(pair, pose, row[U_WHEEL])[0] < 0.0:
+                    looked += 1
+                    assert 0.0 < stretch[0] < depth and 0.0 < stretch[-1] < depth
+                    assert stretch[1] < 0.0 and stretch[-2] < 0.0
+    assert looked > 40
 
 
 def test_a_solution_of_another_place_changes_nothing():

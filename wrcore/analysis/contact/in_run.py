@@ -31,6 +31,9 @@ PARTS = "vehicle", "wheel", "rail", "track", "contact"
 CARRIED = 1e-3
 """Relative error of F^(2/3) that ends the search for a height."""
 
+NEAR = 2e-8
+"""Heights that differ by less (m) end it, too: there the force steps, by less than strips err."""
+
 ROUNDING = 1e-9
 """Of times, s."""
 
@@ -63,12 +66,14 @@ class WheelInRun:
     def at(self, i: int) -> list[Found]:
         """Patches, with their fields, at the i-th output time; none where the wheel is in the air."""
         goal = max(float(self._loads[i]), 0.0) ** (2.0 / 3.0)
-        m = WheelMotion(*self._motions[i].tolist())
+        m, before = WheelMotion(*self._motions[i].tolist()), np.nan
 
         def excess(z):
-            force = sum(found.row[NORMAL] for found in self._wheels.in_motion(m._replace(z=z, friction=0.0)))
-            rest = max(force, 0.0) ** (2.0 / 3.0) - goal
-            return 0.0 if abs(rest) < CARRIED * goal else rest
+            nonlocal before
+            there = self._wheels.in_motion(m._replace(z=z, friction=0.0), warm=before == before)
+            rest = max(sum(found.row[NORMAL] for found in there), 0.0) ** (2.0 / 3.0) - goal
+            near, before = abs(z - before) < NEAR, z
+            return 0.0 if near or abs(rest) < CARRIED * goal else rest
 
         if not goal:
             return []

@@ -145,11 +145,11 @@ class LoadedWheels:
                 one.row[columns.FX : columns.MZ + 1], one.row[columns.XI : columns.PHI + 1] = 0.0, math.nan
         return found
 
-    def in_motion(self, m, fields=False):
-        """The same of a wheel in the `WheelMotion` of a run, for strips."""
+    def in_motion(self, m, fields=False, warm=False):
+        """The same of a wheel in the `WheelMotion` of a run, for strips; if ``warm`` from their last solutions so."""
         side, motion = SIDES_BY_SIGN[m.side], Motion(*m[MOTION.vx : MOTION.wz + 1], abs(m.vx))
         pose = side, m.y, m.z, math.asin(m.ez), math.atan2(-m.ex, m.ey)
-        return list(self._on_strips(self._still_handle, as_left(m), pose, motion, m.friction, fields))
+        return list(self._on_strips(self._still_handle, as_left(m), pose, motion, m.friction, fields, warm))
 
     def _at_work(self, looked_up=0.0):
         """The contact that rolls: exact, by the creep table, or looked up in a pair's table for a coefficient of
@@ -192,23 +192,25 @@ class LoadedWheels:
             one[columns.P_MAX] = 1.5 * one[columns.NORMAL] / (math.pi * a * b)
             yield Found(one, (x - a, x + a, 2.0 * b), float(one[columns.NORMAL]), float(one[columns.XI]))
 
-    def _on_strips(self, contact, left, pose, motion, friction, fields):
+    def _on_strips(self, contact, left, pose, motion, friction, fields, warm=False):
         """`Found` of each group of overlaps that is one patch; a right wheel is the mirror image of a left one."""
         sign, work, overlaps = SIDES[pose[0]], self._work, self._rows
         if not fields and (motion is None or fields is None):
             left = left._replace(friction=0.0)  # without friction no rolling problem is solved
         count = find_patches(self.geometry, *left[:6], self.spatial, MOMENT, overlaps)
-        out, wrench, first = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0
+        out, wrench, first, group = np.zeros((1, PATCH_COLUMNS)), np.zeros(6), 0, 0
         while first < count:
             last, before = group_end(self.geometry, overlaps, count, first), self._counters.copy()
-            work.spare[0] = 0.0
+            memory = work.memory[0, int(sign < 0.0), group]
+            if not warm:
+                memory[0] = 0.0
             found = UNKNOWN
             if contact.value.strips.looked_up:
                 found = tabulated_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
                                          self._counters, self._work_handle)  # fmt: skip
             if found.load < 0.0:
                 found = group_wrench(contact, left, self.spatial, overlaps, first, last, out[0], wrench,
-                                     self._counters, work.spare, self._work_handle)  # fmt: skip
+                                     self._counters, memory, self._work_handle)  # fmt: skip
             sums = work.sums
             x = out[0, columns.X] - sums[solve.MEAN_X]
             extent = x + sums[solve.X_MIN], x + sums[solve.X_MAX], sums[solve.S_MAX] - sums[solve.S_MIN]
@@ -226,7 +228,7 @@ class LoadedWheels:
                     has |= {"patch": self._fields(out[0], found.load, pose, friction, left.vx < 0.0)}
                     has |= {"places": self._places()}
                 yield Found(out[0].copy(), tuple(map(float, extent)), found.load, found.xi, **has)
-            first = last
+            first, group = last, group + 1
 
     def _fields(self, row, load, pose, friction, back):
         """`Patch` of the strips solved last, their panels as cells, about the pressure's centroid; a wheel that rolls
