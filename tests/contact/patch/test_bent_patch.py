@@ -12,7 +12,7 @@ from wrcore.contact.patch.fixed import solve_fixed
 from wrcore.contact.patch.gap import NODE_GAP, NODES, S, frame_of_overlaps, look_over_overlaps
 from wrcore.contact.patch.grading import grade, spread
 from wrcore.contact.patch.solve import LOAD, MEAN_S, MEAN_X, STRIP_ROWS, SUMS, publish
-from wrcore.contact.patch.strips import MAX_STRIPS, normal_work
+from wrcore.contact.patch.strips import MAX_STRIPS, MEMORY, normal_work
 from wrcore.contact.patch.windows import guess_squares
 from wrcore.contact.statics import height_of_zero
 from wrcore.contact.wheel_on_rail import WheelOnRail
@@ -135,7 +135,7 @@ def test_fixed_strips_are_hertz_to_within_a_strip_at_the_tips(yaw):
     pair, z, force = cone_on_head()
     work, pose, frame, stretches = looked_over(pair, 0.0, z, yaw)
     contact = NormalContact(pair, MODULUS)
-    windows = solve_fixed(pair, pose, frame, contact._values, work, stretches, 3 if yaw else 2)
+    windows = solve_fixed(pair, pose, frame, contact._values, work, stretches, 3 if yaw else 2, np.zeros(MEMORY))
     strips, sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
     assert windows == 1 and 3 <= publish(MODULUS, work, windows, strips, sums) <= NODES
     (exact,) = contact.at_height("left", 0.0, z, 0.0, yaw)
@@ -150,7 +150,7 @@ def test_fixed_strips_of_a_yawed_flange_lie_where_newtons_do(benchmark_pair, yaw
     contact, z = at_load(benchmark_pair, 16, 6.5e-3, yaw, roll=0.0)
     (newton,) = contact.at_height("left", 6.5e-3, z, 0.0, yaw)
     work, pose, frame, stretches = looked_over(benchmark_pair, 6.5e-3, z, -math.sin(yaw))
-    windows = solve_fixed(benchmark_pair, pose, frame, contact._values, work, stretches, 3)
+    windows = solve_fixed(benchmark_pair, pose, frame, contact._values, work, stretches, 3, np.zeros(MEMORY))
     strips, sums = np.zeros((STRIP_ROWS, MAX_STRIPS)), np.zeros(SUMS)
     publish(MODULUS, work, windows, strips, sums)
     assert sums[LOAD] == pytest.approx(newton.normal_force, rel=1e-3)

@@ -14,7 +14,7 @@ from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch import gap, solve
 from wrcore.contact.patch.grid import grid_normal
 from wrcore.contact.patch.solve import even_length
-from wrcore.contact.patch.strips import FIXED, MEMORY
+from wrcore.contact.patch.strips import FIXED, GUESSED, MEMORY
 from wrcore.contact.patch.surfaces import ContactPlane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_WHEEL
 from wrcore.contact.statics import height_at_load
@@ -110,7 +110,7 @@ def started(contact, poses):
     for pose in poses:
         found.append(forces(contact, [pose], warm=True)[0])
         memory = contact._memories["left", 0]
-        others.append(0.0 < memory[0] != memory[solve._GUESSED])
+        others.append(0.0 < memory[0] != memory[GUESSED])
         steps.append(solve._ALL_STEPS - contact._work.left[0])
     return np.array(found), np.array(others), np.array(steps)
 
@@ -158,7 +158,8 @@ def test_a_solution_is_found_again_at_once():
 
 
 def test_windows_that_were_not_found_are_sought_again_elsewhere():
-    """Fixed strips stand in meanwhile, for 50 um; those that a search ends at are the same."""
+    """Fixed strips stand in meanwhile, for 50 um, and go on from the last ones; those that a search ends at are the
+    same."""
     contact = NormalContact(pair_with_waves(8, 4), MODULUS, "coarse")
     _, z = contact.at_load("left", -1e-3, 60e3)
     contact._memories.clear()

@@ -1,8 +1,8 @@
 """What ellipses err by in local wear: ``python -m study.wear.patches FOLDER [PLAN] [--resolution middle]``.
 
 Each scene of a plan (config/wear/main_line.yaml) runs on its new wheels with contact that is looked up; what the first
-wheelset's wheels lose is found over the ellipses of equal moments and over the exact patches of the same motion. Prints
-a row per scene and wheel, and draws the depths.
+wheelset's wheels lose is found over the ellipses of equal moments and over the exact patches of the same motion, and
+over the exact patches of the motion of ellipses. Prints a row per scene and wheel, and draws the depths.
 """
 
 import argparse
@@ -17,11 +17,14 @@ from wrcore.analysis.wear.evolve import load_wear_plan
 from wrcore.analysis.wear.local_wear import PATCHES, local_wear
 from wrcore.geometry.track import SIDES
 from wrcore.run.simulate import simulate
+from wrcore.scene.description import load_scene
 
 WIDTH = 5e-4
 """Of the bins, m."""
 U = WIDTH * np.arange(-120, 80)
 """Places on a wheel's profile, m."""
+WAYS = *PATCHES, "exact, on the motion of ellipses"
+"""In which wear is found."""
 
 
 def depths(wear):
@@ -31,12 +34,13 @@ def depths(wear):
 
 
 def compared(scene, begin, law, resolution):
-    """Of both wheels of the first wheelset, by way (`PATCHES`): depths, volume (m^3/m), processor time (s)."""
-    run, found = simulate(scene), {}
-    assert run.status == "completed", run.reason
-    for patches in PATCHES:
+    """Of both wheels of the first wheelset, by way (`WAYS`): depths, volume (m^3/m), processor time (s)."""
+    found, elsewhere = {}, load_scene(scene, {"contact.patch": "moment"})
+    runs = simulate(scene), simulate(elsewhere)
+    assert all(run.status == "completed" for run in runs), [run.reason for run in runs]
+    for patches, run, of in zip(WAYS, (runs[0], *runs), (scene, scene, elsewhere), strict=True):
         began = time.process_time()
-        worn = local_wear(run, begin, law, WIDTH, patches, resolution, scene)
+        worn = local_wear(run, begin, law, WIDTH, PATCHES[patches != PATCHES[0]], resolution, of)
         seconds = time.process_time() - began
         wheels = [worn[scene.vehicle.wheelset_names[0], side] for side in SIDES]
         found[patches] = [(depths(wheel), wheel.volume, seconds) for wheel in wheels]
@@ -50,14 +54,14 @@ def figure_of(found):
     rows = figure.subplots(len(found), 2, squeeze=False, sharex=True)
     for axes, (name, ways) in zip(rows, found.items(), strict=True):
         for k, (one, side) in enumerate(zip(axes, SIDES, strict=True)):
-            for patches, line in zip(PATCHES, ("--", "-"), strict=True):
+            for patches, line in zip(WAYS, ("--", "-", ":"), strict=True):
                 one.plot(1e3 * U, 1e12 * ways[patches][k][0], line, label=patches)
             one.set_title(f"{name}, {side}", fontsize="small")
             one.set_xlim(-45.0, 25.0)
     figure.supylabel("depth / µm per 1000 km", fontsize="medium")
     for one in rows[-1]:
         one.set_xlabel("u, to the field side / mm")
-    rows[0, 0].legend()
+    figure.legend(handles=rows[0, 0].lines, loc="outside upper center", ncols=len(WAYS))
     return figure
 
 
@@ -69,7 +73,8 @@ def main():
     asked = parser.parse_args()
     data, scenes = load_wear_plan(asked.plan, {"patches": "exact", "set": {"contact.patch": "tabulated"}})
     head = ["scene", "wheel", "deepest, exact over ellipse", "at u, mm: ellipse", "exact",
-            "largest deviation, % of the deepest", "volume, %", "processor time, s: ellipse", "exact"]  # fmt: skip
+            "largest deviation, % of the deepest", "exact on the motion of ellipses", "volume, %", "so",
+            "processor time, s: ellipse", "exact"]  # fmt: skip
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     found = {}
     for scene in scenes:
@@ -78,10 +83,11 @@ def main():
         name = f"{curve}, {scene.data['speed']:g} m/s, gauge {1e3 * scene.data['track']['gauge']:g} mm"
         found[name] = ways = compared(scene, data["begin"], data["law"], asked.resolution)
         for k, side in enumerate(SIDES):
-            (flat, volume, took), (real, other, longer) = (ways[patches][k] for patches in PATCHES)
-            deviation = np.abs(real - flat).max() / real.max()
+            (flat, volume, took), (real, other, longer), (near, elsewhere, _) = (ways[way][k] for way in WAYS)
+            deviation, less = (np.abs(real - one).max() / real.max() for one in (flat, near))
             print(f"| {name} | {side} | {real.max() / flat.max():.2f} | {1e3 * U[flat.argmax()]:.1f} |"
-                  f" {1e3 * U[real.argmax()]:.1f} | {100 * deviation:.0f} | {100 * (other / volume - 1):+.1f} |"
+                  f" {1e3 * U[real.argmax()]:.1f} | {100 * deviation:.0f} | {100 * less:.0f} |"
+                  f" {100 * (other / volume - 1):+.1f} | {100 * (elsewhere / other - 1):+.1f} |"
                   f" {took:.2f} | {longer:.1f} |", flush=True)  # fmt: skip
     save_figure(figure_of(found), asked.folder / "wear_patches.png")
 

@@ -4,14 +4,18 @@ import math
 
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
-from wrcore.contact.patch.strips import BEND, MAX_WINDOWS, assemble, place_strips
-from wrcore.contact.patch.windows import active_runs, take_fresh
+from wrcore.contact.patch.strips import BEND, KEPT, MAX_WINDOWS, STRIPS_FROM, TIPS_FROM, assemble, place_strips
+from wrcore.contact.patch.windows import active_runs, newborn, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
 FIXED = 32
 """Fixed strips, where the first guess of the windows has failed."""
 
-_SWEEPS = 10
+_SWEEPS, _AGAIN = 10, 4
+"""Of half lengths and loads, from the overlaps and from the last solution: each leaves some 0.7 of what c is off by."""
+
+_BESIDE = 1e-3
+"""Share of the deepest penetration by which loaded surfaces interpenetrate beside the strips that are kept."""
 
 _SETTLED = 0.02
 """A solution stands if no c moves by more than this share of the largest in the end."""
@@ -38,7 +42,8 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
             work.start[k + 1] = work.start[k] + FIXED // windows
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
         place_strips(geometry, pose, frame, work, windows)
-        moved = _carry(values, work, windows, kinds)
+        _press(work, windows)
+        moved = _carry(values, work, windows, kinds, _SWEEPS)
         if moved < 0.0:
             return 0, found, largest, moved
         found, largest = active_runs(work, windows)
@@ -71,12 +76,19 @@ def windows_from_fixed(geometry, pose, frame, values, work, stretches, resolutio
 
 
 @jit(allocates=False, fastmath=FUSED)
-def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
+def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
     """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
-    number of windows; 0 where c does not come to rest."""
-    windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
+    number of windows; 0 where c does not come to rest.
+
+    A ``memory`` of windows in vain (see `solve_patch`) keeps the strips: they go on from there while lobes stay among
+    them."""
+    windows, moved = _go_on(geometry, pose, frame, values, work, stretches, kinds, memory)
+    if windows == 0:
+        windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
     if moved > _SETTLED:
         return 0
+    if memory[0] < 0.0:
+        _keep(frame, work, windows, memory)
     kept = first = lobe = 0
     for k in range(windows):
         end = work.start[k + 1]
@@ -95,22 +107,72 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _carry(values, work, windows, kinds):
-    """Loads of fixed strips by an active set at given half lengths and middles, these from the loads (middles for
-    ``kinds`` = 3, with yaw); by which share of the largest c one moved last, -1 without loads."""
-    strips, matrix, load, active = work.start[windows], work.matrix, work.load, work.active
-    for i in range(strips):
-        active[i] = work.gap[i, GAP] < 0.0
+def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
+    """The solution from the last one on the same strips: their windows, and by what share of the largest c one moved
+    last; no windows where none are kept or lobes have come to their ends or beside them."""
+    if not (memory[0] < 0.0 < memory[KEPT]):
+        return 0, -1.0
+    windows = int(memory[KEPT])
+    shift = (memory[2] - frame.ur) * frame.cosine + (memory[3] - frame.z) * frame.sine
+    for k in range(windows):
+        at, work.start[0] = TIPS_FROM + 3 * k, 0
+        work.start[k + 1], work.low[k], work.high[k] = int(memory[at]), memory[at + 1] + shift, memory[at + 2] + shift
+    work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
+    place_strips(geometry, pose, frame, work, windows)
+    for i in range(work.start[windows]):
+        at = STRIPS_FROM + 3 * i
+        work.active[i] = memory[at] > 0.0
+        work.square[i], work.middle[i] = memory[at + 1], memory[at + 2] + memory[1] - frame.x
+    moved = _carry(values, work, windows, kinds, _AGAIN)
+    if not 0.0 <= moved <= _SETTLED:
+        return 0, -1.0
+    for k in range(windows):
+        for i in (work.start[k], work.start[k + 1] - 1):
+            if work.active[i] and memory[STRIPS_FROM + 3 * i] <= 0.0:
+                return 0, -1.0
+    for i in range(work.start[windows]):
+        work.share[i] = work.load[i] / work.square[i]
+    if newborn(values, work, windows, stretches, FIXED, _BESIDE) != windows:
+        return 0, -1.0
+    return windows, moved
+
+
+@jit(allocates=False)
+def _keep(frame, work, windows, memory):
+    """Note the strips for `_go_on`, about the place that the memory is of."""
+    shift = (memory[2] - frame.ur) * frame.cosine + (memory[3] - frame.z) * frame.sine
+    memory[KEPT] = windows
+    for k in range(windows):
+        at = TIPS_FROM + 3 * k
+        memory[at], memory[at + 1], memory[at + 2] = work.start[k + 1], work.low[k] - shift, work.high[k] - shift
+    for i in range(work.start[windows]):
+        at = STRIPS_FROM + 3 * i
+        memory[at], memory[at + 1] = work.load[i], work.square[i]
+        memory[at + 2] = work.middle[i] - memory[1] + frame.x
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _press(work, windows):
+    """First guess: each strip by itself."""
+    for i in range(work.start[windows]):
+        work.active[i] = work.gap[i, GAP] < 0.0
         work.square[i] = max(-work.gap[i, GAP] / work.gap[i, SHAPE], 0.05 * work.width[i] ** 2)
         work.middle[i] = work.gap[i, CREST]
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _carry(values, work, windows, kinds, sweeps):
+    """Loads of fixed strips by an active set at given half lengths and middles, these from the loads (middles for
+    ``kinds`` = 3, with yaw); by which share of the largest c one moved last, -1 without loads."""
+    strips, matrix, load = work.start[windows], work.matrix, work.load
     offset, moved, points = kinds * strips + 2 * windows, 0.0, kinds - 1.0  # twice the points with yaw
-    for sweep in range(_SWEEPS):
+    for sweep in range(sweeps):
         for i in range(strips):
             work.share[i] = 0.0
         n = assemble(values, work, windows, kinds)
         if not _active_set(work, strips, kinds, n, offset):
             return -1.0
-        if sweep + 1 == _SWEEPS:  # c and the loads belong together
+        if sweep + 1 == sweeps:  # c and the loads belong together
             break
         largest, moved = 0.0, 0.0
         for i in range(strips):

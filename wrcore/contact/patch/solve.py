@@ -22,7 +22,17 @@ from wrcore.contact.patch.fixed import solve_fixed, windows_from_fixed
 from wrcore.contact.patch.gap import HEIGHT, TILT, UR, S, U, frame_of_overlaps, look_over_overlaps, unroll
 from wrcore.contact.patch.grading import grade
 from wrcore.contact.patch.newton import CONVERGED, CROSSED, LOST, newton, solve_shares
-from wrcore.contact.patch.strips import FIXED, MAX_WINDOWS, WEIGHT, WIDENED, place_strips
+from wrcore.contact.patch.strips import (
+    EXTRA,
+    FIXED,
+    GUESSED,
+    KEPT,
+    STRIPS_FROM,
+    TIPS_FROM,
+    WEIGHT,
+    WIDENED,
+    place_strips,
+)
 from wrcore.contact.patch.windows import (
     count_again,
     drop_starved,
@@ -49,12 +59,6 @@ N is off by 1 to 29 % of waves that leave more, and fixed strips stand in."""
 
 _OTHER_NUMBERS = 0, 4, -1, 2
 """Strips by which a window's number differs in turn, where no solution was found."""
-
-_GUESSED = 4 + 3 * MAX_WINDOWS
-"""Where a memory holds of how many windows the first guess was, then by how many strips more than usual they were
-solved, and from there on its strips."""
-
-_EXTRA, _STRIPS_FROM = _GUESSED + 1, _GUESSED + 2
 
 _IN_VAIN = -1.0
 """First number of a memory where no windows were found."""
@@ -102,10 +106,10 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     work.left[0] = left = _ALL_STEPS
-    if memory[0] < 0.0 and memory[_GUESSED] == guessed and _moved(frame, memory) < _NEARBY:
+    if memory[0] < 0.0 and memory[GUESSED] == guessed and _moved(frame, memory) < _NEARBY:
         work.more[WEIGHT], work.more[FIXED], work.guessed[0], work.left[0] = 0.0, 1.0, 0, 0
-        return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
-    usual = resolution + int(memory[_EXTRA])
+        return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
+    usual = resolution + int(memory[EXTRA])
     if memory[0] > 0.0 and usual != resolution:
         windows = guess_windows(work, stretches, usual)
     if _resume(frame, memory, work, guessed, stretches, usual):
@@ -138,8 +142,9 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         windows = work.guessed[0] = 0
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
     if work.more[WIDENED] == 1.0:  # not of the second of two solutions
-        memory[0], memory[1], memory[2], memory[3], memory[_GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
-    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds), frame
+        memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
+        memory[KEPT] = 0.0
+    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
 
 
 @jit(allocates=False)
@@ -188,13 +193,13 @@ def _solve_cold(geometry, pose, frame, values, work, stretches, windows, resolut
 @jit(allocates=False)
 def _remember(frame, work, windows, guessed, extra, memory):
     """Note what a warm start wants to know of the solution."""
-    memory[0], memory[1], memory[2], memory[3], memory[_GUESSED] = windows, frame.x, frame.ur, frame.z, guessed
-    memory[_EXTRA] = extra
+    memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = windows, frame.x, frame.ur, frame.z, guessed
+    memory[EXTRA] = extra
     for k in range(windows):
-        at = 4 + 3 * k
+        at = TIPS_FROM + 3 * k
         memory[at], memory[at + 1], memory[at + 2] = work.start[k + 1], work.low[k], work.high[k]
     for i in range(work.start[windows]):
-        at = _STRIPS_FROM + 3 * i
+        at = STRIPS_FROM + 3 * i
         memory[at], memory[at + 1], memory[at + 2] = work.share[i], work.square[i], work.middle[i]
 
 
@@ -203,27 +208,27 @@ def _resume(frame, memory, work, guessed, stretches, resolution):
     """Move the last solution to the new frame if the first guess was of as many windows as this one, and its own lie
     among the overlaps: to the guess's strips if they are as many, else if they want as many strips as they had."""
     windows = int(memory[0])
-    if windows <= 0 or guessed == 0 or memory[_GUESSED] != guessed:
+    if windows <= 0 or guessed == 0 or memory[GUESSED] != guessed:
         return False
     y, z, along = memory[2] - frame.ur, memory[3] - frame.z, memory[1] - frame.x
     shift, old_first = y * frame.cosine + z * frame.sine, 0
     first_place, last_place = _outermost(work, stretches)
     for k in range(windows):
-        low, high = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
+        low, high = memory[TIPS_FROM + 1 + 3 * k] + shift, memory[TIPS_FROM + 2 + 3 * k] + shift
         reach = _REACH * (high - low)
         if low < first_place - reach or high > last_place + reach:
             return False
     for k in range(windows):
-        work.low[k], work.high[k] = memory[5 + 3 * k] + shift, memory[6 + 3 * k] + shift
-    if windows != guessed and not count_again(work, windows, memory[4:], memory[_STRIPS_FROM:], resolution):
+        work.low[k], work.high[k] = memory[TIPS_FROM + 1 + 3 * k] + shift, memory[TIPS_FROM + 2 + 3 * k] + shift
+    if windows != guessed and not count_again(work, windows, memory[TIPS_FROM:], memory[STRIPS_FROM:], resolution):
         return False
     for k in range(windows):
-        old_end, first, end = int(memory[4 + 3 * k]), work.start[k], work.start[k + 1]
+        old_end, first, end = int(memory[TIPS_FROM + 3 * k]), work.start[k], work.start[k + 1]
         ratio = (old_end - old_first) / (end - first)
         for i in range(first, end):
             place = (i - first + 0.5) * ratio - 0.5
             j = min(max(int(place), 0), old_end - old_first - 2)
-            at, part = _STRIPS_FROM + 3 * (old_first + j), place - j
+            at, part = STRIPS_FROM + 3 * (old_first + j), place - j
             rest = 1.0 - part
             work.share[i] = rest * memory[at] + part * memory[at + 3]
             square = rest * memory[at + 1] + part * memory[at + 4]

@@ -50,7 +50,14 @@ BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 MEMORY = 6 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
 """Numbers that a warm start wants of a solution: windows (0: none; below: none were found), x, ur, z of its frame's
 origin; ends in strips and tips of its windows; windows of the first guess, and strips more than usual; Q, c and X of
-its strips."""
+its strips. Where no windows were found: those of fixed strips, their number in place of the strips more, and the load
+in place of Q."""
+
+TIPS_FROM = 4
+GUESSED = TIPS_FROM + 3 * MAX_WINDOWS
+EXTRA = KEPT = GUESSED + 1
+STRIPS_FROM = EXTRA + 1
+"""Where a memory holds what."""
 
 
 WIDENED, WEIGHT, GUESS, FIXED = range(4)
