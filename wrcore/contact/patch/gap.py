@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.creepage import creepages
+from wrcore.contact.geometry import SCAN_STEP
 from wrcore.contact.reduction import (
     ANGLE,
     BEYOND,
@@ -64,6 +65,9 @@ NODE_ROWS = 6
 # Rows of the strip gap: what `strip_gap` fills.
 GAP, GAP_SLOPE, SHAPE, CREST, SHAPE_RATE, CREST_RATE, HEIGHT, TILT, U, UR = range(10)
 GAP_ROWS = 10
+
+_STEPS_TO_EDGE = 5
+"""Quarters of a scan step in which an overlap's end is sought from the scan's point next to it."""
 
 _ANGLE_NODES = 32
 """Nodes over half of each overlap for the mean contact angle, over its half width; as many again where it goes on."""
@@ -228,12 +232,15 @@ def strip_gap(geometry, pose, frame, s, u, ur):
 
 
 @jit(allocates=False)
-def _edges_of(geometry, pose, row):
-    """u of both ends of an overlap, m; where its middle is not in contact those of points next to it."""
-    low, high, u = row[OUTSIDE], row[BEYOND], row[U_WHEEL]
-    if gap_at(geometry, pose, u)[0] < 0.0:
-        low, high = edge_by_bracket(geometry, pose, low, u), edge_by_bracket(geometry, pose, high, u)
-    return low, high
+def _edge_of(geometry, pose, outside, step):
+    """u of an overlap's end, m, from a point ``outside`` next to it in steps towards it; that point where none is seen:
+    an overlap may hide between two, and a row have air between several."""
+    u = outside
+    for _ in range(_STEPS_TO_EDGE):
+        u += step
+        if gap_at(geometry, pose, u)[0] < 0.0:
+            return edge_by_bracket(geometry, pose, u - step, u)
+    return outside
 
 
 @jit(allocates=False)
@@ -243,7 +250,8 @@ def look_over_overlaps(geometry, pose, frame, patches, first, last, nodes, ends)
     Returns the number of stretches."""
     count = 0
     for k in range(first, last):
-        low, high = _edges_of(geometry, pose, patches[k])
+        low = _edge_of(geometry, pose, patches[k, OUTSIDE], SCAN_STEP / 4.0)
+        high = _edge_of(geometry, pose, patches[k, BEYOND], -SCAN_STEP / 4.0)
         for i in range(NODES):  # the first and the last half a step outside
             u = low + (high - low) * (i - 0.5) / (NODES - 2)
             _fill_node(geometry, pose, frame, u, nodes, count)
