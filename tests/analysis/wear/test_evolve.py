@@ -339,8 +339,8 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
         ({"law": "archard"}, "law: expected"),
         ({"patches": "strips"}, "patches: expected 'ellipse' or 'exact'"),
         (
-            {"patches": "exact", "set": {"contact.patch": "moment"}},
-            "scenes.0.set: .*contact.patch: expected exact or tab",
+            {"patches": "exact", "set": {"contact.patch": "maximum"}},
+            "scenes.0.set: .*contact.patch: expected exact, tab",
         ),
         ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
         ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
