@@ -14,7 +14,7 @@ from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch import gap, solve
 from wrcore.contact.patch.grid import grid_normal
 from wrcore.contact.patch.solve import even_length
-from wrcore.contact.patch.strips import FIXED, GUESSED, MEMORY
+from wrcore.contact.patch.strips import FIXED, GUESSED, KEPT, MEMORY
 from wrcore.contact.patch.surfaces import ContactPlane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_WHEEL
 from wrcore.contact.statics import height_at_load
@@ -174,6 +174,23 @@ def test_windows_that_were_not_found_are_sought_again_elsewhere():
         assert warm == pytest.approx([cold], rel=5e-3 if known[-1] else 1e-6)
         at = memory[2]
     assert not known[0] and 2 <= sum(known) <= 10
+
+
+def test_fixed_strips_go_on_from_the_last_ones():
+    """To the same force, but not where lobes are born beside them: of a wheel under 20 kN that is pressed in by 60 um
+    while its memory says that it has hardly moved."""
+    light, deep = (NormalContact(pair_with_waves(20, 3.5), MODULUS, "coarse") for _ in range(2))
+    y, z = 5e-4, height(light.geometry, 5e-4, 20e3)
+    again = [forces(light, [(y, z, 0.0)], warm=True)[0] for _ in range(6)]
+    memory = light._memories["left", 0]
+    assert memory[0] < 0.0 < memory[KEPT]
+    steps = np.abs(np.diff(again)) / again[0]
+    assert 0.0 < steps[0] < 1e-3 and steps[-1] < 0.5 * steps[0]
+    cold = forces(deep, [(y, z - 6e-5, 0.0)], warm=True)
+    there = deep._memories["left", 0]
+    assert there[0] < 0.0 and cold > 4.0 * again[0]
+    memory[1:4], memory[GUESSED] = there[1:4], there[GUESSED]
+    np.testing.assert_allclose(forces(light, [(y, z - 6e-5, 0.0)], warm=True), cold, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

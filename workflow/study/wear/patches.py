@@ -23,8 +23,8 @@ WIDTH = 5e-4
 """Of the bins, m."""
 U = WIDTH * np.arange(-120, 80)
 """Places on a wheel's profile, m."""
-WAYS = *PATCHES, "exact, on the motion of ellipses"
-"""In which wear is found."""
+WAYS = {**{patches: patches for patches in PATCHES}, "exact, on the motion of ellipses": "exact"}
+"""In which wear is found: the patches of each."""
 
 
 def depths(wear):
@@ -38,12 +38,12 @@ def compared(scene, begin, law, resolution):
     found, elsewhere = {}, load_scene(scene, {"contact.patch": "moment"})
     runs = simulate(scene), simulate(elsewhere)
     assert all(run.status == "completed" for run in runs), [run.reason for run in runs]
-    for patches, run, of in zip(WAYS, (runs[0], *runs), (scene, scene, elsewhere), strict=True):
+    for way, run, of in zip(WAYS, (runs[0], *runs), (scene, scene, elsewhere), strict=True):
         began = time.process_time()
-        worn = local_wear(run, begin, law, WIDTH, PATCHES[patches != PATCHES[0]], resolution, of)
+        worn = local_wear(run, begin, law, WIDTH, WAYS[way], resolution, of)
         seconds = time.process_time() - began
         wheels = [worn[scene.vehicle.wheelset_names[0], side] for side in SIDES]
-        found[patches] = [(depths(wheel), wheel.volume, seconds) for wheel in wheels]
+        found[way] = [(depths(wheel), wheel.volume, seconds) for wheel in wheels]
     return found
 
 
@@ -54,8 +54,8 @@ def figure_of(found):
     rows = figure.subplots(len(found), 2, squeeze=False, sharex=True)
     for axes, (name, ways) in zip(rows, found.items(), strict=True):
         for k, (one, side) in enumerate(zip(axes, SIDES, strict=True)):
-            for patches, line in zip(WAYS, ("--", "-", ":"), strict=True):
-                one.plot(1e3 * U, 1e12 * ways[patches][k][0], line, label=patches)
+            for way, line in zip(WAYS, ("--", "-", ":"), strict=True):
+                one.plot(1e3 * U, 1e12 * ways[way][k][0], line, label=way)
             one.set_title(f"{name}, {side}", fontsize="small")
             one.set_xlim(-45.0, 25.0)
     figure.supylabel("depth / µm per 1000 km", fontsize="medium")
@@ -73,7 +73,8 @@ def main():
     asked = parser.parse_args()
     data, scenes = load_wear_plan(asked.plan, {"patches": "exact", "set": {"contact.patch": "tabulated"}})
     head = ["scene", "wheel", "deepest, exact over ellipse", "at u, mm: ellipse", "exact",
-            "largest deviation, % of the deepest", "exact on the motion of ellipses", "volume, %", "so",
+            "largest deviation, % of the deepest: ellipse", "exact on the motion of ellipses",
+            "volume, %: exact over ellipse", "exact on the motion of ellipses over exact",
             "processor time, s: ellipse", "exact"]  # fmt: skip
     print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     found = {}

@@ -5,7 +5,7 @@ import math
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
 from wrcore.contact.patch.strips import BEND, KEPT, MAX_WINDOWS, STRIPS_FROM, TIPS_FROM, assemble, place_strips
-from wrcore.contact.patch.windows import active_runs, newborn, take_fresh
+from wrcore.contact.patch.windows import active_runs, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
 FIXED = 32
@@ -13,9 +13,6 @@ FIXED = 32
 
 _SWEEPS, _AGAIN = 10, 4
 """Of half lengths and loads, from the overlaps and from the last solution: each leaves some 0.7 of what c is off by."""
-
-_BESIDE = 1e-3
-"""Share of the deepest penetration by which loaded surfaces interpenetrate beside the strips that are kept."""
 
 _SETTLED = 0.02
 """A solution stands if no c moves by more than this share of the largest in the end."""
@@ -80,9 +77,8 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
     """The solution on fixed strips, where Newton's iteration finds none: to within a strip at the tips. Returns the
     number of windows; 0 where c does not come to rest.
 
-    A ``memory`` of windows in vain (see `solve_patch`) keeps the strips: they go on from there while lobes stay among
-    them."""
-    windows, moved = _go_on(geometry, pose, frame, values, work, stretches, kinds, memory)
+    A ``memory`` of windows in vain (see `solve_patch`) keeps the strips: they go on from there if c comes to rest."""
+    windows, moved = _go_on(geometry, pose, frame, values, work, kinds, memory)
     if windows == 0:
         windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
     if moved > _SETTLED:
@@ -107,9 +103,9 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
+def _go_on(geometry, pose, frame, values, work, kinds, memory):
     """The solution from the last one on the same strips: their windows, and by what share of the largest c one moved
-    last; no windows where none are kept or lobes have come to their ends or beside them."""
+    last; no windows where none are kept, or c has not come to rest, as where lobes are born."""
     if not (memory[0] < 0.0 < memory[KEPT]):
         return 0, -1.0
     windows = int(memory[KEPT])
@@ -125,14 +121,6 @@ def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
         work.square[i], work.middle[i] = memory[at + 1], memory[at + 2] + memory[1] - frame.x
     moved = _carry(values, work, windows, kinds, _AGAIN)
     if not 0.0 <= moved <= _SETTLED:
-        return 0, -1.0
-    for k in range(windows):
-        for i in (work.start[k], work.start[k + 1] - 1):
-            if work.active[i] and memory[STRIPS_FROM + 3 * i] <= 0.0:
-                return 0, -1.0
-    for i in range(work.start[windows]):
-        work.share[i] = work.load[i] / work.square[i]
-    if newborn(values, work, windows, stretches, FIXED, _BESIDE) != windows:
         return 0, -1.0
     return windows, moved
 

@@ -56,7 +56,7 @@ NODES = 48
 """Nodes over each overlap at which the gap is looked at."""
 
 _REACH = 1.4
-"""Half of the range that is looked at, over the half width that the overlap's moments give."""
+"""Half of the range that the mean contact angle is over, over the half width that the overlap's moments give."""
 
 # Rows of the nodes over the overlaps.
 S, NODE_GAP, NODE_SHAPE, NODE_CREST, NODE_SQUARE, NODE_SHARE = range(6)

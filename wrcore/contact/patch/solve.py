@@ -96,7 +96,8 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     ``resolution``: strips of a window. ``values``: of `influence_table`. ``memory`` (MEMORY,): a solution to start from
     if it fits (its first number 0: none); filled with this one. It leaves the result the same to the square of the
     iteration's tolerance where one set of windows fits; where several do, as between lobes of worn wheels, it keeps its
-    own: N then differs by up to 2 % from that without it, and steps less. Where none were found none are sought nearby.
+    own: N then differs by up to 2 % from that without it, and steps less. Where none were found none are sought nearby:
+    fixed strips go on.
     """
     work.more[FIXED] = 0.0
     frame = frame_of_overlaps(geometry, pose, patches, first, last)
