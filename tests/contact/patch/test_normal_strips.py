@@ -11,10 +11,10 @@ from tests.conftest import DATA, pair_with_waves
 from tests.contact.patch.strip_contact import RESOLUTIONS, NormalContact
 from wrcore.contact.detection import axle_direction, detect, find_patches
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
-from wrcore.contact.patch import gap, solve
+from wrcore.contact.patch import gap
 from wrcore.contact.patch.grid import grid_normal
 from wrcore.contact.patch.solve import even_length
-from wrcore.contact.patch.strips import FIXED, GUESSED, KEPT, MEMORY
+from wrcore.contact.patch.strips import FIXED, GUESSED, KEPT, MEMORY, PLACE, STEPS, STRIPS_FROM
 from wrcore.contact.patch.surfaces import ContactPlane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_WHEEL
 from wrcore.contact.statics import height_at_load
@@ -111,7 +111,7 @@ def started(contact, poses):
         found.append(forces(contact, [pose], warm=True)[0])
         memory = contact._memories["left", 0]
         others.append(0.0 < memory[0] != memory[GUESSED])
-        steps.append(solve._ALL_STEPS - contact._work.left[0])
+        steps.append(STEPS - contact._work.left[0])
     return np.array(found), np.array(others), np.array(steps)
 
 
@@ -169,10 +169,10 @@ def test_windows_that_were_not_found_are_sought_again_elsewhere():
         warm = forces(contact, [pose], warm=True)
         memory, fixed = contact._memories["left", 0].copy(), contact._work.more[FIXED]
         (cold,) = forces(NormalContact(contact.geometry, MODULUS, "coarse"), [pose], warm=False)
-        known.append(memory[0] < 0.0 and at == memory[2])
+        known.append(memory[0] < 0.0 and at == memory[PLACE])
         assert fixed == (memory[0] < 0.0)
         assert warm == pytest.approx([cold], rel=5e-3 if known[-1] else 1e-6)
-        at = memory[2]
+        at = memory[PLACE]
     assert not known[0] and 2 <= sum(known) <= 10
 
 
@@ -181,15 +181,18 @@ def test_fixed_strips_go_on_from_the_last_ones():
     while its memory says that it has hardly moved."""
     light, deep = (NormalContact(pair_with_waves(20, 3.5), MODULUS, "coarse") for _ in range(2))
     y, z = 5e-4, height(light.geometry, 5e-4, 20e3)
-    again = [forces(light, [(y, z, 0.0)], warm=True)[0] for _ in range(6)]
+    again = forces(light, [(y, z, 0.0)] * 3, warm=True)
+    np.testing.assert_allclose(again[1:], again[0], rtol=1e-4)
+    lifted = [(y, z + k * 1e-6, 0.0) for k in range(1, 6)]
+    apart = forces(light, lifted, warm=True) / forces(deep, lifted, warm=False) - 1.0
     memory = light._memories["left", 0]
-    assert memory[0] < 0.0 < memory[KEPT]
-    steps = np.abs(np.diff(again)) / again[0]
-    assert 0.0 < steps[0] < 1e-3 and steps[-1] < 0.5 * steps[0]
+    assert memory[0] < 0.0 < memory[KEPT] and memory[PLACE + 1] < z + 1e-6
+    assert 1e-6 < np.abs(apart).max() < 5e-3  # their strips lie elsewhere
+    deep._memories.clear()
     cold = forces(deep, [(y, z - 6e-5, 0.0)], warm=True)
     there = deep._memories["left", 0]
     assert there[0] < 0.0 and cold > 4.0 * again[0]
-    memory[1:4], memory[GUESSED] = there[1:4], there[GUESSED]
+    memory[1:4], memory[GUESSED:STRIPS_FROM] = there[1:4], [there[GUESSED], memory[KEPT], *there[PLACE:STRIPS_FROM]]
     np.testing.assert_allclose(forces(light, [(y, z - 6e-5, 0.0)], warm=True), cold, rtol=1e-6)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from wrcore.analysis.contact.loaded import GRIDS, Found, LoadedWheels
 from wrcore.contact.patch.result import Patch
+from wrcore.contact.patch.strips import STEPS
 from wrcore.contact.reduction import NORMAL
 from wrcore.contact.statics import height_of_zero
 from wrcore.dynamics.motion import WheelMotion
@@ -39,12 +40,14 @@ ROUNDING = 1e-9
 
 
 class WheelInRun:
-    """A wheel of a run of a scene, solved exactly at its output times; ``asker`` is named in errors.
+    """A wheel of a run of a scene, solved exactly at its output times; ``asker`` is named in errors. ``steps``: as of
+    `LoadedWheels`.
 
     An InputError where the run has no ``wheel_motion``, or rails or wheels that change along the track or the rim.
     """
 
-    def __init__(self, run: Run, scene: Source | None, wheelset: str, side: str, resolution: str, asker: str) -> None:
+    def __init__(self, run: Run, scene: Source | None, wheelset: str, side: str, resolution: str, asker: str,
+                 steps: int = STEPS) -> None:  # fmt: skip
         scene = scene_in_run(run, scene, asker)
         wheel = run.groups.get(f"{wheelset}/{side}", {})
         if not {*ON_RAIL, "N_N"} <= wheel.keys():
@@ -57,8 +60,8 @@ class WheelInRun:
         pair = scene.pair(side, scene.vehicle.wheelset_names.index(wheelset))
         self._wheels = LoadedWheels(
             pair.geometry, "exact", resolution, contact["slip"], **contact["material"],
-            detection="planar" if scene.detection == "planar" else "spatial", friction_ratio=friction.ratio,
-            friction_decay=friction.decay, friction_factors=friction.factors,
+            detection="planar" if scene.detection == "planar" else "spatial", steps=steps,
+            friction_ratio=friction.ratio, friction_decay=friction.decay, friction_factors=friction.factors,
         )  # fmt: skip
         self._motions = np.column_stack([np.full(len(run.t), SIDES[side]), *(wheel[name] for name in ON_RAIL)])
         self._loads = np.nansum(wheel["N_N"].reshape(len(run.t), -1), axis=1)
@@ -78,7 +81,9 @@ class WheelInRun:
         if not goal:
             return []
         z = height_of_zero(excess, m.z)
-        return self._wheels.in_motion(m if np.isnan(z) else m._replace(z=z), fields=True)
+        if np.isnan(z):
+            return self._wheels.in_motion(m, fields=True)
+        return self._wheels.in_motion(m._replace(z=z), fields=True, warm=True)
 
 
 def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:

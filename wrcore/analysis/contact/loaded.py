@@ -22,6 +22,7 @@ from wrcore.contact.patch.model import PATCHES, RESOLUTIONS, SLIPS, strip_model,
 from wrcore.contact.patch.reference import FINE, solve_on_grids
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.rolling import read_field
+from wrcore.contact.patch.strips import STEPS
 from wrcore.contact.patch.surfaces import Motion, contact_plane
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, REDUCTIONS
 from wrcore.contact.statics import ROLL_SLOPE, height_at_load, height_of_zero, settle
@@ -97,14 +98,15 @@ class LoadedWheels:
     """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
 
     Strips and grids have a ``resolution`` (coarse, middle, fine) and a rigid ``slip`` (of the real surfaces, or one set
-    of creepages); where strips find no solution a grid takes over. They may have ``more`` of a `ContactModel`.
+    of creepages); where strips find no solution a grid takes over. Windows are sought for so many ``steps``, then fixed
+    strips stand in. They may have ``more`` of a `ContactModel`.
     """
 
     refines = True
     """Whether a patch that strips do not solve is solved anew on finer grids."""
 
     def __init__(self, geometry, model="exact", resolution="middle", slip="surfaces", shear_modulus=8.2e10,
-                 poisson_ratio=0.28, detection="spatial", **more):  # fmt: skip
+                 poisson_ratio=0.28, detection="spatial", steps=STEPS, **more):  # fmt: skip
         known = {"patch": (model, MODELS), "resolution": (resolution, RESOLUTIONS), "slip": (slip, SLIPS),
                  "detection": (detection, ("planar", "spatial"))}  # fmt: skip
         for name, (value, names) in known.items():
@@ -119,6 +121,7 @@ class LoadedWheels:
         self.grids = GRIDS[resolution] if self.always else GRIDS["middle"][-1:]
         strips = strip_model("exact" if self.always or self.tabulated else model, resolution, slip, self.poisson_ratio)
         self._work = strip_work(strips, 1)
+        self._work.normal.left[1:] = steps
         contact = ContactModel(
             geometry, hertz_table(), LAWS["she"], creep_data(self.poisson_ratio), DETECTIONS[detection], 0.0,
             REDUCTIONS.get(model, MOMENT), self.shear_modulus, self.poisson_ratio, SMOOTH, 1.0, 1.0, SLOWEST, strips,

@@ -44,6 +44,10 @@ PATCHES = "ellipse", "exact"
 BIN = 2.5e-4  # width of the bins of depth over a profile, m
 STRIPS, STEPS = 25, 20  # strips across and steps along a patch
 
+_SOUGHT = 1
+"""Steps for which windows of exact patches are sought, that is from the first guess alone: in worn gauge corners fixed
+strips err no more than what longer searches find."""
+
 
 @dataclass(frozen=True, eq=False)
 class WheelWear:
@@ -207,7 +211,7 @@ def _on_ellipses(run, late, loss, name, side):
 
 def _on_exact_patches(run, late, law, scene, resolution, name, side):
     """`Strips` of the exact patches of a wheel, by a law over friction's work."""
-    solved, parts = WheelInRun(run, scene, name, side, resolution, "local_wear"), []
+    solved, parts = WheelInRun(run, scene, name, side, resolution, "local_wear", _SOUGHT), []
     known = creep_work(*(run[f"{name}/{side}"][part] for part in _WORKING))[2]
     for time, i in enumerate(np.flatnonzero(late).tolist()):
         found = solved.at(i)

@@ -11,11 +11,15 @@ from wrcore.kernels.jit import FUSED, jit
 FIXED = 32
 """Fixed strips, where the first guess of the windows has failed."""
 
-_SWEEPS, _AGAIN = 10, 4
-"""Of half lengths and loads, from the overlaps and from the last solution: each leaves some 0.7 of what c is off by."""
+_SWEEPS, _AGAIN = 16, 8
+"""Of half lengths and loads, at most, from the overlaps and from the last solution."""
 
-_SETTLED = 0.02
-"""A solution stands if no c moves by more than this share of the largest in the end."""
+_KEPT = 3
+"""Sweeps of which the next one's half lengths are mixed."""
+
+_SETTLED, _AT_REST = 0.02, (0.05, 0.002)
+"""A solution stands if no c would move by more than this share of the largest, and is gone on with until none would by
+the second of two, the first where strips are placed anew."""
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -40,7 +44,7 @@ def _fixed_strips(geometry, pose, frame, values, work, stretches, kinds):
         work.gap[0, U], work.gap[0, UR] = frame.u + work.low[0] * frame.cosine, frame.ur + work.low[0] * frame.cosine
         place_strips(geometry, pose, frame, work, windows)
         _press(work, windows)
-        moved = _carry(values, work, windows, kinds, _SWEEPS)
+        moved = _carry(values, work, windows, kinds, _SWEEPS, _AT_REST[refined])
         if moved < 0.0:
             return 0, found, largest, moved
         found, largest = active_runs(work, windows)
@@ -104,8 +108,8 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
 
 @jit(allocates=False, fastmath=FUSED)
 def _go_on(geometry, pose, frame, values, work, kinds, memory):
-    """The solution from the last one on the same strips: their windows, and by what share of the largest c one moved
-    last; no windows where none are kept, or c has not come to rest, as where lobes are born."""
+    """The solution from the last one on the same strips: their windows, and by what share of the largest c one would
+    move; no windows where none are kept, or c does not come to rest, as where lobes are born."""
     if not (memory[0] < 0.0 < memory[KEPT]):
         return 0, -1.0
     windows = int(memory[KEPT])
@@ -119,7 +123,7 @@ def _go_on(geometry, pose, frame, values, work, kinds, memory):
         at = STRIPS_FROM + 3 * i
         work.active[i] = memory[at] > 0.0
         work.square[i], work.middle[i] = memory[at + 1], memory[at + 2] + memory[1] - frame.x
-    moved = _carry(values, work, windows, kinds, _AGAIN)
+    moved = _carry(values, work, windows, kinds, _AGAIN, _AT_REST[1])
     if not 0.0 <= moved <= _SETTLED:
         return 0, -1.0
     return windows, moved
@@ -149,9 +153,9 @@ def _press(work, windows):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _carry(values, work, windows, kinds, sweeps):
+def _carry(values, work, windows, kinds, sweeps, rest):
     """Loads of fixed strips by an active set at given half lengths and middles, these from the loads (middles for
-    ``kinds`` = 3, with yaw); by which share of the largest c one moved last, -1 without loads."""
+    ``kinds`` = 3, with yaw) until they ``rest``; by which share of the largest c one would move, -1 without loads."""
     strips, matrix, load = work.start[windows], work.matrix, work.load
     offset, moved, points = kinds * strips + 2 * windows, 0.0, kinds - 1.0  # twice the points with yaw
     for sweep in range(sweeps):
@@ -160,8 +164,7 @@ def _carry(values, work, windows, kinds, sweeps):
         n = assemble(values, work, windows, kinds)
         if not _active_set(work, strips, kinds, n, offset):
             return -1.0
-        if sweep + 1 == sweeps:  # c and the loads belong together
-            break
+        left, wanted = work.kept[2 * (sweep % _KEPT)], work.kept[2 * (sweep % _KEPT) + 1]
         largest, moved = 0.0, 0.0
         for i in range(strips):
             bend = tilt = 0.0
@@ -169,20 +172,49 @@ def _carry(values, work, windows, kinds, sweeps):
                 share = load[j] / work.square[j]
                 bend -= matrix[kinds * i + 1, kinds * j] * share
                 tilt -= matrix[kinds * i + kinds - 1, kinds * j] * share
-            matrix[offset, i] = bend / (points * work.gap[i, SHAPE] * BEND)
+            wanted[i] = bend / (points * work.gap[i, SHAPE] * BEND)
+            largest = max(largest, wanted[i])
+            left[strips + i], wanted[strips + i] = 0.0, work.middle[i]
             if kinds == 3:  # the mean of t^2 over the points is 1/2
                 a = math.sqrt(work.square[i])
                 shift = work.gap[i, CREST] + 0.25 * tilt / (work.gap[i, SHAPE] * a) - work.middle[i]
-                matrix[offset + 1, i] = min(max(shift, -0.3 * a), 0.3 * a)
-            largest = max(largest, matrix[offset, i])
+                left[strips + i] = min(max(shift, -0.3 * a), 0.3 * a)
+                wanted[strips + i] += left[strips + i]
         for i in range(strips):
-            new = max(matrix[offset, i], 0.02 * largest, 0.02 * work.width[i] ** 2)
-            new = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
-            moved, work.square[i] = max(moved, abs(new - work.square[i]) / largest), new
-            if kinds == 3:
-                shift = matrix[offset + 1, i]
-                moved, work.middle[i] = max(moved, abs(shift) / math.sqrt(largest)), work.middle[i] + shift
+            least = max(0.02 * largest, 0.02 * work.width[i] ** 2)
+            wanted[i] = min(max(wanted[i], least, 0.3 * work.square[i]), 4.0 * work.square[i])
+            left[i] = (wanted[i] - work.square[i]) / largest
+            left[strips + i] /= math.sqrt(largest)
+            moved = max(moved, abs(left[i]), abs(left[strips + i]))
+        if moved <= rest or sweep + 1 == sweeps:  # c and the loads belong together
+            break
+        _mix(work, strips, min(sweep, _KEPT - 1), sweep)
     return moved
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _mix(work, strips, others, sweep):
+    """c and middles for the next sweep: of what the last ``others`` + 1 sweeps wanted the mix that leaves least of what
+    they left, if changes are linear (Anderson 1965)."""
+    kept, matrix, mine = work.kept, work.matrix, 2 * (sweep % _KEPT)
+    for one in range(others):
+        at = 2 * ((sweep - 1 - one) % _KEPT)
+        for other in range(others + 1):
+            of, total = 2 * ((sweep - 1 - other) % _KEPT), 0.0
+            for i in range(2 * strips):
+                aside = kept[mine, i] if other == others else kept[mine, i] - kept[of, i]
+                total += (kept[mine, i] - kept[at, i]) * aside
+            matrix[one, other] = total
+        matrix[one, one] *= 1.0 + 1e-8
+    solved = others > 0 and solve_linear(matrix, others)
+    for i in range(2 * strips):
+        new = kept[mine + 1, i]
+        for one in range(others if solved else 0):
+            new -= matrix[one, others] * (kept[mine + 1, i] - kept[2 * ((sweep - 1 - one) % _KEPT) + 1, i])
+        if i < strips:
+            work.square[i] = min(max(new, 0.3 * work.square[i]), 4.0 * work.square[i])
+        else:
+            work.middle[i - strips] = new
 
 
 @jit(allocates=False, fastmath=FUSED)

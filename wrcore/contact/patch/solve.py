@@ -27,6 +27,7 @@ from wrcore.contact.patch.strips import (
     FIXED,
     GUESSED,
     KEPT,
+    PLACE,
     STRIPS_FROM,
     TIPS_FROM,
     WEIGHT,
@@ -66,13 +67,12 @@ _IN_VAIN = -1.0
 _REACH = 0.5
 """A window's tips may lie this share of its width beyond all overlaps for a solution to start from."""
 
-_NEARBY = 5e-5
-"""Windows are sought anew so far, m, from where none were found."""
+_NEARBY, _AROUND = 1.5e-5, 1e-4
+"""Windows are sought anew where the wheel lies so far, m, from where none were found; the second where they are sought
+from the first guess alone."""
 
-_STEPS, _ALL_STEPS = 24, 250
-"""Of Newton's iteration for one set of windows, and after which a patch gets no further set: 99 of 100 that find a
-solution take at most 30 to 50 in all, on a flange under 230 kN one took 231; those that find none would take up to
-450."""
+_STEPS = 24
+"""Of Newton's iteration for one set of windows; see also `strips.STEPS`."""
 
 _TOLERANCE = 1e-4
 """Newton's iteration ends when no step is longer, as a share of the unknown."""
@@ -106,8 +106,8 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     grade(work, stretches)
     guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
-    work.left[0] = left = _ALL_STEPS
-    if memory[0] < 0.0 and memory[GUESSED] == guessed and _moved(frame, memory) < _NEARBY:
+    work.left[0] = left = work.left[1]
+    if memory[GUESSED] == guessed and _near(geometry, pose, memory, _NEARBY if left > 1 else _AROUND):
         work.more[WEIGHT], work.more[FIXED], work.guessed[0], work.left[0] = 0.0, 1.0, 0, 0
         return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
     usual = resolution + int(memory[EXTRA])
@@ -122,7 +122,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
                 if overlooked(work, windows, stretches) <= _OVERLOOKED:
                     _remember(frame, work, windows, guessed, usual - resolution, memory)
                     return windows, frame
-                left = 0 if windows == guessed else _ALL_STEPS  # others may overlook less
+                left = 0 if windows == guessed else work.left[1]  # others may overlook less
     if memory[0] > 0.0:
         windows = guess_windows(work, stretches, resolution)
     memory[0], work.left[0] = 0.0, left
@@ -144,15 +144,22 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     work.more[WEIGHT], work.more[FIXED] = 0.0, 1.0
     if work.more[WIDENED] == 1.0:  # not of the second of two solutions
         memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
-        memory[KEPT] = 0.0
+        memory[KEPT], (memory[PLACE], memory[PLACE + 1]) = 0.0, _place_of(geometry, pose)
     return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
 
 
 @jit(allocates=False)
-def _moved(frame, memory):
-    """How far a patch's frame is from where it was, m."""
-    y, z = memory[2] - frame.ur, memory[3] - frame.z
-    return math.sqrt(y * y + z * z)
+def _place_of(geometry, pose):
+    """y, z (m) of the wheel on the rail: where the nominal radius ends below its axle."""
+    out, down = geometry.half_distance, geometry.rolling_radius
+    return pose.y + out * pose.ey + down * pose.y_down, pose.z + out * pose.ez + down * pose.z_down
+
+
+@jit(allocates=False)
+def _near(geometry, pose, memory, reach):
+    """Whether the wheel lies within the ``reach`` (m) of where windows were sought in vain."""
+    y, z = _place_of(geometry, pose)
+    return memory[0] < 0.0 and abs(y - memory[PLACE]) < reach and abs(z - memory[PLACE + 1]) < reach
 
 
 @jit(allocates=False)
