@@ -188,6 +188,8 @@ def test_fixed_strips_go_on_from_the_last_ones():
     memory = light._memories["left", 0]
     assert memory[0] < 0.0 < memory[KEPT] and memory[PLACE + 1] < z + 1e-6
     assert 1e-6 < np.abs(apart).max() < 5e-3  # their strips lie elsewhere
+    memory[PLACE + 2] += 0.1  # of a frame that has turned since: places in it are others
+    np.testing.assert_allclose(forces(light, lifted[-1:], warm=True), forces(deep, lifted[-1:], warm=False), rtol=1e-9)
     deep._memories.clear()
     cold = forces(deep, [(y, z - 6e-5, 0.0)], warm=True)
     there = deep._memories["left", 0]

@@ -71,6 +71,9 @@ _NEARBY, _AROUND = 1.5e-5, 1e-4
 """Windows are sought anew where the wheel lies so far, m, from where none were found; the second where they are sought
 from the first guess alone."""
 
+_TURNED, _SHIFTED = 0.05, 1e-3
+"""Or where the frame has turned (rad) or moved (m) by so much: places in it are others then."""
+
 _STEPS = 24
 """Of Newton's iteration for one set of windows; see also `strips.STEPS`."""
 
@@ -107,7 +110,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     guessed = windows = guess_windows(work, stretches, resolution)
     kinds = 3 if changes_along(geometry) or pose.ex != 0.0 else 2
     work.left[0] = left = work.left[1]
-    if memory[GUESSED] == guessed and _near(geometry, pose, memory, _NEARBY if left > 1 else _AROUND):
+    if memory[GUESSED] == guessed and _near(geometry, pose, frame, memory, _NEARBY if left > 1 else _AROUND):
         work.more[WEIGHT], work.more[FIXED], work.guessed[0], work.left[0] = 0.0, 1.0, 0, 0
         return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
     usual = resolution + int(memory[EXTRA])
@@ -145,6 +148,7 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     if work.more[WIDENED] == 1.0:  # not of the second of two solutions
         memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
         memory[KEPT], (memory[PLACE], memory[PLACE + 1]) = 0.0, _place_of(geometry, pose)
+        memory[PLACE + 2] = math.atan2(frame.sine, frame.cosine)
     return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
 
 
@@ -156,10 +160,13 @@ def _place_of(geometry, pose):
 
 
 @jit(allocates=False)
-def _near(geometry, pose, memory, reach):
-    """Whether the wheel lies within the ``reach`` (m) of where windows were sought in vain."""
+def _near(geometry, pose, frame, memory, reach):
+    """Whether the wheel lies within the ``reach`` (m) of where windows were sought in vain, and the frame is the same
+    but for little."""
     y, z = _place_of(geometry, pose)
-    return memory[0] < 0.0 and abs(y - memory[PLACE]) < reach and abs(z - memory[PLACE + 1]) < reach
+    near = memory[0] < 0.0 and abs(y - memory[PLACE]) < reach and abs(z - memory[PLACE + 1]) < reach
+    turned = abs(math.atan2(frame.sine, frame.cosine) - memory[PLACE + 2])
+    return near and turned < _TURNED and max(abs(frame.ur - memory[2]), abs(frame.z - memory[3])) < _SHIFTED
 
 
 @jit(allocates=False)

@@ -47,17 +47,17 @@ BEND = float(np.sum(((4.0 * POINTS**2 - 2.0) * POINTS**2)[:2]))
 """What the second of Galerkin's conditions makes of a parabola t^2."""
 
 
-MEMORY = 8 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
+MEMORY = 9 + 3 * MAX_WINDOWS + 3 * MAX_STRIPS
 """Numbers that a warm start wants of a solution: windows (0: none; below: none were found), x, ur, z of its frame's
 origin; ends in strips and tips of its windows; windows of the first guess, and strips more than usual; y, z of the
-wheel; Q, c and X of its strips. Where no windows were found: those of fixed strips, their number in place of the strips
-more, and the load in place of Q."""
+wheel and angle of the frame; Q, c and X of its strips. Where no windows were found: those of fixed strips, their number
+in place of the strips more, and the load in place of Q."""
 
 TIPS_FROM = 4
 GUESSED = TIPS_FROM + 3 * MAX_WINDOWS
 EXTRA = KEPT = GUESSED + 1
 PLACE = EXTRA + 1
-STRIPS_FROM = PLACE + 2
+STRIPS_FROM = PLACE + 3
 """Where a memory holds what."""
 
 
