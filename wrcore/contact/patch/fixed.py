@@ -1,4 +1,9 @@
-"""Windows from fixed strips over the overlaps: slower than a guess, and safe."""
+"""Windows from fixed strips over the overlaps: slower than a guess, and safe.
+
+References
+----------
+Anderson, Iterative procedures for nonlinear integral equations, J. ACM 12 (1965) 547-560.
+"""
 
 import math
 
