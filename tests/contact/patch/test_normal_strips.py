@@ -10,13 +10,14 @@ from study.patch.rolling import solve_patch
 from tests.conftest import DATA, pair_with_waves
 from tests.contact.patch.strip_contact import RESOLUTIONS, NormalContact
 from wrcore.contact.detection import axle_direction, detect, find_patches
+from wrcore.contact.geometry import SLOPE
 from wrcore.contact.normal import contact_modulus, hertz_ellipse, hertz_table
 from wrcore.contact.patch import gap
 from wrcore.contact.patch.grid import grid_normal
 from wrcore.contact.patch.solve import even_length
 from wrcore.contact.patch.strips import FIXED, GUESSED, KEPT, MEMORY, PLACE, STEPS, STRIPS_FROM
 from wrcore.contact.patch.surfaces import ContactPlane
-from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_WHEEL
+from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS, PENETRATION, U_RAIL, U_WHEEL
 from wrcore.contact.statics import height_at_load
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.contact.wheel_on_rail import WheelOnRail
@@ -196,6 +197,36 @@ def test_fixed_strips_go_on_from_the_last_ones():
     assert there[0] < 0.0 and cold > 4.0 * again[0]
     memory[1:4], memory[GUESSED:STRIPS_FROM] = there[1:4], [there[GUESSED], memory[KEPT], *there[PLACE:STRIPS_FROM]]
     np.testing.assert_allclose(forces(light, [(y, z - 6e-5, 0.0)], warm=True), cold, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("waves", "y"), [((20, 3.0), 0.0), ((40, 4.0), 1e-3), ((20, 3.5), -1e-3)])
+def test_fixed_strips_are_placed_anew_where_a_patch_has_grown_beyond_them(waves, y):
+    """As where a wheel that all but hung is pressed down by 20 um: one on a worn flange kept 0.3 of its 5.7 kN."""
+    light, fresh = (NormalContact(pair_with_waves(*waves), MODULUS, "coarse") for _ in range(2))
+    for contact in (light, fresh):
+        contact._work.left[1] = 1  # windows are sought from the first guess alone: strips are kept over 100 um
+    z, found = height(light.geometry, y, 300.0), 0
+    for depth in np.arange(0.0, 9e-5, 1e-5):
+        (warm,) = forces(light, [(y, z - depth, 0.0)], warm=True)
+        (cold,) = forces(fresh, [(y, z - depth, 0.0)], warm=False)
+        assert warm == pytest.approx(cold, rel=0.02)
+        found += light._work.more[FIXED] != 0.0
+    assert found > 4
+
+
+def test_the_angle_of_a_patch_is_of_its_overlaps_where_the_rail_ends_in_one(benchmark_pair):
+    """The rail's curve goes on past its end, where nothing touches it; metres of overlap there turned the frame."""
+    contact, y = NormalContact(benchmark_pair, MODULUS), 7e-3
+    count, pose = contact.overlaps(y, height(benchmark_pair, y, 60e3), axle_direction(0.0, 0.0))
+    rows = contact._patches
+    whole, end = gap.frame_of_overlaps(benchmark_pair, pose, rows, 0, 1), rows[0, U_RAIL]
+    cut = int((end - 4e-4 - benchmark_pair.rail_start) / benchmark_pair.rail_step)  # some of the overlap is gone
+    rail = benchmark_pair.rail[cut:].copy()
+    rail[0, SLOPE] = -100.0
+    ended = benchmark_pair._replace(rail=rail, rail_start=benchmark_pair.rail_start + cut * benchmark_pair.rail_step)
+    assert gap_at(ended, pose, rows[0, U_WHEEL] - 6e-4)[0] == 1.0 and count > 0
+    frame = gap.frame_of_overlaps(ended, pose, rows, 0, 1)
+    assert math.atan2(frame.sine, frame.cosine) == pytest.approx(math.atan2(whole.sine, whole.cosine), abs=0.05)
 
 
 @pytest.mark.parametrize(

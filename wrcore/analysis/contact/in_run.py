@@ -1,8 +1,9 @@
 """Exact contact at the output times of a run, whatever its own patches were: ``wr.patch_in_run``.
 
 Where a wheel lay on its rail and how it moved there are the channels ``wheel_motion``; of the run's contact the wheel
-keeps the sum of its normal forces: it is raised or lowered until its exact patches carry that (where no height does, as
-they step by more, it stays).
+keeps the vertical force: it is raised or lowered until its exact patches carry that, or nearly that where their force
+steps. That holds of exact runs, too: with a damping factor their contact is softer than the material, and the wheel lay
+deeper.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ import numpy as np
 from wrcore.analysis.contact.loaded import GRIDS, Found, LoadedWheels
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.strips import STEPS
-from wrcore.contact.reduction import NORMAL
 from wrcore.contact.statics import height_of_zero
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, checked
 from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.track import SIDES
+from wrcore.kernels.cache import warn
 from wrcore.run.run import Run
 from wrcore.run.simulation import ON_RAIL
 from wrcore.scene.description import Scene, Source, scene_of
@@ -30,10 +31,16 @@ PARTS = "vehicle", "wheel", "rail", "track", "contact"
 """Of a scene, on which contact hangs."""
 
 CARRIED = 1e-3
-"""Relative error of F^(2/3) that ends the search for a height."""
+"""Relative error of F^(2/3) that ends the search for a height, and of F for a height with friction."""
+
+AGAIN = 4
+"""Searches for a height: each one is without friction, for a force that friction made of the last one."""
 
 NEAR = 2e-8
 """Heights that differ by less (m) end it, too: there the force steps, by less than strips err."""
+
+SAID = 1e-2
+"""Share by which the force of patches may be off without a word."""
 
 ROUNDING = 1e-9
 """Of times, s."""
@@ -64,26 +71,46 @@ class WheelInRun:
             friction_ratio=friction.ratio, friction_decay=friction.decay, friction_factors=friction.factors,
         )  # fmt: skip
         self._motions = np.column_stack([np.full(len(run.t), SIDES[side]), *(wheel[name] for name in ON_RAIL)])
-        self._loads = np.nansum(wheel["N_N"].reshape(len(run.t), -1), axis=1)
+        rows = (wheel[name].reshape(len(run.t), -1) for name in ("N_N", "Fy_N", "contact_angle_rad"))
+        normal, lateral, angle = rows
+        self._loads = np.nansum(normal * np.cos(angle) + lateral * np.sin(angle), axis=1)
+        self._presses = np.nansum(normal, axis=1) > 0.0
+        self.missed = 0.0  # by the patches found last: what they lack or have too much, as a share of the force
 
     def at(self, i: int) -> list[Found]:
         """Patches, with their fields, at the i-th output time; none where the wheel is in the air."""
-        goal = max(float(self._loads[i]), 0.0) ** (2.0 / 3.0)
-        m, before = WheelMotion(*self._motions[i].tolist()), np.nan
+        self.missed = 0.0
+        if not self._presses[i]:
+            return []
+        m, load, self.missed = WheelMotion(*self._motions[i].tolist()), float(self._loads[i]), np.inf
+        found: list[Found] = []
+        self._wheels.in_motion(m._replace(friction=0.0))  # what follows is warm: its force is a function of height
+        z, wanted = m.z, load
+        for _ in range(AGAIN if load > 0.0 else 0):
+            z = self._height(m._replace(z=z), wanted)
+            tried = self._wheels.in_motion(m._replace(z=z), fields=True, warm=True)
+            carried = sum(one.vertical for one in tried)
+            if abs(carried / load - 1.0) < self.missed:
+                found, self.missed = tried, abs(carried / load - 1.0)
+            if self.missed <= CARRIED or not carried > 0.0:
+                break
+            wanted *= load / carried
+        return found or self._wheels.in_motion(m, fields=True, warm=True)
+
+    def _height(self, m: WheelMotion, load: float) -> float:
+        """Height, m, at which the patches of a wheel carry a load, N, without friction, from that of ``m``; this one
+        where there is none."""
+        goal, before = load ** (2.0 / 3.0), np.nan
 
         def excess(z):
             nonlocal before
-            there = self._wheels.in_motion(m._replace(z=z, friction=0.0), warm=before == before)
-            rest = max(sum(found.row[NORMAL] for found in there), 0.0) ** (2.0 / 3.0) - goal
+            there = self._wheels.in_motion(m._replace(z=z, friction=0.0), warm=True)
+            rest = max(sum(found.vertical for found in there), 0.0) ** (2.0 / 3.0) - goal
             near, before = abs(z - before) < NEAR, z
             return 0.0 if near or abs(rest) < CARRIED * goal else rest
 
-        if not goal:
-            return []
         z = height_of_zero(excess, m.z)
-        if np.isnan(z):
-            return self._wheels.in_motion(m, fields=True)
-        return self._wheels.in_motion(m._replace(z=z), fields=True, warm=True)
+        return m.z if np.isnan(z) else z
 
 
 def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:
@@ -125,8 +152,9 @@ def patch_in_run(
     Returns
     -------
     list of Patch
-        From the flange to the field side; empty where the wheel is in the air. Together they carry the normal force
-        that the wheel had in the run, at its place and motion on its rail.
+        From the flange to the field side; empty where the wheel is in the air. Together they carry the vertical force
+        that the wheel had in the run, at its place and motion on its rail, but for its height; next to it where their
+        force steps over it.
 
     Raises
     ------
@@ -149,4 +177,7 @@ def patch_in_run(
     if wheelset not in run.groups or f"{wheelset}/{side}" not in run.groups:
         raise InputError("patch_in_run", "wheelset", f"expected a wheelset of the run with contacts, got {wheelset!r}")
     wheel = WheelInRun(run, scene, wheelset, side, resolution, "patch_in_run")
-    return [found.patch for found in wheel.at(int(np.argmin(np.abs(run.t - t))))]
+    found = wheel.at(int(np.argmin(np.abs(run.t - t))))
+    if wheel.missed > SAID:
+        warn(f"patch_in_run: {wheelset}/{side}: at {t:g} s the patches' vertical force is off by {wheel.missed:.2%}")
+    return [one.patch for one in found]

@@ -32,6 +32,7 @@ from wrcore.creep.kalker import kalker_coefficients, kalker_data
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
+from wrcore.kernels.cache import warn
 from wrcore.run.derived import creep_work, rolling_speed
 from wrcore.run.progress import counted
 from wrcore.run.run import Run
@@ -43,6 +44,9 @@ PATCHES = "ellipse", "exact"
 
 BIN = 2.5e-4  # width of the bins of depth over a profile, m
 STRIPS, STEPS = 25, 20  # strips across and steps along a patch
+
+MISSED = 0.1
+"""Share of a wheel's force that its exact patches may miss; else ellipses stand in at that time."""
 
 _SOUGHT = 1
 """Steps for which windows of exact patches are sought, that is from the first guess alone: in worn gauge corners fixed
@@ -140,7 +144,8 @@ def local_wear(
     over = partial(_on_ellipses, run, late, loss)
     if patches == "exact":
         own = scene_in_run(run, scene, "local_wear")
-        over = partial(_on_exact_patches, run, late, law_on_cells(law, own, "local_wear"), own, resolution)
+        exact = law_on_cells(law, own, "local_wear")
+        over = partial(_on_exact_patches, run, late, exact, own, resolution, otherwise=over)
         wheels = counted(wheels, unit="wheel")
     return {(name, side): _wheel_wear(run, name, late, over(name, side), width) for name, side in wheels}
 
@@ -209,12 +214,16 @@ def _on_ellipses(run, late, loss, name, side):
     return Strips(across, wheel.reshape(2, -1), rail.reshape(2, -1), *amounts)
 
 
-def _on_exact_patches(run, late, law, scene, resolution, name, side):
-    """`Strips` of the exact patches of a wheel, by a law over friction's work."""
-    solved, parts = WheelInRun(run, scene, name, side, resolution, "local_wear", _SOUGHT), []
+def _on_exact_patches(run, late, law, scene, resolution, name, side, otherwise):
+    """`Strips` of the exact patches of a wheel, by a law over friction's work; some of those ``otherwise`` where exact
+    patches do not carry the wheel."""
+    solved, parts, missed = WheelInRun(run, scene, name, side, resolution, "local_wear", _SOUGHT), [], []
     known = creep_work(*(run[f"{name}/{side}"][part] for part in _WORKING))[2]
     for time, i in enumerate(np.flatnonzero(late).tolist()):
         found = solved.at(i)
+        if not solved.missed <= MISSED:
+            missed.append(time)
+            continue
         total = sum(float(one.patch.friction_work @ one.patch.cell_area) for one in found)
         for patch, places in ((one.patch, one.places) for one in found if total > 0.0):
             if places is None:  # on a grid, whose plane is flat
@@ -223,6 +232,11 @@ def _on_exact_patches(run, late, law, scene, resolution, name, side):
             count = places.shape[-1]
             amounts = (np.sum((q * area).reshape(count, -1), axis=1) for q in (law(work) / DENSITY, work))
             parts.append(Strips(np.full(count, time), *places, *amounts))
+    if missed:
+        warn(f"local_wear: {name}/{side}: ellipses stand in at {len(missed)} of {late.sum()} output times, at which no"
+             f" exact patches carry the wheel within {MISSED:.0%}")  # fmt: skip
+        ellipses = otherwise(name, side)
+        parts.append(Strips(*(part[..., np.isin(ellipses.time, missed)] for part in ellipses)))
     return Strips(*(np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))) if parts else NOTHING
 
 

@@ -10,7 +10,7 @@ import math
 from wrcore.contact.patch.gap import CREST, GAP, GAP_ROWS, NODE_GAP, NODE_SHARE, NODE_SQUARE, SHAPE, UR, S, U
 from wrcore.contact.patch.newton import solve_linear
 from wrcore.contact.patch.strips import BEND, KEPT, MAX_WINDOWS, STRIPS_FROM, TIPS_FROM, assemble, place_strips
-from wrcore.contact.patch.windows import active_runs, take_fresh
+from wrcore.contact.patch.windows import active_runs, newborn, take_fresh
 from wrcore.kernels.jit import FUSED, jit
 
 FIXED = 32
@@ -21,6 +21,9 @@ _SWEEPS, _AGAIN = 16, 8
 
 _KEPT = 3
 """Sweeps of which the next one's half lengths are mixed."""
+
+_BESIDE = 0.01
+"""Share of the deepest penetration by which loaded surfaces may interpenetrate beside strips that go on."""
 
 _SETTLED, _AT_REST = 0.02, (0.05, 0.002)
 """A solution stands if no c would move by more than this share of the largest, and is gone on with until none would by
@@ -87,7 +90,7 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
     number of windows; 0 where c does not come to rest.
 
     A ``memory`` of windows in vain (see `solve_patch`) keeps the strips: they go on from there if c comes to rest."""
-    windows, moved = _go_on(geometry, pose, frame, values, work, kinds, memory)
+    windows, moved = _go_on(geometry, pose, frame, values, work, stretches, kinds, memory)
     if windows == 0:
         windows, _, _, moved = _fixed_strips(geometry, pose, frame, values, work, stretches, kinds)
     if moved > _SETTLED:
@@ -112,9 +115,9 @@ def solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _go_on(geometry, pose, frame, values, work, kinds, memory):
+def _go_on(geometry, pose, frame, values, work, stretches, kinds, memory):
     """The solution from the last one on the same strips: their windows, and by what share of the largest c one would
-    move; no windows where none are kept, or c does not come to rest, as where lobes are born."""
+    move; no windows where none are kept, where the patch has grown beyond them, or c does not come to rest."""
     if not (memory[0] < 0.0 < memory[KEPT]):
         return 0, -1.0
     windows = int(memory[KEPT])
@@ -131,7 +134,10 @@ def _go_on(geometry, pose, frame, values, work, kinds, memory):
     moved = _carry(values, work, windows, kinds, _AGAIN, _AT_REST[1])
     if not 0.0 <= moved <= _SETTLED:
         return 0, -1.0
-    return windows, moved
+    for i in range(work.start[windows]):
+        work.share[i] = work.load[i] / work.square[i]
+    grown = newborn(values, work, windows, stretches, FIXED, _BESIDE) != windows
+    return 0 if grown else windows, moved
 
 
 @jit(allocates=False)

@@ -40,6 +40,7 @@ from wrcore.contact.strip import (
     gap_at,
     lean_at,
     leaning,
+    on_rail,
     strip_point,
     wheel_slope,
     with_rail_along,
@@ -157,7 +158,8 @@ def _mean_angle(geometry, pose, patches, first, last, otherwise):
                 ur, z, _, slope, _, along = strip_point(geometry, pose, u)
                 f, df, _ = cubic_at(geometry.rail, geometry.rail_start, geometry.rail_step, ur)
                 depth = f - z
-                if not row[OUTSIDE] < u < row[BEYOND] or (i >= _ANGLE_NODES and depth <= 0.0):
+                off = not row[OUTSIDE] < u < row[BEYOND] or not on_rail(geometry, ur)  # past its end a curve goes on
+                if off or (i >= _ANGLE_NODES and depth <= 0.0):
                     break
                 if depth > 0.0:
                     both = 0.5 * (wheel_slope(pose, slope, along) + df)

@@ -44,6 +44,7 @@ from wrcore.contact.patch.windows import (
     overlooked,
     start_strips,
 )
+from wrcore.contact.reduction import BEYOND, OUTSIDE
 from wrcore.contact.strip import changes_along
 from wrcore.kernels.jit import FUSED, jit
 
@@ -112,7 +113,8 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
     work.left[0] = left = work.left[1]
     if memory[GUESSED] == guessed and _near(geometry, pose, frame, memory, _NEARBY if left > 1 else _AROUND):
         work.more[WEIGHT], work.more[FIXED], work.guessed[0], work.left[0] = 0.0, 1.0, 0, 0
-        return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
+        windows = solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory)
+        return _on_overlaps(patches, first, last, work, windows, memory), frame
     usual = resolution + int(memory[EXTRA])
     if memory[0] > 0.0 and usual != resolution:
         windows = guess_windows(work, stretches, usual)
@@ -149,7 +151,18 @@ def solve_patch(geometry, pose, hertz, values, patches, first, last, resolution,
         memory[0], memory[1], memory[2], memory[3], memory[GUESSED] = _IN_VAIN, frame.x, frame.ur, frame.z, guessed
         memory[KEPT], (memory[PLACE], memory[PLACE + 1]) = 0.0, _place_of(geometry, pose)
         memory[PLACE + 2] = math.atan2(frame.sine, frame.cosine)
-    return solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory), frame
+    windows = solve_fixed(geometry, pose, frame, values, work, stretches, kinds, memory)
+    return _on_overlaps(patches, first, last, work, windows, memory), frame
+
+
+@jit(allocates=False)
+def _on_overlaps(patches, first, last, work, windows, memory):
+    """The number of windows, 0 if a strip lies off the overlaps: on steep flanks places of a frame are ambiguous."""
+    for i in range(work.start[windows]):
+        if not patches[first, OUTSIDE] < work.gap[i, U] < patches[last - 1, BEYOND]:
+            memory[KEPT] = 0.0
+            return 0
+    return windows
 
 
 @jit(allocates=False)
