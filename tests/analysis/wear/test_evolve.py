@@ -342,6 +342,11 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
             {"patches": "exact", "set": {"contact.patch": "maximum"}},
             "scenes.0.set: .*contact.patch: expected exact, tab",
         ),
+        ({"patches": "exact", "law": ARCHARD}, "plan: law: expected one of sheffield, energy"),
+        (
+            {"patches": "exact", "scene": str(SCENES / "crossing.yaml")},
+            "scenes.0.set: .*crossing.yaml: expected rails and wheels that are the same everywhere",
+        ),
         ({"rails": {"renewal": 1e7}}, "rails.tonnage"),
         ({"limits": {"Sd": 22.0}}, "limits.Sd: expected a length in m"),
         ({"law": {"archard": {"hardness": 2e9, "coefficients": []}}}, "law.archard.coefficients: expected a list"),

@@ -316,6 +316,28 @@ def test_a_patch_on_a_grid_wears_where_its_strips_do(monkeypatch):
     assert middles[:2] == pytest.approx(middles[2:], abs=5e-4)
 
 
+def test_ellipses_stand_in_where_exact_patches_do_not_carry_the_wheel(monkeypatch, capsys):
+    """At three of eleven times here, which is said; what is lost there is what ellipses lose."""
+    scene, run = exact_run()
+    at, name = WheelInRun.at, ("wheelset", "right")
+
+    def astray(wheel, i):
+        found = at(wheel, i)
+        wheel.missed = 0.2 if i in spoilt else wheel.missed
+        return found
+
+    monkeypatch.setattr(WheelInRun, "at", astray)
+    wears = []
+    for spoilt in ((), (3, 4, 7), range(11)):  # noqa: B007 (astray looks at it)
+        wears.append(local_wear(run, patches="exact", scene=scene)[name])
+    assert "wheelset/right: ellipses stand in at 3 of 11 output times" in capsys.readouterr().err
+    exact, mixed, ellipses = wears
+    assert mixed.work == pytest.approx(exact.work, rel=1e-9)
+    np.testing.assert_array_equal(ellipses.wheel_depth, local_wear(run)[name].wheel_depth)
+    places = [0.5 * (w.wheel_edges[1:] + w.wheel_edges[:-1]) @ w.wheel_depth / w.wheel_depth.sum() for w in wears]
+    assert min(places[::2]) < places[1] < max(places[::2])
+
+
 def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
     scene, run = exact_run(**{"contact.patch": "maximum", "integration.duration": 0.02})
     with pytest.raises(InputError, match=r"contact.patch: expected exact, tabulated or moment where .*got maximum"):

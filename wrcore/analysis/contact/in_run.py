@@ -60,8 +60,7 @@ class WheelInRun:
         if not {*ON_RAIL, "N_N"} <= wheel.keys():
             expected = f"expected contact and wheel_motion among them for the exact patches of {wheelset}/{side}"
             raise InputError(asker, "output.channels", expected)
-        if any((scene.crossings, scene.out_of_round, scene.corrugation)):
-            raise InputError(asker, "run", "expected rails and wheels that are the same everywhere for exact patches")
+        check_same_everywhere(scene, asker, "run")
         contact = scene.data["contact"]
         friction = read_friction(contact["friction"], scene.source)
         pair = scene.pair(side, scene.vehicle.wheelset_names.index(wheelset))
@@ -111,6 +110,12 @@ class WheelInRun:
 
         z = height_of_zero(excess, m.z)
         return m.z if np.isnan(z) else z
+
+
+def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:
+    """An InputError, of an asker's field, for a scene whose rails or wheels change along the track or the rim."""
+    if any((scene.crossings, scene.out_of_round, scene.corrugation)):
+        raise InputError(asker, field, "expected rails and wheels that are the same everywhere for exact patches")
 
 
 def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:

@@ -25,8 +25,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from wrcore.analysis.contact.in_run import check_same_everywhere
 from wrcore.analysis.wear import worn_profiles, worn_rails
-from wrcore.analysis.wear.local_wear import BIN, law_on_cells, local_wear
+from wrcore.analysis.wear.local_wear import BIN, check_motion, law_on_cells, local_wear
 from wrcore.analysis.wear.wear_folder import claim, rows_of, write_rows
 from wrcore.analysis.wear.wear_laws import check_friction, wear_law
 from wrcore.analysis.wear.worn_profiles import file_of, points_of, read_points, write_points
@@ -70,12 +71,14 @@ def load_wear_plan(
     scenes: list[Scene] = []
     output: dict[str, Any] = {"output.rate": data["rate"]}
     if data["patches"] == "exact":
+        law_on_cells(data["law"], name)
         output["output.channels"] = ["pose", "velocity", "contact", "wheel_motion"]
     for i, part in enumerate(data["scenes"]):
         try:
             scene = load_scene(path, {**part.get("set", {}), **data["set"], **output})
             if data["patches"] == "exact":
-                law_on_cells(data["law"], scene, name)
+                check_motion(scene, scene.source)
+                check_same_everywhere(scene, scene.source, "")
         except InputError as error:
             raise InputError(name, f"scenes.{i}.set", str(error)) from None
         if data["begin"] >= scene.data["integration"]["duration"]:

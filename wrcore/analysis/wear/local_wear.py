@@ -144,19 +144,24 @@ def local_wear(
     over = partial(_on_ellipses, run, late, loss)
     if patches == "exact":
         own = scene_in_run(run, scene, "local_wear")
-        exact = law_on_cells(law, own, "local_wear")
+        check_motion(own, "local_wear")
+        exact = law_on_cells(law, "local_wear")
         over = partial(_on_exact_patches, run, late, exact, own, resolution, otherwise=over)
         wheels = counted(wheels, unit="wheel")
     return {(name, side): _wheel_wear(run, name, late, over(name, side), width) for name, side in wheels}
 
 
-def law_on_cells(law: str | dict[str, Any], scene: Scene, asker: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Loss (kg per metre rolled and m^2) over friction's work per area on exact patches of a scene; an InputError for
-    what these do not take, in the name of the ``asker``."""
+def check_motion(scene: Scene, asker: str) -> None:
+    """An InputError in the name of the ``asker`` for a scene whose motion is not near that of exact contact."""
     own = scene.data["contact"]["patch"]
     if own == "maximum":
         expected = "expected exact, tabulated or moment where patches are exact: others move a wheelset in another way"
         raise InputError(asker, "contact.patch", f"{expected}, got {own}")
+
+
+def law_on_cells(law: str | dict[str, Any], asker: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Loss (kg per metre rolled and m^2) over friction's work per area on exact patches; an InputError for what these
+    do not take, in the name of the ``asker``."""
     if not isinstance(law, str) or law not in LAWS:
         raise InputError(asker, "law", f"{one_of(LAWS, law)}, where patches are exact")
     return LAWS[law]
