@@ -6,7 +6,7 @@ import copy
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from os import PathLike
@@ -43,6 +43,7 @@ from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
 from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossings, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
+from wrcore.scene.examples import examples_folder
 from wrcore.scene.friction import read_friction
 from wrcore.scene.out_of_round import read_out_of_round
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
@@ -131,12 +132,15 @@ def as_scene(scene: Source) -> Scene:
 
 
 def scene_of(run: Any, scene: Source | None, asker: str) -> Scene:
-    """The scene of a run: what stands for it, or read anew by what the run says; ``asker`` is named in errors."""
+    """The scene of a run: what stands for it, or read anew by what the run says, with files in the working directory or
+    beside the examples; ``asker`` is named in errors."""
     if scene is not None:
         return as_scene(scene)
     try:
         return load_scene(run.scene)
     except InputError as error:
+        with suppress(InputError):
+            return _checked(copy.deepcopy(run.scene), "scene", examples_folder() / "scenes")
         raise InputError(asker, "scene", f"expected that of the run, as its files are not here ({error})") from None
 
 

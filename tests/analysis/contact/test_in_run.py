@@ -118,7 +118,7 @@ def test_friction_counts_where_a_height_is_sought(tmp_path):
 def test_a_patch_of_a_run_by_ellipses_carries_its_load():
     scene, run = run_of({"contact.patch": "moment", "initial.y": 0.003})
     t, rows = float(run.t[2]), run["wheelset/right"]
-    (patch,) = patch_in_run(run, t, "wheelset", "right", scene=scene)
+    (patch,) = patch_in_run(run, t, "wheelset", "right")  # its scene reads files of the examples
     vertical = rows.N_N[2] * np.cos(rows.contact_angle_rad[2]) + rows.Fy_N[2] * np.sin(rows.contact_angle_rad[2])
     carried = patch.normal * np.cos(patch.contact_angle) + patch.fs * np.sin(patch.contact_angle)
     assert patch.side == "right" and carried == pytest.approx(np.nansum(vertical), rel=2e-3)
@@ -146,14 +146,15 @@ def test_a_profile_that_was_edited_since_is_refused(tmp_path):
 def test_refusals():
     scene, run = run_of({"contact.patch": "moment", "output.channels": ["pose", "contact"]})
     other = load_scene(scene, {"rail.inclination": "1/20"})
-    asking = run_of({"contact.patch": "moment"})[1]
+    asking, elsewhere = (run_of({"contact.patch": "moment"})[1] for _ in range(2))
+    elsewhere.scene["vehicle"]["parameters"] = "vehicles/of_mine.yaml"
     cases = [
         ({"run": asking, "scene": other}, "patch_in_run: scene: expected that of the run, but rail of it differ"),
         ({"t": 0.02 + 1e-12}, "patch_in_run: output.channels: expected contact and wheel_motion among them"),
         ({"t": 1.0}, "patch_in_run: t: expected a time of the run, got 1 s"),
         ({"wheelset": "bogie"}, "patch_in_run: wheelset: expected a wheelset of the run with contacts, got 'bogie'"),
         ({}, "patch_in_run: output.channels: expected contact and wheel_motion among them"),
-        ({"scene": None}, "patch_in_run: scene: expected that of the run, as its files are not here"),
+        ({"scene": None, "run": elsewhere}, "patch_in_run: scene: expected that of the run, as its files are not here"),
     ]
     for changes, message in cases:
         with pytest.raises(InputError, match=message):
