@@ -127,6 +127,21 @@ def test_a_patch_of_a_run_by_ellipses_carries_its_load():
     assert patch.friction_work @ patch.cell_area == pytest.approx(power, rel=1e-12) and power > 0.0
 
 
+def test_a_patch_without_a_load_is_none():
+    """As of an overlap so small that no element of a grid touches: its centroid and its extent are no numbers."""
+    scene, run = run_of({"initial.y": 0.003})
+    wheel = WheelInRun(run, scene, "wheelset", "left", "coarse", "test")
+    in_motion = wheel._wheels.in_motion
+
+    def with_another(m, **how):
+        (one,) = in_motion(m, **how)
+        return [one._replace(row=np.zeros_like(one.row), load=0.0), one]
+
+    wheel._wheels.in_motion = with_another
+    (found,) = wheel.at(2)
+    assert found.load > 0.0 and wheel.missed < 2e-3
+
+
 def test_scenes_that_do_not_ask_have_none_of_its_channels():
     _, run = run_of({"contact.patch": "moment", "output.channels": ["contact"]})
     assert not set(ON_RAIL) & run["wheelset/left"].keys()

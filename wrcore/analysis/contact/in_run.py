@@ -87,14 +87,18 @@ class WheelInRun:
         z, wanted = m.z, load
         for _ in range(AGAIN if load > 0.0 else 0):
             z = self._height(m._replace(z=z), wanted)
-            tried = self._wheels.in_motion(m._replace(z=z), fields=True, warm=True)
+            tried = self._carrying(m._replace(z=z))
             carried = sum(one.vertical for one in tried)
             if abs(carried / load - 1.0) < self.missed:
                 found, self.missed = tried, abs(carried / load - 1.0)
             if self.missed <= CARRIED or not carried > 0.0:
                 break
             wanted *= load / carried
-        return found or self._wheels.in_motion(m, fields=True, warm=True)
+        return found or self._carrying(m)
+
+    def _carrying(self, m: WheelMotion) -> list[Found]:
+        """Patches, with their fields, without those that barely touch: a grid may have no element in contact."""
+        return [one for one in self._wheels.in_motion(m, fields=True, warm=True) if one.load > 0.0]
 
     def _height(self, m: WheelMotion, load: float) -> float:
         """Height, m, at which the patches of a wheel carry a load, N, without friction, from that of ``m``; this one
