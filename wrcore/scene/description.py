@@ -33,6 +33,7 @@ from wrcore.dynamics.wheel import ContactModel
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.errors.checked_yaml import read_source, validate
+from wrcore.errors.input_files import digest_of_all
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
@@ -132,15 +133,17 @@ def as_scene(scene: Source) -> Scene:
 
 
 def scene_of(run: Any, scene: Source | None, asker: str) -> Scene:
-    """The scene of a run: what stands for it, or read anew by what the run says, with files in the working directory or
-    beside the examples; ``asker`` is named in errors."""
+    """The scene of a run: what stands for it, or read anew by what the run says. Its files are in the working directory
+    or, if they hold what the run's did, beside the examples. ``asker`` is named in errors."""
     if scene is not None:
         return as_scene(scene)
     try:
         return load_scene(run.scene)
     except InputError as error:
         with suppress(InputError):
-            return _checked(copy.deepcopy(run.scene), "scene", examples_folder() / "scenes")
+            found = _checked(copy.deepcopy(run.scene), "scene", examples_folder() / "scenes")
+            if digest_of_all(found.files) == run.settings.get("files_sha256"):
+                return found
         raise InputError(asker, "scene", f"expected that of the run, as its files are not here ({error})") from None
 
 

@@ -161,15 +161,19 @@ def test_a_profile_that_was_edited_since_is_refused(tmp_path):
 def test_refusals():
     scene, run = run_of({"contact.patch": "moment", "output.channels": ["pose", "contact"]})
     other = load_scene(scene, {"rail.inclination": "1/20"})
-    asking, elsewhere = (run_of({"contact.patch": "moment"})[1] for _ in range(2))
+    asking, elsewhere, namesake = (run_of({"contact.patch": "moment"})[1] for _ in range(3))
     elsewhere.scene["vehicle"]["parameters"] = "vehicles/of_mine.yaml"
+    namesake.settings["files_sha256"] = "of files with the names of the examples'"
     cases = [
         ({"run": asking, "scene": other}, "patch_in_run: scene: expected that of the run, but rail of it differ"),
         ({"t": 0.02 + 1e-12}, "patch_in_run: output.channels: expected contact and wheel_motion among them"),
         ({"t": 1.0}, "patch_in_run: t: expected a time of the run, got 1 s"),
         ({"wheelset": "bogie"}, "patch_in_run: wheelset: expected a wheelset of the run with contacts, got 'bogie'"),
         ({}, "patch_in_run: output.channels: expected contact and wheel_motion among them"),
-        ({"scene": None, "run": elsewhere}, "patch_in_run: scene: expected that of the run, as its files are not here"),
+        *(
+            ({"scene": None, "run": one}, "patch_in_run: scene: expected that of the run, as its files are not here")
+            for one in (elsewhere, namesake)
+        ),
     ]
     for changes, message in cases:
         with pytest.raises(InputError, match=message):

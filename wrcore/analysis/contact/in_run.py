@@ -188,5 +188,6 @@ def patch_in_run(
     wheel = WheelInRun(run, scene, wheelset, side, resolution, "patch_in_run")
     found = wheel.at(int(np.argmin(np.abs(run.t - t))))
     if wheel.missed > SAID:
-        warn(f"patch_in_run: {wheelset}/{side}: at {t:g} s the patches' vertical force is off by {wheel.missed:.2%}")
+        off = f"off by {wheel.missed:.2%}" if np.isfinite(wheel.missed) else "not the wheel's at any height"
+        warn(f"patch_in_run: {wheelset}/{side}: at {t:g} s the patches' vertical force is {off}")
     return [one.patch for one in found]
