@@ -52,7 +52,7 @@ def copy_deepest(rows, first, last, out):
     copy_into(out, rows[deepest])
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False, fastmath=FUSED, nogil=True)
 def group_wrench(model, m, spatial, rows, first, last, out, wrench, counters, memory, work):
     """Solve the overlaps from ``first`` to before ``last`` as one patch of a left wheel: its row, its share of the
     wrench, and its `Solution`; a NORMAL of 0 where the wheel hangs in the air."""

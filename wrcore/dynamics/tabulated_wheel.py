@@ -45,7 +45,7 @@ UNLISTED = -1.0
 """Cell of the first of several lobes if one of them is in no lattice."""
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False, fastmath=FUSED, nogil=True)
 def tabulated_wrench(model, m, spatial, rows, first, last, out, wrench, counters, work):
     """As `group_wrench`, looked up; UNKNOWN where the table has no answer."""
     if not spatial or changed_here(model.geometry):  # the lattices are of spatial detection on plain rails

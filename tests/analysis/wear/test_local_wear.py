@@ -12,6 +12,8 @@ from wrcore.analysis.wear.wear_laws import LAWS, Sliding, sheffield, wear_law
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.creep.fastsim import FastsimData, fastsim
 from wrcore.creep.kalker import kalker_data
+from wrcore.dynamics.strip_wheel import group_wrench
+from wrcore.dynamics.tabulated_wheel import tabulated_wrench
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
 from wrcore.run.derived import creep_work
@@ -348,3 +350,9 @@ def test_exact_patches_want_a_motion_that_is_theirs_and_laws_over_work():
     for law in ({"t_gamma": [[0, 0], [100, 1e-12]]}, "braghin"):
         with pytest.raises(InputError, match=r"local_wear: law: expected"):
             local_wear(run, law=law, patches="exact", scene=exact)
+
+
+@pytest.mark.parametrize("kernel", [group_wrench, tabulated_wrench], ids=lambda kernel: kernel.py_func.__name__)
+def test_patches_are_solved_without_the_lock_of_python(kernel):
+    """Each scene of a wear plan has a thread: with it they would take turns."""
+    assert kernel.targetoptions["nogil"]

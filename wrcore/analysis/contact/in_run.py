@@ -8,6 +8,7 @@ deeper.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from wrcore.analysis.contact.loaded import GRIDS, Found, LoadedWheels
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.patch.strips import STEPS
+from wrcore.contact.reduction import ANGLE, PENETRATION
 from wrcore.contact.statics import height_of_zero
 from wrcore.dynamics.motion import WheelMotion
 from wrcore.errors import InputError
@@ -31,10 +33,7 @@ PARTS = "vehicle", "wheel", "rail", "track", "contact"
 """Of a scene, on which contact hangs."""
 
 CARRIED = 1e-3
-"""Relative error of F^(2/3) that ends the search for a height, and of F for a height with friction."""
-
-AGAIN = 4
-"""Searches for a height: each one is without friction, for a force that friction made of the last one."""
+"""Relative error of F^(2/3) that ends the search for a height."""
 
 NEAR = 2e-8
 """Heights that differ by less (m) end it, too: there the force steps, by less than strips err."""
@@ -82,38 +81,35 @@ class WheelInRun:
         if not self._presses[i]:
             return []
         m, load, self.missed = WheelMotion(*self._motions[i].tolist()), float(self._loads[i]), np.inf
-        found: list[Found] = []
-        self._wheels.in_motion(m._replace(friction=0.0))  # what follows is warm: its force is a function of height
-        z, wanted = m.z, load
-        for _ in range(AGAIN if load > 0.0 else 0):
-            z = self._height(m._replace(z=z), wanted)
+        goal, before, best = max(load, 0.0) ** (2.0 / 3.0), np.nan, []
+        first = self._wheels.in_motion(m._replace(friction=0.0))  # what follows is warm: forces without steps
+
+        def excess(z):
+            nonlocal before, best
             tried = self._carrying(m._replace(z=z))
             carried = sum(one.vertical for one in tried)
-            if abs(carried / load - 1.0) < self.missed:
-                found, self.missed = tried, abs(carried / load - 1.0)
-            if self.missed <= CARRIED or not carried > 0.0:
-                break
-            wanted *= load / carried
-        return found or self._carrying(m)
+            if load > 0.0 and abs(carried / load - 1.0) < self.missed:
+                best, self.missed = tried, abs(carried / load - 1.0)
+            rest = max(carried, 0.0) ** (2.0 / 3.0) - goal
+            near, before = abs(z - before) < NEAR, z
+            return 0.0 if near or abs(rest) < CARRIED * goal else rest
+
+        if load > 0.0:
+            height_of_zero(excess, m.z + _lift(first, load))
+        return best or self._carrying(m)
 
     def _carrying(self, m: WheelMotion) -> list[Found]:
         """Patches, with their fields, without those that barely touch: a grid may have no element in contact."""
         return [one for one in self._wheels.in_motion(m, fields=True, warm=True) if one.load > 0.0]
 
-    def _height(self, m: WheelMotion, load: float) -> float:
-        """Height, m, at which the patches of a wheel carry a load, N, without friction, from that of ``m``; this one
-        where there is none."""
-        goal, before = load ** (2.0 / 3.0), np.nan
 
-        def excess(z):
-            nonlocal before
-            there = self._wheels.in_motion(m._replace(z=z, friction=0.0), warm=True)
-            rest = max(sum(found.vertical for found in there), 0.0) ** (2.0 / 3.0) - goal
-            near, before = abs(z - before) < NEAR, z
-            return 0.0 if near or abs(rest) < CARRIED * goal else rest
-
-        z = height_of_zero(excess, m.z)
-        return m.z if np.isnan(z) else z
+def _lift(found: list[Found], load: float) -> float:
+    """By what a wheel is to be lifted, m, so that its patches carry a load, N, if its force goes with depth^1.5."""
+    most = max(found, key=lambda one: one.load, default=None)
+    if most is None or not most.load > 0.0:
+        return 0.0
+    share = (load / sum(one.vertical for one in found)) ** (2.0 / 3.0)
+    return (1.0 - share) * float(most.row[PENETRATION]) / math.cos(most.row[ANGLE])
 
 
 def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:

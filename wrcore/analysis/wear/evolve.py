@@ -276,9 +276,11 @@ def _wear_rate(data, scenes, shares, folder, step, profile, threads, spent):
     total, volume, fastest = np.zeros(len(profile[0])), 0.0, 0.0
     rails: list[dict[str, float]] = []
     falls: list[dict[str, np.ndarray]] = []
+    longest_first = sorted(range(len(scenes)), key=lambda i: -scenes[i].data["integration"]["duration"])
     with ThreadPoolExecutor(threads) as pool:
-        found = (pool.map if threads > 1 else map)(one, range(len(scenes)), scenes)
-        for share, worn in zip(shares, found, strict=True):
+        done = (pool.map if threads > 1 else map)(one, longest_first, [scenes[i] for i in longest_first])
+        found = dict(zip(longest_first, done, strict=True))
+        for share, (_, worn) in zip(shares, sorted(found.items()), strict=True):
             total += share * worn.rise
             volume += share * worn.volume
             rails.append({"scene": len(rails), "share": share} | worn.rails)
