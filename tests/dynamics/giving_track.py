@@ -27,8 +27,8 @@ SPEEDS = (60.0, 70.0, 80.0)
 
 def hunting(track, speed):
     """A run of the suspended wheelset into its limit cycle."""
-    changes = {"track": track, "speed": speed, "initial.y": 0.005, "integration.duration": 4.0,
-               "integration.rtol": 1e-5, "output.rate": 5000.0}  # fmt: skip
+    changes = {"contact.patch": "moment", "track": track, "speed": speed, "initial.y": 0.005,
+               "integration.duration": 4.0, "integration.rtol": 1e-5, "output.rate": 5000.0}  # fmt: skip
     return simulate(load_scene(SCENES / "suspended_wheelset.yaml", changes))
 
 
@@ -58,7 +58,9 @@ STIFFER = {f"massless, {a} x lateral, {b} x vertical": stiffer(a, b) for a, b in
 def critical(vehicle, tracks):
     """Rows of the linear critical speeds of a vehicle on tracks."""
     start, names = SCENES / f"{vehicle}.yaml", list(tracks)
-    scenes = {name: load_scene(start, {"initial.y": 0.0, "track": tracks[name]}) for name in names}
+    scenes = {
+        name: load_scene(start, {"contact.patch": "moment", "initial.y": 0.0, "track": tracks[name]}) for name in names
+    }
     found = critical_speeds(scenes, np.linspace(50.0, 90.0, 5)).set_index("variant")["critical_speed_m_per_s"]
     return [f"| {vehicle} | {name} | {found[name]:.1f} |" for name in names]
 

@@ -20,6 +20,8 @@ from wrcore.dynamics.wheel import SOLVED
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.joint import Joint
+from wrcore.geometry.made_rails import whole_head
 from wrcore.geometry.standards import named_profile
 from wrcore.geometry.switch import Switch
 from wrcore.geometry.track import SIDES
@@ -134,7 +136,7 @@ def test_what_was_seen_before_does_not_matter(changes):
     assert len(np.unique(forth[:, VELOCITY + 1])) == len(states)
 
 
-@pytest.mark.parametrize("slices", ["crossing:1/12", "switch:500", "switch:760"])
+@pytest.mark.parametrize("slices", ["crossing:1/12", "switch:500", "switch:760", "joint:0.01"])
 def test_no_contact_is_found_twice(slices):
     # the reserve of a head's steep side lets the search begin far off, but not look for lowest gaps across the head
     model, start = compile_scene(load_scene(CROSSING, {"track.crossing.slices": slices}))
@@ -375,6 +377,16 @@ def test_stretches_lie_apart_and_name_their_keys():
     with pytest.raises(InputError, match="from 1/30 to 1/5") as error:
         load_scene(CROSSING, {"track.crossing": [NOSE, NOSE | {"slices": "crossing:2"}]})
     assert error.value.field == "track.crossing.1.slices"
+    with pytest.raises(InputError, match="such as joint:0.01"):
+        load_scene(CROSSING, {"track.crossing": NOSE | {"slices": "joint:1"}})
+
+
+def test_a_made_joint_dips_by_its_angle():
+    joint = Joint(0.01)
+    s = np.array([-joint.straight - joint.level, -0.8, -0.4, 0.0, 0.4, 0.8, joint.straight + joint.level])
+    heights = joint.rail("joint").heights(s, np.array([0.0]))[0][:, 0]
+    np.testing.assert_allclose(np.diff(heights)[1:5] / 0.4, [-0.005, -0.005, 0.005, 0.005], atol=2e-5)
+    np.testing.assert_allclose(heights[[0, -1]], whole_head()[1].max(), atol=1e-5)
 
 
 def test_its_picture_shows_the_load_going_over():
@@ -395,7 +407,7 @@ def test_its_picture_shows_the_load_going_over():
 def test_its_page_is_read_and_run():
     text = (ROOT / "reports" / "crossings.md").read_text(encoding="utf-8")
     blocks = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
-    assert len(blocks) == 6
+    assert len(blocks) == 7
     for block in blocks:
         assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 

@@ -68,7 +68,7 @@ def add(commands):
     )  # fmt: skip
     command.add_argument(
         "--patch", choices=("maximum", "moment", "exact", "tabulated", "grid"), default="moment",
-        help="reduction of an overlap to an ellipse, or the real patch",
+        help="reduction of an overlap to an ellipse, or the real patch: solved, or, where the wheel rolls, looked up",
     )  # fmt: skip
     command.add_argument(
         "--resolution", choices=("coarse", "middle", "fine"), default="fine", help="of strips and grids"

@@ -8,8 +8,9 @@ ahead of the axle where the rail rises. The seen section has the height that giv
 which does not depend on the wheelset's height. What strips want beside it is kept at the section's nodes
 (`ContactGeometry.along`): how much further ahead the gap is least than over a prismatic rail, half of what the gap's
 second derivative over x has more, and how much higher the wheel's point there lies. Gap, place and curvature are those
-of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Over a rail that is the
-same everywhere the section is the rail's own and all three vanish.
+of the parabola that fits the gap best over the length of a patch: strips know parabolas only. Where an overlap is of
+another length, its area counts. Over a rail that is the same everywhere the section is the rail's own and all three
+vanish.
 
 A wheel out of round is seen in the same way, see `wrcore.contact.out_of_round`.
 
@@ -40,6 +41,11 @@ sections there, m, and at every how many of them the wheel is first put."""
 WINDOW = 5.5e-3
 """Half of the length over which the gap is fitted, m: of a cubic gap the parabola feels w^2/3, and a pressure
 sqrt(1 - (x/a)^2) feels 3 a^2/7, as much for patches of 9.7 mm."""
+
+USUAL_DEPTH, OTHER, ANOTHER = 6e-5, math.log(1.25), math.log(1.65)
+"""Depth (m) to which surfaces overlap under a wheel's usual load; and the ratio (logarithm) of that overlap's length to
+the fitted parabola's from which on its own area begins to count, and counts alone: on the chord of a fresh flat, say.
+"""
 
 BELOW = 0.03
 """Depth below the section's lowest point at which what lies between its heads is put, m."""
@@ -243,6 +249,39 @@ def _parabola(x, g, best):
 
 
 @jit(allocates=False)
+def _usual_overlap(x, g, best, floor, low, high):
+    """Area (m^2) by which the gap is closed beyond a height ``floor``, from the station ``best`` on both ways within
+    those from ``low`` to ``high``, the middle of that area (m), and whether it ends there."""
+    area, moment, ends = 0.0, 0.0, True
+    for way in (-1, 1):
+        i = best
+        while g[i] > floor:
+            if not (low <= i + way <= high and g[i + way] == g[i + way]):
+                ends = ends and low <= i + way <= high
+                break
+            here, there = g[i] - floor, max(g[i + way] - floor, 0.0)
+            length = (x[i + way] - x[i]) * (1.0 if there > 0.0 else here / (g[i] - g[i + way]))
+            area += 0.5 * abs(length) * (here + there)
+            moment += abs(length) * (0.5 * x[i] * (here + there) + length * (here + 2.0 * there) / 6.0)
+            i += way
+    return area, moment / area, ends
+
+
+@jit(allocates=False)
+def _of_area(place, second, area, middle):
+    """Vertex and second derivative of a parabola, or, where the overlap of the usual depth is another one, of the
+    parabola of its ``area`` (m^2) about its ``middle`` (m)."""
+    if not area > 0.0:
+        return place, second
+    half = 0.75 * area / USUAL_DEPTH
+    part = (abs(math.log(half * math.sqrt(-0.5 * second / USUAL_DEPTH))) - OTHER) / (ANOTHER - OTHER)
+    if not part > 0.0:
+        return place, second
+    part = min(part, 1.0) ** 2 * (3.0 - 2.0 * min(part, 1.0))
+    return place + part * (middle - place), second - part * (second + 2.0 * USUAL_DEPTH / (half * half))
+
+
+@jit(allocates=False)
 def _fill(wheel, pose, plane, x, rail, first, end, step, guess, g):
     """Fill ``g`` with the height of the rail less that of the wheel at every ``step``-th station, NaN where one of them
     is missing; returns the highest one, or -1."""
@@ -273,7 +312,8 @@ def _see(wheel, pose, x, rail, beyond, u, seen):
         best = _fill(wheel, pose, plane, x, rail[:, k], 0, n, COARSE, guess, g)
         if best < 0:
             continue
-        _fill(wheel, pose, plane, x, rail[:, k], max(best - near, 0), min(best + near + 1, n), 1, guess, g)
+        low, high = max(best - near, 0), min(best + near, n - 1)
+        _fill(wheel, pose, plane, x, rail[:, k], low, high + 1, 1, guess, g)
         for i in range(max(best - COARSE, 0), min(best + COARSE + 1, n)):
             if g[i] > g[best]:
                 best = i
@@ -286,6 +326,11 @@ def _see(wheel, pose, x, rail, beyond, u, seen):
             height, second = top, -2.0 * own
         else:
             top = max(top, height)
+        area, middle, ends = _usual_overlap(x, g, best, top - USUAL_DEPTH, low, high)
+        if not ends:
+            _fill(wheel, pose, plane, x, rail[:, k], 0, n, 1, guess, g)
+            area, middle, _ = _usual_overlap(x, g, best, top - USUAL_DEPTH, 0, n - 1)
+        place, second = _of_area(place, second, area, middle)
         wheel_there = wheel_height(wheel, pose, plane, place, 0.0, guess)
         if len(beyond):
             at = (place - x[0]) / h

@@ -118,7 +118,7 @@ class RailSlices:
         top = int(np.argmax(f))
         low = np.flatnonzero(f[:top] < f[top] - depth)
         if not low.size:
-            expected = f"expected a first slice down to {depth:g} m below its top on the gauge side (or the distance)"
+            expected = f"expected a first slice down to {depth:g} m below its top on the gauge side, as the gauge asks"
             raise InputError(self.name, "gauge", expected)
         k = low[-1]
         crossing = u[k] + (u[k + 1] - u[k]) * (f[top] - depth - f[k]) / (f[k + 1] - f[k])

@@ -26,7 +26,8 @@ UNIT_SUFFIXES = {
 
 DESCRIPTIONS = {
     "t": "time",
-    "x_m": "place along the track (body: arc length of its centre of mass; contact: contact point), forward positive",
+    "x_m": "place along the track (body: arc length of its centre of mass; contact: contact point, from its wheelset's"
+    " cross-section), forward positive",
     "s_m": "arc length along the track's centre line, the same as x (tracks that are not tangent)",
     "y_m": "lateral position in the track's axes, left positive",
     "z_m": "height above the plane of the rails' highest points",

@@ -16,6 +16,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import parse_ratio
 from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.crossing import Crossing
+from wrcore.geometry.joint import Joint
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import RailSlices
 from wrcore.geometry.switch import Switch
@@ -125,6 +126,11 @@ def _slices(spec, folder, source, field) -> RailSlices:
         if not 100.0 <= radius <= 5000.0:
             raise InputError(source, field, f"expected a switch of 100 to 5000 m, such as switch:500, got {spec!r}")
         return Switch(radius).rail(f"switch:{radius:g}")
+    if kind == "joint" and colon:
+        angle = parse_ratio(value)
+        if not 1e-4 <= angle <= 0.05:
+            raise InputError(source, field, f"expected a joint of 0.0001 to 0.05 rad, such as joint:0.01, got {spec!r}")
+        return Joint(angle).rail(f"joint:{angle:g}")
     how = spec if isinstance(spec, dict) else {"slices": spec}
     if not isinstance(how.get("slices"), str):
         raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")

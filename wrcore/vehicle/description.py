@@ -13,6 +13,7 @@ from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
 from wrcore.kernels import own
+from wrcore.kernels.cache import warn
 from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element
 from wrcore.vehicle.elements import compile_elements
@@ -20,6 +21,9 @@ from wrcore.vehicle.layout import Layout
 
 GRAVITY = 9.81
 """m/s^2; the value behind the static wheel loads of Manchester vehicle 1."""
+
+IMPOSSIBLE = 1.01
+"""A principal moment of inertia beyond this part of the sum of the two others is told."""
 
 BODY_KEYS = {
     "wheelset": (("rolling_radius", "tape_circle_half_distance"), ("independent_wheels",)),
@@ -179,10 +183,16 @@ def _check_bodies(bodies, source):
         for key in part:
             if key not in ("kind", "mass", "inertia", "position", *needed, *optional):
                 raise InputError(source, f"bodies.{name}.{key}", f"unknown for kind {part['kind']}")
-        least = np.linalg.eigvalsh(tensor_of(part["inertia"]))[0]
-        if least <= 0.0:
-            expected = f"expected products that leave all principal moments above 0, got one of {least:.4g} kg m^2"
+        moments = np.linalg.eigvalsh(tensor_of(part["inertia"]))
+        if moments[0] <= 0.0:
+            expected = f"expected products that leave all principal moments above 0, got one of {moments[0]:.4g} kg m^2"
             raise InputError(source, f"bodies.{name}.inertia", expected)
+        if part["kind"] == "wheelset":  # whose pitch may have a rotor, by the gear ratio squared
+            moments = *sorted(part["inertia"][key] for key in ("roll", "yaw")), part["inertia"]["pitch"]
+            moments = np.array(moments)[[0, 2, 1]]
+        if moments[2] > IMPOSSIBLE * (moments[0] + moments[1]):
+            warn(f"{source}: bodies.{name}.inertia: no mass has a moment of {moments[2]:.4g} kg m^2 beside two of"
+                 f" {moments[0]:.4g} and {moments[1]:.4g}: it is at most their sum")  # fmt: skip
         if part["kind"] == "axle_box" and part["wheelset"] not in wheelsets:
             raise InputError(source, f"bodies.{name}.wheelset", f"expected a wheelset, got {part['wheelset']!r}")
     for name, part in wheelsets.items():
