@@ -167,7 +167,7 @@ def boundary_elements(shape, angle, depths, size):
 @pytest.mark.parametrize("length", [0.03, 0.05, 0.08])
 def test_a_wheel_on_the_chord_of_a_fresh_flat_bears_what_boundary_elements_bear(length):
     # where it lies on its chord, or nearly so, at one depth of the overlap; a parabola over a patch's usual length
-    # would bear .3 to 2 times as much, as it happens to lie
+    # would bear .3 to .95 times as much, as angles of the table happen to lie
     depth, shape, ratios = 6e-5, OutOfRound(RADIUS, (Flat(length),)), []
     pair = WheelOnRail(named_profile("cone:1/1000", "wheel"), named_profile("circle:0.3", "rail", 0.0))
     table, hertz, modulus = shape_table(pair, shape), hertz_table(), contact_modulus(82e9, 0.28)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.conftest import SCENES
 from tests.vehicle.conftest import element
 from wrcore.cli import main
+from wrcore.scene.description import load_scene
 from wrcore.vehicle.description import build_vehicle
 
 
@@ -149,3 +151,21 @@ def test_bad_vehicle_files_get_one_line_that_names_the_element(scene_of, trailer
     printed = capsys.readouterr().err
     assert printed.count("\n") == 1 and "vehicle.yaml" in printed
     assert f" {field}:" in printed and expected in printed
+
+
+@pytest.mark.parametrize(
+    ("inertia", "told"),
+    [
+        ({"roll": 1.0, "pitch": 112.0, "yaw": 1120.0}, True),
+        ({"roll": 1120.0, "pitch": 112.0, "yaw": 1120.0}, False),
+        ({"roll": 1120.0, "pitch": 9e3, "yaw": 1120.0}, False),  # a rotor, by the gear ratio squared
+    ],
+)
+def test_moments_of_inertia_that_no_mass_has_are_told(capsys, inertia, told):
+    load_scene(SCENES / "suspended_wheelset.yaml", {"vehicle.bodies.wheelset.inertia": inertia})
+    assert ("bodies.wheelset.inertia: no mass has a moment" in capsys.readouterr().err) == told
+
+
+def test_a_body_may_have_no_moment_above_the_sum_of_the_others(capsys):
+    load_scene(SCENES / "trailer_vehicle.yaml", {"vehicle.bodies.car_body.inertia.yaw": 9e6})
+    assert "car_body.inertia: no mass has a moment of 9e+06 kg m^2" in capsys.readouterr().err

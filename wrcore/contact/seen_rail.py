@@ -14,8 +14,8 @@ vanish.
 
 A wheel out of round is seen in the same way, see `wrcore.contact.out_of_round`.
 
-Where a head begins or ends under the wheel, its edge may be what is nearest; it then counts with the wheel's curvature
-alone. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
+Where a head begins or ends under the wheel, its edge may be what is nearest; then the overlap that is there counts by
+its area. Of two places along one line of the track that the wheel touches at once only the nearer one is seen.
 """
 
 import math

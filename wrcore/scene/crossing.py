@@ -111,26 +111,22 @@ def _check_begin(crossing, vehicle, source, field):
             raise InputError(source, field, expected)
 
 
+MADE = {
+    "crossing": (Crossing, 1.0 / 30.0, 1.0 / 5.0, "a crossing from 1/30 to 1/5, such as crossing:1/12"),
+    "switch": (Switch, 100.0, 5000.0, "a switch of 100 to 5000 m, such as switch:500"),
+    "joint": (Joint, 1e-4, 0.05, "a joint of 0.0001 to 0.05 rad, such as joint:0.01"),
+}
+"""Rails by a formula: their first dimension, within bounds, and what to say beyond these."""
+
+
 def _slices(spec, folder, source, field) -> RailSlices:
     alone = spec["slices"] if isinstance(spec, dict) and list(spec) == ["slices"] else spec
     kind, colon, value = alone.partition(":") if isinstance(alone, str) else ("", "", "")
-    if kind == "crossing" and colon:
-        angle = parse_ratio(value)
-        if not 1.0 / 30.0 <= angle <= 1.0 / 5.0:
-            raise InputError(
-                source, field, f"expected a crossing from 1/30 to 1/5, such as crossing:1/12, got {spec!r}"
-            )
-        return Crossing(angle).rail(f"crossing:1/{1.0 / angle:g}")
-    if kind == "switch" and colon:
-        radius = parse_ratio(value)
-        if not 100.0 <= radius <= 5000.0:
-            raise InputError(source, field, f"expected a switch of 100 to 5000 m, such as switch:500, got {spec!r}")
-        return Switch(radius).rail(f"switch:{radius:g}")
-    if kind == "joint" and colon:
-        angle = parse_ratio(value)
-        if not 1e-4 <= angle <= 0.05:
-            raise InputError(source, field, f"expected a joint of 0.0001 to 0.05 rad, such as joint:0.01, got {spec!r}")
-        return Joint(angle).rail(f"joint:{angle:g}")
+    if colon and kind in MADE:
+        made, low, high, expected = MADE[kind]
+        if not low <= (size := parse_ratio(value)) <= high:
+            raise InputError(source, field, f"expected {expected}, got {spec!r}")
+        return made(size).rail(f"{kind}:{value}")
     how = spec if isinstance(spec, dict) else {"slices": spec}
     if not isinstance(how.get("slices"), str):
         raise InputError(source, field, f"expected a file of slices, or {{slices: FILE, ...}}, got {spec!r}")

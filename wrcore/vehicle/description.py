@@ -188,8 +188,8 @@ def _check_bodies(bodies, source):
             expected = f"expected products that leave all principal moments above 0, got one of {moments[0]:.4g} kg m^2"
             raise InputError(source, f"bodies.{name}.inertia", expected)
         if part["kind"] == "wheelset":  # whose pitch may have a rotor, by the gear ratio squared
-            moments = *sorted(part["inertia"][key] for key in ("roll", "yaw")), part["inertia"]["pitch"]
-            moments = np.array(moments)[[0, 2, 1]]
+            low, high = sorted(part["inertia"][key] for key in ("roll", "yaw"))
+            moments = low, part["inertia"]["pitch"], high
         if moments[2] > IMPOSSIBLE * (moments[0] + moments[1]):
             warn(f"{source}: bodies.{name}.inertia: no mass has a moment of {moments[2]:.4g} kg m^2 beside two of"
                  f" {moments[0]:.4g} and {moments[1]:.4g}: it is at most their sum")  # fmt: skip
