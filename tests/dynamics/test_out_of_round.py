@@ -150,7 +150,8 @@ def test_a_flat_is_a_path_under_a_mass_on_springs(flat, speed, bound):
 
 def boundary_elements(shape, angle, depths, size):
     """Loads (N) of a wheel of a shape, turned by an angle (rad), pressed onto a circular head of 0.3 m by depths (m,)
-    from where it touches, and how much lower that is than of the circle (m); a grid of a ``size``."""
+    from where it touches, how much lower that is than of the circle, and the last load's place ahead of the axle (m); a
+    grid of a ``size``."""
     x, modulus, loads = np.linspace(-0.1, 0.1, 20001), contact_modulus(82e9, 0.28), []
     reach = np.sqrt(RADIUS**2 - x**2) + shape.reach(np.array([RADIUS]), angle, x)[:, 0]
     for depth in depths:
@@ -161,7 +162,7 @@ def boundary_elements(shape, angle, depths, size):
         pressure = np.zeros(gap.shape)
         assert solve_pressure(gap, along[1] - along[0], across[1] - across[0], modulus, 1e-4, pressure) > 0
         loads.append(pressure.sum() * (along[1] - along[0]) * (across[1] - across[0]))
-    return np.array(loads), reach.max() - RADIUS
+    return np.array(loads), reach.max() - RADIUS, along @ pressure.sum(axis=1) / pressure.sum()
 
 
 @pytest.mark.parametrize("length", [0.03, 0.05, 0.08])
@@ -174,11 +175,12 @@ def test_a_wheel_on_the_chord_of_a_fresh_flat_bears_what_boundary_elements_bear(
     crown = int(np.argmax(table.sections[0, 0, HEIGHT]))
     rows, rates = table.sections[:, 0, :, crown], table.sections[:, 1, :, crown]
     for angle in np.linspace(-0.006, 0.006, 15):
-        (load,), top = boundary_elements(shape, angle, [depth], (96, 48))
+        (load,), top, ahead = boundary_elements(shape, angle, [depth], (96, 48))
         at = (angle - table.begin) / table.step
         seen = CubicHermiteSpline(np.arange(len(rows)), rows, rates)(at)
         deep, bend = depth + seen[HEIGHT] - rows[0, HEIGHT] - top, 0.5 / RADIUS + seen[BEND]
         ratios.append(loaded_ellipse(hertz, modulus, 1.0, 1.0, deep, bend, 0.5 / 0.3, 0.0)[0] / load)
+        assert seen[AHEAD] == pytest.approx(ahead, abs=0.2 * length)
     assert min(ratios) > 0.74 and max(ratios) < 1.03
 
 
@@ -187,7 +189,7 @@ def test_a_fresh_flat_is_a_mass_on_boundary_elements(length, speed):
     half, depths = math.asin(0.5 * length / RADIUS), np.array([1e-5, 4e-5, 8e-5, 1.4e-4, 2.2e-4, 3.2e-4])
     angles = np.concatenate([np.linspace(0.0, 0.006, 9)[:-1], np.linspace(0.006, 1.25 * half, 16)])
     solved = [boundary_elements(OutOfRound(RADIUS, (Flat(length),)), angle, depths, (64, 32)) for angle in angles]
-    tops, stiff = np.array([top for _, top in solved]), np.array([loads for loads, _ in solved]) ** (2 / 3) / depths
+    tops, stiff = np.array([one[1] for one in solved]), np.array([one[0] for one in solved]) ** (2 / 3) / depths
     stiffness = RegularGridInterpolator((angles, depths), stiff)
 
     def load(s, z):
