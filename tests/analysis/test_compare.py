@@ -49,6 +49,15 @@ def test_what_hardly_moves_is_no_scale():
     assert 0.0 < found.loc["car_body", "y_m"]["relative"] < 1e-12
 
 
+def test_a_steady_difference_is_its_own_scale():
+    """Speeds that differ by 20 m/s and waver by micrometres a second differ wholly, not ten million times."""
+    one, other = hunting_run(), hunting_run()
+    for run, speed in ((one, 20.0), (other, 40.0)):
+        run.groups["wheelset"]["vx_m_per_s"] = speed + 1e-6 * np.sin(run.t)
+    row = rows(wr.compare(one, other)).loc["wheelset", "vx_m_per_s"]
+    assert row["scale"] == pytest.approx(20.0) and row["relative"] == pytest.approx(1.0)
+
+
 def test_only_times_that_both_have_count():
     one, other = hunting_run(), changed(duration=2.5)
     other.t, end = other.t[::5], None

@@ -141,11 +141,11 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
     Comparison
         ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``: of the
         difference b - a (the mean with its sign); ``t_max_s``: when it is largest. ``scale``: root mean square of the
-        channel, without the mean for places and motions; the largest of both runs and all groups, so that what hardly
-        moves is no scale. ``relative``: rms over scale. ``error``: what the runs state of their own errors, added as
-        squares; NaN where they state none. Runs of :func:`wrcore.simulate_to_accuracy` state that of y, Y or Q
-        (rms) or wear (of the mean), those that look contact up the largest ones of N and Q. ``compared``: share of the
-        common times at which both have a value.
+        channel; for places and motions their standard deviation, or how far the runs' means are apart; the largest of
+        both runs and all groups, so that what hardly moves is no scale. ``relative``: rms over scale. ``error``: what
+        the runs state of their own errors, added as squares; NaN where they state none. Runs of
+        :func:`wrcore.simulate_to_accuracy` state that of y, Y or Q (rms) or wear (of the mean), those that look contact
+        up the largest ones of N and Q. ``compared``: share of the common times at which both have a value.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
     scales: dict[tuple[bool, str], float] = {}
     for group, name, *pair in found:
         key = "/" in group, name
-        scales[key] = max(scales.get(key, 0.0), *(_scale(*key, values) for values in pair))
+        scales[key] = max(scales.get(key, 0.0), _scale(*key, *pair))
     t = runs[0].t[places[0]]
     rows = [row for group, name, *pair in found for row in _row(runs, t, group, name, pair, scales["/" in group, name])]
     if not rows:
@@ -203,12 +203,14 @@ def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.where(alike[:, None], other[:, : width[0]] - one[:, : width[0]], np.nan)
 
 
-def _scale(of_contact: bool, name: str, values: np.ndarray) -> float:
-    values = values[np.isfinite(values)]
-    if not values.size:
+def _scale(of_contact: bool, name: str, *pair: np.ndarray) -> float:
+    """The larger root mean square of both, of places and motions the larger standard deviation or their distance."""
+    finite = [values[np.isfinite(values)] for values in pair]
+    if not all(values.size for values in finite):
         return 0.0
-    varies = name in PLACES if of_contact else unit_of(name) in MOTION
-    return float(np.std(values) if varies else np.sqrt(np.mean(values**2)))
+    if name in PLACES if of_contact else unit_of(name) in MOTION:
+        return float(max(*(np.std(values) for values in finite), abs(np.mean(finite[1]) - np.mean(finite[0]))))
+    return float(max(np.sqrt(np.mean(values**2)) for values in finite))
 
 
 def _row(runs, t, group, name, pair, scale) -> Iterator[dict[str, Any]]:

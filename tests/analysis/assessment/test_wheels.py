@@ -96,6 +96,7 @@ def test_wheel_table_has_a_row_per_wheel(run):
     assert len(table) == 2
     assert table.loc[("wheelset", "left"), "Y_over_Q_max"] == pytest.approx(math.tan(0.1))
     assert table.loc[("wheelset", "right"), "Q_mean_N"] == pytest.approx(8.9e3 * math.cos(0.03))
+    assert table.loc[("wheelset", "left"), "Y_mean_N"] == pytest.approx(2e4 * math.sin(0.1))
 
 
 def test_hunting_of_a_decaying_oscillation(run):

@@ -176,8 +176,8 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        A row per wheel: wheelset, side, mean, least and largest Q, largest |Y| (N), largest |Y/Q|, mean wear numbers
-        without and with spin (N, over the way) and mean creep power (W, over time).
+        A row per wheel: wheelset, side, mean, least and largest Q, mean Y (to the field side), largest |Y| (N), largest
+        |Y/Q|, mean wear numbers without and with spin (N, over the way) and mean creep power (W, over time).
 
     Examples
     --------
@@ -196,7 +196,7 @@ def wheel_table(run: Run, begin: float = 0.0) -> pd.DataFrame:
             ratio = np.abs(quotient(vertical, lateral))
             rows.append({
                 "wheelset": wheelset, "side": side, "Q_mean_N": np.mean(vertical), "Q_min_N": np.min(vertical),
-                "Q_max_N": np.max(vertical), "Y_max_N": np.max(np.abs(lateral)),
+                "Q_max_N": np.max(vertical), "Y_mean_N": np.mean(lateral), "Y_max_N": np.max(np.abs(lateral)),
                 "Y_over_Q_max": np.nan if np.all(np.isnan(ratio)) else np.nanmax(ratio),
                 "T_gamma_mean_N": share @ wear_number(run, wheelset, side)[late],
                 "T_gamma_spin_mean_N": share @ wear_number(run, wheelset, side, spin=True)[late],
