@@ -17,7 +17,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.detection import WIDE
-from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, scan_nodes, slopes_of_moments
+from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, scan_nodes, slopes_of_square
 from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, U_WHEEL, X, Y, Z
 from wrcore.contact.scan import leaves_cells
 from wrcore.contact.strip import AHEAD, LIFT, changes_along, cubic_at, leaning, on_rail, strip_point, with_rail_along
@@ -112,7 +112,7 @@ def least_of(row):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def pressed_from(pose, middle, sums):
-    """Of an overlap with these `slopes_of_moments`."""
+    """Of an overlap with these `slopes_of_square`."""
     roll, yaw = sums[0, 1 + ROLL], sums[0, 1 + YAW]
     turned = -(pose.ex * roll + pose.ez * yaw) / pose.ey  # about its axle a wheel turns without a change
     moment = middle * sums[0, 0] + sums[1, 0]
@@ -124,7 +124,7 @@ def pressed_by(geometry, pose, spatial, lean, row, sums):
     """`Pressed` of one overlap of a left wheel, found by moments at this ``pose``. ``sums`` (3, 1 + MOVES) is
     scratch."""
     if spatial and not changes_along(geometry) and not leaves_cells(pose):
-        middle, _ = slopes_of_moments(geometry, pose, row, least_of(row), sums)
+        middle, _ = slopes_of_square(geometry, pose, row, least_of(row), sums)
         return _of_parabola(pose, row) if math.isnan(middle) else pressed_from(pose, middle, sums)
     count, found = _strip_by_strip(geometry, pose, lean, scan_nodes(geometry, pose, row))
     if count < least_of(row):

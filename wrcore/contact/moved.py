@@ -66,9 +66,9 @@ def _put(sums, row, scale, square, across, up, rolled, yawed):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _moment_slopes(geometry, pose, nodes, wheel, rail, sums):
-    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; returns the
-    number of nodes in overlap."""
+def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; only with
+    M1, M0 and what this one changes by unless ``whole``. Returns the number of nodes in overlap."""
     grid, zero, reach = nodes.grid, lanes.lanes8(0.0), geometry.half_distance + nodes.u
     begin, end = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end))
     ahead, aside = pose.tilt * pose.q, nodes.ur + geometry.rail_distance - pose.side * pose.y
@@ -94,18 +94,22 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, sums):
         gap = lanes.where_below(gap, zero, gap, zero)
         count += lanes.count_bits(lanes.below(gap, zero))
         px, py = ahead * along + (reach + nodes.step * index) * pose.ex, pose.side * (aside + nodes.step * index + d)
-        one = gap * index
-        two = one * index
         across, rolled, yawed = zero - slope, py + slope * (height - pose.z), circled - slope * px
-        m0, m1, m2 = m0 + gap * gap, m1 + one * gap, m2 + two * gap
-        y0, y1, y2 = y0 + gap * across, y1 + one * across, y2 + two * across
-        z0, z1, z2 = z0 + gap, z1 + one, z2 + two
-        r0, r1, r2 = r0 + gap * rolled, r1 + one * rolled, r2 + two * rolled
-        w0, w1, w2 = w0 + gap * yawed, w1 + one * yawed, w2 + two * yawed
+        one = gap * index
+        m0, m1 = m0 + gap * gap, m1 + one * gap
+        y0, z0, r0, w0 = y0 + gap * across, z0 + gap, r0 + gap * rolled, w0 + gap * yawed
+        if whole:
+            two = one * index
+            y1, z1, r1, w1 = y1 + one * across, z1 + one, r1 + one * rolled, w1 + one * yawed
+            y2, z2, r2, w2 = y2 + two * across, z2 + two, r2 + two * rolled, w2 + two * yawed
+            m2 = m2 + two * gap
     step = nodes.step
     _put(sums, 0, step, m0, y0, z0, r0, w0)
-    _put(sums, 1, step * step, m1, y1, z1, r1, w1)
-    _put(sums, 2, step * step * step, m2, y2, z2, r2, w2)
+    if whole:
+        _put(sums, 1, step * step, m1, y1, z1, r1, w1)
+        _put(sums, 2, step * step * step, m2, y2, z2, r2, w2)
+    else:
+        sums[1, 0] = step * step * lanes.total(m1)
     return count
 
 
@@ -181,19 +185,32 @@ def _narrow_slopes(geometry, pose, row, sums):
     return place
 
 
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _of_nodes(geometry, pose, row, least, whole, sums):
+    """See `slopes_of_moments`."""
+    if least < math.inf:
+        nodes = scan_nodes(geometry, pose, row)
+        count = _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, whole, sums)
+        if count >= least:
+            return nodes.u, True
+    nodes = fine_nodes(geometry, pose, row)
+    if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, whole, sums) >= WIDE:
+        return nodes.u, False
+    return math.nan, False
+
+
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_moments(geometry, pose, row, least, sums):
     """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row``, found by moments and spatially at a pose
     nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes, and
     whether the scan's were enough: from ``least`` on."""
-    if least < math.inf:
-        nodes = scan_nodes(geometry, pose, row)
-        if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, sums) >= least:
-            return nodes.u, True
-    nodes = fine_nodes(geometry, pose, row)
-    if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, sums) >= WIDE:
-        return nodes.u, False
-    return math.nan, False
+    return _of_nodes(geometry, pose, row, least, True, sums)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def slopes_of_square(geometry, pose, row, least, sums):
+    """As `slopes_of_moments`, only with what `wrcore.contact.approach.pressed_from` wants: M1, M0 and its slopes."""
+    return _of_nodes(geometry, pose, row, least, False, sums)
 
 
 @jit(allocates=False, fastmath=FUSED)

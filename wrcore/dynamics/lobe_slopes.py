@@ -12,7 +12,7 @@ import numpy as np
 from wrcore.contact.approach import Pressed, add_pressed, approach_of, least_of, pressed_from
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL
-from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, moved_axle, slopes_of_moments
+from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, moved_axle, slopes_of_square
 from wrcore.contact.normal import contact_modulus
 from wrcore.contact.patch.gap import group_end
 from wrcore.contact.scan import leaves_cells
@@ -134,7 +134,7 @@ def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
     total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for patch in range(count):
         least = least_of(rows[patch]) if first else work.weights[patch]
-        middle, enough = slopes_of_moments(geometry, pose, rows[patch], least, sums)
+        middle, enough = slopes_of_square(geometry, pose, rows[patch], least, sums)
         if first:
             work.weights[patch] = 0.0 if enough else math.inf
         total = add_pressed(total, pressed_from(pose, middle, sums))

@@ -150,8 +150,8 @@ def weigh(at, weights):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _sum_rows(rows, weights, first, end, numbers):
-    """Fill the ``numbers`` from ``first`` to before ``end`` with the weighted sum of rows: eight at a time."""
+def _add_rows(rows, weights, first, end, numbers):
+    """Add the weighted sum of a cell's rows to the ``numbers`` from ``first`` to before ``end``: eight at a time."""
     for column in range(first, end, LANES):
         start = np.uint64(column)
         one = two = three = four = lanes8(0.0)
@@ -160,51 +160,50 @@ def _sum_rows(rows, weights, first, end, numbers):
             two = two + weights[n + 1] * load8(rows, n + 1, start)
             three = three + weights[n + 2] * load8(rows, n + 2, start)
             four = four + weights[n + 3] * load8(rows, n + 3, start)
-        put8(numbers, start, (one + two) + (three + four))
+        put8(numbers, start, take8(numbers, start) + ((one + two) + (three + four)))
 
 
 @jit(allocates=False, fastmath=FUSED)
 def look_up(rows, weights, numbers):
     """Fill ``numbers`` (NUMBERS,), but for coefficients of modes, from a cell's ``rows`` (NODES, NUMBERS)."""
-    _sum_rows(rows, weights, 0, PARTED_FROM, numbers)
+    numbers[:] = 0.0
+    _add_rows(rows, weights, 0, PARTED_FROM, numbers)
     if LEAST < numbers[ROOT] < 1.0 - LEAST:
-        _sum_rows(rows, weights, PARTED_FROM, MODE, numbers)
-    else:
-        numbers[PARTED_FROM:MODE] = 0.0
+        _add_rows(rows, weights, PARTED_FROM, MODE, numbers)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def look_modes_up(rows, weights, numbers):
     """As `look_up`, after it: the coefficients of modes that count."""
-    part = flank_part(numbers[ANGLE])
     for family in range(2):
-        if (part if family else 1.0 - part) > 0.0:
-            first = MODE + MODES * family
-            _sum_rows(rows, weights, first, first + MODES, numbers)
+        if family_share(numbers, family) > 0.0:
+            _add_rows(rows, weights, MODE + MODES * family, MODE + MODES * (family + 1), numbers)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def look_shares_up(table, at, shares, weights, numbers):
     """As `look_up` and `look_modes_up` together, from all cells that have a share, see `locate`."""
-    weigh(at, weights)
     numbers[:] = 0.0
-    add_rows(table.cells[at.cell], weights, at.own, numbers)
-    for row in range(LEFT):
-        if shares[row, 0] > 0.0:
-            there = place_of(shares[row])
-            weigh(there, weights)
-            add_rows(table.cells[there.cell], weights, there.own, numbers)
+    for modes in (False, True):
+        _add_share(table, at, modes, weights, numbers)
+        for row in range(LEFT):
+            if shares[row, 0] > 0.0:
+                _add_share(table, place_of(shares[row]), modes, weights, numbers)
     if not LEAST < numbers[ROOT] < 1.0 - LEAST:
         numbers[PARTED_FROM:MODE] = 0.0
 
 
 @jit(allocates=False, fastmath=FUSED)
-def add_rows(rows, weights, share, numbers):
-    """Add the weighted sum of a cell's rows, times its share."""
+def _add_share(table, at, modes, weights, numbers):
+    """Add what a cell with a share has in the coefficients of ``modes``, after all else, or in all else."""
+    rows = table.cells[at.cell]
+    weigh(at, weights)
     for n in range(NODES):
-        weight = share * weights[n]
-        for column in range(numbers.shape[0]):
-            numbers[column] += weight * rows[n, column]
+        weights[n] *= at.own
+    if modes:
+        look_modes_up(rows, weights, numbers)
+    else:
+        _add_rows(rows, weights, 0, MODE, numbers)
 
 
 @jit(allocates=False)
@@ -218,6 +217,13 @@ def smooth(value, ends):
 def flank_part(angle):
     """Weight of the second family of modes at a contact angle."""
     return smooth(abs(angle), FLANKS)
+
+
+@jit(allocates=False, forceinline=True)
+def family_share(numbers, family):
+    """Weight of a family of modes."""
+    part = flank_part(numbers[ANGLE])
+    return part if family else 1.0 - part
 
 
 @jit(allocates=False, forceinline=True)
@@ -285,8 +291,8 @@ def root_share(angle):
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _at_ellipse(model, log_a, log_b, limit, xi, eta, phi):
     """Creep force of the creep table, over mu N and mu N c; look-ups missed; c."""
-    square, log_g = math.exp(log_a + log_b), log_a - log_b
-    c, scale = math.sqrt(square), model.shear_modulus * square / limit
+    c, log_g = math.exp(0.5 * (log_a + log_b)), log_a - log_b
+    scale = model.shear_modulus * c * c / limit
     f1, f2, m3, missed = creep_force_at(
         _TABLE, model.creep, log_g, math.exp(log_g), 0.0, xi * scale, eta * scale, phi * scale * c
     )
@@ -334,11 +340,11 @@ def base_force(model, numbers, slip, xi, eta, limit):
     along the normal of the whole, over mu N."""
     root, log_a, log_b, two = numbers[ROOT], numbers[LOG_A], numbers[LOG_B], of_two(numbers)
     f1 = f2 = m3 = missed = 0.0
-    c = math.exp(0.5 * (log_a + log_b))
     if two < 1.0:
         f1, f2, m3, missed, c = _at_ellipse(model, log_a, log_b, limit, xi, eta, slip.phi)
         if two <= 0.0:
             return f1, f2, m3, missed, c, 0.0
+    c = math.exp(0.5 * (log_a + log_b))
     g1, g2, n3, more, gn = _of_part(model, numbers, slip, xi, eta, limit, root, 1.0, ROOT_A)
     h1, h2, o3, most, hn = _of_part(model, numbers, slip, xi, eta, limit, 1.0 - root, -1.0, REST_A)
     one = 1.0 - two

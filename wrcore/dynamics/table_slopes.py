@@ -18,6 +18,7 @@ from wrcore.dynamics.pair_table import (
     ROOT,
     ROUND,
     along_axis,
+    family_share,
     flank_part,
     round_part,
     spread_weights,
@@ -55,8 +56,9 @@ def weigh_slopes(at, weights):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _sum_rows(rows, weights, first, end, numbers, along):
-    """Fill ``numbers`` and what they change by ``along`` the axes, from ``first`` to before ``end``."""
+def _add_rows(rows, weights, first, end, numbers, along):
+    """Add the weighted sums of a cell's rows to the ``numbers``, and to what they change by ``along`` the axes, from
+    ``first`` to before ``end``."""
     for column in range(first, end, LANES):
         start = np.uint64(column)
         value = x = y = z = w = lanes8(0.0)
@@ -64,55 +66,60 @@ def _sum_rows(rows, weights, first, end, numbers, along):
             row = load8(rows, n, start)
             value, x, y = value + weights[0, n] * row, x + weights[1, n] * row, y + weights[2, n] * row
             z, w = z + weights[3, n] * row, w + weights[4, n] * row
-        put8(numbers, start, value)
-        put8(along[0], start, x)
-        put8(along[1], start, y)
-        put8(along[2], start, z)
-        put8(along[3], start, w)
+        put8(numbers, start, take8(numbers, start) + value)
+        put8(along[0], start, take8(along[0], start) + x)
+        put8(along[1], start, take8(along[1], start) + y)
+        put8(along[2], start, take8(along[2], start) + z)
+        put8(along[3], start, take8(along[3], start) + w)
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_modes(rows, weights, numbers, along):
+    """As `_add_rows`, after all else: the coefficients of modes that count."""
+    for family in range(2):
+        if family_share(numbers, family) > 0.0:
+            _add_rows(rows, weights, MODE + MODES * family, MODE + MODES * (family + 1), numbers, along)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def look_slopes_up(rows, weights, numbers, along):
     """Fill ``numbers`` (NUMBERS,) as `look_up` and `look_modes_up` do, and what they change by ``along`` the axes
     (AXES, NUMBERS), from a cell's ``rows``; see `weigh_slopes`."""
-    _sum_rows(rows, weights, 0, PARTED_FROM, numbers, along)
+    numbers[:], along[:] = 0.0, 0.0
+    _add_rows(rows, weights, 0, PARTED_FROM, numbers, along)
     if LEAST < numbers[ROOT] < 1.0 - LEAST:
-        _sum_rows(rows, weights, PARTED_FROM, MODE, numbers, along)
-    else:
-        numbers[PARTED_FROM:MODE] = 0.0
-        along[:, PARTED_FROM:MODE] = 0.0
-    part = flank_part(numbers[ANGLE])
-    for family in range(2):
-        if (part if family else 1.0 - part) > 0.0:
-            first = MODE + MODES * family
-            _sum_rows(rows, weights, first, first + MODES, numbers, along)
+        _add_rows(rows, weights, PARTED_FROM, MODE, numbers, along)
+    _add_modes(rows, weights, numbers, along)
 
 
 @jit(allocates=False, fastmath=FUSED)
 def look_share_slopes_up(table, at, shares, weights, numbers, along):
     """As `look_slopes_up`, from all cells that have a share, see `wrcore.dynamics.pair_cells.locate`."""
     numbers[:], along[:] = 0.0, 0.0
-    _add_slopes(table, at, shares[LEFT], weights, numbers, along)
-    for row in range(LEFT):
-        if shares[row, 0] > 0.0:
-            _add_slopes(table, place_of(shares[row]), shares[row], weights, numbers, along)
+    for modes in (False, True):
+        _add_share(table, at, shares[LEFT], modes, weights, numbers, along)
+        for row in range(LEFT):
+            if shares[row, 0] > 0.0:
+                _add_share(table, place_of(shares[row]), shares[row], modes, weights, numbers, along)
     if not LEAST < numbers[ROOT] < 1.0 - LEAST:
         numbers[PARTED_FROM:MODE] = 0.0
         along[:, PARTED_FROM:MODE] = 0.0
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_slopes(table, at, share, weights, numbers, along):
-    """Add what a cell with a ``share``, that changes along the axes, has in the numbers and their slopes."""
-    weigh_slopes(at, weights)
+def _add_share(table, at, share, modes, weights, numbers, along):
+    """Add what a cell with a ``share``, that changes along the axes, has in the coefficients of ``modes``, after all
+    else, or in all else."""
     rows = table.cells[at.cell]
+    weigh_slopes(at, weights)
     for n in range(NODES):
-        for column in range(numbers.shape[0]):
-            row = rows[n, column]
-            numbers[column] += share[0] * weights[0, n] * row
-            for axis in range(AXES):
-                slope = share[0] * weights[1 + axis, n] + share[1 + axis] * weights[0, n]
-                along[axis, column] += slope * row
+        for axis in range(AXES):
+            weights[1 + axis, n] = share[0] * weights[1 + axis, n] + share[1 + axis] * weights[0, n]
+        weights[0, n] *= share[0]
+    if modes:
+        _add_modes(rows, weights, numbers, along)
+    else:
+        _add_rows(rows, weights, 0, MODE, numbers, along)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -116,7 +116,7 @@ class StripWork(NamedTuple):
     lattice: np.ndarray
     """(5, NODES), (4, NUMBERS), (8, 3) and (10, 4): of its slopes, see `wrcore.dynamics.lobe_slopes`."""
     moments: np.ndarray
-    """(3, 5): of overlaps, see `wrcore.contact.moved.slopes_of_moments`."""
+    """(3, 5): of overlaps, see `wrcore.contact.moved.slopes_of_square`."""
     normal: NormalWork
     rolling: RollingWork
     slender: RollingWork
