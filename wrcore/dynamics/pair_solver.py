@@ -4,6 +4,7 @@ import itertools
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from functools import cached_property
 from queue import LifoQueue
 
@@ -58,19 +59,27 @@ class PairSolver:
         side where they are new; NaN where there is no solution.
 
         A node is solved under the part of the profile in which its lobe then lies, once for all parts."""
-        first, codes = nodes[0, 1].item(), node_codes(nodes).tolist()
-        parts = self._parts_of(codes)
-        keys = [code + (part - first) * PART_CODE for code, part in zip(codes, parts, strict=True)]
-        new = [key for key in dict.fromkeys(keys) if key not in self._solved_at]
-        self._solved_at |= zip(new, side_by_side(self._at, new), strict=True)
-        self._new += len(new)
-        return np.array([self._solved_at[key] for key in keys])
+        codes, first = node_codes(nodes), nodes[0, 1]
+        keys = (codes + (np.array(self._parts_of(codes.tolist())) - first) * PART_CODE).tolist()
+        self._new += self._learn(self._solved_at, self._at, keys)
+        return np.array(list(map(self._solved_at.__getitem__, keys)))
 
     def _parts_of(self, codes):
         """Parts of the profile in which the lobes of nodes lie."""
-        new = [code for code in dict.fromkeys(codes) if code not in self._parts]
-        self._parts |= zip(new, side_by_side(self._part, new), strict=True)
-        return [self._parts[code] for code in codes]
+        self._learn(self._parts, self._part, codes)
+        return list(map(self._parts.__getitem__, codes))
+
+    def _learn(self, known, solve, places):
+        """Solve for the places that are not ``known`` yet; returns how many these were."""
+        new = list(dict.fromkeys(place for place in places if place not in known))
+        if new:
+            with self._told():
+                known |= zip(new, side_by_side(solve, new), strict=True)
+        return len(new)
+
+    def _told(self):
+        """A context in which it is said that what is done takes long."""
+        return nullcontext()
 
     def _part(self, code):
         """Part of the wheel's profile in which a node's lobe lies, and `BESIDE`."""
@@ -105,8 +114,8 @@ class PairSolver:
         """Fill a cell's rows of yaw; those of up to four corners that are not known are the mean of the others. False
         where more are not."""
         level, part, turn, *first = corner_of(key)
-        corners = np.repeat(2 * (CORNERS + np.array(first) // 2), 3, axis=0)
-        found = self._numbers(nodes_at(level % LEVELS, part, 2 * turn + np.tile(np.arange(3), 8), corners))
+        corners = _YAWED + 2 * (np.array(first) // 2)
+        found = self._numbers(nodes_at(level % LEVELS, part, 2 * turn + _TURNS, corners))
         left, middle, right = found.reshape(8, 3, NUMBERS).swapaxes(0, 1)
         yawed = rows[32:].reshape(8, 2, NUMBERS)
         yawed[:, 0], yawed[:, 1] = right - left, left + right - 2.0 * middle
@@ -185,6 +194,7 @@ def _ends():
 
 
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+_YAWED, _TURNS = np.repeat(2 * CORNERS, 3, axis=0), np.tile(np.arange(3), 8)
 _OWN_ROWS = np.array([4 * (corner // 2) + corner % 2 for corner in range(8)])
 _BEYOND_ROWS, _BEYOND, _NEAR, _ACROSS = map(np.array, zip(*_ends(), strict=True))
 

@@ -12,7 +12,7 @@ import hashlib
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import contextmanager
 from threading import Lock
 from weakref import WeakValueDictionary
 
@@ -98,20 +98,23 @@ class Pair(PairSolver):
             if self._full():
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
-            mu, begin = self.contact.strips.looked_up, time.monotonic()
-            text = f"exact contact at a friction of {mu:g} is solved for its table, once ({self.path}); {WITHOUT}"
-            told = nullcontext() if key in self._known else told_if_long(text, self._spent)
-            with handed_on("patches are solved without a table"), told:  # or the cell stays as if never met
+            with handed_on("patches are solved without a table"):  # or the cell stays as if never met
                 own = self._own(key)
                 if own not in self.cells:
                     self._keep(own, *self._solved(own))
                 if own != key and own in self.cells:
                     self._others.add(key)
                     self._list(key, self.cells[own])
-            if key not in self._known:
-                self._spent += time.monotonic() - begin
             if time.monotonic() > self._next_written:
                 self.write()
+
+    @contextmanager
+    def _told(self):
+        mu, begin = self.contact.strips.looked_up, time.monotonic()
+        text = f"exact contact at a friction of {mu:g} is solved for its table, once ({self.path}); {WITHOUT}"
+        with told_if_long(text, self._spent):
+            yield
+        self._spent += time.monotonic() - begin
 
     def _own(self, key):
         """The cell for which a cell stands, whichever of those that stand for each other is asked first: cells of
