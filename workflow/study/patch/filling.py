@@ -13,7 +13,7 @@ from pathlib import Path
 import pandas as pd
 
 import wrcore as wr
-from study.patch.look_up import ROUGH
+from study.patch.look_up import CURVE, ROUGH
 from study.patch.shipped_nodes import SHARP
 from wrcore.contact.patch.model import RESOLUTIONS
 from wrcore.dynamics import pair_store
@@ -27,6 +27,10 @@ SCENES = {
     "metro car, friction 0.25": ("metro_car", OTHER),
     "trailer vehicle, 55 m/s, rough track": ("trailer_vehicle", {"speed": 55.0, **ROUGH, **SEED}),
     "trailer vehicle, 14 m/s, R 350 m": ("trailer_vehicle", {"speed": 14.0, **SHARP, "track.path.2.radius": 350.0}),
+    "trailer vehicle, 16.7 m/s, R 300 m, rough, friction 0.25": (
+        "trailer_vehicle",
+        {"speed": 16.7, **CURVE, **ROUGH, **OTHER},
+    ),
     "suspended wheelset, 65 m/s, 3 s": ("suspended_wheelset", {"speed": 65.0, "integration.duration": 3.0}),
 }
 """Example scenes and what is set in them."""
