@@ -49,6 +49,13 @@ def test_what_hardly_moves_is_no_scale():
     assert 0.0 < found.loc["car_body", "y_m"]["relative"] < 1e-12
 
 
+def test_rounding_is_no_scale():
+    one, other = hunting_run(), hunting_run()
+    for run, size in ((one, 1e-14), (other, -1e-14)):
+        run.groups["wheelset"]["roll_rad"] = size * np.sin(run.t)
+    assert rows(wr.compare(one, other)).loc["wheelset", "roll_rad"]["relative"] < 1e-4
+
+
 def test_a_steady_difference_is_its_own_scale():
     """Speeds that differ by 20 m/s and waver by micrometres a second differ wholly, not ten million times."""
     one, other = hunting_run(), hunting_run()

@@ -544,6 +544,22 @@ def test_an_interrupt_is_handed_on_after_the_call():
         signal.signal(signal.SIGINT, handler)
 
 
+def test_an_interrupt_while_equilibrium_is_sought_is_no_lack_of_one(monkeypatch):
+    """What a cell leaves unanswered then is no number of the vehicle."""
+
+    def interrupted(pair, key):
+        raise KeyboardInterrupt
+
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    monkeypatch.setattr(pair_store.Pair, "_solved", interrupted)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            wr.simulate(wr.example("suspended_wheelset"), contact__friction=0.23)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
 def test_implicit_steps_are_those_of_ellipses():
     """Jacobians are of the table itself."""
     steps, settings = {}, {"integration.method": "rodas4", "integration.rtol": 1e-4, "integration.duration": 0.5}

@@ -31,6 +31,9 @@ MOTION = ("m", "rad", "m/s", "rad/s", "m/s^2")
 ACCURACIES = {"y": "y_m", "Y": "Y_N", "Q": "Q_N", "wear": "T_gamma_N"}
 """Channel that the error of :func:`wrcore.simulate_to_accuracy` is of, by what it was asked of."""
 
+LEAST = 1e-9
+"""Scale of a place or motion, at least, in its unit: what varies by less is rounding."""
+
 SHOWN = {"y_m": False, "yaw_rad": False, "Q_N": True, "Y_N": True}
 """Channels that are drawn unless others are asked for, of bodies or of contacts."""
 
@@ -142,8 +145,8 @@ def compare(a: Run | str | PathLike[str], b: Run | str | PathLike[str]) -> Compa
         ``table`` has a row per group and channel, in the channel's ``unit``. ``rms``, ``max``, ``mean``: of the
         difference b - a (the mean with its sign); ``t_max_s``: when it is largest. ``scale``: root mean square of the
         channel; for places and motions their standard deviation, or how far the runs' means are apart; the largest of
-        both runs and all groups, so that what hardly moves is no scale. ``relative``: rms over scale. ``error``: what
-        the runs state of their own errors, added as squares; NaN where they state none. Runs of
+        both runs and all groups, 1e-9 at least, so that what hardly moves is no scale. ``relative``: rms over scale.
+        ``error``: what the runs state of their own errors, added as squares; NaN where they state none. Runs of
         :func:`wrcore.simulate_to_accuracy` state that of y, Y or Q (rms) or wear (of the mean), those that look contact
         up the largest ones of N and Q. ``compared``: share of the common times at which both have a value.
 
@@ -209,7 +212,8 @@ def _scale(of_contact: bool, name: str, *pair: np.ndarray) -> float:
     if not all(values.size for values in finite):
         return 0.0
     if name in PLACES if of_contact else unit_of(name) in MOTION:
-        return float(max(*(np.std(values) for values in finite), abs(np.mean(finite[1]) - np.mean(finite[0]))))
+        apart = abs(np.mean(finite[1]) - np.mean(finite[0]))
+        return float(max(LEAST, apart, *(np.std(values) for values in finite)))
     return float(max(np.sqrt(np.mean(values**2)) for values in finite))
 
 

@@ -17,7 +17,8 @@ FILES = columns(
     max="largest amount of the difference",
     t_max_s="when that is",
     mean="of the difference, with its sign",
-    scale="root mean square of the channel (without the mean for places and motions), the largest of all groups",
+    scale="root mean square of the channel (of places and motions: standard deviation, or how far the means "
+    "are apart), the largest of all groups",
     relative="rms over scale",
     error="what the runs state of their own error; empty where they state none",
     compared="share of the common times at which both have a value",

@@ -38,7 +38,7 @@ from wrcore.dynamics.wheel import alone
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
-from wrcore.kernels.told import PATIENCE, handed_on, told_if_long, warn_once
+from wrcore.kernels.told import PATIENCE, handed_on, interrupted, told_if_long, warn_once
 
 NONSENSE = 0.1, 0.3, 0.3
 WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.03), (2e-3, 0.015, 0.03), NONSENSE
@@ -93,7 +93,7 @@ class Pair(PairSolver):
     def _fill(self, key):
         """Solve what a cell needs; kernels call this."""
         with self._lock:
-            if key in self.cells or key in self._others:
+            if key in self.cells or key in self._others or interrupted():
                 return
             if self._full():
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")

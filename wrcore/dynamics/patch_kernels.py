@@ -20,7 +20,7 @@ from wrcore.dynamics.strip_wheel import add_group
 from wrcore.dynamics.tabulated_wheel import add_tabulated
 from wrcore.dynamics.wheel import COUNTERS, alone, wheel_wrenches
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, values_of
-from wrcore.kernels.told import handed_on, told_if_long
+from wrcore.kernels.told import handed_on, interrupted, told_if_long
 
 
 def with_fallback(contact):
@@ -77,6 +77,8 @@ class LateKernels:
 
     def find(self, which):
         """Find the kernel with ellipses, that of lobes that are apart, or the solver and its model."""
+        if interrupted():
+            return
         what = {ELLIPSES: "ellipses", LOBES: "lobes that are apart"}.get(which, "the solver of exact contact")
         text = f"{what}: compiled, once, for {'some minutes' if which == KERNEL else 'seconds'} of one core; {WITHOUT}"
         with handed_on("it has no solver"), told_if_long(text):

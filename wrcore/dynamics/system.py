@@ -50,6 +50,7 @@ from wrcore.dynamics.wheel import (
 )
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.told import raise_interrupted
 
 FRICTIONLESS = 1e-9
 """Coefficient of friction that counts as none: of a static wheel load of 50 kN it leaves 50 uN."""
@@ -399,4 +400,5 @@ class Equations:
         states, rates = np.ascontiguousarray(states, float), np.empty(states.shape)
         equations, model, work = self.arguments
         fill_many(equations, t, states, model, work, rates, mode)
+        raise_interrupted()
         return rates

@@ -15,6 +15,24 @@ PATIENCE = 3.0
 """Work takes this long before it says so, s."""
 
 
+_again: list[Timer] = []
+"""Of Ctrl-C that is to be said again."""
+
+
+def interrupted():
+    """Whether Ctrl-C in a call from a kernel is still to be said again: nothing is begun any more."""
+    return any(timer.is_alive() for timer in _again)
+
+
+def raise_interrupted():
+    """Say it again, now that the kernel has returned."""
+    waits = interrupted()
+    while _again:
+        _again.pop().cancel()
+    if waits:
+        raise KeyboardInterrupt
+
+
 @contextmanager
 def handed_on(outcome):
     """Around what a kernel calls, which can raise nothing: say later what went wrong, Ctrl-C once more, after the call,
@@ -22,7 +40,8 @@ def handed_on(outcome):
     try:
         yield
     except KeyboardInterrupt:
-        Timer(_AFTER, _thread.interrupt_main).start()
+        _again.append(Timer(_AFTER, _thread.interrupt_main))
+        _again[-1].start()
     except BaseException as error:
         first = str(error).strip().partition("\n")[0]
         warn_once(f"exact contact: {type(error).__name__}: {first}; {outcome}")
