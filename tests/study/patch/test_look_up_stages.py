@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.patch.look_up_stages import FORCE, SEAMS, SEARCH, STATES, costs, one_by_one, up_to, wheels_of
+from study.patch.look_up_stages import FORCE, SEARCH, STATES, costs, one_by_one, up_to, wheels_of
 from wrcore.dynamics.strip_wheel import strip_wrenches
 from wrcore.dynamics.wheel import COUNTERS
 
@@ -23,10 +23,9 @@ def test_stages_are_those_of_an_evaluation():
     last = wheels.contact, wheels.motions[-1:, :1].repeat(2, axis=1), patches[0, 0].copy(), counters, wheels.work
     along = up_to(FORCE, *last) - up_to(FORCE - 1, *last)
     assert along == pytest.approx(2.0 * work.rail_wrenches[0, 0, 0], rel=1e-6)
-    assert 0 <= up_to(SEAMS, *arguments) < 2 * STATES
 
 
 def test_all_takes_longer_than_its_stages():
-    row = costs(*SCENE, 20)
+    row = costs(*SCENE, 100)
     stages = sum(row[name] for name in ("search", "place", "numbers", "creep force"))
     assert 0.0 < row["search"] < stages < 1.2 * row["wheel"] and row["moment"] < row["wheel"]
