@@ -78,11 +78,11 @@ def test_numbers_along_the_lattice():
     assert Pair._add_yaw(pair_of_known_numbers(), key, rows)
     numbers, along, weights = np.zeros(NUMBERS), np.zeros((AXES, NUMBERS)), np.zeros((1 + AXES, NODES))
     parts, steps = np.array([0.3, 0.6, 0.9]), np.array([*pair_cells.STEPS, 1.0])
-    steps[:3], steps[3] = steps[:3] / 2.0, pair_cells.YAW / 3.0
+    steps[:2], steps[3] = steps[:2] / 2.0, pair_cells.YAW / 3.0
 
     def at(parts, turn):
         double = 0.5 * (parts + np.array([301, 199, 10]) % 2)
-        return Place(1, *parts, *double, turn, 2.0, 2.0, pair_cells.YAW / 3.0, 1.0)
+        return Place(1, *parts, *double, turn, 2.0, pair_cells.YAW / 3.0, 1.0)
 
     weigh_slopes(at(parts, 0.4), weights)
     look_slopes_up(rows, weights, numbers, along)

@@ -20,29 +20,29 @@ OWN = pair_store.Pair._own
 
 
 def test_finer_steps_where_a_cell_is_too_coarse():
-    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps of t and slope from the
-    first place and in a third of the yaw; ln D is cut finer from the third lattice on."""
-    coarse = np.array([300.3, 200.6, 9.8, 1.84])
-    t, slope, log_depth = np.array(pair_cells.FIRST) + coarse[:3] * pair_cells.STEPS
+    """A lobe in a cell that is left to the next lattice is looked up there, at twice the steps of offset and slope from
+    the first place and in a third of the yaw; ln D is never cut finer."""
+    coarse = np.array([150.3, 100.6, 9.8, 1.84])
+    offset, slope, log_depth = np.array(pair_cells.FIRST) + coarse[:3] * pair_cells.STEPS
     part = round((U - pair_cells.FIELD) / pair_cells.PART)
     keys, states = np.zeros(1009, np.int64), np.zeros(1009, np.int32)
-    for level, parts in enumerate(((1, 1, 1, 1), (2, 2, 1, 3), (4, 4, 2, 9), (8, 8, 4, 27))):
+    for level, parts in enumerate(((1, 1, 1, 1), (2, 2, 1, 3), (4, 4, 1, 9), (8, 8, 1, 27))):
         i, j, k, turn = map(int, coarse * parts)
         key = key_of(level, part, turn, i, j, k)
         keys[key % 1009], states[key % 1009] = key, 5 if level == 3 else FINER
     table = NO_TABLE._replace(keys=keys, states=states)
     yaw = (2.0 * coarse[3] - pair_cells.YAWS) * YAW
-    at = locate(table, U, False, t, slope, log_depth, yaw, np.zeros(SHARES))
-    assert (at.cell, at.scale, at.deeper, at.half, at.own) == (5, 8.0, 4.0, YAW / 27.0, 1.0)
-    expected = coarse * (8, 8, 4, 27) - (i, j, k, turn)
+    at = locate(table, U, False, offset + U, slope, log_depth, yaw, np.zeros(SHARES))
+    assert (at.cell, at.scale, at.half, at.own) == (5, 8.0, YAW / 27.0, 1.0)
+    expected = coarse * (8, 8, 1, 27) - (i, j, k, turn)
     np.testing.assert_allclose((at.fx, at.fy, at.fz, 0.5 * (at.turn + 1.0)), expected, atol=1e-9)
     np.testing.assert_allclose((at.gx, at.gy, at.gz), 0.5 * (expected[:3] + np.array([i, j, k]) % 2), atol=1e-9)
 
 
 def test_a_node_of_several_lattices_is_solved_once():
-    nodes = np.array([(4, 25, 243, 2400, 1600, 80), (4, 25, 242, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)])
+    nodes = np.array([(4, 25, 243, 2400, 1600, 10), (4, 25, 242, 2400, 1600, 10), (1, 25, 3, 300, 201, 9)])
     found = [pair_cells.node_of(code) for code in pair_cells.node_codes(nodes).tolist()]
-    assert found == [(0, 25, 3, 150, 100, 10), (4, 25, 242, 2400, 1600, 80), (1, 25, 3, 300, 201, 9)]
+    assert found == [(0, 25, 3, 150, 100, 10), (4, 25, 242, 2400, 1600, 10), (1, 25, 3, 300, 201, 9)]
     for one, other in zip(nodes, found, strict=True):
         assert pair_solver.place_of(*one) == pair_solver.place_of(*other)
 
@@ -92,15 +92,15 @@ def test_cells_that_stand_for_each_other_are_one_whichever_is_asked_first(order,
     table = patchwork.table()
     for part in order:
         for level, state in ((0, FINER), (LEVELS, pair_cells.HARD)):
-            assert pair_cells._filled(table, key_of(level, part, 4, 300, 200, 9)) == state
+            assert pair_cells._filled(table, key_of(level, part, 4, 150, 100, 9)) == state
     assert solved == [(0, 22), (LEVELS, 22)]
 
 
 def number_at(table, place):
     """A number at a place (steps of the coarsest lattice, its cells in yaw), and its cell's own share."""
-    t, slope, log_depth = np.array(pair_cells.FIRST) + place[:3] * pair_cells.STEPS
+    offset, slope, log_depth = np.array(pair_cells.FIRST) + place[:3] * pair_cells.STEPS
     shares, weights, numbers = np.zeros(SHARES), np.zeros(NODES), np.zeros(NUMBERS)
-    at = locate(table, U, False, t, slope, log_depth, (2.0 * place[3] - pair_cells.YAWS) * YAW, shares)
+    at = locate(table, U, False, offset + U, slope, log_depth, (2.0 * place[3] - pair_cells.YAWS) * YAW, shares)
     if at.own < 1.0:
         look_shares_up(table, at, shares, weights, numbers)
     else:
@@ -116,7 +116,7 @@ def test_lattices_go_over_into_each_other_without_a_step_or_a_kink(patchwork):
     for _ in range(8):
         way = random.normal(size=AXES) * (1.0, 1.0, 1.0, 0.5)
         way *= step / abs(way).max()
-        begin = random.uniform((300.0, 200.0, 8.0, 1.0), (301.0, 201.0, 9.0, 2.0)) - 750 * way
+        begin = random.uniform((150.0, 100.0, 8.0, 1.0), (151.0, 101.0, 9.0, 2.0)) - 750 * way
         numbers = np.array([number_at(table, begin + n * way)[0] for n in range(1500)])
         seen |= set(np.round(numbers, 6)) & plain
         assert 1.0 - 1e-6 < numbers.min() <= numbers.max() < 3.3 + 1e-6
@@ -130,7 +130,7 @@ def test_what_shares_change_by(patchwork):
     table, random, step, count = patchwork.table(), np.random.default_rng(3), 1e-6, 0
     units = np.array([*pair_cells.STEPS, 2.0 * YAW])
     weights, numbers, along = np.zeros((1 + AXES, NODES)), np.zeros(NUMBERS), np.zeros((AXES, NUMBERS))
-    for place in random.uniform((300.0, 200.0, 8.0, 1.0), (302.0, 202.0, 10.0, 2.0), size=(1500, AXES)):
+    for place in random.uniform((150.0, 100.0, 8.0, 1.0), (152.0, 102.0, 10.0, 2.0), size=(1500, AXES)):
         number, at, shares = number_at(table, place)
         if at.own == 1.0:
             continue

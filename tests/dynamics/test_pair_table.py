@@ -72,7 +72,7 @@ def test_what_a_cell_gives_exactly(first):
     assert pair_store.Pair._add_yaw(pair, key, rows)
     part = np.array([0.3, 0.6, 0.9])
     weights = np.empty(NODES)
-    pair_table.weigh(Place(1, *part, *0.5 * (part + np.array(first) % 2), 0.4, 1.0, 1.0, 1.0, 1.0), weights)
+    pair_table.weigh(Place(1, *part, *0.5 * (part + np.array(first) % 2), 0.4, 1.0, 1.0, 1.0), weights)
     look_up(rows, weights, numbers)
     x, y, z = part + first - (300, 200, 9)
     expected = known_numbers(300 + x, 200 + y, 9 + z)[0], x + 4.0 * 0.4 * y + 2.0 * 0.4**2 * z

@@ -1,6 +1,7 @@
 """A wheelset at rest on the rails: height and roll at which each wheel carries a given vertical load."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -151,28 +152,46 @@ def settle(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nomina
     return 0.5 * (low + high), 0.5 * (z + other)
 
 
+class Bracket(NamedTuple):
+    """Where a function that falls has its zero: between the last place where it was above and where it was not (NaN
+    without), with its values there, halved as Illinois's rule says; the next place to try, the next step where there
+    is no bracket yet, and the sign found last."""
+
+    at: float
+    step: float
+    low: float
+    high: float
+    e_low: float
+    e_high: float
+    last: float
+
+
+@jit(allocates=False, nogil=True)
+def bracket_from(at, step):
+    """No `Bracket` yet: where the search begins."""
+    return Bracket(at, step, math.nan, math.nan, 0.0, 0.0, 0.0)
+
+
+@jit(allocates=False, nogil=True)
+def narrowed(b, e):
+    """`Bracket` with the function's value at its place, and the next place."""
+    if e > 0.0:
+        low, e_low, high, e_high, last = b.at, e, b.high, b.e_high * (0.5 if b.last > 0.0 else 1.0), 1.0
+    else:
+        low, e_low, high, e_high, last = b.low, b.e_low * (0.5 if b.last < 0.0 else 1.0), b.at, e, -1.0
+    if math.isnan(low) or math.isnan(high):
+        return Bracket(b.at + last * b.step, 2.0 * b.step, low, high, e_low, e_high, 0.0)
+    return Bracket(low + (high - low) * e_low / (e_low - e_high), b.step, low, high, e_low, e_high, last)
+
+
 def height_of_zero(excess, z):
     """Zero of a function that falls with z, nearly linear near it: a bracket, then Illinois steps; NaN if lost."""
-    low = high = math.nan
-    e_low = e_high = 0.0
-    step, last = 2e-5, 0
+    bracket = bracket_from(z, 2e-5)
     for _ in range(60):
-        e = excess(z)
+        e = excess(bracket.at)
         if math.isnan(e):
             return math.nan
-        pressed = e > 0.0
-        if pressed:
-            low, e_low = z, e
-            e_high *= 0.5 if last > 0 else 1.0
-        else:
-            high, e_high = z, e
-            e_low *= 0.5 if last < 0 else 1.0
-        if math.isnan(low) or math.isnan(high):
-            z, step = z + (step if pressed else -step), 2.0 * step
-            continue
-        last = 1 if pressed else -1
-        new = low + (high - low) * e_low / (e_low - e_high)
-        if abs(new - z) < 1e-13 or high - low < 1e-13:
-            return new
-        z = new
+        before, bracket = bracket.at, narrowed(bracket, e)
+        if abs(bracket.at - before) < 1e-13 or bracket.high - bracket.low < 1e-13:
+            return bracket.at
     return math.nan

@@ -53,7 +53,8 @@ def depth_left(rows, first, last, lobe, y):
         beside = (row[reduction.Y] - y) / row[reduction.COSINE]
         left = max(row[reduction.PENETRATION] - lobe[LIFT] - tilt * beside + 0.25 * tilt * tilt / b, 0.0)
         square = left * left * math.sqrt(left / b) / row[reduction.COSINE]
-        total, moment = total + square, moment + square * row[reduction.U_WHEEL]
+        u = row[reduction.U_WHEEL] - 0.5 * tilt / b * row[reduction.COSINE]
+        total, moment = total + square, moment + square * u
     return (math.sqrt(CURVATURE) * total) ** 0.4, moment / max(total, 1e-30)
 
 

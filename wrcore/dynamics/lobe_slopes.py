@@ -60,7 +60,7 @@ SMALL, SMALL_SLIP = 1e-6, 1e-8
 """Differences of velocities, where the lift's slope is wanted (m/s, rad/s), and of ln(a/b); and of velocities over V
 where two ellipses are differenced."""
 
-T, TILT, DEPTH, TURN = range(AXES)
+OFFSET, TILT, DEPTH, TURN = range(AXES)
 
 BASE = 3 + AXES
 """Row of what remains where the base force is."""
@@ -145,16 +145,17 @@ def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
 def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
     """Fill ``work.lattice`` (SLOPES, AXES) with what the wheel's place on the lattice changes by."""
     rates = work.lattice
-    depth, aside = lift.depth * lift.sine, lift.share * lift.depth * lift.sine
+    u, depth, aside = pressed.moment / pressed.square, lift.depth * lift.sine, lift.share * lift.depth * lift.sine
     own = pressed.across, pressed.up, pressed.about_x, pressed.about_z
     ahead, half = -1.0 if m.vx < 0.0 else 1.0, model.geometry.half_distance
     for k in range(MOVES):
         ex, ey, ez = moved_axle(m.ex, m.ey, m.ez, k, DIFFERENCE)
         across = DIFFERENCE if k == ACROSS else 0.0
         there = make_pose(1.0, m.y + across, m.z + (DIFFERENCE if k == UP else 0.0), ex, ey, ez, True)
-        its = lift_of(model, m, _pressed_nearby(model.geometry, there, False, rows, count, sums, work))
+        moved = _pressed_nearby(model.geometry, there, False, rows, count, sums, work)
+        its, its_u = lift_of(model, m, moved), moved.moment / moved.square
         across += half * (ey - m.ey) - its.share * its.depth * its.sine + aside
-        rates[k, T], rates[k, TILT] = across / DIFFERENCE, (ez - m.ez) / DIFFERENCE
+        rates[k, OFFSET], rates[k, TILT] = (across - its_u + u) / DIFFERENCE, (ez - m.ez) / DIFFERENCE
         rates[k, TURN] = ahead * (ex - m.ex) / DIFFERENCE
         rates[k, DEPTH] = 0.4 * own[k] / pressed.square - (its.share - lift.share) / (DIFFERENCE * (1.0 - lift.share))
     size = math.sqrt(pressed.across * pressed.across + pressed.up * pressed.up)
@@ -164,7 +165,7 @@ def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
     for j in range(6):
         share = faster * speeds[j]
         rates[MOVES + j] = 0.0
-        rates[MOVES + j, T], rates[MOVES + j, DEPTH] = -share * depth, -share / (1.0 - lift.share)
+        rates[MOVES + j, OFFSET], rates[MOVES + j, DEPTH] = -share * depth, -share / (1.0 - lift.share)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -181,7 +182,7 @@ def _turned(m, j):
 def _sum_along(along, column, rates):
     """What a number changes by, from what the places on the lattice's axes do."""
     return (
-        along[T, column] * rates[T] + along[TILT, column] * rates[TILT] + along[DEPTH, column] * rates[DEPTH]
+        along[OFFSET, column] * rates[OFFSET] + along[TILT, column] * rates[TILT] + along[DEPTH, column] * rates[DEPTH]
         + along[TURN, column] * rates[TURN]
     )  # fmt: skip
 
@@ -190,7 +191,7 @@ def _sum_along(along, column, rates):
 def _sum_axes(rest, k, rates):
     """The same of the remainder, see `remainder_slopes`."""
     return (
-        rest[3 + T, k] * rates[T] + rest[3 + TILT, k] * rates[TILT] + rest[3 + DEPTH, k] * rates[DEPTH]
+        rest[3 + OFFSET, k] * rates[OFFSET] + rest[3 + TILT, k] * rates[TILT] + rest[3 + DEPTH, k] * rates[DEPTH]
         + rest[3 + TURN, k] * rates[TURN]
     )  # fmt: skip
 

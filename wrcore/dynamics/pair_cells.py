@@ -14,27 +14,24 @@ import numpy as np
 from wrcore.kernels.handles import call_c
 from wrcore.kernels.jit import jit
 
-STEPS = 2e-4, 5e-4, 0.25
-"""Of the coarsest lattice in t (m), slope of the axle and ln D."""
+STEPS = 8e-4, 1e-3, 0.25
+"""Of the coarsest lattice in the offset (m), slope of the axle and ln D."""
 
 LEVELS = 5
-"""Lattices, each with half the steps in t and slope of the one before."""
+"""Lattices, each with half the steps in offset and slope of the one before, and a third of the yaw. All have one step
+in ln D."""
 
-FIRST = -0.05, -0.1, math.log(4e-6)
+FIRST = -0.1, -0.1, math.log(4e-6)
 """Their first places."""
 
-COUNTS = 500, 400, 19
+COUNTS = 250, 200, 19
 """Steps of the coarsest lattice."""
 
-YAW, YAWS = 8e-3, 3
+YAW, YAWS = 4e-3, 7
 """Half of a cell of the coarsest lattice in yaw (rad), and how many there are."""
 
-HALVED, THIRDS = (0, 0, 1, 2, 3), (0, 1, 2, 3, 4)
-"""How often each lattice's steps are halved in ln D and cut in three in yaw: what is too coarse is not so in ln D
-first."""
-
 AXES = 4
-"""Of a lattice: t, slope, ln D and yaw."""
+"""Of a lattice: offset, slope, ln D and yaw."""
 
 BESIDE = 64
 """Added to the part of the wheel's profile in places of lobes with others beside them."""
@@ -56,24 +53,24 @@ LEFT = 2 * LEVELS
 def key_of(level, part, turn, i, j, k):
     """One number, not 0, for the cell with this place in yaw and first corner; `corner_of` reads it. With `LEVELS` more
     it means what a cell gives that is left to the next lattice."""
-    return (((((level + 1) * 128 + part) * 256 + turn) * 8192 + i) * 8192 + j) * 512 + k
+    return (((((level + 1) * 128 + part) * 1024 + turn) * 8192 + i) * 8192 + j) * 32 + k
 
 
 def corner_of(key):
     """Level, part of the profile, place in yaw and first corner of a cell."""
     found = []
-    for count in (512, 8192, 8192, 256, 128):
+    for count in (32, 8192, 8192, 1024, 128):
         key, rest = divmod(key, count)
         found.append(rest)
     return key - 1, *reversed(found)
 
 
 def steps_of(level):
-    """Steps of a lattice in t (m), slope and ln D."""
-    return np.array(STEPS) / (2.0**level, 2.0**level, 2.0 ** HALVED[level])
+    """Steps of a lattice in the offset (m), slope and ln D."""
+    return np.array(STEPS) / (2.0**level, 2.0**level, 1.0)
 
 
-PART_CODE = 512 * 8192 * 8192 * 512
+PART_CODE = 2048 * 8192 * 8192 * 32
 """What one part of the profile more adds to one of `node_codes`."""
 
 
@@ -85,19 +82,16 @@ def node_codes(nodes):
     codes = np.empty(len(nodes), np.int64)
     for n in range(len(nodes)):
         level, part, turn, i, j, k = nodes[n]
-        while level > 0:
-            deep, thirds = 2 ** (HALVED[level] - HALVED[level - 1]), 3 ** (THIRDS[level] - THIRDS[level - 1])
-            if turn % thirds or i % 2 or j % 2 or k % deep:
-                break
-            level, turn, i, j, k = level - 1, turn // thirds, i // 2, j // 2, k // deep
-        codes[n] = (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 512 + k
+        while level > 0 and turn % 3 == i % 2 == j % 2 == 0:
+            level, turn, i, j = level - 1, turn // 3, i // 2, j // 2
+        codes[n] = (level * 128 + part) * PART_CODE + ((turn * 8192 + i) * 8192 + j) * 32 + k
     return codes
 
 
 def node_of(code):
     """Level, part of the profile, place in yaw and in the lattice of a node."""
     found = []
-    for count in (512, 8192, 8192, 512, 128):
+    for count in (32, 8192, 8192, 2048, 128):
         code, rest = divmod(code, count)
         found.append(rest)
     return code, *reversed(found)
@@ -132,7 +126,7 @@ class Place(NamedTuple):
     fx: float
     fy: float
     fz: float
-    """Parts of a step of t, slope and ln D beyond the first corner."""
+    """Parts of a step of offset, slope and ln D beyond the first corner."""
     gx: float
     gy: float
     gz: float
@@ -140,41 +134,41 @@ class Place(NamedTuple):
     turn: float
     """Yaw from the cell's middle over half of the cell."""
     scale: float
-    deeper: float
-    """Steps of the coarsest lattice over those of this one: in t and slope, and in ln D."""
+    """Steps of the coarsest lattice over those of this one, in offset and slope."""
     half: float
     """Half of the cell in yaw, rad."""
     own: float
     """Share that the cell has; coarser ones, near a seam, have the rest."""
 
 
-NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, YAW, 1.0)
+NOWHERE = Place(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, YAW, 1.0)
 
 
 @jit(allocates=False)
 def locate(table, u, beside, t, slope, log_depth, yaw, shares):
-    """`Place` of a lobe with ln D. One that only just touches is looked up at the least depth.
+    """`Place` of a lobe at u on the wheel's profile with ln D. One that only just touches is looked up at the least
+    depth.
 
     Where its ``own`` share is below 1, other cells are in the first 2 LEVELS rows of ``shares`` (`SHARES`), each with
     its share, what this changes by along the axes, and its `Place`; row `LEFT` has the first of these of the cell."""
     part, scale, own = int((u - FIELD) / PART + 0.5) + (BESIDE if beside else 0), 1.0, 1.0
     for level in range(LEVELS):
-        deeper, half = 2.0 ** HALVED[level], YAW / 3.0 ** THIRDS[level]
-        x, y = scale * (t - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
-        z, w = deeper * max((log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
-        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < deeper * COUNTS[2]):
+        half = YAW / 3.0**level
+        x, y = scale * (t - u - FIRST[0]) / STEPS[0], scale * (slope - FIRST[1]) / STEPS[1]
+        z, w = max((log_depth - FIRST[2]) / STEPS[2], 1.0), (yaw + YAWS * YAW) / (2.0 * half)
+        if not (1.0 <= x < scale * COUNTS[0] and 1.0 <= y < scale * COUNTS[1] and z < COUNTS[2]):
             break
         if not 0.0 <= w < YAWS * YAW / half:
             break
         i, j, k, turn = int(x), int(y), int(z), int(w)
         state = _filled(table, key_of(level, part, turn, i, j, k))
         gx, gy, gz = 0.5 * (x - i + i % 2), 0.5 * (y - j + j % 2), 0.5 * (z - k + k % 2)
-        at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, deeper, half, own)
+        at = Place(state, x - i, y - j, z - k, gx, gy, gz, 2.0 * (w - turn) - 1.0, scale, half, own)
         in_seam = _in_seam(w - turn)
         if state > 0:
             if in_seam:
                 own = _share_turned(table, level, part, (turn, i, j, k), at, shares)
-            return Place(state, at.fx, at.fy, at.fz, gx, gy, gz, at.turn, scale, deeper, half, own)
+            return Place(state, at.fx, at.fy, at.fz, gx, gy, gz, at.turn, scale, half, own)
         if state != FINER:
             break
         if in_seam or _in_seam(at.fx) or _in_seam(at.fy) or _in_seam(at.fz):
@@ -194,11 +188,11 @@ def _reached(table, level, part, turn, i, j, k):
     """Whether a cell is there, and all coarser ones are left to its lattice."""
     if min(i, j) < 2**level or max(i // COUNTS[0], j // COUNTS[1]) >= 2**level or _beyond(level, turn):
         return False
-    if not 1 <= k >> HALVED[level] < COUNTS[2]:
+    if not 1 <= k < COUNTS[2]:
         return False
     for coarser in range(level):
-        n, m, thirds = level - coarser, HALVED[level] - HALVED[coarser], 3 ** (THIRDS[level] - THIRDS[coarser])
-        if _filled(table, key_of(coarser, part, turn // thirds, i >> n, j >> n, k >> m)) != FINER:
+        n = level - coarser
+        if _filled(table, key_of(coarser, part, turn // 3**n, i >> n, j >> n, k)) != FINER:
             return False
     return True
 
@@ -206,7 +200,7 @@ def _reached(table, level, part, turn, i, j, k):
 @jit(allocates=False, forceinline=True)
 def _beyond(level, turn):
     """Whether a lattice has no such cell in yaw."""
-    return not 0 <= turn < YAWS * 3 ** THIRDS[level]
+    return not 0 <= turn < YAWS * 3**level
 
 
 @jit(allocates=False)
@@ -221,8 +215,7 @@ def _begin(at, shares):
 def _put(number, at, turn, share):
     """Write the `Place` in a cell with a ``number`` into its share."""
     share[5], share[6], share[7], share[8], share[9] = number, at.fx, at.fy, at.fz, at.gx
-    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, turn, at.scale, at.deeper
-    share[15] = at.half
+    share[10], share[11], share[12], share[13], share[14] = at.gy, at.gz, turn, at.scale, at.half
 
 
 @jit(allocates=False, forceinline=True)
@@ -230,7 +223,7 @@ def place_of(share):
     """`Place` in a cell that has a share."""
     return Place(
         int(share[5]), share[6], share[7], share[8], share[9], share[10], share[11], share[12], share[13], share[14],
-        share[15], share[0],
+        share[0],
     )  # fmt: skip
 
 
@@ -279,7 +272,7 @@ def _share_coarse(table, level, part, cell, at, shares):
     for axis in range(AXES):
         f = at.fx if axis == 0 else at.fy if axis == 1 else at.fz if axis == 2 else 0.5 * (at.turn + 1.0)
         side, q = -1.0 if f < 0.5 else 1.0, 1.0 - min(f, 1.0 - f) / SEAM
-        unit = 0.5 / at.half if axis == 3 else (at.deeper if axis == 2 else at.scale) / STEPS[axis]
+        unit = 0.5 / at.half if axis == 3 else (1.0 if axis == 2 else at.scale) / STEPS[axis]
         ends[3 * axis], ends[3 * axis + 1] = side, q * q * (3.0 - 2.0 * q) if q > 0.0 else 0.0
         ends[3 * axis + 2] = 6.0 * q * (1.0 - q) * side * unit / SEAM
     turn, i, j, k = cell

@@ -13,7 +13,7 @@ from wrcore.contact.patch.model import NUMBERS
 from wrcore.contact.patch.strips import WEIGHT, WIDENED
 from wrcore.contact.patch.windows import MORE
 from wrcore.contact.reduction import MOMENT, PENETRATION
-from wrcore.contact.statics import height_of_zero
+from wrcore.contact.statics import bracket_from, narrowed
 from wrcore.contact.strip import gap_at, make_pose
 from wrcore.creep.kalker import coefficients_at
 from wrcore.dynamics import pair_table as columns
@@ -39,9 +39,12 @@ makes the slope exact."""
 AT_REST = PROBE * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [0, 0]])
 """Creepages with which slopes and force at rest are found."""
 
+HEIGHT_STEP, HEIGHT_ERROR = 2e-5, 1e-13
+ASIDE_STEP, ASIDE_ERROR, FARTHEST = 2e-4, 1e-10, 1e-8
+"""First steps in height and across of the search for a lobe, where it ends, and how far its place on the profile may
+then be off, m."""
 
-REACH = 2.0 * PART
-"""A lobe this far from a place on the wheel's profile may still be meant, m."""
+MOST_STEPS = 60
 
 
 @jit(allocates=False, nogil=True)
@@ -49,7 +52,7 @@ def lobe_at(geometry, y, z, ex, ey, ez, place, limits, rows, sums):
     """First and end of the overlaps of the lobe nearest to a place on the wheel's profile, their depth D and their own
     place; 0, 0, 0 and the place where there is none."""
     low, high, found, at, first = 0, 0, 0.0, place, 0
-    nearest, pose = REACH, make_pose(1.0, y, z, ex, ey, ez, True)
+    nearest, pose = math.inf, make_pose(1.0, y, z, ex, ey, ez, True)
     count = find_patches(geometry, 1.0, y, z, ex, ey, ez, True, MOMENT, rows)
     while first < count:
         group = group_end(geometry, rows, count, first)
@@ -72,26 +75,57 @@ def least_gap(geometry, y, z, ex, ey, ez, place):
     return least
 
 
+@jit(allocates=False, nogil=True)
+def lobe_height(geometry, y, axle, place, rows, sums):
+    """Height of the wheelset's centre at which the lobe nearest to u of a ``place``, see `solve_place`, has its
+    depth; NaN if lost."""
+    _, _, depth, _, u, limits = place
+    ex, ey, ez = axle
+    level = geometry.rolling_radius - geometry.half_distance * ez
+    level -= least_gap(geometry, y, level, ex, ey, ez, u) + 0.5 * depth
+    bracket = bracket_from(level, HEIGHT_STEP)
+    for _ in range(MOST_STEPS):
+        found, z = lobe_at(geometry, y, bracket.at, ex, ey, ez, u, limits, rows, sums)[2], bracket.at
+        if found == 0.0 and least_gap(geometry, y, z, ex, ey, ez, u) < 0.0:  # one with its neighbours
+            found = 2.0 * depth
+        bracket = narrowed(bracket, found - depth)
+        if abs(bracket.at - z) < HEIGHT_ERROR or bracket.high - bracket.low < HEIGHT_ERROR:
+            return bracket.at
+    return math.nan
+
+
+@jit(allocates=False, nogil=True)
+def find_lobe(geometry, place, rows, sums):
+    """Pose (y, z, axle) of the wheelset at which the lobe of a ``place``, see `solve_place`, has its depth and its
+    offset, where it then lies on the wheel's profile, and whether others lie beside it; a height of NaN where there is
+    none.
+
+    The wheel is moved across its rail until the lobe nearest to the place that the offset implies lies there."""
+    offset, slope, depth, yaw, u, limits = place
+    ex, ey, ez = axle = yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope
+    middle = geometry.rail_distance - geometry.half_distance * ey
+    bracket, beside = bracket_from(offset + u, ASIDE_STEP), False
+    for _ in range(MOST_STEPS):
+        t = bracket.at
+        y, near = t + middle, t - offset
+        z = lobe_height(geometry, y, axle, (offset, slope, depth, yaw, near, limits), rows, sums)
+        if math.isnan(z):
+            break
+        first, last, found, at = lobe_at(geometry, y, z, ex, ey, ez, near, limits, rows, sums)
+        bracket = narrowed(bracket, at - near)
+        if abs(at - near) < ASIDE_ERROR or bracket.high - bracket.low < HEIGHT_ERROR:
+            if abs(at - near) > FARTHEST or abs(found - depth) > 1e-6 * depth:
+                break
+            alone = lobe_at(geometry, y, z, ex, ey, ez, at, WIDE, rows, sums)
+            beside = first != alone[0] or last != alone[1]
+            return (y, z, axle), at, beside
+    return (0.0, math.nan, axle), 0.0, beside
+
+
 def lobe_of(geometry, place, work):
-    """Pose of the wheelset (y, z, axle) at which the lobe of a place, see `solve_place`, has its depth, where it then
-    lies on the wheel's profile, and whether others lie beside it; None where there is none. ``work``: `StripWork`, of
-    which it needs the rows of overlaps."""
-    t, slope, depth, yaw, u, limits = place
-    axle = np.array([yaw, math.sqrt(1.0 - yaw * yaw - slope * slope), slope])
-    y = t + geometry.rail_distance - geometry.half_distance * axle[1]
-    level = geometry.rolling_radius - geometry.half_distance * axle[2]
-    level -= least_gap(geometry, y, level, *axle, u) + 0.5 * depth
-
-    def excess(z):
-        found = lobe_at(geometry, y, z, *axle, u, limits, work.rows, work.moments)[2]
-        if found == 0.0 and least_gap(geometry, y, z, *axle, u) < 0.0:  # one with its neighbours
-            return depth
-        return found - depth
-
-    z = height_of_zero(excess, level)
-    first, last, found, at = lobe_at(geometry, y, z, *axle, u, limits, work.rows, work.moments)
-    beside = (first, last) != lobe_at(geometry, y, z, *axle, u, WIDE, work.rows, work.moments)[:2]
-    return ((y, z, axle), at, beside) if abs(found - depth) < 1e-6 * depth else None
+    """As `find_lobe`; None where there is none. ``work``: `StripWork`, of which it needs the rows of overlaps."""
+    found = find_lobe(geometry, place, work.rows, work.moments)
+    return None if math.isnan(found[0][1]) else found
 
 
 @jit(allocates=False, nogil=True)
@@ -183,16 +217,16 @@ def solve_place(contact, handle, works, place, points):
     creepages (n, 2) over those of saturation; None where strips find no solution.
 
     ``contact``: `ContactModel` with exact patches and a creep table, and its handle; ``works``: handles of two
-    `StripWork`, for less and for more strips; ``place``: t, slope of the axle, depth D, yaw, place on the wheel's
-    profile (m), and limits of `lobe_end`.
+    `StripWork`, for less and for more strips; ``place``: offset, slope of the axle, depth D, yaw, about where on the
+    wheel's profile (m), and limits of `lobe_end`.
     """
-    (_, _, depth, _, u, limits), geometry = place, contact.geometry
+    (_, slope, depth, yaw, _, limits), geometry = place, contact.geometry
     half, radius, modulus = geometry.half_distance, geometry.rolling_radius, _modulus(contact)
     found = lobe_of(geometry, place, works[0].value)
     if found is None:
         return None
-    (y, z, axle), *_ = found
-    at, sums, each, pressed = (y, z, tuple(axle)), np.zeros(SUMS), np.zeros(SUMS), []
+    (y, z, axle), u, _ = found
+    at, axle, sums, each, pressed = (y, z, axle), np.array(axle), np.zeros(SUMS), np.zeros(SUMS), []
     for work, more in zip(works, (1.0, MORE), strict=True):
         windows, frame, share = press_lobe(
             handle, *at, u, limits, np.array([1.0, 0.0, 0.0, *(axle / radius)]), more, each, work
@@ -225,7 +259,7 @@ def solve_place(contact, handle, works, place, points):
     numbers[[columns.LOG_A, columns.LOG_B, columns.LOG_PEAK]] = np.log([a, b, sums[11] / modulus])
     _part_numbers(numbers, sums)
     # what is added to rolling without slip in the mean, over the creepages of saturation
-    free = rolling_slip(numbers, place[1], place[3], half, radius, 0.0, 0.0)
+    free = rolling_slip(numbers, slope, yaw, half, radius, 0.0, 0.0)
     c, limit, at_slip = math.sqrt(a * b), contact.friction * normal, tuple(slip)
     kalker = coefficients_at(math.log(a / b), contact.creep.table.kalker)[:2]
     unit = contact.shear_modulus * c * c / limit
@@ -236,7 +270,7 @@ def solve_place(contact, handle, works, place, points):
         velocities, exact, table = np.empty((len(points), 6)), np.empty((len(points), 3)), np.empty((len(points), 3))
         slide(free, at_slip, cosine, creepages, velocities)
         along_normal(forces_at(velocities), at_slip, cosine, sine, c, limit, exact)
-        base_forces(handle, numbers, place[1], place[3], creepages, factors, limit, table)
+        base_forces(handle, numbers, slope, yaw, creepages, factors, limit, table)
         return exact, table
 
     exact, table = exact_and_table(AT_REST, np.ones(2))

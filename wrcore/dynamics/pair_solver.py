@@ -20,7 +20,6 @@ from wrcore.dynamics.pair_cells import (
     LEVELS,
     PART,
     PART_CODE,
-    THIRDS,
     YAW,
     YAWS,
     Place,
@@ -161,7 +160,7 @@ class PairSolver:
                 return UNKNOWN
             exact, left = rows[0], 0.0
         exact = exact.astype(float)
-        columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0, 1.0), weights)
+        columns.weigh(Place(1, 0.5, 0.5, 0.5, *(0.5 * (0.5 + n % 2) for n in first), turn, 1.0, 1.0, 1.0), weights)
         columns.look_up(rows, weights, found)
         columns.look_modes_up(rows, weights, found)
         light, modes = min(place[2] / LIGHT, 1.0) ** 1.5, self.modes
@@ -208,9 +207,9 @@ def nodes_at(level, part, turn, corners):
 
 def place_of(level, part, turn, i, j, k):
     """Place, as `solve_place` has it, of a node."""
-    t, slope, log_depth = np.array(FIRST) + steps_of(level) * (i, j, k)
-    yaw, (beside, part) = YAW * (turn / 3.0 ** THIRDS[level] - YAWS), divmod(part, BESIDE)
-    return t, slope, math.exp(log_depth), yaw, FIELD + part * PART, NARROW if beside else WIDE
+    offset, slope, log_depth = np.array(FIRST) + steps_of(level) * (i, j, k)
+    yaw, (beside, part) = YAW * (turn / 3.0**level - YAWS), divmod(part, BESIDE)
+    return offset, slope, math.exp(log_depth), yaw, FIELD + part * PART, NARROW if beside else WIDE
 
 
 def side_by_side(solve, places):

@@ -24,10 +24,9 @@ from wrcore.dynamics.creep_modes import SHIPPED, creep_modes
 from wrcore.dynamics.pair_cells import (
     BESIDE,
     FINER,
-    HALVED,
     HARD,
     LEVELS,
-    THIRDS,
+    YAW,
     corner_of,
     key_of,
     node_codes,
@@ -282,8 +281,8 @@ def fingerprint(contact):
     settings = contact.strips
     numbers = [
         *steps_of(LEVELS - 1),
-        *HALVED,
-        *THIRDS,
+        YAW,
+        LEVELS,
         NUMBERS,
         contact.friction,
         contact.shear_modulus,

@@ -40,8 +40,8 @@ def _slope_along(f):
 
 @jit(allocates=False, fastmath=FUSED)
 def weigh_slopes(at, weights):
-    """Fill the weights (1 + AXES, NODES) of a cell's rows at a `Place` in it, and their derivatives by t (1/m), slope,
-    ln D and yaw (1/rad)."""
+    """Fill the weights (1 + AXES, NODES) of a cell's rows at a `Place` in it, and their derivatives by the offset
+    (1/m), slope, ln D and yaw (1/rad)."""
     x, y, z = along_axis(at.fx, at.gx), along_axis(at.fy, at.gy), along_axis(at.fz, at.gz)
     odd, even = 0.5 * at.turn, 0.5 * at.turn * at.turn
     weigh(at, weights[0])
@@ -51,7 +51,7 @@ def weigh_slopes(at, weights):
     spread_weights(x, y, z, 0.5, at.turn, weights[4])
     for n in range(NODES):
         for axis in range(3):
-            weights[1 + axis, n] *= (at.deeper if axis == 2 else at.scale) / STEPS[axis]
+            weights[1 + axis, n] *= (1.0 if axis == 2 else at.scale) / STEPS[axis]
         weights[4, n] *= 0.0 if n < 32 else 1.0 / at.half
 
 

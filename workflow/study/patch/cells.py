@@ -21,7 +21,7 @@ from wrcore.contact.normal import damping_factor
 from wrcore.contact.patch.gap import group_end
 from wrcore.contact.reduction import MAX_PATCHES, MOMENT, PATCH_COLUMNS
 from wrcore.contact.strip import make_pose
-from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, THIRDS, YAW, YAWS, corner_of, steps_of
+from wrcore.dynamics.pair_cells import FINER, FIRST, HARD, LEVELS, YAW, YAWS, corner_of, steps_of
 from wrcore.dynamics.pair_store import _PAIRS, WRONG, Pair, pair_of
 from wrcore.dynamics.pair_table import APART, FAR, SADDLE, lobe_end, log_depth_of
 from wrcore.run.simulate import output_times
@@ -53,7 +53,7 @@ class Across(NamedTuple):
     """What is drawn over SI."""
 
 
-ALONG = Across(("t_low_m", "t_high_m"), "t_m", MM)
+ALONG = Across(("offset_low_m", "offset_high_m"), "offset_m", MM)
 DEPTH = Across(("D_low_m", "D_high_m"), "D_m", 1e6)
 SLOPE = Across(("slope_low", "slope_high"), "slope", 1e3)
 
@@ -95,19 +95,20 @@ def filled_by_run(source, overrides):
 
 
 def cells_of(pair):
-    """Cells of a `Pair`, one a row: lattice (0 is the coarsest), ends in t (m), slope (1), D (m) and yaw (rad), what
-    becomes of it, and its errors in the middle, of N, of the creep force over mu N, of p_max, and what modes leave of
-    the creep force."""
+    """Cells of a `Pair`, one a row: lattice (0 is the coarsest), ends in offset (m), slope (1), D (m) and yaw (rad),
+    what becomes of it, and its errors in the middle, of N, of the creep force over mu N, of p_max, and what modes leave
+    of the creep force."""
     rows = []
     for key, state in pair.cells.items():
         level, _, turn, *first = corner_of(key)
         if level >= LEVELS:  # what a cell gives that is left to the next lattice
             continue
-        (t, slope, depth), width = ends_of(level, first), 2.0 * YAW / 3.0 ** THIRDS[level]
+        (offset, slope, depth), width = ends_of(level, first), 2.0 * YAW / 3.0**level
         yaw = width * turn - YAWS * YAW
         normal, force, pressure, left = pair.misses[key]
         rows.append({
-            "level": level, "t_low_m": t[0], "t_high_m": t[1], "slope_low": slope[0], "slope_high": slope[1],
+            "level": level, "offset_low_m": offset[0], "offset_high_m": offset[1], "slope_low": slope[0],
+            "slope_high": slope[1],
             "D_low_m": math.exp(depth[0]), "D_high_m": math.exp(depth[1]), "yaw_low_rad": yaw,
             "yaw_high_rad": yaw + width, "state": {FINER: REFINED, HARD: SOLVED}.get(state, LOOKED_UP),
             "normal_error": normal, "force_error": force, "pressure_error": pressure, "modes_left": left,
@@ -116,7 +117,7 @@ def cells_of(pair):
 
 
 def ends_of(level, first):
-    """Ends of a cell in t, slope and ln D from its first corner."""
+    """Ends of a cell in offset, slope and ln D from its first corner."""
     low = np.array(FIRST) + steps_of(level) * first
     return np.column_stack([low, low + steps_of(level)])
 
@@ -131,13 +132,14 @@ def lobes_of(contact, poses):
         for side in (1.0, -1.0):
             left = side * y, z, side * ex, ey, side * ez
             t = left[0] + geometry.half_distance * ey - geometry.rail_distance
-            place = {"t_m": t, "slope": left[4], "yaw_rad": left[2]}
-            rows += [place | {"D_m": depth} for depth in depths_of(contact, left, overlaps)]
-    return pd.DataFrame(rows, columns=["t_m", "slope", "yaw_rad", "D_m"])
+            for depth, u in depths_of(contact, left, overlaps):
+                rows.append({"offset_m": t - u, "slope": left[4], "yaw_rad": left[2], "D_m": depth})
+    return pd.DataFrame(rows, columns=["offset_m", "slope", "yaw_rad", "D_m"])
 
 
 def depths_of(contact, left, overlaps):
-    """D (m) of each lobe of a left wheel, as damping at rest leaves it; ``overlaps`` is scratch."""
+    """D (m) of each lobe of a left wheel, as damping at rest leaves it, and its place on the wheel's profile (m);
+    ``overlaps`` is scratch."""
     geometry, first, found = contact.geometry, 0, []
     left_over = damping_factor(0.0, contact.damping, contact.damping_speed) ** (2.0 / 3.0)
     count = find_patches(geometry, 1.0, *left, True, MOMENT, overlaps)
@@ -145,23 +147,23 @@ def depths_of(contact, left, overlaps):
     while first < count:
         group = group_end(geometry, overlaps, count, first)
         last = lobe_end(geometry, pose, overlaps, first, group, (APART, FAR, SADDLE))
-        log_depth, _ = log_depth_of(pressed_together(geometry, pose, True, LEVEL, overlaps, first, last, sums))
-        found.append(left_over * math.exp(log_depth))
+        log_depth, u = log_depth_of(pressed_together(geometry, pose, True, LEVEL, overlaps, first, last, sums))
+        found.append((left_over * math.exp(log_depth), u))
         first = last
     return found
 
 
 @styled
 def fig_cells(cells, lobes):
-    """Cells over place and depth, over place and slope of the axle, and how many of them err by how much."""
+    """Cells over offset and depth, over offset and slope of the axle, and how many of them err by how much."""
     figure = Figure(figsize=(7.2, 7.0), layout="constrained")
     places, errors = figure.subplots(2, 2, height_ratios=(1.25, 1.0))
     draw_cells(places[0], cells, lobes, DEPTH)
     draw_cells(places[1], cells, lobes, SLOPE)
-    places[0].set(yscale="log", ylabel="depth D / µm", title="(a) place and depth")
-    places[1].set(ylabel="slope of the axle / mrad", title="(b) place and slope")
+    places[0].set(yscale="log", ylabel="depth D / µm", title="(a) offset and depth")
+    places[1].set(ylabel="slope of the axle / mrad", title="(b) offset and slope")
     for axes in places:
-        axes.set_xlabel("place of the wheel on the rail, t / mm")
+        axes.set_xlabel("offset of the wheel less its place of contact / mm")
     depths = 1e6 * cells["D_low_m"].min(), 1e6 * cells["D_high_m"].max()
     ticks = [tick for tick in (5, 10, 20, 50, 100, 200, 500) if depths[0] <= tick <= depths[1]]
     places[0].set_yticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -175,7 +177,8 @@ def fig_cells(cells, lobes):
 
 
 def draw_cells(axes, cells, lobes, across):
-    """Cells that are looked up or solved as rectangles over t and another coordinate, finer ones above, and lobes."""
+    """Cells that are looked up or solved as rectangles over the offset and another coordinate, finer ones above; and
+    lobes."""
     drawn = {LOOKED_UP: 2.0, SOLVED: 2.5}
     for (level, state), part in cells[cells["state"].isin(drawn)].groupby(["level", "state"]):
         corners = np.column_stack([ALONG.unit * part[[*ALONG.ends]], across.unit * part[[*across.ends]]]).round(9)
@@ -203,7 +206,7 @@ def draw_errors(axes, cells, name, limits):
 
 
 def legend_entries(cells):
-    """Lattices with their steps in t, what is solved, lobes, and limits."""
+    """Lattices with their steps in the offset, what is solved, lobes, and limits."""
     entries = []
     for level in range(LEVELS):
         label = f"lattice {level + 1}: {MM * steps_of(level)[0]:g} mm"

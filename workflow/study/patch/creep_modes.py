@@ -104,8 +104,8 @@ def random_places(geometry, count, random):
         across, profile, depths = regions[n % len(regions)]
         yaw = 0.0 if random.random() < 0.4 else random.uniform(-0.02, 0.02)
         depth, t = math.exp(random.uniform(*np.log(depths))), middle + random.uniform(*across)
-        limits = NARROW if random.random() < 0.3 else WIDE
-        places.append((t, random.normal(0, 2e-3), depth, yaw, random.uniform(*profile), limits))
+        limits, slope, u = NARROW if random.random() < 0.3 else WIDE, random.normal(0, 2e-3), random.uniform(*profile)
+        places.append((t - u, slope, depth, yaw, u, limits))
     return places
 
 

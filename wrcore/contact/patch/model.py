@@ -46,7 +46,7 @@ NO_TABLE = PairTable(
 NODES, NUMBERS, MODES = 48, 72, 24
 """Rows of a cell, numbers of a node, and modes of each family of the creep force that are among them."""
 
-LOBE_COLUMNS, SHARES = 10 + 2 * MAX_PATCHES, (12, 16)
+LOBE_COLUMNS, SHARES = 10 + 2 * MAX_PATCHES, (12, 15)
 """Of a lobe that is looked up, see `wrcore.dynamics.coupled_lobes`, and of the cells that have a share in it, see
 `wrcore.dynamics.pair_cells`."""
 
