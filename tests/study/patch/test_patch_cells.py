@@ -83,17 +83,17 @@ def test_damping_at_rest_lifts_a_lobe():
 
 
 def test_the_figure_has_cells_lobes_and_shares(table, tmp_path):
-    lobes = pd.DataFrame({"t_m": [-0.0099], "slope": [2e-4], "yaw_rad": [0.0], "D_m": [8.5e-5]})
+    lobes = pd.DataFrame({"offset_m": [-0.0099], "slope": [2e-4], "yaw_rad": [0.0], "D_m": [8.5e-5]})
     figure = cells.fig_cells(table, lobes)
     places, errors = np.reshape(figure.axes, (2, 2))
     assert [len(axes.collections) for axes in places] == [2, 2]  # what is refined is not drawn
     for level, shown in ((1, places[1].collections[0]), (3, places[1].collections[1])):
-        assert np.ptp(shown.get_paths()[0].vertices, axis=0) == pytest.approx([0.2 * 0.5**level, 0.5 * 0.5**level])
+        assert np.ptp(shown.get_paths()[0].vertices, axis=0) == pytest.approx([0.8 * 0.5**level, 1.0 * 0.5**level])
     assert [to_hex(axes.collections[1].get_facecolor()[0], False).upper() for axes in places] == [
         cells.SOLVED_COLOR
     ] * 2
     (x, y), *_ = places[1].collections[0].get_paths()[0].vertices
-    assert (x, y) == pytest.approx((-10.0, 0.0), abs=1e-9)
+    assert (x, y) == pytest.approx((-20.0, 0.0), abs=1e-9)
     shares = [
         line.get_ydata().max()
         for line in errors[0].lines

@@ -4,7 +4,7 @@ Units change where it is drawn and nowhere before: m to mm and µm, rad to mrad.
 """
 
 import math
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import NamedTuple
 
 import numpy as np
@@ -63,8 +63,11 @@ class OwnPair(Pair):
     come with the package, which are those that it would solve."""
 
     def _read(self):
-        """Nothing is known before, and nothing is to be said of a file."""
-        self._told = True
+        """Nothing is known before."""
+
+    def _told(self):
+        """Nothing is to be said of a file."""
+        return nullcontext()
 
     def write(self):
         """Nothing is kept."""
@@ -163,7 +166,7 @@ def fig_cells(cells, lobes):
     places[0].set(yscale="log", ylabel="depth D / µm", title="(a) offset and depth")
     places[1].set(ylabel="slope of the axle / mrad", title="(b) offset and slope")
     for axes in places:
-        axes.set_xlabel("offset of the wheel less its place of contact / mm")
+        axes.set_xlabel("offset t − u / mm")
     depths = 1e6 * cells["D_low_m"].min(), 1e6 * cells["D_high_m"].max()
     ticks = [tick for tick in (5, 10, 20, 50, 100, 200, 500) if depths[0] <= tick <= depths[1]]
     places[0].set_yticks(ticks, [f"{tick:g}" for tick in ticks])
