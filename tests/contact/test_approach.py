@@ -64,8 +64,11 @@ def test_what_overlaps_are_pressed_by(benchmark_pair, y, yaw, spatial):
     assert found.square == pytest.approx(square, rel=5e-4)
     assert found.moment / found.square == pytest.approx(moment / square, abs=5e-6)
     moves = step * np.eye(5)[: 5 if spatial else 2]  # in planes, turns are left out
-    slopes = [(dense_at(move)[0] - dense_at(-move)[0]) / (2.0 * step) for move in moves]
-    np.testing.assert_allclose(found[2 : 2 + len(moves)], slopes, atol=3e-3 * math.hypot(*slopes[:2]))
+    slopes = np.array([np.subtract(dense_at(move), dense_at(-move)) / (2.0 * step) for move in moves])
+    size = math.hypot(*slopes[:2, 0])
+    np.testing.assert_allclose(found[2 : 2 + len(moves)], slopes[:, 0], atol=3e-3 * size)
+    about = np.subtract([found.moment_across, found.moment_up], moment / square * np.array(found[2:4]))
+    np.testing.assert_allclose(about, slopes[:2, 1] - moment / square * slopes[:2, 0], atol=2e-5 * size)
 
 
 def test_a_parabola_is_as_deep_as_it_is():

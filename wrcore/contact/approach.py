@@ -33,7 +33,8 @@ of the scan are off by 7e-4, and by 1e-3 where overlaps in a flange root merge."
 
 class Pressed(NamedTuple):
     """M0 of a patch's overlaps (m^3), their place on the wheel's profile times M0, and what M0 changes by where the
-    wheel's centre moves across and up (m^2) or the wheel turns about x, y and z (m^3)."""
+    wheel's centre moves across and up (m^2) or the wheel turns about x, y and z (m^3); what the second one changes by
+    across and up (m^3)."""
 
     square: float
     moment: float
@@ -42,6 +43,8 @@ class Pressed(NamedTuple):
     about_x: float
     about_y: float
     about_z: float
+    moment_across: float
+    moment_up: float
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -50,6 +53,7 @@ def add_pressed(one, other):
     return Pressed(
         one.square + other.square, one.moment + other.moment, one.across + other.across, one.up + other.up,
         one.about_x + other.about_x, one.about_y + other.about_y, one.about_z + other.about_z,
+        one.moment_across + other.moment_across, one.moment_up + other.moment_up,
     )  # fmt: skip
 
 
@@ -76,14 +80,14 @@ def _of_parabola(pose, row):
     depth, cosine = row[PENETRATION], row[COSINE]
     square = depth * depth * math.sqrt(depth / row[CURVATURE_Y]) / (0.9375 * cosine)
     gap = -1.25 * square * cosine / depth
-    rates = _strip_rates(gap, math.tan(row[ANGLE]), row[X], row[Y] - pose.y, row[Z] - pose.z)
-    return Pressed(square, square * row[U_WHEEL], *rates)
+    rates, u = _strip_rates(gap, math.tan(row[ANGLE]), row[X], row[Y] - pose.y, row[Z] - pose.z), row[U_WHEEL]
+    return Pressed(square, square * u, *rates, u * rates[0], u * rates[1])
 
 
 @jit(allocates=False, fastmath=FUSED)
 def _strip_by_strip(geometry, pose, lean, nodes):
     """Of an overlap at its nodes, in axes that ``lean``, and how many there are."""
-    square = moment = across = up = about_x = about_y = about_z = 0.0
+    square = moment = across = up = about_x = about_y = about_z = moment_across = moment_up = 0.0
     count = 0
     for k in range(nodes.first, nodes.end):
         u = nodes.u + k * nodes.step
@@ -97,11 +101,13 @@ def _strip_by_strip(geometry, pose, lean, nodes):
             one = _strip_rates(gap, slope, px, ur + geometry.rail_distance - pose.y, pz)
             square, moment, count = square + gap * gap, moment + gap * gap * u, count + 1
             across, up = across + one[0], up + one[1]
+            moment_across, moment_up = moment_across + one[0] * u, moment_up + one[1] * u
             about_x, about_y, about_z = about_x + one[2], about_y + one[3], about_z + one[4]
     step = nodes.step
     return count, Pressed(
-        step * square, step * moment, step * across, step * up, step * about_x, step * about_y, step * about_z
-    )
+        step * square, step * moment, step * across, step * up, step * about_x, step * about_y, step * about_z,
+        step * moment_across, step * moment_up,
+    )  # fmt: skip
 
 
 @jit(allocates=False, forceinline=True)
@@ -115,8 +121,11 @@ def pressed_from(pose, middle, sums):
     """Of an overlap with these `slopes_of_square`."""
     roll, yaw = sums[0, 1 + ROLL], sums[0, 1 + YAW]
     turned = -(pose.ex * roll + pose.ez * yaw) / pose.ey  # about its axle a wheel turns without a change
-    moment = middle * sums[0, 0] + sums[1, 0]
-    return Pressed(sums[0, 0], moment, sums[0, 1 + ACROSS], sums[0, 1 + UP], roll, turned, yaw)
+    across, up = sums[0, 1 + ACROSS], sums[0, 1 + UP]
+    return Pressed(
+        sums[0, 0], middle * sums[0, 0] + sums[1, 0], across, up, roll, turned, yaw,
+        middle * across + sums[1, 1 + ACROSS], middle * up + sums[1, 1 + UP],
+    )  # fmt: skip
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

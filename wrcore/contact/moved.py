@@ -67,8 +67,9 @@ def _put(sums, row, scale, square, across, up, rolled, yawed):
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
-    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; only with
-    M1, M0 and what this one changes by unless ``whole``. Returns the number of nodes in overlap."""
+    """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; unless
+    ``whole``, only with M0 and M1 and, of this one, what it changes by across and up. Returns the number of nodes in
+    overlap."""
     grid, zero, reach = nodes.grid, lanes.lanes8(0.0), geometry.half_distance + nodes.u
     begin, end = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end))
     ahead, aside = pose.tilt * pose.q, nodes.ur + geometry.rail_distance - pose.side * pose.y
@@ -98,18 +99,17 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
         one = gap * index
         m0, m1 = m0 + gap * gap, m1 + one * gap
         y0, z0, r0, w0 = y0 + gap * across, z0 + gap, r0 + gap * rolled, w0 + gap * yawed
+        y1, z1 = y1 + one * across, z1 + one
         if whole:
             two = one * index
-            y1, z1, r1, w1 = y1 + one * across, z1 + one, r1 + one * rolled, w1 + one * yawed
+            r1, w1 = r1 + one * rolled, w1 + one * yawed
             y2, z2, r2, w2 = y2 + two * across, z2 + two, r2 + two * rolled, w2 + two * yawed
             m2 = m2 + two * gap
     step = nodes.step
     _put(sums, 0, step, m0, y0, z0, r0, w0)
+    _put(sums, 1, step * step, m1, y1, z1, r1, w1)
     if whole:
-        _put(sums, 1, step * step, m1, y1, z1, r1, w1)
         _put(sums, 2, step * step * step, m2, y2, z2, r2, w2)
-    else:
-        sums[1, 0] = step * step * lanes.total(m1)
     return count
 
 
@@ -209,7 +209,7 @@ def slopes_of_moments(geometry, pose, row, least, sums):
 
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_square(geometry, pose, row, least, sums):
-    """As `slopes_of_moments`, only with what `wrcore.contact.approach.pressed_from` wants: M1, M0 and its slopes."""
+    """As `slopes_of_moments`, only with what `wrcore.contact.approach.pressed_from` wants."""
     return _of_nodes(geometry, pose, row, least, False, sums)
 
 

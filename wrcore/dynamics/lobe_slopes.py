@@ -52,7 +52,7 @@ from wrcore.dynamics.pair_table import (
     of_two,
 )
 from wrcore.dynamics.table_slopes import look_share_slopes_up, look_slopes_up, remainder_slopes, weigh_slopes
-from wrcore.dynamics.tabulated_wheel import lifted_place
+from wrcore.dynamics.tabulated_wheel import lifted_place, place_with_depth
 from wrcore.dynamics.wheel import contact_of, falling, press_wheels
 from wrcore.kernels.jit import FUSED, jit
 
@@ -131,7 +131,7 @@ def lobe_slopes(model, m, rows, count, scratch, out, work):
 def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
     """`Pressed` of the overlaps in ``rows`` at a pose nearby, a moment of NaN where one of them has few nodes. The
     ``first`` time it is written into ``work.weights`` over which nodes they are summed."""
-    total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for patch in range(count):
         least = least_of(rows[patch]) if first else work.weights[patch]
         middle, enough = slopes_of_square(geometry, pose, rows[patch], least, sums)
@@ -145,7 +145,11 @@ def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
 def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
     """Fill ``work.lattice`` (SLOPES, AXES) with what the wheel's place on the lattice changes by."""
     rates = work.lattice
-    u, depth, aside = pressed.moment / pressed.square, lift.depth * lift.sine, lift.share * lift.depth * lift.sine
+    (_, (_, u)), depth, aside = (
+        lifted_place(m, pressed, lift),
+        lift.depth * lift.sine,
+        lift.share * lift.depth * lift.sine,
+    )
     own = pressed.across, pressed.up, pressed.about_x, pressed.about_z
     ahead, half = -1.0 if m.vx < 0.0 else 1.0, model.geometry.half_distance
     for k in range(MOVES):
@@ -153,7 +157,8 @@ def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
         across = DIFFERENCE if k == ACROSS else 0.0
         there = make_pose(1.0, m.y + across, m.z + (DIFFERENCE if k == UP else 0.0), ex, ey, ez, True)
         moved = _pressed_nearby(model.geometry, there, False, rows, count, sums, work)
-        its, its_u = lift_of(model, m, moved), moved.moment / moved.square
+        its = lift_of(model, m, moved)
+        its_u = lifted_place(m, moved, its)[1][1]
         across += half * (ey - m.ey) - its.share * its.depth * its.sine + aside
         rates[k, OFFSET], rates[k, TILT] = (across - its_u + u) / DIFFERENCE, (ez - m.ez) / DIFFERENCE
         rates[k, TURN] = ahead * (ex - m.ex) / DIFFERENCE
@@ -161,11 +166,12 @@ def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
     size = math.sqrt(pressed.across * pressed.across + pressed.up * pressed.up)
     approach = approach_of(pressed, m)[3]
     faster = (lift_share(model, approach + SMALL) - lift.share) / (SMALL * size)
+    left = place_with_depth(pressed, lift) / (1.0 - lift.share)
     speeds = 0.0, pressed.across, pressed.up, pressed.about_x, pressed.about_y, pressed.about_z
     for j in range(6):
         share = faster * speeds[j]
         rates[MOVES + j] = 0.0
-        rates[MOVES + j, OFFSET], rates[MOVES + j, DEPTH] = -share * depth, -share / (1.0 - lift.share)
+        rates[MOVES + j, OFFSET], rates[MOVES + j, DEPTH] = left * share - share * depth, -share / (1.0 - lift.share)
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)

@@ -100,11 +100,19 @@ def add_tabulated(model, m, spatial, rows, first, last, out, wrench, counters, m
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
+def place_with_depth(pressed, lift):
+    """What the place of overlaps on the wheel's profile changes by with ln D where the wheel is lifted, m."""
+    u = pressed.moment / pressed.square
+    across, up = pressed.moment_across - u * pressed.across, pressed.moment_up - u * pressed.up
+    return lift.depth * (lift.sine * across - lift.cosine * up) / pressed.square
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def lifted_place(m, pressed, lift):
     """Pose of a lifted wheel, and ln D and place on the wheel's profile of its overlaps if they are one lobe."""
-    height, (log_depth, u) = lift.share * lift.depth, log_depth_of(pressed)
+    height, (log_depth, u), less = lift.share * lift.depth, log_depth_of(pressed), math.log(1.0 - lift.share)
     pose = make_pose(1.0, m.y - height * lift.sine, m.z + height * lift.cosine, m.ex, m.ey, m.ez, True)
-    return pose, (log_depth + math.log(1.0 - lift.share), u)
+    return pose, (log_depth + less, u + less * place_with_depth(pressed, lift))
 
 
 @jit(allocates=False, fastmath=FUSED)
