@@ -1,17 +1,21 @@
 """Exact contact, looked up: lattices of solutions of one wheel on one rail, solved where they are first needed.
 
 A patch consists of lobes: overlaps that lie near each other, or are about to be one, are one. A lobe's place over the
-rail decides its contact: t, the distance of the wheel's tape circle from the rail's origin across the track; the slope
-of the wheel's axle; its yaw; the part of the wheel's profile where it lies; and the depth D that its overlaps imply,
+rail decides its contact: its offset t - u; the slope of the wheel's axle; its yaw; the part of the wheel's profile
+where it lies; and the depth D that its overlaps imply,
 
-    M0 = sum of int g^2 du,   D = (15/16 sqrt(B0) M0)^0.4,
+    M0 = sum of int g^2 du,   u = sum of int g^2 u du / M0,   D = (15/16 sqrt(B0) M0)^0.4,
 
-with the gap g along z: a sum that stays smooth where overlaps merge. Between nodes at no yaw: Catmull-Rom along each of
-t, slope and ln D, linear in the other two, the three together less twice what is linear in all (a Boolean sum, which
-wants 32 nodes in place of 64 and errs by the product of two curvatures more). What yaw changes from the middle of a
-cell is a parabola through three nodes, linear between nodes of a lattice with twice the steps. A node depends on its
-place alone, not on what was solved before it. Where the lattice is too coarse a finer one takes over
-(:mod:`wrcore.dynamics.pair_cells`).
+with the gap g along z and u on the wheel's profile: sums that stay smooth where overlaps merge. t is the distance of
+the wheel's tape circle from the rail's origin across the track. By itself it is a poor coordinate: in a flange root
+that is as round as its rail all numbers change within micrometres of it, as u does by millimetres. On a convex rail u
+falls where t grows, and the offset tells the places apart.
+
+Between nodes at no yaw: Catmull-Rom along each of offset, slope and ln D, linear in the other two, the three together
+less twice what is linear in all (a Boolean sum, which wants 32 nodes in place of 64 and errs by the product of two
+curvatures more). What yaw changes from the middle of a cell is a parabola through three nodes, linear between nodes of
+a lattice with twice the steps. A node depends on its place alone, not on what was solved before it. Where the lattice
+is too coarse a finer one takes over (:mod:`wrcore.dynamics.pair_cells`).
 
 References
 ----------
