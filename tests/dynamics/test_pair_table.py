@@ -193,8 +193,8 @@ def test_both_parts_of_a_lobe_roll_as_contacts_of_their_own(benchmark_pair):
     assert abs(expected[3]) > 20.0
 
 
-TREAD_AND_ROOT = -5.65e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
-BENT = -4.335e-3, 7e-4, 1e-4, -8.4e-3, -0.0343, pair_table.WIDE
+TREAD_AND_ROOT = 16.54e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
+BENT = 29.64e-3, 7e-4, 1e-4, -8.4e-3, -0.0343, pair_table.WIDE
 """Places: tread and root carry in one overlap; a flange root lies in a gauge corner, bent by 0.85 rad."""
 
 
@@ -346,8 +346,8 @@ def test_a_lobe_that_barely_touches_is_left_out(own_cache):
     model, _ = compile_scene(load_scene(wr.example("trailer_vehicle"), {"contact.patch": "exact"}))
     strips = model.contact.strips._replace(looked_up=model.contact.friction)
     pair, found = pair_store.Pair(model.contact._replace(strips=strips), "barely"), []
-    for t in (-5.2e-3, -5.1875e-3, -5.175e-3):
-        place = t, 3.75e-4, 7.315235792977453e-05, -2.37037037e-3, -0.028, pair_table.WIDE
+    for offset in (23.205e-3, 23.337e-3, 23.462e-3):
+        place = offset, 3.75e-4, 7.315235792977453e-05, -2.37037037e-3, -0.028, pair_table.WIDE
         found.append(pair.solve(place, creep_modes(0.3).points[:2])[0][pair_table.LOG_NORMAL])
     before, here, beyond = found
     assert before < here < beyond < before + 0.02
