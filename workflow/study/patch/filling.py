@@ -70,8 +70,8 @@ def main():
     words, resolution = asked.scenes, asked.resolution
     wanted = {name: scene for name, scene in SCENES.items() if not words or any(word in name for word in words)}
     waited("suspended_wheelset", {"contact.friction": 0.27, "integration.duration": 0.01}, resolution)  # compiles
-    table = pd.DataFrame({name: waited(*scene, resolution) for name, scene in wanted.items()}).T
-    print(table.to_markdown(floatfmt=".1f"))
+    for name, scene in wanted.items():
+        print(pd.DataFrame({name: waited(*scene, resolution)}).T.to_markdown(floatfmt=".1f"), flush=True)
 
 
 if __name__ == "__main__":
