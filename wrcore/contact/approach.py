@@ -10,14 +10,15 @@ would hang free at the height
     depth = 2.5 M0 / G,
 
 its deepest penetration, and it comes nearer at the speed (dM0/dt) / G. All three are sums over the overlaps: nothing
-steps where two of them merge.
+steps where two of them merge. They are summed over the wheel profile's own nodes: those of the scan move the
+place of an overlap to and fro, which costs critical speeds of looked-up contact 0.2 m/s.
 """
 
 import math
 from typing import NamedTuple
 
 from wrcore.contact.detection import WIDE
-from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, scan_nodes, slopes_of_square
+from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, slopes_of_square
 from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, U_WHEEL, X, Y, Z
 from wrcore.contact.scan import leaves_cells
 from wrcore.contact.strip import AHEAD, LIFT, changes_along, cubic_at, leaning, on_rail, strip_point, with_rail_along
@@ -25,10 +26,6 @@ from wrcore.kernels.jit import FUSED, jit
 
 LEVEL = 1.0, 0.0
 """Axes that do not lean, see `wrcore.contact.strip.lean_at`."""
-
-TREAD, SMOOTH = 0.9928, 14
-"""Nodes of the scan over which M0 is summed, at least, where the normal has this cosine; else those of the profile: 10
-of the scan are off by 7e-4, and by 1e-3 where overlaps in a flange root merge."""
 
 
 class Pressed(NamedTuple):
@@ -110,12 +107,6 @@ def _strip_by_strip(geometry, pose, lean, nodes):
     )  # fmt: skip
 
 
-@jit(allocates=False, forceinline=True)
-def least_of(row):
-    """Nodes of the scan that an overlap takes."""
-    return float(SMOOTH) if row[COSINE] > TREAD else math.inf
-
-
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
 def pressed_from(pose, middle, sums):
     """Of an overlap with these `slopes_of_square`."""
@@ -133,11 +124,9 @@ def pressed_by(geometry, pose, spatial, lean, row, sums):
     """`Pressed` of one overlap of a left wheel, found by moments at this ``pose``. ``sums`` (3, 1 + MOVES) is
     scratch."""
     if spatial and not changes_along(geometry) and not leaves_cells(pose):
-        middle, _ = slopes_of_square(geometry, pose, row, least_of(row), sums)
+        middle = slopes_of_square(geometry, pose, row, sums)
         return _of_parabola(pose, row) if math.isnan(middle) else pressed_from(pose, middle, sums)
-    count, found = _strip_by_strip(geometry, pose, lean, scan_nodes(geometry, pose, row))
-    if count < least_of(row):
-        count, found = _strip_by_strip(geometry, pose, lean, fine_nodes(geometry, pose, row))
+    count, found = _strip_by_strip(geometry, pose, lean, fine_nodes(geometry, pose, row))
     return found if count >= WIDE else _of_parabola(pose, row)
 
 

@@ -186,31 +186,28 @@ def _narrow_slopes(geometry, pose, row, sums):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _of_nodes(geometry, pose, row, least, whole, sums):
-    """See `slopes_of_moments`."""
-    if least < math.inf:
-        nodes = scan_nodes(geometry, pose, row)
-        count = _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, whole, sums)
-        if count >= least:
-            return nodes.u, True
+def _of_fine_nodes(geometry, pose, row, whole, sums):
+    """As `slopes_of_moments`, over the profile's own nodes."""
     nodes = fine_nodes(geometry, pose, row)
-    if _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, whole, sums) >= WIDE:
-        return nodes.u, False
-    return math.nan, False
+    count = _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, whole, sums)
+    return nodes.u if count >= WIDE else math.nan
 
 
 @jit(allocates=False, fastmath=FUSED)
-def slopes_of_moments(geometry, pose, row, least, sums):
+def slopes_of_moments(geometry, pose, row, sums):
     """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row``, found by moments and spatially at a pose
-    nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes, and
-    whether the scan's were enough: from ``least`` on."""
-    return _of_nodes(geometry, pose, row, least, True, sums)
+    nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes."""
+    nodes = scan_nodes(geometry, pose, row)
+    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, True, sums) >= WIDE:
+        return nodes.u
+    return _of_fine_nodes(geometry, pose, row, True, sums)
 
 
 @jit(allocates=False, fastmath=FUSED)
-def slopes_of_square(geometry, pose, row, least, sums):
-    """As `slopes_of_moments`, only with what `wrcore.contact.approach.pressed_from` wants."""
-    return _of_nodes(geometry, pose, row, least, False, sums)
+def slopes_of_square(geometry, pose, row, sums):
+    """As `slopes_of_moments`, over the profile's own nodes, and only with what
+    `wrcore.contact.approach.pressed_from` wants."""
+    return _of_fine_nodes(geometry, pose, row, False, sums)
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -219,7 +216,7 @@ def move_patch(geometry, pose, row, patch, sums, moved):
     is after each move by `DIFFERENCE`; False where only a search tells. ``sums`` (3, 1 + MOVES) is scratch."""
     if leaves_cells(pose):
         return False
-    middle, _ = slopes_of_moments(geometry, pose, row, WIDE, sums)
+    middle = slopes_of_moments(geometry, pose, row, sums)
     if math.isnan(middle):
         middle = _narrow_slopes(geometry, pose, row, sums)
         if math.isnan(middle):

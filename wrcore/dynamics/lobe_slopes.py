@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from wrcore.contact.approach import Pressed, add_pressed, approach_of, least_of, pressed_from
+from wrcore.contact.approach import Pressed, add_pressed, approach_of, pressed_from
 from wrcore.contact.creepage import creepages
 from wrcore.contact.detection import SPATIAL
 from wrcore.contact.moved import ACROSS, DIFFERENCE, MOVES, ROLL, UP, YAW, moved_axle, slopes_of_square
@@ -102,7 +102,7 @@ def lobe_slopes(model, m, rows, count, scratch, out, work):
     pose, ahead = make_pose(1.0, m.y, m.z, m.ex, m.ey, m.ez, True), -1.0 if m.vx < 0.0 else 1.0
     if group_end(geometry, rows, count, 0) < count or leaves_cells(pose):
         return False
-    pressed = _pressed_nearby(geometry, pose, True, rows, count, scratch, work)
+    pressed = _pressed_nearby(geometry, pose, rows, count, scratch)
     if math.isnan(pressed.moment):
         return False
     lift = lift_of(model, m, pressed)
@@ -128,15 +128,11 @@ def lobe_slopes(model, m, rows, count, scratch, out, work):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _pressed_nearby(geometry, pose, first, rows, count, sums, work):
-    """`Pressed` of the overlaps in ``rows`` at a pose nearby, a moment of NaN where one of them has few nodes. The
-    ``first`` time it is written into ``work.weights`` over which nodes they are summed."""
+def _pressed_nearby(geometry, pose, rows, count, sums):
+    """`Pressed` of the overlaps in ``rows`` at a pose nearby, a moment of NaN where one of them has few nodes."""
     total = Pressed(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for patch in range(count):
-        least = least_of(rows[patch]) if first else work.weights[patch]
-        middle, enough = slopes_of_square(geometry, pose, rows[patch], least, sums)
-        if first:
-            work.weights[patch] = 0.0 if enough else math.inf
+        middle = slopes_of_square(geometry, pose, rows[patch], sums)
         total = add_pressed(total, pressed_from(pose, middle, sums))
     return total
 
@@ -156,7 +152,7 @@ def _lattice_rates(model, m, pressed, lift, rows, count, sums, work):
         ex, ey, ez = moved_axle(m.ex, m.ey, m.ez, k, DIFFERENCE)
         across = DIFFERENCE if k == ACROSS else 0.0
         there = make_pose(1.0, m.y + across, m.z + (DIFFERENCE if k == UP else 0.0), ex, ey, ez, True)
-        moved = _pressed_nearby(model.geometry, there, False, rows, count, sums, work)
+        moved = _pressed_nearby(model.geometry, there, rows, count, sums)
         its = lift_of(model, m, moved)
         its_u = lifted_place(m, moved, its)[1][1]
         across += half * (ey - m.ey) - its.share * its.depth * its.sine + aside
