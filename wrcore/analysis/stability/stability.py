@@ -189,13 +189,13 @@ def critical_speeds(scenes: Scene | str | PathLike[str] | dict[str, Scene], spee
     Examples
     --------
     >>> import wrcore as wr
-    >>> wr.critical_speeds(wr.example("suspended_wheelset"), range(40, 71, 10)).round(0).T
+    >>> wr.critical_speeds(wr.example("suspended_wheelset"), range(40, 71, 10)).round(1).T
                                              0
     variant                 suspended_wheelset
-    critical_speed_m_per_s                58.0
+    critical_speed_m_per_s                58.5
     mode                      wheelset hunting
-    frequency_Hz                           7.0
-    wavelength_m                           8.0
+    frequency_Hz                           6.9
+    wavelength_m                           8.5
     """
     rows, speeds = [], rising(speeds)
     if not isinstance(scenes, dict):
