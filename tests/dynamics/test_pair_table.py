@@ -353,6 +353,25 @@ def test_a_lobe_that_barely_touches_is_left_out(own_cache):
     assert before < here < beyond < before + 0.02
 
 
+def test_what_is_left_of_a_lobe_that_is_lifted_and_tilted():
+    """Depth and place of two parabolas from which a slanting plane is taken, against sums over their squares."""
+    rows, lobe, y = np.zeros((2, PATCH_COLUMNS)), np.zeros(LOBE_COLUMNS), 0.01
+    lobe[coupled_lobes.LIFT], lobe[coupled_lobes.TILT] = 6e-6, 3e-3
+    for row, place, depth, b, angle in zip(rows, (9e-3, 13e-3), (6e-5, 4e-5), (1.5, 4.0), (0.2, 0.05), strict=True):
+        row[reduction.U_WHEEL], row[reduction.Y], row[reduction.COSINE] = place - 0.05, place, math.cos(angle)
+        row[reduction.PENETRATION], row[reduction.CURVATURE_Y] = depth, b
+    square = moment = 0.0
+    for row in rows:
+        s, cosine = np.linspace(-0.01, 0.01, 40001), row[reduction.COSINE]
+        plane = lobe[coupled_lobes.LIFT] + lobe[coupled_lobes.TILT] * (s + (row[reduction.Y] - y) / cosine)
+        gap = np.maximum(row[reduction.PENETRATION] - row[reduction.CURVATURE_Y] * s**2 - plane, 0.0) / cosine
+        square += (gap**2).sum() * 5e-7 * cosine
+        moment += (gap**2 * (row[reduction.U_WHEEL] + s * cosine)).sum() * 5e-7 * cosine
+    depth, u = coupled_lobes.depth_left(rows, 0, 2, lobe, y)
+    assert depth == pytest.approx((0.9375 * math.sqrt(pair_table.CURVATURE) * square) ** 0.4, rel=1e-3)
+    assert u == pytest.approx(moment / square, abs=2e-6)
+
+
 def points_of_hertz(a, b, n=16):
     """Places (n^2, 2) in an ellipse that share its Hertz pressure alike."""
     radius = np.sqrt(1.0 - (1.0 - (np.arange(n) + 0.5) / n) ** (2.0 / 3.0))
