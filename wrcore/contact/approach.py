@@ -18,7 +18,7 @@ import math
 from typing import NamedTuple
 
 from wrcore.contact.detection import WIDE
-from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, fine_nodes, slopes_of_square
+from wrcore.contact.moved import ACROSS, ROLL, UP, YAW, slopes_of_square, smooth_nodes
 from wrcore.contact.reduction import ANGLE, COSINE, CURVATURE_Y, PENETRATION, U_WHEEL, X, Y, Z
 from wrcore.contact.scan import leaves_cells
 from wrcore.contact.strip import AHEAD, LIFT, changes_along, cubic_at, leaning, on_rail, strip_point, with_rail_along
@@ -126,7 +126,7 @@ def pressed_by(geometry, pose, spatial, lean, row, sums):
     if spatial and not changes_along(geometry) and not leaves_cells(pose):
         middle = slopes_of_square(geometry, pose, row, sums)
         return _of_parabola(pose, row) if math.isnan(middle) else pressed_from(pose, middle, sums)
-    count, found = _strip_by_strip(geometry, pose, lean, fine_nodes(geometry, pose, row))
+    count, found = _strip_by_strip(geometry, pose, lean, smooth_nodes(geometry, pose, row)[0])
     return found if count >= WIDE else _of_parabola(pose, row)
 
 

@@ -11,7 +11,7 @@ SCAN_STEP = 0.6e-3
 
 # Columns of the profile arrays.
 VALUE, SLOPE, CURVATURE = range(3)
-# Rows of the strip arrays (scan and fine); with along = tilt R' a strip's radius has the shares
+# Rows of the strip arrays (scan, fine and spread); with along = tilt R' a strip's radius has the shares
 # R along = tilt ALONG and R sqrt(1 - along^2) = R - tilt^2 (DOWN_2 + tilt^2 (DOWN_4 + tilt^2 DOWN_6)) to along^8/26.
 RADIUS, ALONG, DOWN_2, DOWN_4, DOWN_6 = range(5)
 # Further rows of the scan arrays.
@@ -20,6 +20,9 @@ RAIL_RESERVE, RAIL_COSINE = 4, 5
 
 LANES = 8
 """Strips are taken in multiples of this: whole vector registers."""
+
+SPREAD = 4
+"""Of the profile's own nodes each of so many is a spread one."""
 
 _MOST_BLOCKS = 56
 """Blocks that are told apart: of the 64 bits of a word, in whole registers, one left over."""
@@ -71,6 +74,10 @@ class ContactGeometry(NamedTuple):
     fine_rail: np.ndarray
     """(4, m - 1 + LANES): the rail between its own nodes, as in ``scan_rail``, and padding; padding alone where the two
     spacings differ."""
+    spread_wheel: np.ndarray
+    """(5, n / SPREAD + LANES): ``fine_wheel`` at its spread nodes, from the first on, and padding."""
+    spread_rail: np.ndarray
+    """(SPREAD, 4, m / SPREAD + LANES): ``fine_rail`` in as many cells, from each of the first on."""
     wheel_start: float
     wheel_step: float
     rail_start: float
@@ -95,11 +102,12 @@ def contact_geometry(wheel, rail, rolling_radius, half_distance, rail_distance):
     scan_rail, scan_rail_start, block = _rail_scan(rail)
     scan_wheel, scan_wheel_start = _wheel_scan(wheel, rolling_radius, scan_rail.shape[1])
     gaps = zone_gaps(scan_wheel, scan_rail, block, rolling_radius)
+    strips, cells = _strip_rows(rolling_radius - wheel.f, -wheel.df), _fine_rail(wheel, rail)
     return ContactGeometry(
         np.column_stack([-wheel.f, -wheel.df, -wheel.d2f]), np.column_stack([rail.f, rail.df, rail.d2f]),
         scan_wheel, scan_rail,
         gaps, zone_planar_errors(scan_wheel, scan_rail, block), block,
-        _padded(_strip_rows(rolling_radius - wheel.f, -wheel.df)), _padded(_fine_rail(wheel, rail)),
+        _padded(strips), _padded(cells), _padded(strips[:, ::SPREAD]), _spread(cells),
         float(wheel.u[0]), wheel.spacing, float(rail.u[0]), rail.spacing,
         scan_wheel_start, scan_rail_start,
         float(rolling_radius), float(half_distance), rail_distance,
@@ -141,6 +149,12 @@ def _strip_rows(radius, slope):
 
 def _padded(rows):
     return np.pad(rows, ((0, 0), (0, LANES)))
+
+
+def _spread(cells):
+    """See ``spread_rail``; all of one length, of cells that there are."""
+    count = cells.shape[1] // SPREAD
+    return np.stack([_padded(cells[:, first::SPREAD][:, :count]) for first in range(SPREAD)])
 
 
 def zone_gaps(wheel, rail, block, rolling_radius):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.contact.detection import WIDE
-from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS, SCAN_STEP
+from wrcore.contact.geometry import ALONG, DOWN_2, DOWN_4, DOWN_6, LANES, RADIUS, SCAN_STEP, SPREAD
 from wrcore.contact.reduction import (
     BEYOND,
     COSINE,
@@ -28,7 +28,7 @@ from wrcore.contact.reduction import (
     edge_by_newton,
     patch_from_moments,
 )
-from wrcore.contact.scan import Grid, fine_cell_shift, fine_grid, leaves_cells, make_window
+from wrcore.contact.scan import Grid, fine_cell_shift, fine_grid, leaves_cells, make_window, spread_grid, strip_place
 from wrcore.contact.strip import cubic_at, make_pose, strip_point
 from wrcore.kernels import lanes
 from wrcore.kernels.jit import FUSED, jit
@@ -42,6 +42,13 @@ DIFFERENCE = 1e-9
 
 ROUNDING = 1e-6
 """Of places among nodes, in steps."""
+
+TREAD, MANY = 0.9928, 20
+"""Overlaps where the normal has at least this cosine are summed over the profile's spread nodes if they have so many of
+them, 4 mm: that costs their place 0.01 um."""
+
+STEEP = 10.0
+"""Slope of a gap beyond any of profiles."""
 
 
 class Nodes(NamedTuple):
@@ -69,14 +76,14 @@ def _put(sums, row, scale, square, across, up, rolled, yawed):
 def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
     """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 about the first node and what they change by in each move; unless
     ``whole``, only with M0 and M1 and, of this one, what it changes by across and up. Returns the number of nodes in
-    overlap."""
+    overlap, the first and the last one."""
     grid, zero, reach = nodes.grid, lanes.lanes8(0.0), geometry.half_distance + nodes.u
     begin, end = lanes.lanes8(float(nodes.first)), lanes.lanes8(float(nodes.end))
     ahead, aside = pose.tilt * pose.q, nodes.ur + geometry.rail_distance - pose.side * pose.y
     tilted = -pose.ey / (pose.q * pose.q * pose.q)
     sink, along_y, along_z = -2.0 * tilted * pose.tilt, tilted * pose.side * pose.y_along, tilted * pose.z_along
     m0 = m1 = m2 = y0 = y1 = y2 = z0 = z1 = z2 = r0 = r1 = r2 = w0 = w1 = w2 = zero
-    count = 0
+    count, first, last = 0, -1, 0
     for k in range(0, nodes.end, LANES):
         node, cell, index = np.uint64(grid.node + k), np.uint64(grid.cell + k), float(k) + lanes.ramp8()
         square, along = grid.tilt_square, lanes.load8(wheel, ALONG, node)
@@ -93,7 +100,10 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
         slope = pose.side * slope
         gap = lanes.where_below(index, begin, zero, lanes.where_below(index, end, gap, zero))
         gap = lanes.where_below(gap, zero, gap, zero)
-        count += lanes.count_bits(lanes.below(gap, zero))
+        overlap = lanes.below(gap, zero)
+        if overlap > 0:
+            first = k + lanes.lowest_bit(overlap) if first < 0 else first
+            last, count = k + lanes.highest_bit(overlap), count + lanes.count_bits(overlap)
         px, py = ahead * along + (reach + nodes.step * index) * pose.ex, pose.side * (aside + nodes.step * index + d)
         across, rolled, yawed = zero - slope, py + slope * (height - pose.z), circled - slope * px
         one = gap * index
@@ -110,7 +120,42 @@ def _moment_slopes(geometry, pose, nodes, wheel, rail, whole, sums):
     _put(sums, 1, step * step, m1, y1, z1, r1, w1)
     if whole:
         _put(sums, 2, step * step * step, m2, y2, z2, r2, w2)
-    return count
+    return count, first, last
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def _at_node(nodes, wheel, rail, k):
+    """Gap at a node, its height, its distance from the start of the rail's cell below, and the rail's slope there."""
+    d, height = strip_place(nodes.grid, wheel, k)
+    cell = np.uint64(nodes.grid.cell + k)
+    c1, c2, c3 = rail[1, cell], rail[2, cell], rail[3, cell]
+    return height - (rail[0, cell] + d * (c1 + d * (c2 + d * c3))), height, d, c1 + d * (2.0 * c2 + d * (3.0 * c3))
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _add_end(geometry, pose, nodes, wheel, rail, inside, outside, sums):
+    """Add what ``sums`` over nodes miss of M0, M1 and their changes, but for yaw, at an end of an overlap between two
+    nodes.
+
+    There g falls to 0 as a straight line, at theta h from the node inside. Sums of g^2 and of g from there on are short
+    of their integrals by g'^2 h^3 B3(theta) / 3 and g' h^2 B2(theta) / 2, with Bernoulli's polynomials (Euler and
+    Maclaurin)."""
+    if min(nodes.grid.node, nodes.grid.cell) + outside < 0:
+        return
+    gap, height, d, slope = _at_node(nodes, wheel, rail, inside)
+    beyond, h = _at_node(nodes, wheel, rail, outside)[0], nodes.step
+    if not 0.0 <= beyond < STEEP * h:  # the profile ends there
+        return
+    rise, slope = beyond - gap, pose.side * slope
+    theta = -gap / rise
+    less = theta * (1.0 - theta)
+    square, fall = h * rise * rise * less * (0.5 - theta) / 3.0, h * rise * (less - 1.0 / 6.0)
+    place, py = h * (inside + (outside - inside) * theta), nodes.ur + geometry.rail_distance + h * inside + d
+    rolled = pose.side * py - pose.y + slope * (height - pose.z)
+    sums[0, 0], sums[1, 0] = sums[0, 0] + square, sums[1, 0] + square * place
+    sums[0, 1 + UP], sums[1, 1 + UP] = sums[0, 1 + UP] + fall, sums[1, 1 + UP] + fall * place
+    sums[0, 1 + ROLL], fall = sums[0, 1 + ROLL] + fall * rolled, fall * slope
+    sums[0, 1 + ACROSS], sums[1, 1 + ACROSS] = sums[0, 1 + ACROSS] - fall, sums[1, 1 + ACROSS] - fall * place
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -136,6 +181,20 @@ def fine_nodes(geometry, pose, row):
     shift, step = fine_cell_shift(geometry, row[U_WHEEL], row[U_RAIL]), geometry.wheel_step
     grid, u, begin, end = fine_grid(geometry, pose, shift, row[OUTSIDE], row[BEYOND])
     return Nodes(grid, u, geometry.rail_start + grid.cell * step, step, 0, end - begin)
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def smooth_nodes(geometry, pose, row):
+    """The same, on a tread only its spread ones if there are many, and the scan's where wheel and rail have nodes of
+    different spacing; and the strip rows of the wheel and the rail's cubics that go with them."""
+    step = SPREAD * geometry.wheel_step
+    if geometry.fine_rail.shape[1] <= LANES:
+        return scan_nodes(geometry, pose, row), geometry.scan_wheel, geometry.scan_rail
+    if row[COSINE] <= TREAD or row[BEYOND] - row[OUTSIDE] <= MANY * step:
+        return fine_nodes(geometry, pose, row), geometry.fine_wheel, geometry.fine_rail
+    shift = fine_cell_shift(geometry, row[U_WHEEL], row[U_RAIL])
+    (grid, u, begin, end), start, rail = spread_grid(geometry, pose, shift, row[OUTSIDE], row[BEYOND])
+    return Nodes(grid, u, start + grid.cell * step, step, 0, end - begin), geometry.spread_wheel, rail
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
@@ -185,29 +244,28 @@ def _narrow_slopes(geometry, pose, row, sums):
     return place
 
 
-@jit(allocates=False, forceinline=True, fastmath=FUSED)
-def _of_fine_nodes(geometry, pose, row, whole, sums):
-    """As `slopes_of_moments`, over the profile's own nodes."""
-    nodes = fine_nodes(geometry, pose, row)
-    count = _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, whole, sums)
-    return nodes.u if count >= WIDE else math.nan
-
-
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_moments(geometry, pose, row, sums):
     """Fill ``sums`` (3, 1 + MOVES) with M0 to M2 of the overlap of a ``row``, found by moments and spatially at a pose
     nearby, and with what they change by in each move; returns about where they are, NaN without enough nodes."""
     nodes = scan_nodes(geometry, pose, row)
-    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, True, sums) >= WIDE:
+    if _moment_slopes(geometry, pose, nodes, geometry.scan_wheel, geometry.scan_rail, True, sums)[0] >= WIDE:
         return nodes.u
-    return _of_fine_nodes(geometry, pose, row, True, sums)
+    nodes = fine_nodes(geometry, pose, row)
+    count, _, _ = _moment_slopes(geometry, pose, nodes, geometry.fine_wheel, geometry.fine_rail, True, sums)
+    return nodes.u if count >= WIDE else math.nan
 
 
 @jit(allocates=False, fastmath=FUSED)
 def slopes_of_square(geometry, pose, row, sums):
-    """As `slopes_of_moments`, over the profile's own nodes, and only with what
-    `wrcore.contact.approach.pressed_from` wants."""
-    return _of_fine_nodes(geometry, pose, row, False, sums)
+    """As `slopes_of_moments`, over `smooth_nodes`, and only with what `wrcore.contact.approach.pressed_from` wants."""
+    nodes, wheel, rail = smooth_nodes(geometry, pose, row)
+    count, first, last = _moment_slopes(geometry, pose, nodes, wheel, rail, False, sums)
+    if count < WIDE:
+        return math.nan
+    _add_end(geometry, pose, nodes, wheel, rail, first, first - 1, sums)
+    _add_end(geometry, pose, nodes, wheel, rail, last, last + 1, sums)
+    return nodes.u
 
 
 @jit(allocates=False, fastmath=FUSED)

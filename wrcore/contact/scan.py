@@ -28,6 +28,7 @@ from wrcore.contact.geometry import (
     SCAN_STEP,
     SECOND_BOUND,
     SMALL_SHARE,
+    SPREAD,
     WHEEL_COSINE,
     WHEEL_RESERVE,
 )
@@ -249,18 +250,38 @@ def fine_cell_shift(geometry, u, ur):
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
-def fine_grid(geometry, pose, shift, first, last):
-    """`Grid` of the strips at the wheel profile's own nodes between ``first`` and ``last``, where the first one lies on
-    the wheel (m), the first one's number, and that after the last one. ``shift``: see `fine_cell_shift`, for the middle
-    of an overlap."""
-    step = geometry.wheel_step
+def _own_grid(geometry, pose, wheel, rail, rail_start, step, shift, first, last):
+    """`Grid` of strips ``step`` apart from the profile's first node on, where they lie between ``first`` and ``last``
+    on the wheel (m); where the first one lies, its number, and that after the last one. ``shift``: number of the rail
+    cell below a strip less the strip's."""
     density = 1.0 / step
     begin = max(max(int((first - geometry.wheel_start) * density) + 1, 0), -shift)
-    end = min(int((last - geometry.wheel_start) * density) + 1, geometry.fine_wheel.shape[1] - LANES)
-    end = min(end, geometry.fine_rail.shape[1] - LANES - shift)
+    end = min(int((last - geometry.wheel_start) * density) + 1, wheel.shape[1] - LANES)
+    end = min(end, rail.shape[1] - LANES - shift)
     origin, cell = geometry.wheel_start + begin * step, begin + shift
-    offset = geometry.rail_distance - pose.side * pose.y + geometry.rail_start + cell * step
+    offset = geometry.rail_distance - pose.side * pose.y + rail_start + cell * step
     return _grid(pose, begin, cell, geometry.half_distance + origin, offset, step), origin, begin, end
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def fine_grid(geometry, pose, shift, first, last):
+    """`_own_grid` of the strips at all of the profile's nodes. ``shift``: see `fine_cell_shift`, for the middle of an
+    overlap."""
+    return _own_grid(
+        geometry, pose, geometry.fine_wheel, geometry.fine_rail, geometry.rail_start, geometry.wheel_step, shift, first,
+        last,
+    )  # fmt: skip
+
+
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
+def spread_grid(geometry, pose, shift, first, last):
+    """The same at its spread nodes, and the rail's cells below them."""
+    part, step = shift % SPREAD, geometry.wheel_step
+    rail, start = geometry.spread_rail[part], geometry.rail_start + part * step
+    own = _own_grid(
+        geometry, pose, geometry.spread_wheel, rail, start, SPREAD * step, (shift - part) // SPREAD, first, last
+    )
+    return own, start, rail
 
 
 @jit(allocates=False, forceinline=True, fastmath=FUSED)
