@@ -95,9 +95,11 @@ def test_profiles_with_nodes_of_different_spacing(uic60):
         geometry = WheelOnRail(named_profile("S1002", "wheel", spacing=spacing), uic60).geometry
         z = LoadedWheels(geometry, "moment").height("left", 1.3e-3, 6e4)
         own, _ = pressed(geometry, 1.3e-3, z, axle_direction(0.0, 0.0))
-        found.append([own.square, own.moment / own.square])
+        place = own.moment / own.square
+        found.append([own.square, place, (own.moment_up - place * own.up) / own.up])
     assert found[1][0] == pytest.approx(found[0][0], rel=1e-3)
     assert found[1][1] == pytest.approx(found[0][1], abs=5e-6)
+    assert found[1][2] == pytest.approx(found[0][2], abs=2e-5) and abs(found[0][2]) > 1e-4
 
 
 def test_a_parabola_is_as_deep_as_it_is():
