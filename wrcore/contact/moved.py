@@ -132,7 +132,7 @@ def _at_node(nodes, wheel, rail, k):
     return height - (rail[0, cell] + d * (c1 + d * (c2 + d * c3))), height, d, c1 + d * (2.0 * c2 + d * (3.0 * c3))
 
 
-@jit(allocates=False, fastmath=FUSED)
+@jit(allocates=False, forceinline=True, fastmath=FUSED)
 def _add_end(geometry, pose, nodes, wheel, rail, inside, outside, sums):
     """Add what ``sums`` over nodes miss of M0, M1 and their changes, but for yaw, at an end of an overlap between two
     nodes.
@@ -263,8 +263,9 @@ def slopes_of_square(geometry, pose, row, sums):
     count, first, last = _moment_slopes(geometry, pose, nodes, wheel, rail, False, sums)
     if count < WIDE:
         return math.nan
-    _add_end(geometry, pose, nodes, wheel, rail, first, first - 1, sums)
-    _add_end(geometry, pose, nodes, wheel, rail, last, last + 1, sums)
+    for side in range(-1, 2, 2):
+        inside = first if side < 0 else last
+        _add_end(geometry, pose, nodes, wheel, rail, inside, inside + side, sums)
     return nodes.u
 
 
