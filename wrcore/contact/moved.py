@@ -140,7 +140,8 @@ def _add_end(geometry, pose, nodes, wheel, rail, inside, outside, sums):
     There g falls to 0 as a straight line, at theta h from the node inside. Sums of g^2 and of g from there on are short
     of their integrals by g'^2 h^3 B3(theta) / 3 and g' h^2 B2(theta) / 2, with Bernoulli's polynomials (Euler and
     Maclaurin)."""
-    if min(nodes.grid.node, nodes.grid.cell) + outside < 0:
+    node, cell = nodes.grid.node + outside, nodes.grid.cell + outside
+    if min(node, cell) < 0 or node >= wheel.shape[1] - LANES or cell >= rail.shape[1] - LANES:
         return
     gap, height, d, slope = _at_node(nodes, wheel, rail, inside)
     beyond, h = _at_node(nodes, wheel, rail, outside)[0], nodes.step
