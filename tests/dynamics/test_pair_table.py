@@ -197,6 +197,9 @@ TREAD_AND_ROOT = 16.54e-3, 4e-4, 5e-5, 0.0, -0.028, pair_table.WIDE
 BENT = 29.64e-3, 7e-4, 1e-4, -8.4e-3, -0.0343, pair_table.WIDE
 """Places: tread and root carry in one overlap; a flange root lies in a gauge corner, bent by 0.85 rad."""
 
+DISK = np.outer([0.1, 0.4, 1.0, 2.5, 8.0], np.exp(1j * (0.2 + 0.25 * math.pi * np.arange(8)))).ravel()
+"""Creepages over those of saturation, as complex numbers."""
+
 
 @pytest.mark.parametrize(("place", "root", "bound"), [(TREAD_AND_ROOT, 0.5, 0.06), (BENT, 0.8, 0.13)])
 def test_two_ellipses_stand_for_a_lobe_that_turns(own_cache, place, root, bound):
@@ -204,7 +207,8 @@ def test_two_ellipses_stand_for_a_lobe_that_turns(own_cache, place, root, bound)
     one ellipse of equal moments it is far off."""
     model, _ = compile_scene(load_scene(wr.example("trailer_vehicle"), {"contact.patch": "exact"}))
     strips = model.contact.strips._replace(looked_up=model.contact.friction)
-    pair, points = pair_store.Pair(model.contact._replace(strips=strips), "two"), creep_modes(0.3).points
+    pair = pair_store.Pair(model.contact._replace(strips=strips), "two")
+    points = np.stack([DISK.real, DISK.imag]).T
     numbers, remainder = pair.solve(place, points)
     assert abs(numbers[pair_table.ROOT] - root) < 0.1
     assert np.hypot(*remainder.T[:2]).max() < bound
@@ -327,7 +331,8 @@ def test_in_the_root_of_the_flange(benchmark_pair, y, load, yaw, spin, drift, mo
 
 def test_a_slender_contact_on_the_flange_about_its_spin_pole(benchmark_pair):
     """Where it slips about a place within, its creep force turns round within a few parts in a thousand of the rate:
-    within 0.51 % of mu N (0.4 with modes of flanges alone)."""
+    within 1.0 % of mu N. Modes that erred by 0.5 % here erred by 1.6 % of mu N c in a curve of 250 m, where these err by
+    0.74; with modes of flanges alone it is 0.4 %."""
     models = {name: LoadedWheels(benchmark_pair, name) for name in ("exact", "tabulated")}
     roll, _ = models["exact"].settled(6.5e-3, 1e4)
     z, forces = models["exact"].height("left", 6.5e-3, 1e4, roll, 0.0), {name: [] for name in models}
@@ -338,7 +343,7 @@ def test_a_slender_contact_on_the_flange_about_its_spin_pole(benchmark_pair):
             forces[name].append(row[[reduction.FX, reduction.FY]] / (0.3 * row[reduction.NORMAL]))
     exact, table = map(np.array, forces.values())
     assert np.ptp(exact[:, 0]) > 1.0
-    assert np.hypot(*(table - exact).T).max() < 0.006
+    assert np.hypot(*(table - exact).T).max() < 0.011
 
 
 def test_a_lobe_that_barely_touches_is_left_out(own_cache):
