@@ -331,8 +331,8 @@ def test_in_the_root_of_the_flange(benchmark_pair, y, load, yaw, spin, drift, mo
 
 def test_a_slender_contact_on_the_flange_about_its_spin_pole(benchmark_pair):
     """Where it slips about a place within, its creep force turns round within a few parts in a thousand of the rate:
-    within 1.0 % of mu N. Modes that erred by 0.5 % here erred by 1.6 % of mu N c in a curve of 250 m, where these err by
-    0.74; with modes of flanges alone it is 0.4 %."""
+    within 1.0 % of mu N. Modes that erred by 0.5 % here erred by 1.6 % of mu N c in a curve of 250 m, these err by 0.74
+    there; with modes of flanges alone it is 0.4 %."""
     models = {name: LoadedWheels(benchmark_pair, name) for name in ("exact", "tabulated")}
     roll, _ = models["exact"].settled(6.5e-3, 1e4)
     z, forces = models["exact"].height("left", 6.5e-3, 1e4, roll, 0.0), {name: [] for name in models}
