@@ -71,21 +71,29 @@ def test_what_overlaps_are_pressed_by(benchmark_pair, y, yaw, spatial):
     np.testing.assert_allclose(about, slopes[:2, 1] - moment / square * slopes[:2, 0], atol=2e-5 * size)
 
 
-def test_overlaps_on_a_tread_are_pressed_as_if_their_nodes_were_dense(benchmark_pair):
-    """The place of an overlap, and both slopes of M0, while its ends pass from node to node of the profile: without
-    what the sums miss at the ends they err by three and ten times as much."""
+@pytest.mark.parametrize("first", [-3e-3, 1.3e-3])
+def test_overlaps_on_a_tread_are_pressed_as_if_their_nodes_were_dense(benchmark_pair, first):
+    """The place of an overlap, what M0 changes by across, up and in roll, and what the place does across and up, while
+    its ends pass from node to node of the profile. Without what the sums miss at the ends they err by more."""
     wheels, axle, step, errors = LoadedWheels(benchmark_pair, "moment"), axle_direction(0.0, 0.0), 2e-7, []
-    for y in 1.3e-3 + 13e-6 * np.arange(16):
+    for y in first + 13e-6 * np.arange(16):
         z = wheels.height("left", y, 6e4)
         found, rows = pressed(benchmark_pair, y, z, axle)
         ends = rows[0, reduction.OUTSIDE] - 1e-3, rows[-1, reduction.BEYOND] + 1e-3
         square, moment = dense(benchmark_pair, y, z, axle, *ends, True)
-        moves = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
-        right, left, up, down = (dense(benchmark_pair, y + dy, z + dz, axle, *ends, True)[0] for dy, dz in moves)
-        slopes = np.array([right - left, up - down]) / (2.0 * step)
-        off = np.subtract([found.across, found.up], slopes) / math.hypot(*slopes)
-        errors.append([found.moment / found.square - moment / square, *off])
-    assert np.all(abs(np.array(errors)).max(axis=0) < [1.5e-8, 1e-5, 1e-5])
+
+        def dense_at(dy, dz, turn, y=y, z=z, ends=ends):
+            axis = axle[0], axle[1] - turn * axle[2], axle[2] + turn * axle[1]
+            return np.array(dense(benchmark_pair, y + dy, z + dz, axis, *ends, True))
+
+        changes = [(dense_at(*move) - dense_at(*-move)) / (2.0 * step) for move in step * np.eye(3)]
+        (across, moved_across), (up, moved_up), (rolled, _) = changes
+        u, size = moment / square, math.hypot(across, up)
+        own = found.across, found.up, found.about_x
+        places = found.moment_across - u * found.across, found.moment_up - u * found.up
+        off = np.subtract([*own, *places], [across, up, rolled, moved_across - u * across, moved_up - u * up])
+        errors.append([found.moment / found.square - u, *(off / size)])
+    assert np.all(abs(np.array(errors)).max(axis=0) < [8e-9, 6e-6, 1e-5, 8e-6, 1.5e-8, 1e-7])
 
 
 def test_profiles_with_nodes_of_different_spacing(uic60):
