@@ -117,6 +117,16 @@ def test_what_was_changed_and_where_it_shows_most(capsys):
     assert summary.set_index("channel").loc["N_N", "group"] == "wheelset/left"
 
 
+def test_bodies_of_one_run_alone_are_named():
+    one, other = hunting_run(), hunting_run()
+    other.groups["car_body"] = {"y_m": np.zeros_like(other.t)}
+    said = repr(wr.compare(one, other))
+    assert "only the second run has car_body: not compared" in said and "first run" not in said
+    one.groups |= {f"axle_box_{k}": {"y_m": np.zeros_like(one.t)} for k in range(8)}
+    assert "axle_box_5 and 2 more: not compared" in repr(wr.compare(one, other))
+    assert "only" not in repr(wr.compare(one, one))
+
+
 def test_its_picture_shows_both_runs_their_difference_and_the_error():
     one, other = hunting_run(), changed()
     one.settings |= {"accuracy_of": "y", "accuracy_found": 5e-4}

@@ -652,6 +652,20 @@ def test_cells_of_the_package_count_as_no_time_of_solving(own_cache, monkeypatch
     assert pair._ready >= 10 and pair._spent == 0.0
 
 
+def test_how_far_solving_has_come_is_told_ever_more_seldom(own_cache, monkeypatch, capsys):
+    monkeypatch.undo()
+    monkeypatch.delenv("WRCORE_PROGRESS", raising=False)
+    monkeypatch.setattr(pair_store, "table_folder", lambda: own_cache)
+    monkeypatch.setattr(pair_store, "_PAIRS", {})
+    pair, said = shipped_pair(), []
+    for seconds in (0.0, 31.0, 59.0, 61.0, 100.0, 119.0):
+        pair._spent = seconds
+        with pair._told():
+            pass
+        said.append(len(capsys.readouterr().err.splitlines()))
+    assert said == [0, 1, 0, 1, 0, 0]
+
+
 @pytest.mark.parametrize("name, speed", [
     ("suspended_wheelset", 60.0), ("trailer_vehicle", 50.0), ("freight_wagon_empty", 20.0),
     ("freight_wagon_laden", 20.0), ("metro_car", 30.0),

@@ -34,6 +34,9 @@ ACCURACIES = {"y": "y_m", "Y": "Y_N", "Q": "Q_N", "wear": "T_gamma_N"}
 LEAST = 1e-9
 """Scale of a place or motion, at least, in its unit: what varies by less is rounding."""
 
+NAMED = 6
+"""Bodies and wheels that are named where only one run has them."""
+
 SHOWN = {"y_m": False, "yaw_rad": False, "Q_N": True, "Y_N": True}
 """Channels that are drawn unless others are asked for, of bodies or of contacts."""
 
@@ -72,7 +75,15 @@ class Comparison:
         names = " and ".join(f"{run.scene.get('name', 'run')!r} ({run.status})" for run in self.runs)
         keys = [f"{key}: {one!r}, {other!r}" for key, (one, other) in self.changes.items()]
         rows = self.summary.to_string(index=False, float_format=lambda value: f"{value:.3g}", na_rep="")
-        return "\n".join([f"{names}: {len(self.t)} times, {self.t[0]:g} to {self.t[-1]:g} s", *keys, rows])
+        times = f"{names}: {len(self.t)} times, {self.t[0]:g} to {self.t[-1]:g} s"
+        return "\n".join([times, *keys, *self._left_out(), rows])
+
+    def _left_out(self) -> Iterator[str]:
+        """A line for each run that has bodies or wheels of its own."""
+        for which, one, other in zip(("first", "second"), self.runs, self.runs[::-1], strict=True):
+            if alone := [group for group in one if group not in other]:
+                more = f" and {len(alone) - NAMED} more" if len(alone) > NAMED else ""
+                yield f"only the {which} run has {', '.join(alone[:NAMED])}{more}: not compared"
 
     @checked
     @styled

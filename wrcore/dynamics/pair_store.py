@@ -37,7 +37,7 @@ from wrcore.dynamics.wheel import alone
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
-from wrcore.kernels.told import PATIENCE, handed_on, interrupted, told_if_long, warn_once
+from wrcore.kernels.told import PATIENCE, handed_on, interrupted, tell, told_if_long, warn_once
 
 NONSENSE = 0.1, 0.3, 0.3
 WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.03), (2e-3, 0.015, 0.03), NONSENSE
@@ -49,6 +49,9 @@ in it."""
 
 SEAMED = 0.1, 0.2, 0.3
 """The same of what a cell that is left to the next lattice may miss to have a share near its neighbours."""
+
+OFTEN = 30.0
+"""How far solving has come is told after so long, s, and whenever that has doubled."""
 
 WRITINGS = 20.0
 """A table is kept again after so many times what that took, and not before `PATIENCE`."""
@@ -73,7 +76,7 @@ class Pair(PairSolver):
         self._cells, self._misses = np.zeros((CELLS, NODES, NUMBERS), np.float32), np.zeros((CELLS, 4), np.float32)
         self.cells, self.misses, self._known, self._others, self._ready = {}, {}, {}, set(), 0
         self._wrong = COARSE if contact.strips.strips == RESOLUTIONS["coarse"].strips else WRONG
-        self._spent, self._next_written = 0.0, time.monotonic() + PATIENCE
+        self._spent, self._next_told, self._next_written = 0.0, OFTEN, time.monotonic() + PATIENCE
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
         self._take_shipped()
@@ -114,6 +117,10 @@ class Pair(PairSolver):
         with told_if_long(text, self._spent):
             yield
         self._spent += time.monotonic() - begin
+        if self._spent > self._next_told:
+            self._next_told *= 2.0
+            nodes, cells = len(self._solved_at), len(self.cells)
+            tell(f"{self.path.name} has {nodes} nodes and {cells} cells after {self._spent:.0f} s of solving")
 
     def _own(self, key):
         """The cell for which a cell stands, whichever of those that stand for each other is asked first: cells of

@@ -47,10 +47,20 @@ def handed_on(outcome):
         warn_once(f"exact contact: {type(error).__name__}: {first}; {outcome}")
 
 
+def _silent():
+    return os.environ.get("WRCORE_PROGRESS") == "0"
+
+
+def tell(text):
+    """Say a line of how far work has come; none with ``WRCORE_PROGRESS=0``."""
+    if not _silent():
+        warn(text)
+
+
 @contextmanager
 def told_if_long(text, spent=0.0):
     """Say a line once what is done takes long, with the time ``spent`` before (s); none with ``WRCORE_PROGRESS=0``."""
-    if os.environ.get("WRCORE_PROGRESS") == "0":
+    if _silent():
         yield
         return
     timer = Timer(max(PATIENCE - spent, 0.0), warn_once, [text])
