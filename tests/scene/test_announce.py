@@ -69,3 +69,15 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
     with pytest.raises(Known):
         description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
     assert len(said) == lines and all("contact.patch moment" in line for line in said)
+
+
+@pytest.mark.parametrize(
+    ("least", "patch", "lines"), [(0.1, "tabulated", 1), (0.28, "tabulated", 0), (0.1, "moment", 0)]
+)
+def test_friction_that_falls_along_a_rail_is_announced_where_contact_is_looked_up(least, patch, lines, monkeypatch):
+    said = []
+    monkeypatch.setattr(description, "announce", said.append)
+    friction = {"left": 0.3, "right": {"arc_length": [10, 20], "mu": [0.3, least]}}
+    changes = {"contact.patch": patch, "contact.friction": friction}
+    description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    assert len(said) == lines and all("half" in line for line in said)

@@ -79,7 +79,11 @@ whole: interpolated, they are differences of small numbers."""
 FLANKS = 0.2, 0.4
 """Contact angles up to which the first family of modes counts alone, and from which on the second one."""
 
-ROUND = 0.1
+DISK = 0.7
+"""Creepages over those of saturation, p, lie in the disk at p / (DISK + sqrt(DISK^2 + p^2)): the less, the finer modes
+are where wheels creep little, and the coarser where they slide."""
+
+ROUND = 0.05
 """Where slopes at rest are exact, modes set in from this radius on in the disk of the creepages, to leave them so."""
 
 LOCKED = 0.3
@@ -239,7 +243,7 @@ def round_part(square, linear):
 @jit(allocates=False, fastmath=FUSED)
 def remainder(modes, numbers, x, y):
     """Remainder of Fx, Fy, Mz at creepages over those of saturation."""
-    cells, root = modes.shape[1] - 2, 1.0 / (1.0 + math.sqrt(1.0 + x * x + y * y))
+    cells, root = modes.shape[1] - 2, 1.0 / (DISK + math.sqrt(DISK * DISK + x * x + y * y))
     p, q = x * root, y * root
     weight, part = round_part(p * p + q * q, numbers[LINEAR]), flank_part(numbers[ANGLE])
     u, v = 0.5 * (p + 1.0) * cells, 0.5 * (q + 1.0) * cells

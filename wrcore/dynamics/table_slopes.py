@@ -9,6 +9,7 @@ from wrcore.contact.patch.model import MODES, NODES
 from wrcore.dynamics.pair_cells import AXES, LEFT, STEPS, place_of
 from wrcore.dynamics.pair_table import (
     ANGLE,
+    DISK,
     FLANKS,
     FORCE,
     LEAST,
@@ -134,8 +135,8 @@ def _flank_slope(angle):
 def remainder_slopes(modes, numbers, along, x, y, out):
     """Fill ``out`` (3 + AXES, 3): `remainder` at creepages x, y over those of saturation, then its derivatives by both,
     and along the axes of the lattice."""
-    cells, far = modes.shape[1] - 2, math.sqrt(1.0 + x * x + y * y)
-    root = 1.0 / (1.0 + far)
+    cells, far = modes.shape[1] - 2, math.sqrt(DISK * DISK + x * x + y * y)
+    root = 1.0 / (DISK + far)
     p, q = x * root, y * root
     square, part = p * p + q * q, flank_part(numbers[ANGLE])
     weight, bent = round_part(square, numbers[LINEAR]), _flank_slope(numbers[ANGLE])

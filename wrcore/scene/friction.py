@@ -31,6 +31,8 @@ class Friction(NamedTuple):
     """B, s/m; of a law of the user's own, samples per m/s."""
     factors: np.ndarray = np.zeros(0)
     """(n,): samples of such a law, from slip velocity 0 on."""
+    least_share: float = 1.0
+    """Of a rail's largest coefficient, the smallest one along it."""
 
 
 def read_friction(spec, source, folder="."):
@@ -55,8 +57,9 @@ def read_friction(spec, source, folder="."):
         tables = [_table(table, source, field)] * 2
     else:
         tables = [_table(spec[side], source, f"{field}.{side}") for side in SIDES]
-    largest = float(max(np.max(table[:, 1]) for table in tables))
-    return Friction(largest, pack_schedules(tables), *falling)
+    largest = [float(table[:, 1].max()) for table in tables]
+    shares = (float(table[:, 1].min()) / most for table, most in zip(tables, largest, strict=True))
+    return Friction(max(largest), pack_schedules(tables), *falling)._replace(least_share=min(shares))
 
 
 def _table(spec, source, field):

@@ -12,7 +12,7 @@ def remainders(points, poses, parts, seed):
     """Numbers (poses, NUMBERS) and remainder (poses, n, 3): random sums of ``parts`` smooth functions of the creepages,
     others for each family, beside a force at rest that counts where slopes are exact."""
     shapes, random = np.random.default_rng(1), np.random.default_rng(seed)
-    at = points / (1.0 + np.sqrt(1.0 + (points**2).sum(axis=1)))[:, None]
+    at = creep_modes.in_disk(points)
     square = (at**2).sum(axis=1)
     waves, phases = shapes.normal(0.0, 2.0, (2, parts, 3, 2)), shapes.uniform(0.0, 6.0, (2, 1, parts, 3))
     functions = np.sin(np.einsum("nd,fpcd->fnpc", at, waves) + phases)

@@ -12,8 +12,8 @@ They come with the package (``wrcore/dynamics/tables/creep_modes.h5``) and serve
 foreign modes are as good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were
 kept back, over mu N in %, by contact angle: median, 95 % and 99 %.
 
-Those that come with the package are made so: for 0.3 of 900 poses, from the nodes that came with it until then; for
-the others of 1800, from nodes of the lattices before these, with a ``MOMENT`` of 1.
+Those that come with the package are made so from the nodes that came with it until then, for 0.3 of 1800 poses, for the
+others of 900.
 
 References
 ----------
@@ -37,7 +37,7 @@ from wrcore.dynamics.pair_store import pair_of
 from wrcore.dynamics.pair_table import NARROW, WIDE
 from wrcore.errors.checked_hdf5 import new_hdf5
 
-SAMPLES, NEAR, CELLS, SOLUTIONS = 400, 150, 20, 20
+SAMPLES, NEAR, CELLS, SOLUTIONS = 400, 150, 24, 20
 """Creepages of a pose all over the disk, and near none; cells of the splines across the disk; and solutions from which
 a node's coefficients come."""
 
@@ -61,10 +61,6 @@ KEPT = 4
 SMOOTHING, NOISE = 1e-3, 1e-3
 """Weight of the splines' second differences, and error of a solution over mu N."""
 
-MOMENT = 1.4
-"""Weight of the moment, over mu N c, beside forces over mu N: of 1, 1.4 and 2 that with the least errors in a curve of
-300 m."""
-
 EVENED, FLOOR = 0.5, 5e-3
 """A pose counts for its remainder (root mean square, over mu N, and the second) to the power of 1 less the first: what
 is wide and bent has ten times the remainder of the rest."""
@@ -75,6 +71,11 @@ def disk(n):
     k = np.arange(n) + 0.5
     radius, angle = 0.99 * np.sqrt(k / n), math.pi * (1.0 + math.sqrt(5.0)) * k
     return (2.0 * radius / (1.0 - radius**2) * np.stack([np.cos(angle), np.sin(angle)])).T
+
+
+def in_disk(points):
+    """Places (n, 2) in the disk of creepages, see `DISK` of `wrcore.dynamics.pair_table`."""
+    return points / (columns.DISK + np.sqrt(columns.DISK**2 + (points**2).sum(axis=1)))[:, None]
 
 
 def splines(places, cells=CELLS):
@@ -128,13 +129,11 @@ def collect(poses, friction, points, seed=5):
 
 def train(numbers, remainder, points):
     """`Modes` from what `collect` found at ``points``."""
-    places = points / (1.0 + np.sqrt(1.0 + (points**2).sum(axis=1)))[:, None]
+    places = in_disk(points)
     square = (places**2).sum(axis=1)
     weights = square / (square + columns.ROUND**2)
     own = mode_weights(weights, numbers[:, columns.LINEAR, None])[..., None]
     free = (remainder - (1.0 - own) * numbers[:, None, columns.FORCE : columns.FORCE + 3]) * weights[:, None] / own
-    scale = np.array([1.0, 1.0, MOMENT])
-    free *= scale
     values, angles = weights[:, None] * splines(places), np.abs(numbers[:, columns.ANGLE])
     weighed = _fitted(values, free)
     sizes = np.sqrt(np.mean(np.einsum("nc,pqc->pnq", values, weighed) ** 2, axis=(1, 2)))
@@ -144,9 +143,8 @@ def train(numbers, remainder, points):
     seen = [np.einsum("nc,pqc->pnq", values, one) for one in fits]
     chosen = _most_telling(seen, np.hypot(*places.T) < 0.97)
     tables, shapes, gains = zip(*map(_family, fits, seen, [chosen, chosen]), strict=True)
-    tables, each = np.stack(tables) / np.repeat(scale, MODES), np.tile(scale, SOLUTIONS)
-    tables = tables.astype(np.float32)
-    return Modes(tables, points[chosen], np.hstack(shapes) / each[:, None], np.vstack(gains) * each, weights[chosen])
+    tables = np.stack(tables).astype(np.float32)
+    return Modes(tables, points[chosen], np.hstack(shapes), np.vstack(gains), weights[chosen])
 
 
 def _fitted(values, free):
