@@ -12,8 +12,8 @@ They come with the package (``wrcore/dynamics/tables/creep_modes.h5``) and serve
 foreign modes are as good as a pair's own. Prints how well a node's few solutions give the remainder of poses that were
 kept back, over mu N in %, by contact angle: median, 95 % and 99 %.
 
-Those that come with the package are made so from the nodes that came with it until then, for 0.3 of 1800 poses, for the
-others of 900.
+Those that come with the package are made so from the nodes that came with it until then, for 0.05 and 0.3 of 1800
+poses, for the others of 900.
 
 References
 ----------
