@@ -63,7 +63,7 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
         raise Known
 
     said = []
-    monkeypatch.setattr(description, "announce", said.append)
+    monkeypatch.setattr(description, "tell", said.append)
     monkeypatch.setattr(description, "_kept", known)
     changes = {"contact.patch": "tabulated", "contact.detection": detection}
     with pytest.raises(Known):
@@ -76,7 +76,7 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
 )
 def test_friction_that_falls_along_a_rail_is_announced_where_contact_is_looked_up(least, patch, lines, monkeypatch):
     said = []
-    monkeypatch.setattr(description, "announce", said.append)
+    monkeypatch.setattr(description, "tell", said.append)
     friction = {"left": 0.3, "right": {"arc_length": [10, 20], "mu": [0.3, least]}}
     changes = {"contact.patch": patch, "contact.friction": friction}
     description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))

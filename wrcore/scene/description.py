@@ -39,6 +39,7 @@ from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
 from wrcore.kernels.cache import say
+from wrcore.kernels.told import tell
 from wrcore.scene.changes import changes_of, of_a_change, set_at
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
@@ -321,14 +322,14 @@ def compile_scene(
     material, damping = contact["material"], contact["normal"]["damping"]
     changing = scene.crossings, scene.out_of_round, scene.corrugation
     if contact["patch"] == "tabulated" and scene.detection != "spatial":
-        announce(f"contact.detection {scene.detection}: patches are solved, not looked up, some hundred times as slow; "
-                 "contact.patch moment, or contact.detection spatial, does without")  # fmt: skip
+        tell(f"contact.detection {scene.detection}: patches are solved, not looked up, some hundred times as slow; "
+             "contact.patch moment, or contact.detection spatial, does without")  # fmt: skip
     parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
-        announce("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
-                 "largest one by 2 % of mu N, at a sixth by 14; contact.patch exact does not")  # fmt: skip
+        tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
+             "largest one by 2 % of mu N, at a sixth by 14; contact.patch exact does not")  # fmt: skip
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
     pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
