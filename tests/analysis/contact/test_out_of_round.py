@@ -170,6 +170,9 @@ FLATS = {
 }
 """Wavelength of the smoothing: CONTACT's parameter 5 mm^3 of points 1 mm apart, 2 pi (5 mm^3 1 mm)^(1/4) = 9.4 mm."""
 
+PEAKED = ((80, 80),)
+"""Elements on which pressures beside the edges of flats have settled to a percent."""
+
 
 @pytest.mark.parametrize("name", FLATS)
 def test_flats_against_contact(name):
@@ -178,8 +181,10 @@ def test_flats_against_contact(name):
     for case in cases.itertuples():
         for model, one in wheels.items():
             one.turned = -case.pitch_rad
-            z = one.height("right", 0.0, case.Fz_wheel_N)
+            z, grids = one.height("right", 0.0, case.Fz_wheel_N), one.grids
+            one.grids = PEAKED
             found = max(one.at_height("right", 0.0, z), key=lambda patch: patch.load)
+            one.grids = grids
             rows.append([model, 1e6 * (pair.rolling_radius - z) - 1e3 * case.z_ws_mm,
                          1e3 * found.row[columns.X] - case.x_tr_pc_mm,
                          1e-6 * found.row[columns.P_MAX] / case.pmax_MPa - 1.0])  # fmt: skip
@@ -189,4 +194,4 @@ def test_flats_against_contact(name):
     assert worst.height["exact"] < 2.2
     assert worst.height["grid"] < 0.3
     assert worst.x["grid"] < 0.05
-    assert worst.p_max["grid"] < 0.06
+    assert worst.p_max["grid"] < 0.04
