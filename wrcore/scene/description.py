@@ -329,7 +329,7 @@ def compile_scene(
     friction = read_friction(contact["friction"], scene.source, folder)
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
         tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
-             "largest one by 2 % of mu N, at a sixth by 14; contact.patch exact does not")  # fmt: skip
+             "largest one by 2 to 3 % of mu N, at a sixth by 14 to 19; contact.patch exact does not")  # fmt: skip
     geometry = _kept(shared, "geometry", parts, lambda: scene.alike.geometry)
     geometries, plain, crossing = tuple(pair.geometry for pair in scene.pairs), (), no_crossing()
     pairs = scene.pairs or (scene.alike,) * (2 * len(vehicle.bodies.wheelsets))
