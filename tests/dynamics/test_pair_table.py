@@ -746,7 +746,7 @@ def test_each_rail_has_a_table_of_its_own_friction():
 
 @pytest.mark.parametrize(("least", "low", "high"), [(0.15, 0.003, 0.03), (0.05, 0.05, 0.2)])
 def test_friction_that_falls_along_a_rail_errs_by_what_a_scene_says(least, low, high):
-    """Beyond the fall, over what friction bears there: 2 to 3 % of it where it is half, 14 to 19 where it is a sixth."""
+    """Beyond the fall, over what friction bears there: 2 to 3 % where it is half, 14 to 19 where it is a sixth."""
     friction = {"arc_length": [10.0, 20.0], "mu": [0.3, least]}
     changes = {"contact.friction": friction, "speed": 60.0, "initial.y": 0.004}
     forces = beside_exact(changes, np.linspace(0.0, 1.0, 61))[:, 21:]
