@@ -40,12 +40,12 @@ from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
 from wrcore.kernels.told import PATIENCE, handed_on, interrupted, tell, told_if_long, warn_once
 
 NONSENSE = 0.1, 0.3, 0.3
-WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.03), (2e-3, 0.015, 0.03), NONSENSE
+WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.1), (2e-3, 0.015, 0.2), NONSENSE
 COARSE = (0.01, 0.03, 0.2), (0.01, 0.03, 0.2), (0.02, 0.05, 0.3), (0.02, 0.05, 0.3), NONSENSE
 """Errors in the middle of a cell of each lattice, of N, of the creep force over mu N and of p_max, from which on it is
-left to the next lattice, and in the end to the solver; and those at the coarse resolution. The finest lattice is where
-a lobe is born: forces bend there, and steps through solutions would be as small as they can. Only nonsense is refused
-in it."""
+left to the next lattice, and in the end to the solver; and those at the coarse resolution. In flange roots p_max steps
+by 5 to 15 % with the number of strips, which no lattice mends. The finest lattice is where a lobe is born: forces bend
+there, and steps through solutions would be as small as they can. Only nonsense is refused in it."""
 
 SEAMED = 0.1, 0.2, 0.3
 """The same of what a cell that is left to the next lattice may miss to have a share near its neighbours."""
