@@ -781,6 +781,18 @@ def test_a_cell_is_left_to_the_next_lattice_where_any_error_is_large(
     assert pair.misses[key] == miss
 
 
+@pytest.mark.parametrize(("lattice", "peak", "state"), [(1, 0.05, -1), (2, 0.05, 1), (2, 0.12, -1), (3, 0.12, 1)])
+def test_pressure_sends_few_cells_to_the_finest_lattices(own_cache, monkeypatch, benchmark_pair, lattice, peak, state):
+    """On flange roots it steps by 5 to 15 % with the number of strips; what N and the creep force may miss stays."""
+    pair = pair_store.Pair(LoadedWheels(benchmark_pair, "tabulated")._at_work(0.3).value, "any")
+    monkeypatch.setattr(pair, "_rows_of", lambda *_: np.zeros((48, NUMBERS), np.float32))
+    monkeypatch.setattr(pair, "_add_yaw", lambda *_: True)
+    key = pair_cells.key_of(lattice, 25, 1, 7, 9, 11)
+    for miss, found in (((1e-3, 1e-3, peak, 0.0), state), ((4e-3, 1e-3, 0.0, 0.0), -1), ((1e-3, 0.02, 0.0, 0.0), -1)):
+        monkeypatch.setattr(pair, "_miss", lambda *_, miss=miss: miss)
+        assert pair._solved(key)[0] == found
+
+
 def test_a_run_says_how_far_its_cells_are_from_the_exact_solver():
     """The largest errors in the middles of those that it met at its output times."""
     run = wr.simulate(wr.example("suspended_wheelset"), **{"integration.duration": 0.05, "contact.patch": "tabulated"})
