@@ -36,6 +36,11 @@ SCENES = {
 }
 UNTUNED = {
     "hunting, 45 m/s": ("suspended_wheelset", {"speed": 45.0, "initial.y": 4e-3}, 2.0),
+    "falling friction, R 300 m": (
+        "trailer_vehicle",
+        {"speed": 16.7, **CURVE, "contact.friction": {"mu": 0.3, "falling": {"ratio": 0.4, "decay": 0.6}}},
+        5.0,
+    ),
     "R 250 m, 13 m/s": ("trailer_vehicle", {"speed": 13.0, **curved_track(250, 0.1)}, 6.0),
     "R 450 m, 20 m/s": ("trailer_vehicle", {"speed": 20.0, **curved_track(450, 0.08)}, 5.0),
     "metro car, R -350 m, 15 m/s": ("metro_car", {"speed": 15.0, **curved_track(-350, 0.08)}, 5.0),
