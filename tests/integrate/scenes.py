@@ -38,9 +38,9 @@ def trailing_arm_car():
 
 
 def compiled(name, speed, changes):
-    """Model and initial state of a scene by its name."""
+    """Model and initial state of a scene by its name, with patches as ellipses."""
     file = f"{name.split(',')[0].replace(' ', '_')}.yaml"
-    return compile_scene(load_scene(EXAMPLES / file, {"speed": speed, **changes}))
+    return compile_scene(load_scene(EXAMPLES / file, {"speed": speed, "contact.patch": "moment", **changes}))
 
 
 def rough(level="low", seed=1, begin=20.0):

@@ -19,7 +19,7 @@ from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.run.simulate import output_times, simulate, simulate_many
 from wrcore.scene.description import compile_scene, load_scene
 
-ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas4": 4, "rodas4p2": 4, "ros34pw2": 3}
+ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas5": 5, "rodas4": 4, "rodas4p2": 4, "ros34pw2": 3}
 WHEELSET = SCENES / "suspended_wheelset.yaml"
 CURVE = (
     "track={path: [{transition: 30}, {curve: 700, radius: 600, cant: 0.05}], irregularity: {fade_in: 10, fade_out: 10, "
@@ -101,7 +101,7 @@ def test_order_on_a_tumbling_body(contact, method):  # noqa: F811
     model = make_model(contact, [1.0], [[1.0, 2.0, 3.5]], gravity=0.0, alpha=0.0)
     start = body_state(angles=(0.1, 0.2, 0.3), omega=(0.1, 3.0, 0.2))
     exact = integrate(model, start, [0.0, 2.0], "scipy_dop853", 1e-13, 1e-14, longest_step=math.inf).states[-1]
-    steps = (0.05, 0.025, 0.0125)
+    steps = (0.05, 0.025, 0.0125) if method != "rodas5" else (0.1, 0.05, 0.025)  # its Jacobian's differences leave 1e-9
     errors = [np.abs(integrate(model, start, [0.0, 2.0], method, step=h).states[-1] - exact).max() for h in steps]
     # Rodas4 and both pairs of order 5 have not quite settled; they come from above
     assert orders(errors)[-1] > ORDERS[method] - 0.1
@@ -112,7 +112,7 @@ def test_order_on_the_suspended_wheelset(wheelset, method):
     """The real contact for 40 ms. Patches gain and lose nodes, where forces have one continuous derivative only."""
     model, start = thrown(*wheelset)
     exact = integrate(model, start, [0.0, 0.04], "scipy_dop853", 1e-13, 1e-14).states[-1]
-    steps = (4e-4, 2e-4, 1e-4) if ORDERS[method] < 5 else (8e-4, 4e-4)
+    steps = (4e-4, 2e-4, 1e-4) if ORDERS[method] < 5 else (16e-4, 8e-4) if method == "rodas5" else (8e-4, 4e-4)
     errors = [np.abs(integrate(model, start, [0.0, 0.04], method, step=h).states[-1] - exact).max() for h in steps]
     assert errors[-1] < 2e-8
     assert orders(errors).max() > ORDERS[method] - 0.4
@@ -204,7 +204,7 @@ def test_auto_sees_a_stiff_damper(contact):  # noqa: F811
     assert fastest_rate(damped, Equations(damped), 0.0, start) == pytest.approx(
         16667.0 * 2.5, rel=0.1
     )  # the one of 4 kg
-    assert integrate(damped, start, [0.0, 1e-3]).method == "rodas4p2"
+    assert integrate(damped, start, [0.0, 1e-3]).method == "rodas5"
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -435,7 +435,7 @@ def test_many_runs_are_the_single_ones():
     many = simulate_many(scenes, progress=lambda items: (seen.append(item) or item for item in items))
     assert seen == scenes
     for runs in (many, simulate_many(scenes, threads=2)):
-        assert [run.settings["method_used"] for run in runs] == ["rodas4p2", "rodas4p2", "rodas4p2, rk4"]
+        assert [run.settings["method_used"] for run in runs] == ["rodas5", "rodas5", "rodas5, rk4"]
         assert all(map(same, runs, single))
     assert not same(single[0], single[1])
 

@@ -46,7 +46,7 @@ def refreshed(moving, jacobian=None, whole=True):
     model, t, state, rate, equations = moving
     jacobian = jacobian or new_jacobian(equations)
     refresh_jacobian(
-        plan_sweep(model), joined_bodies(model), whole, jacobian, t, state, rate, np.empty_like(state),
+        plan_sweep(model), joined_bodies(model), whole, False, jacobian, t, state, rate, np.empty_like(state),
         np.empty_like(state), np.empty(99), *equations.arguments,
     )  # fmt: skip
     return jacobian

@@ -6,8 +6,8 @@ from scipy.integrate import RK23, RK45
 
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 
-ORDERS = {"rk45": (5, 4), "tsit5": (5, 4), "rk23": (3, 2), "rk4": (4, 3), "rodas4": (4, 3), "rodas4p2": (4, 3),
-          "ros34pw2": (3, 2)}  # fmt: skip
+ORDERS = {"rk45": (5, 4), "tsit5": (5, 4), "rk23": (3, 2), "rk4": (4, 3), "rodas5": (5, 4), "rodas4": (4, 3),
+          "rodas4p2": (4, 3), "ros34pw2": (3, 2)}  # fmt: skip
 """Orders of the method and of its embedded one."""
 
 
@@ -27,7 +27,7 @@ def explicit_order(a, weights, theta=1.0):
 
 
 def rosenbrock_order(alpha, gamma, weights, theta=1.0, exact=True):
-    """Order (at most 4; 3 with any matrix for J) of weights at theta (Hairer and Wanner, IV.7)."""
+    """Order (at most 5; 3 with any matrix for J) of weights at theta (Hairer and Wanner, IV.7)."""
     a, g, one = alpha.sum(axis=1), gamma.sum(axis=1), np.ones(len(alpha))
     beta, b = alpha + gamma, (alpha + gamma).sum(axis=1)
     if exact:
@@ -36,7 +36,10 @@ def rosenbrock_order(alpha, gamma, weights, theta=1.0, exact=True):
             2: [(b, 2)],
             3: [(a**2, 3), (beta @ b, 6)],
             4: [(a**3, 4), (a * (alpha @ b), 8), (beta @ a**2, 12), (beta @ beta @ b, 24)],
-        }
+            5: [(a**4, 5), (a**2 * (alpha @ b), 10), ((alpha @ b) ** 2, 20), (a * (alpha @ a**2), 15),
+                (a * (alpha @ beta @ b), 30), (beta @ a**3, 20), (beta @ (a * (alpha @ b)), 40),
+                (beta @ beta @ a**2, 60), (beta @ beta @ beta @ b, 120)],
+        }  # fmt: skip
     else:
         none = np.inf  # what the matrix contributes must vanish
         trees = {
@@ -101,15 +104,16 @@ def test_rosenbrock_methods_have_their_orders(name):
     main, embedded = t.weights @ back, (t.weights - t.error) @ back
     assert (rosenbrock_order(alpha, gamma, main), rosenbrock_order(alpha, gamma, embedded)) == ORDERS[name]
     assert t.exponent == ORDERS[name][1] + 1
-    np.testing.assert_allclose(alpha.sum(axis=1), t.nodes, atol=1e-14)
-    np.testing.assert_allclose(gamma.sum(axis=1), t.by_time, atol=1e-14)
+    rounding = 1e-15 * max(10.0, np.abs(t.couplings).max())
+    np.testing.assert_allclose(alpha.sum(axis=1), t.nodes, atol=rounding)
+    np.testing.assert_allclose(gamma.sum(axis=1), t.by_time, atol=rounding)
     for theta in (0.2, 0.6):
-        assert rosenbrock_order(alpha, gamma, dense_weights(t, theta) @ back, theta) == 3
+        assert rosenbrock_order(alpha, gamma, dense_weights(t, theta) @ back, theta) == (4 if name == "rodas5" else 3)
     np.testing.assert_allclose(dense_weights(t, 1.0), t.weights, atol=1e-13)
 
 
-def test_ros34pw2_keeps_its_order_with_any_jacobian_and_rodas4_does_not():
-    for name, order in (("ros34pw2", 3), ("rodas4", 1)):
+def test_what_is_left_of_the_order_with_any_jacobian():
+    for name, order in (("ros34pw2", 3), ("rodas4p2", 2), ("rodas4", 1)):
         alpha, gamma, back = original_form(ROSENBROCK[name])
         assert rosenbrock_order(alpha, gamma, ROSENBROCK[name].weights @ back, exact=False) == order
     assert ROSENBROCK["rodas4"].reuse == 1
@@ -143,10 +147,12 @@ def force_error(tableau, steps, omega=1e4):
     return worst
 
 
-@pytest.mark.parametrize(("name", "order"), [("rodas4", 0.0), ("rodas4p2", 2.0), ("ros34pw2", 1.0)])
+@pytest.mark.parametrize(("name", "order"), [("rodas5", 0.0), ("rodas4", 0.0), ("rodas4p2", 2.0), ("ros34pw2", 1.0)])
 def test_orders_on_a_light_part_that_follows_another_on_a_stiff_spring(name, order):
     """Prothero and Robinson's problem of second order. Steps of a thousand periods: the force of Rodas4 errs by a
-    third of what it is, m a, whatever the step."""
+    quarter of what it is, m a, whatever the step, of Rodas5 by 3 %."""
     coarse, fine = (force_error(ROSENBROCK[name], steps) for steps in (20, 40))
-    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
-    assert fine == pytest.approx({"rodas4": 0.26, "rodas4p2": 3.8e-5, "ros34pw2": 7.5e-3}[name], rel=0.02)
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
+    assert fine == pytest.approx(
+        {"rodas5": 0.029, "rodas4": 0.26, "rodas4p2": 3.8e-5, "ros34pw2": 7.5e-3}[name], rel=0.02
+    )

@@ -56,8 +56,8 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
         if whole:
             counters[engine.SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[engine.EVALUATIONS] += refresh_jacobian(
-            linear.sweep, linear.joined, whole, linear.jacobian, clock[engine.T], memory.state, memory.rate,
-            scratch.trial, scratch.slope, linear.differences, equations, model, work,
+            linear.sweep, linear.joined, whole, tableau.reuse == 1, linear.jacobian, clock[engine.T], memory.state,
+            memory.rate, scratch.trial, scratch.slope, linear.differences, equations, model, work,
         )  # fmt: skip
         counters[engine.JACOBIANS] += 1
         counters[engine.SINCE_FULL] += 1

@@ -16,6 +16,7 @@ Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; its interpolant: Sham
 Tsitouras, Comput. Math. Appl. 62 (2011) 770-775.
 Bogacki and Shampine, Appl. Math. Lett. 2 (1989) 321-325.
 Hairer and Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), IV.10 (RODAS).
+Di Marzo, RODAS5(4), thesis, Geneva (1993), as OrdinaryDiffEq.jl has its coefficients (Rodas5).
 Steinebach, in Progress in Differential-Algebraic Equations II (Springer 2020) 165-184 (Rodas4P2).
 Rang and Angermann, BIT 45 (2005) 761-787 (ROS34PW2).
 """
@@ -123,14 +124,16 @@ def _classical():
     return ExplicitTableau(np.array([0.0, 1 / 2, 1 / 2, 1.0, 1.0]), stages, error, _hermite(stages[-1]), 4.0)
 
 
-def _rodas(nodes, by_time, stages, couplings, second, third):
-    """A method of RODAS' kind: six stages, the last two at the end of the step, the last one the error's estimate. Rows
-    of ``stages`` up to the fifth; ``second`` and ``third`` are the weights of its dense output."""
-    weights, second, third = np.array([*stages[-1], 1.0, 1.0]), np.array([*second, 0.0]), np.array([*third, 0.0])
-    dense = np.stack([weights + second, third - second, -third], axis=1)
+def _rodas(nodes, by_time, stages, couplings, *bends, exponent=4.0, gamma=0.25):
+    """A method of RODAS' kind: the last two stages are at the end of the step, the last one is the error's estimate.
+    Rows of ``stages`` up to the last but one; ``bends`` are the weights, for some or all stages, of its dense output:
+    theta times those of the step and (1 - theta) theta^k times the k-th."""
+    weights, size = np.array([*stages[-1], 1.0, 1.0]), len(nodes) + 2
+    bent = [np.zeros(size), *(np.append(bend, np.zeros(size - len(bend))) for bend in bends), np.zeros(size)]
+    dense = np.diff(bent, axis=0).T + np.outer(weights, np.arange(len(bends) + 1) == 0)
     return RosenbrockTableau(
         np.array([*nodes, 1.0, 1.0]), np.array([*by_time, 0.0, 0.0]), _lower(*stages, [*stages[-1], 1.0]),
-        _lower(*couplings), weights, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), dense, 4.0, 0.25, 1,
+        _lower(*couplings), weights, np.eye(size)[-1], dense, exponent, gamma, 1,
     )  # fmt: skip
 
 
@@ -178,6 +181,39 @@ def _rodas4p2():
     )
 
 
+def _rodas5():
+    return _rodas(
+        [0.0, 0.38, 0.3878509998321533, 0.483971893787384, 0.457047700881958, 1],
+        [0.19, -0.1823079225333714636, -0.319231832186874912, 0.3449828624725343, -0.377417564392089818, 0],
+        [
+            [2.0],
+            [3.040894194418781, 1.041747909077569],
+            [2.576417536461461, 1.62208306077664, -0.9089668560264532],
+            [2.760842080225597, 1.446624659844071, -0.3036980084553738, 0.2877498600325443],
+            [-14.09640773051259, 6.925207756232704, -41.47510893210728, 2.343771018586405, 24.13215229196062],
+            [-14.09640773051259, 6.925207756232704, -41.47510893210728, 2.343771018586405, 24.13215229196062, 1],
+        ],
+        [
+            [-10.31323885133993],
+            [-21.04823117650003, -7.234992135176716],
+            [32.22751541853323, -4.943732386540191, 19.44922031041879],
+            [-20.69865579590063, -8.816374604402768, 1.260436877740897, -0.7495647613787146],
+            [-46.22004352711257, -17.49534862857472, -289.6389582892057, 93.60855400400906, 318.3822534212147],
+            [34.20013733472935, -14.1553540271769, 57.823356409884, 25.83362985412365, 1.408950972071624,
+             -6.551835421242162],
+            [42.57076742291101, -13.80770672017997, 93.98938432427124, 18.77919633714503, -31.5835918722337,
+             -6.685968952921985, -5.810979938412932],
+        ],
+        [27.354592673333357, -6.925207756232857, 26.40037733258859, 0.5635230501052979, -4.699151156849391,
+         -1.6008677469422725, -1.5306074446748028, -1.3929872940716344],
+        [44.19024239501722, 1.3677947663381929e-13, 202.93261852171622, -35.5669339789154, -181.91095152160645,
+         3.4116351403665033, 2.5793540257308067, 2.2435122582734066],
+        [-44.0988150021747, -5.755396159656812e-13, -181.26175034586677, 56.99302194811676, 183.21182741427398,
+         -7.480257918273637, -5.792426076169686, -5.32503859794143],
+        exponent=5.0, gamma=0.19,
+    )  # fmt: skip
+
+
 def _ros34pw2():
     gamma = 0.43586652150845900
     alpha = _lower([0.87173304301691801], [0.84457060015369423, -0.11299064236484185], [0.0, 0.0, 1.0])
@@ -209,5 +245,5 @@ EXPLICIT = {
 }
 """Explicit pairs by name: orders 5(4), 5(4), 3(2) and 4(3)."""
 
-ROSENBROCK = {"rodas4": _rodas4(), "rodas4p2": _rodas4p2(), "ros34pw2": _ros34pw2()}
-"""Rosenbrock methods by name: orders 4(3), 4(3) and 3(2)."""
+ROSENBROCK = {"rodas5": _rodas5(), "rodas4": _rodas4(), "rodas4p2": _rodas4p2(), "ros34pw2": _ros34pw2()}
+"""Rosenbrock methods by name: orders 5(4), 4(3), 4(3) and 3(2)."""

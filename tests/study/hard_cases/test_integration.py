@@ -24,14 +24,14 @@ def test_stability_functions_against_known_limits():
     # Taylor polynomials of order p on the negative real axis (Hairer and Wanner, Solving ODEs II, table IV.2.1)
     assert predicted_step("rk23", np.array([-1.0 + 0j]), 10.0) == pytest.approx(2.5127, abs=1e-3)
     assert predicted_step("rk45", np.array([-1.0 + 0j]), 10.0) == pytest.approx(3.3066, abs=1e-3)
-    for method in ("rodas4", "rodas4p2", "ros34pw2"):  # L-stable
+    for method in ("rodas5", "rodas4", "rodas4p2", "ros34pw2"):  # L-stable
         assert abs(amplification(method, -1e9)) < 1e-6
-    for method in ("tsit5", "rk4", "rodas4", "rodas4p2", "ros34pw2"):
+    for method in ("tsit5", "rk4", "rodas5", "rodas4", "rodas4p2", "ros34pw2"):
         assert amplification(method, 0.01) == pytest.approx(np.exp(0.01), abs=1e-8)
 
 
 def test_errors_fall_with_the_tolerance(vehicles, assert_passed):
-    methods = ["tsit5", "rk45", "rk23", "rk4", "rodas4", "rodas4p2", "ros34pw2"]
+    methods = ["tsit5", "rk45", "rk23", "rk4", "rodas5", "rodas4", "rodas4p2", "ros34pw2"]
     found, curve = tolerance_ladder(
         vehicles, ["suspended wheelset"], 20.0, [1e-1, 1e-4, 1e-7], methods, ["spatial"], 0.5
     )

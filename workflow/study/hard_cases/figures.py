@@ -14,7 +14,7 @@ KILO = 1e-3
 
 METHODS = {
     "tsit5": ("#0072B2", "o"), "rk45": ("#56B4E9", "s"), "rk4": ("#CC79A7", "v"), "rk23": ("#E69F00", "^"),
-    "rodas4": ("#222222", "D"), "rodas4p2": ("#009E73", "X"), "ros34pw2": ("0.55", "P"),
+    "rodas5": ("#D55E00", "h"), "rodas4": ("#222222", "D"), "rodas4p2": ("#009E73", "X"), "ros34pw2": ("0.55", "P"),
 }  # fmt: skip
 """Colour (Okabe-Ito; dark to light in grey) and marker of the integrators."""
 
