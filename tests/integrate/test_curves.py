@@ -27,9 +27,6 @@ def test_rates_of_increments_are_their_derivatives(turn):
     """Along any path u(t) of the increments the state's rate leads back to u', by central differences."""
     size = STATE_SIZE * BODIES + 2
     start, drift, a, b = np.random.default_rng(3).normal(size=(4, size))
-    for body in range(BODIES):
-        drift[STATE_SIZE * body + 3 : STATE_SIZE * (body + 1)] = 0.0
-    drift[STATE_SIZE * BODIES :] = 0.0
 
     def state_at(t):
         state = a * t + b * t**2

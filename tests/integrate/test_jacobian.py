@@ -13,6 +13,7 @@ from wrcore.dynamics.system import Equations, internal_states
 from wrcore.integrate.blocks import factorise, new_system, solve_stage
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.jacobian import joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
+from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments
 from wrcore.scene.description import compile_scene, load_scene
 
 CURVE = "track={path: [{transition: 20}, {curve: 300, radius: 500, cant: 0.05}]}"
@@ -42,11 +43,11 @@ def moving(request):
     return model, t, state, equations(t, state), equations
 
 
-def refreshed(moving, jacobian=None, whole=True):
+def refreshed(moving, jacobian=None, whole=True, along=False):
     model, t, state, rate, equations = moving
     jacobian = jacobian or new_jacobian(equations)
     refresh_jacobian(
-        plan_sweep(model), joined_bodies(model), whole, False, jacobian, t, state, rate, np.empty_like(state),
+        plan_sweep(model), joined_bodies(model), whole, along, jacobian, t, state, rate, np.empty_like(state),
         np.empty_like(state), np.empty(99), *equations.arguments,
     )  # fmt: skip
     return jacobian
@@ -130,6 +131,25 @@ def test_every_entry_against_central_differences(moving):
     for body in range(n):  # velocities stay
         expected[13 * body : 13 * body + 3] = 0.0
     np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max() + 0.01)
+
+
+def test_the_drift_of_the_whole_state(moving):
+    """It is all of the state's rate, as increments see it, and the derivative with respect to time is that along it."""
+    model, t, state, _, function = moving
+    jacobian, n = refreshed(moving, along=True), len(model.bodies.mass)
+    axes = jacobian.turn[RATE], jacobian.turn[ANGLE]
+
+    def seen(s):
+        there = np.zeros_like(state)
+        carry(n, axes, jacobian.drift, s, state, there)
+        rates = function(t + s, there)
+        rates_of_increments(n, axes, jacobian.drift, s, state, there, rates)
+        return rates
+
+    np.testing.assert_allclose(seen(0.0), 0.0, atol=1e-9 * np.abs(jacobian.drift).max())
+    expected = (seen(1e-7) - seen(-1e-7)) / 2e-7
+    np.testing.assert_allclose(jacobian.by_time, expected, atol=1e-4 * np.abs(expected).max() + 0.02)
+    assert np.abs(jacobian.by_time - refreshed(moving).by_time).max() > 0.01 * np.abs(expected).max()
 
 
 def test_refreshing_the_contacts_is_taking_the_whole_anew(moving):

@@ -104,7 +104,7 @@ def test_rosenbrock_methods_have_their_orders(name):
     main, embedded = t.weights @ back, (t.weights - t.error) @ back
     assert (rosenbrock_order(alpha, gamma, main), rosenbrock_order(alpha, gamma, embedded)) == ORDERS[name]
     assert t.exponent == ORDERS[name][1] + 1
-    rounding = 1e-15 * max(10.0, np.abs(t.couplings).max())
+    rounding = 3e-13 if name == "rodas5" else 1e-14  # of coefficients up to 318 with 16 digits
     np.testing.assert_allclose(alpha.sum(axis=1), t.nodes, atol=rounding)
     np.testing.assert_allclose(gamma.sum(axis=1), t.by_time, atol=rounding)
     for theta in (0.2, 0.6):
@@ -152,7 +152,7 @@ def test_orders_on_a_light_part_that_follows_another_on_a_stiff_spring(name, ord
     """Prothero and Robinson's problem of second order. Steps of a thousand periods: the force of Rodas4 errs by a
     quarter of what it is, m a, whatever the step, of Rodas5 by 3 %."""
     coarse, fine = (force_error(ROSENBROCK[name], steps) for steps in (20, 40))
-    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15)
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.15 if name == "rodas5" else 0.1)  # 2.7, 2.9 %
     assert fine == pytest.approx(
         {"rodas5": 0.029, "rodas4": 0.26, "rodas4p2": 3.8e-5, "ros34pw2": 7.5e-3}[name], rel=0.02
     )
