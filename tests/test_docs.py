@@ -162,8 +162,8 @@ def test_numbers_in_the_theory_are_those_of_the_code():
         "integration": [
             f"${choice.STABLE:g}/", f"{tolerances.LENGTH}\\ \\mathrm m",
             f"\\min({tolerances.RATE:g},\\ V/{tolerances.HALF_GAUGE}", f"= {engine.SAFETY}\\,h_n",
-            f"{choice.GROWING} steps for their length and {choice.FIRST['rodas4p2']} more",
-            f"{choice.LAST['rodas4p2']} at most",
+            f"{choice.GROWING} steps for their length and {choice.FIRST['rodas5']} more",
+            f"{choice.LAST['rodas5']} at most",
             f"less than {choice.WORTH:g} of", f"over {choice.TRIED} steps, after {choice.GROWING} in which",
             f"{choice.FIRST['rk4']} steps after the trial, then {choice.APART['rk4']:g} times as many,",
             f"{choice.LAST['rk4']} at most",

@@ -104,7 +104,7 @@ def main(folder):
         print(f"| {name} | {static:.1f} | {largest:.0f} | {air:.1f} | {low:.2f} |")
         if name in PICTURES:
             save_figure(plot_crossing(run, scene=scene), Path(folder) / PICTURES[name])
-    methods = "rk4", "rodas4p2", "auto"
+    methods = "rk4", "rodas5", "auto"
     print(f"\n| cost of a metre on it, over rough track | {' | '.join(methods)} |\n|---|---|---|---|")
     for name in ("suspended wheelset, facing", "trailer vehicle, facing"):
         costs = [f"{cost(CASES[name] | {'integration.method': method}):.1f}" for method in methods]

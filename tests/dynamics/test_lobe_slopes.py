@@ -49,9 +49,7 @@ def blocks_of(jacobian, states, model, work, found, expected, uncounted):
 def test_slopes_of_lobes_are_those_of_differences(case):
     name, changes, duration, direction, rolling = CASES[case]
     model, start = compile_scene(load_scene(wr.example(name), **{"contact.patch": "tabulated", **changes}))
-    states = np.ascontiguousarray(
-        integrate(model, start, np.linspace(0.0, duration, 60), "rodas4p2", 1e-4, 1e-7).states
-    )
+    states = np.ascontiguousarray(integrate(model, start, np.linspace(0.0, duration, 60), "rodas5", 1e-4, 1e-7).states)
     for body in model.bodies.wheelsets:
         states[:, 13 * body + 7] *= direction
         states[:, 13 * body + 11] *= direction * rolling

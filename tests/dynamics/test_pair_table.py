@@ -595,7 +595,7 @@ def test_implicit_steps_are_those_of_ellipses():
 
 def test_what_is_solved_has_the_jacobian_of_the_exact_solver():
     """Where ellipses stand in, they do so for the rate that the derivative by time starts from, too."""
-    settings = {"integration.method": "rodas4p2", "contact.detection": "planar", "integration.duration": 0.02}
+    settings = {"integration.method": "rodas5", "contact.detection": "planar", "integration.duration": 0.02}
     table, exact = (
         wr.simulate(wr.example("suspended_wheelset"), **settings, **{"contact.patch": patch})
         for patch in ("tabulated", "exact")
@@ -726,7 +726,7 @@ def beside_exact(changes, times):
     """Fx and N of both wheels of the suspended wheelset, (2, n, 2, 2), at the states of a run: looked up, and exact."""
     scene = wr.example("suspended_wheelset")
     models = [compile_scene(load_scene(scene, changes | {"contact.patch": one})) for one in ("tabulated", "exact")]
-    run, equations = integrate(*models[0], times, "rodas4p2"), [Equations(model) for model, _ in models]
+    run, equations = integrate(*models[0], times, "rodas5"), [Equations(model) for model, _ in models]
     forces = np.empty((2, len(times), 2, 2))
     for k, state in enumerate(run.states):
         for one, rows in zip(equations, forces, strict=True):

@@ -36,7 +36,7 @@ KINDS = {"wheelset": "wheelsets", "trailer": "coach, straight", "metro": "metro 
          "loco": "locomotive", "R ": "curves", "ballast": "rails that give", "random": "random vehicles"}  # fmt: skip
 """Kinds of scenes by what their names hold; the last one counts."""
 REFERENCE, TWIN = ("tsit5", 1e-9), ("rk45", 1e-8)
-TOO_DEAR = 2.5
+TOO_DEAR = 4.0
 """A choice that takes this many times as many evaluations as `auto` is given up."""
 
 

@@ -1,4 +1,4 @@
-"""Steps, evaluations and speed of Rosenbrock runs on irregular track: ``python -m tests.integrate.speed``.
+"""Speed of an evaluation, and of runs on irregular track: ``python -m tests.integrate.speed``.
 
 Processor time, the best of four runs; nothing else should run. Errors: `snakemake speed_against_error`.
 """
@@ -13,13 +13,18 @@ from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene, load_scene
 
 SPECTRUM = {"spectrum": {"level": "low", "seed": 1, "length": 2000.0, "begin": 20.0}}
-CURVE = [{"tangent": 20}, {"transition": 40}, {"curve": 250, "radius": 300, "cant": 0.1}, {"transition": 40},
-         {"tangent": 100}]  # fmt: skip
+ROUGH = {"track.irregularity": SPECTRUM}
+CURVE = {"track.path": [{"tangent": 20}, {"transition": 40}, {"curve": 250, "radius": 300, "cant": 0.1},
+                        {"transition": 40}, {"tangent": 100}]}  # fmt: skip
 CASES = [
-    *(("trailer_vehicle", {"speed": speed}, 5.0, rtol) for rtol in (1e-3, 3e-3) for speed in (20.0, 40.0, 60.0)),
-    ("trailer_vehicle", {"speed": 16.7, "track.path": CURVE}, 20.0, 3e-4),
-    ("metro_car", {"speed": 16.7, "track.path": CURVE}, 20.0, 1e-3),
+    *(("trailer_vehicle", {"speed": v, **ROUGH}, 5.0) for v in (20.0, 40.0, 60.0)),
+    ("trailer_vehicle", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
+    ("metro_car", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
+    ("suspended_wheelset", {"speed": 20.0}, 10.0),
+    ("suspended_wheelset", {"speed": 60.0}, 10.0),
 ]
+CHOICES = ("rodas5", 3e-4), ("rodas4p2", 3e-4), ("rk4", 3e-4), ("auto", 1e-4)
+"""Near the cheapest that keep y to 1 um and N to 0.5 % (`tests.integrate.auto`), and the default."""
 
 
 def evaluation(name):
@@ -37,18 +42,15 @@ def evaluation(name):
 def main():
     for name in ("suspended_wheelset", "trailer_vehicle"):
         print(f"{name}: {1e6 * evaluation(name):.3f} us an evaluation")
-    for name, changes, duration, rtol in CASES:
-        changes = changes | {"track.irregularity": SPECTRUM}
-        model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", changes))
-        times, best = np.linspace(0.0, duration, round(100 * duration) + 1), np.inf
-        for _ in range(4):
+    for name, changes, duration in CASES:
+        model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", {"contact.patch": "moment", **changes}))
+        times, best = np.linspace(0.0, duration, round(100 * duration) + 1), dict.fromkeys(CHOICES, np.inf)
+        for choice in CHOICES * 4:  # in turn
             begun = time.process_time()
-            run = integrate(model, start, times, "rodas4", rtol)
-            best = min(best, time.process_time() - begun)
-        path = "R 300" if "track.path" in changes else "straight"
-        print(f"{name}, {changes['speed']:g} m/s, {path}, rodas4 {rtol:g}: {run.steps} steps, {run.rejected} rejected, "
-              f"{run.rhs_evaluations} evaluations, {1e6 * best / run.steps:.1f} us a step, "
-              f"{duration / best:.0f} times real time")  # fmt: skip
+            integrate(model, start, times, *choice)
+            best[choice] = min(best[choice], time.process_time() - begun)
+        print(f"{name}, {changes['speed']:g} m/s{', R 300' * ('track.path' in changes)}, times real time:",
+              *(f"{method} {rtol:g}: {duration / best[method, rtol]:.0f}" for method, rtol in CHOICES))  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -63,7 +63,7 @@ def test_a_kernel_that_is_needed_last_is_compiled_by_another_process_or_here(tmp
     ("scene", "settings"),
     [
         ("suspended_wheelset", {"contact.patch": "moment", "speed": 80.0, "integration.duration": 0.3}),
-        ("suspended_wheelset", {"contact.patch": "tabulated", "integration.method": "rodas4p2"}),
+        ("suspended_wheelset", {"contact.patch": "tabulated", "integration.method": "rodas5"}),
         ("trailer_vehicle", {"integration.method": "tsit5"}),
     ],
 )
@@ -72,7 +72,7 @@ def test_what_is_planned_is_what_a_run_compiles(scene, settings):
     simulation, integration = Simulation(scene), scene.data["integration"]
     planned = needed_last(simulation.model, integration["method"])
     simulation.advance(output_times(0.0, integration["duration"], 1e3))
-    forms = {"tsit5": ["called"], "rodas4p2": ["addressed", "called"], "auto": ["addressed", *["called"] * 3]}
+    forms = {"tsit5": ["called"], "rodas5": ["addressed", "called"], "auto": ["addressed", *["called"] * 3]}
     assert [kernel.form for kernel, _ in planned] == forms[integration["method"]]  # auto: two methods, and its look
     for kernel, types in planned:
         assert types in kernel.overloads

@@ -82,6 +82,7 @@ class Scratch(NamedTuple):
     trial: np.ndarray  # (n,)
     slope: np.ndarray  # (n,)
     defect: np.ndarray  # (n,)
+    between: np.ndarray  # (n,)
     still: np.ndarray  # (n,): zeros
     places: np.ndarray  # (k,): where searches started before the attempt, see `wrcore.dynamics.contract.kept_size`
 
@@ -105,7 +106,7 @@ def new_memory(state, start, stages, first_step):
 
 def new_scratch(size, places):
     """Scratch arrays for a state vector of a length and a number of places."""
-    return Scratch(*np.zeros((4, size)), np.zeros(places))
+    return Scratch(*np.zeros((5, size)), np.zeros(places))
 
 
 @jit(allocates=False)
@@ -204,11 +205,24 @@ def keep_short(control, memory, model, work):
 
 
 @jit(allocates=False)
+def interpolate(dense, theta, scale, stages, out):
+    """Set ``out`` (n,) to the sum of the stages, times ``scale``, by the weights of a dense output at ``theta``."""
+    out[:] = 0.0
+    for i in range(stages.shape[0]):
+        weight = 0.0
+        for k in range(dense.shape[1] - 1, -1, -1):
+            weight = (weight + dense[i, k]) * theta
+        weight *= scale
+        for j in range(out.shape[0]):
+            out[j] += weight * stages[i, j]
+
+
+@jit(allocates=False)
 def write_outputs(control, dense, scale, turn, drift, memory, record, model, work):
     """Write the outputs that the run has come to and return RUNNING, COMPLETED, DERAILED or TOO_SMALL. ``dense`` (s, d)
     are the coefficients of the dense output, for stages times ``scale``; ``turn`` and ``drift`` are the axes of the
     stages at the step's end, see `wrcore.integrate.moving_axes`."""
-    clock, stages = memory.clock, memory.stages
+    clock = memory.clock
     times, reached = record.times, record.reached[0]
     while reached < times.shape[0] and times[reached] <= clock[T]:
         out = record.states[reached]
@@ -216,14 +230,7 @@ def write_outputs(control, dense, scale, turn, drift, memory, record, model, wor
             copy_into(out, memory.state)
         else:
             theta = (times[reached] - clock[T_OLD]) / (clock[T] - clock[T_OLD])
-            out[:] = 0.0
-            for i in range(stages.shape[0]):
-                weight = 0.0
-                for k in range(dense.shape[1] - 1, -1, -1):
-                    weight = (weight + dense[i, k]) * theta
-                weight *= scale
-                for j in range(out.shape[0]):
-                    out[j] += weight * stages[i, j]
+            interpolate(dense, theta, scale, memory.stages, out)
             begin = (turn[RATE], turn[ANGLE] - turn[RATE] * (clock[T] - clock[T_OLD]))
             carry(model.bodies.mass.shape[0], begin, drift, times[reached] - clock[T_OLD], memory.old, out)
         reached += 1

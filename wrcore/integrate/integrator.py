@@ -3,7 +3,7 @@
 =====================================================  =============================================================
 ``rk45``, ``tsit5``, ``rk23``, ``rk4``                 explicit pairs of order 5(4), 5(4), 3(2), 4(3), compiled
 ``rodas5``, ``rodas4``, ``rodas4p2``, ``ros34pw2``     Rosenbrock methods of order 5(4), 4(3), 4(3), 3(2)
-``auto``                                               ``rodas4p2``, or ``rk4`` where that gets cheaper:
+``auto``                                               ``rodas5``, or ``rk4`` where that gets cheaper:
                                                        :mod:`wrcore.integrate.choice`
 ``scipy_rk45``, ``_rk23``, ``_dop853``, ``_radau``,    scipy's solvers over the same right-hand side
 ``_bdf``, ``_lsoda``

@@ -16,7 +16,7 @@ from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import factorise, solve_stage
-from wrcore.integrate.engine import accept, error_size, judge, keep_short, take_samples, write_outputs
+from wrcore.integrate.engine import accept, error_size, interpolate, judge, keep_short, take_samples, write_outputs
 from wrcore.integrate.jacobian import Jacobian, Joined, Sweep, joined_bodies, new_jacobian, plan_sweep, refresh_jacobian
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import pace
@@ -71,31 +71,46 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
 
 
 @jit(allocates=False)
-def _touchdown_error(tableau, control, memory, scratch, linear, system, model):
-    """Error by the rate at the end of an attempt (``scratch.slope``) against the step's own dense output there.
-
-    Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
-    embedded method compares is blind to it at any tolerance, and the impact would give energy. The system damps what
-    is stiff.
-    """
+def _residual_error(tableau, control, memory, scratch, linear, system, theta, there, pace_there, model):
+    """Error by the rate ``scratch.defect``, which is overwritten, of a state ``there`` that the dense output of an
+    attempt has at ``theta``, against the output's own; the system damps what is stiff."""
     step, stages, defect = memory.clock[engine.NEXT], memory.stages, scratch.defect
     bodies, turn, drift = model.bodies.mass.shape[0], turn_of(linear.jacobian), linear.jacobian.drift
-    copy_into(defect, scratch.slope)
-    rates_of_increments(bodies, turn, drift, step, memory.state, scratch.trial, defect)
+    rates_of_increments(bodies, turn, drift, theta * step, memory.state, there, defect)
     for i in range(stages.shape[0]):
         weight = 0.0
-        for k in range(tableau.dense.shape[1]):
-            weight += (k + 1) * tableau.dense[i, k]
+        for k in range(tableau.dense.shape[1] - 1, -1, -1):
+            weight = weight * theta + (k + 1) * tableau.dense[i, k]
         for k in range(defect.shape[0]):
             defect[k] -= weight / step * stages[i, k]
     solve_stage(linear.jacobian, system, 1.0 / (step * tableau.gamma), defect)
-    return error_size(
-        control.tolerances,
-        pace(model.bodies.wheelsets, model.contact.least_speed, memory.state, scratch.trial),
-        bodies,
-        scratch.trial,
-        defect,
+    return error_size(control.tolerances, pace_there, bodies, there, defect)
+
+
+@jit(allocates=False)
+def _error_between(tableau, control, memory, scratch, linear, system, pace_there, equations, model, work):
+    """Error of the dense output of an attempt where the tableau has it looked at."""
+    theta, there, step = tableau.looked_at, scratch.between, memory.clock[engine.NEXT]
+    interpolate(tableau.dense, theta, 1.0, memory.stages, there)
+    carry(
+        model.bodies.mass.shape[0], turn_of(linear.jacobian), linear.jacobian.drift, theta * step, memory.state, there
     )
+    derivatives_at(equations, memory.clock[engine.T] + theta * step, there, model, work, scratch.defect, STAGE)
+    memory.counters[engine.EVALUATIONS] += 1
+    return tableau.residual * _residual_error(
+        tableau, control, memory, scratch, linear, system, theta, there, pace_there, model
+    )
+
+
+@jit(allocates=False)
+def _touchdown_error(tableau, control, memory, scratch, linear, system, pace_there, model):
+    """Error by the rate at the end of an attempt (``scratch.slope``) against the dense output's there.
+
+    Both agree to the method's order. A wheel that touches down late in a step is seen by none of its stages; what the
+    embedded method compares is blind to it at any tolerance, and the impact would give energy.
+    """
+    copy_into(scratch.defect, scratch.slope)
+    return _residual_error(tableau, control, memory, scratch, linear, system, 1.0, scratch.trial, pace_there, model)
 
 
 @jit(allocates=False)
@@ -158,13 +173,17 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
         rate = pace(model.bodies.wheelsets, model.contact.least_speed, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
+        if error <= 1.0 and tableau.looked_at > 0.0:
+            found = _error_between(tableau, control, memory, scratch, linear, system, rate, equations, model, work)
+            error = found if not found <= error else error
         fresh, contacts = error <= 1.0, 0
         if fresh:  # the next step's first rate
             derivatives_at(equations, clock[engine.T] + step, trial, model, work, slope, STAGE)
             counters[engine.EVALUATIONS] += 1
             contacts = touching(work)
             if contacts > counters[engine.TOUCHING]:
-                error = max(error, _touchdown_error(tableau, control, memory, scratch, linear, system, model))
+                found = _touchdown_error(tableau, control, memory, scratch, linear, system, rate, model)
+                error = found if not found <= error else error
         if judge(control, tableau.exponent, hold, memory, error):
             accept(control, memory, trial, step)
             linear.jacobian.turn[ANGLE] += linear.jacobian.turn[RATE] * step

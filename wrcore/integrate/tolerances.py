@@ -36,7 +36,7 @@ RATE = 30.0
 """Velocities' tolerance over that of positions, 1/s. Above 100 explicit methods at their stability bound let forces
 swing by per cents; much below 30 it is velocities alone that count."""
 
-SHARE = {"rodas5": 4.0, "rodas4": 3.0, "rodas4p2": 1.5, "ros34pw2": 0.1, "rk4": 5.0}
+SHARE = {"rodas5": 12.0, "rodas4": 3.0, "rodas4p2": 1.5, "ros34pw2": 0.1, "rk4": 5.0}
 """What a method's estimate of its error is allowed, where that is no good measure of what the run errs by: methods of
 RODAS' kind estimate the error of their embedded method and err less, Kutta's method much less; those of ROS34PW2 with
 an old Jacobian pile up."""

@@ -101,8 +101,8 @@ def run_sweep(
     ... })
     >>> table
        run  speed     status    method  y_max_m
-    0    0     20  completed  rodas4p2    0.002
-    1    1     30  completed  rodas4p2    0.002
+    0    0     20  completed  rodas5    0.002
+    1    1     30  completed  rodas5    0.002
     """
     sweep = source if isinstance(source, Sweep) else load_sweep(source)
     return run_rows(sweep, sweep.runs, threads, progress)

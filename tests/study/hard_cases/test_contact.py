@@ -18,7 +18,7 @@ def test_fast_impacts_keep_the_root_of_the_damping_factor():
 
 
 def test_impacts_follow_the_damping_law(vehicles, assert_passed):
-    methods = ["ros34pw2", "rodas4p2", "tsit5"]
+    methods = ["ros34pw2", "rodas5", "tsit5"]
     found, curve = impacts(vehicles, "free wheelset", [0.001, 0.01, 0.5], ["spatial"], methods)
     assert_passed(found)
     assert len(curve) == 9
@@ -38,7 +38,7 @@ def test_the_depth_of_an_impact(vehicles):
 
 def test_an_impact_between_the_stages_of_a_step_is_not_missed(vehicles, assert_passed):
     # with the embedded estimate alone the wheelset comes back 2000 times as high as it fell from
-    found, _ = drops(vehicles, "free wheelset", 1e-3, 1.0, ["planar"], ["ros34pw2", "rodas4p2"], [1e-4, 1e-6])
+    found, _ = drops(vehicles, "free wheelset", 1e-3, 1.0, ["planar"], ["ros34pw2", "rodas5"], [1e-4, 1e-6])
     assert_passed(found)
 
 

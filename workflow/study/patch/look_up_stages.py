@@ -48,7 +48,7 @@ class Wheels(NamedTuple):
 def wheels_of(name, settings):
     """`Wheels` at equal intervals of a run."""
     model, start = compile_scene(load_scene(wr.example(name), settings))
-    run = integrate(model, start, np.linspace(0.0, settings["integration.duration"], STATES + 1), "rodas4p2", 1e-4)
+    run = integrate(model, start, np.linspace(0.0, settings["integration.duration"], STATES + 1), "rodas5", 1e-4)
     equations, motions = Equations(model), []
     for t, state in zip(run.t[1:], run.states[1:], strict=True):
         equations(t, state)

@@ -41,7 +41,7 @@ MET = [
 
 COMPRESSION = {"compression": "gzip", "compression_opts": 9, "shuffle": True}
 
-METHODS = "auto", *CHOICES
+METHODS = "auto", *CHOICES, "rodas4p2"
 """Of integration: attempts of each meet cells of their own."""
 
 
