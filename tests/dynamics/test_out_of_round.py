@@ -278,9 +278,7 @@ def test_tables_serve_the_round_part_and_the_solver_the_flat():
     speed, travel = 20.0, HALF_TURN + 0.12
     wheel = {"profile": "S1002", "left": {"out_of_round": FLAT}}
     changes = {"wheel": wheel, "rail": S1002["rail"], "integration.rtol": 1e-6, "initial.y": 1e-3}
-    changes["integration.method"] = (
-        "rodas5"  # at 1e-5 it errs by 290 N on the flat, and `auto` may take rk4 for one of both
-    )
+    changes["integration.method"] = "rodas5"  # `auto` may take rk4 for one of both; at 1e-5 it errs by 290 N
     models = ({"contact.patch": name} for name in ("exact", "tabulated"))
     exact, table = (rolling(FLAT, speed, travel, **changes, **model) for model in models)
     solved = table.counters["patches_not_tabulated"]
