@@ -52,13 +52,16 @@ def main():
     for name, changes, duration in CASES:
         model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", {"contact.patch": "moment", **changes}))
         times, best = np.linspace(0.0, duration, round(100 * duration) + 1), dict.fromkeys(CHOICES, np.inf)
+        evaluations = {}
         for choice in CHOICES * 4:  # in turn
             begun = time.process_time()
-            integrate(model, start, times, *choice)
+            run = integrate(model, start, times, *choice)
+            evaluations[choice] = run.rhs_evaluations / run.steps
             best[choice] = min(best[choice], time.process_time() - begun)
         of = ", R 300" * ("track.path" in changes) + ", track that gives" * ("track.support" in changes)
-        print(f"{name}, {changes['speed']:g} m/s{of}, times real time:",
-              *(f"{method} {rtol:g}: {duration / best[method, rtol]:.0f}" for method, rtol in CHOICES))  # fmt: skip
+        print(f"{name}, {changes['speed']:g} m/s{of}, times real time (evaluations a step):")
+        print(*(f"    {choice[0]} {choice[1]:g}: {duration / best[choice]:.0f} ({evaluations[choice]:.0f})"
+                for choice in CHOICES))  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ def recorded():
 def follow(ask):
     try:
         return ask()
-    except OSError as error:
+    except PermissionError as error:
         pytest.skip(f"here no process may follow another: {error}")
 
 
