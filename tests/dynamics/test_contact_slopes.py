@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
-from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, contact_blocks
+from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, add_slopes, contact_blocks
 from wrcore.dynamics.contact_slopes import differentiable
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.dynamics.system import Equations
@@ -31,13 +31,14 @@ def blocks_of(jacobian, equations, states, model, work, found, expected, touchin
         while work.counts.sum() == 0 and lowered < 0.05:
             state[2] -= 2e-5
             lowered += 2e-5
-            contact_blocks(jacobian, 0.0, state, model, work, 1.0, found[i])
+            contact_blocks(jacobian, 0.0, state, state, model, work, 1.0, found[i])
         state[2] -= depth
-        contact_blocks(jacobian, 0.0, state, model, work, 1.0, found[i])
+        contact_blocks(jacobian, 0.0, state, state, model, work, 1.0, found[i])
         touching[i] = work.counts.sum()
         expected[i] = 0.0
         jacobian.counts[:] = UNCOUNTED
-        _difference_wrenches(jacobian, model, work, 1.0, expected[i])
+        _difference_wrenches(jacobian, model, work, 1.0)
+        add_slopes(jacobian, state, model, expected[i])
         work.counts[:] = 0
 
 

@@ -7,7 +7,7 @@ import wrcore as wr
 from tests.dynamics.test_pair_table import known_numbers, pair_of_known_numbers
 from wrcore.contact.patch.model import MODES, NODES, NUMBERS
 from wrcore.dynamics import pair_cells, pair_table
-from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, contact_blocks
+from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, add_slopes, contact_blocks
 from wrcore.dynamics.creep_modes import creep_modes
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.dynamics.pair_cells import AXES, Place
@@ -37,12 +37,13 @@ CASES = {
 def blocks_of(jacobian, states, model, work, found, expected, uncounted):
     """Derivatives by hand and by differences, and the number of wheels that are left to differences."""
     for i in range(states.shape[0]):
-        contact_blocks(jacobian, 0.0, states[i], model, work, 1.0, found[i])
+        contact_blocks(jacobian, 0.0, states[i], states[i], model, work, 1.0, found[i])
         for k in range(jacobian.counts.shape[0]):
             for wheel in range(2):
                 uncounted[i] += jacobian.counts[k, wheel] == UNCOUNTED
         expected[i], jacobian.counts[:] = 0.0, UNCOUNTED
-        _difference_wrenches(jacobian, model, work, 1.0, expected[i])
+        _difference_wrenches(jacobian, model, work, 1.0)
+        add_slopes(jacobian, states[i], model, expected[i])
 
 
 @pytest.mark.parametrize("case", CASES)

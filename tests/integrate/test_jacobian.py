@@ -155,8 +155,7 @@ def test_the_drift_of_the_whole_state(moving):
 def test_refreshing_the_contacts_is_taking_the_whole_anew(moving):
     """Taken where the wheelsets are a bit aside, then refreshed where they are: only contacts are that nonlinear."""
     model, t, state, rate, function = moving
-    if not contacts_alone.py_func(model):
-        pytest.skip("runs take the whole of it each time")
+    assert contacts_alone.py_func(model)
     n, aside = len(model.bodies.mass), state.copy()
     for body in model.bodies.wheelsets:
         aside[13 * body + 1] += 2e-4

@@ -156,3 +156,17 @@ def test_orders_on_a_light_part_that_follows_another_on_a_stiff_spring(name, ord
     assert fine == pytest.approx(
         {"rodas5": 0.029, "rodas4": 0.26, "rodas4p2": 3.8e-5, "ros34pw2": 7.5e-3}[name], rel=0.02
     )
+
+
+@pytest.mark.parametrize("name", ROSENBROCK)
+def test_stages_imply_the_speeds_of_a_state_of_its_own(name):
+    """q' = v, v' = -3 q - 2 v, increments counted from a drift of q that is not v."""
+    method, matrix, start, drift, step = ROSENBROCK[name], np.array([[0, 1], [-3, -2]]), [0.3, 0.8], [0.5, 0.0], 0.1
+    u = np.zeros((len(method.nodes), 2))
+    for i in range(len(u)):
+        there = start + method.nodes[i] * step * np.array(drift) + method.stages[i] @ u
+        implied = start[1] + method.speeds[i] @ u[:, 0] / step + method.begun[i] * (start[1] - drift[0])
+        assert implied == pytest.approx(there[1], rel=1e-11)
+        known = matrix @ there - drift + step * method.by_time[i] * matrix @ drift + method.couplings[i] @ u / step
+        u[i] = np.linalg.solve(np.eye(2) / (step * method.gamma) - matrix, known)
+    assert np.abs(u[:, 1]).max() > 0.05

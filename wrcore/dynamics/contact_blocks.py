@@ -3,10 +3,11 @@
 Of all parts of the Jacobian those of the contacts change fastest. Between two Jacobians in full they are brought up to
 date without an evaluation of the whole vehicle: for each wheelset the wrench's derivatives C by its pose and velocity
 are found in the rails' own frames, and to the accelerations of the wheelset and of bodies joined to it they add A C,
-where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along
-the rail and a turn about the axle change nothing. Where patches are ellipses or lobes that are looked up, C is found by
-hand (`patch_slopes`, :mod:`wrcore.dynamics.lobe_slopes`), of patches that moments move (:mod:`wrcore.contact.moved`);
-elsewhere by differences: of the search alone, or of the wrenches.
+where A are the accelerations by a wrench on the wheelset. In the rail's frame the displacement along the rail and a
+turn about the axle change nothing. Where patches are ellipses or lobes that are looked up, C is found by hand
+(`patch_slopes`, :mod:`wrcore.dynamics.lobe_slopes`), of patches that moments move (:mod:`wrcore.contact.moved`);
+elsewhere by differences: of the search alone, or of the wrenches. The states of a flexible track
+(:mod:`wrcore.dynamics.track_blocks`) and of wheels that turn independently add columns and rows.
 """
 
 import math
@@ -21,6 +22,7 @@ from wrcore.dynamics.inertia import apply_inverse_inertia, inertia_axes
 from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD, PATCHES_ONLY
 from wrcore.dynamics.motion import MOTION, motion_of
 from wrcore.dynamics.system import wheel_motions
+from wrcore.dynamics.track_blocks import give_way, over_rails
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import contact_of, press_wheels
 from wrcore.kernels.handles import call_address
@@ -36,6 +38,9 @@ ALONG, ACROSS, UP, ROLL, PITCH, YAW = range(6)
 MOVING = ACROSS, UP, ROLL, YAW
 """Those that move patches."""
 
+OF_ROLL, OF_YAW, SPINS = 2, 3, MOVES + 3
+"""Rows of slopes by roll and yaw, and first of three by angular velocities."""
+
 UNIT = 1e3
 """Wrench whose accelerations are looked at, N and N m."""
 
@@ -45,15 +50,18 @@ UNCOUNTED = -1
 
 @jit(allocates=False, inline="always")
 def contacts_alone(model):
-    """Whether the contacts' part of the Jacobian is known from the wheelsets' wrenches alone. Wheels that turn
-    independently and a flexible track have internal states, whose rows and columns these do not tell, and check rails
-    press wheels too."""
-    return (
-        model.bodies.wheelsets.shape[0] > 0
-        and model.bodies.independent.shape[0] == 0
-        and model.flexible_track.mass.shape[0] == 0
-        and model.check_rails.rows.shape[0] == 0
-    )
+    """Whether the contacts' part of the Jacobian is known from the rails' wrenches alone: check rails press wheels
+    too."""
+    return model.bodies.wheelsets.shape[0] > 0 and model.check_rails.rows.shape[0] == 0
+
+
+@jit(allocates=False, inline="always")
+def speeds_implied(along, model):
+    """Whether stages go by the rails' speeds that they imply: on rails without mass, with a Jacobian ``along`` the
+    drift of the whole state, where derivatives are those of the model itself."""
+    track, strips = model.flexible_track, model.contact.strips
+    exact = strips.strips == 0 or strips.looked_up > 0.0
+    return along and exact and contacts_alone(model) and track.mass.shape[0] > 0 and track.mass[0] == 0.0
 
 
 @jit(allocates=False)
@@ -92,6 +100,12 @@ def _accelerations(t, state, model, work, body, direction, out):
         apply_inverse_inertia(bodies.inertia[b], axes[b], wrenches[b], out[6 * b + 3 : 6 * b + 6])
 
 
+@jit(allocates=False, inline="always")
+def _direction_of(slope):
+    """Direction of a row of slopes."""
+    return MOVING[slope] if slope < MOVES else slope + 2
+
+
 @jit(allocates=False, fastmath=FUSED)
 def _moved(base, direction, difference, row):
     """Write a wheel's motion with a difference in one direction of its rail's frame into ``row``."""
@@ -106,28 +120,67 @@ def _moved(base, direction, difference, row):
 
 
 @jit(allocates=False, fastmath=FUSED)
-def _add_column(rail, direction, slope, scale, columns):
-    """Add ``scale`` times a derivative of a wrench in a rail's frame (axes: columns of ``rail``)."""
-    i, first = direction % 3, direction - direction % 3
-    fx, fy, fz = slope[0] * scale, slope[1] * scale, slope[2] * scale
-    mx, my, mz = slope[3] * scale, slope[4] * scale, slope[5] * scale
-    for axis in range(3):
-        share, column = rail[axis, i], columns[first + axis]
-        if share == 0.0:
-            continue
-        for j in range(3):
-            column[j] += share * (rail[j, 0] * fx + rail[j, 1] * fy + rail[j, 2] * fz)
-            column[3 + j] += share * (rail[j, 0] * mx + rail[j, 1] * my + rail[j, 2] * mz)
+def _add_share(rail, wheel, slope, share, column):
+    """Add a share of a derivative of a wrench in a rail's frame (axes: columns of ``rail``), and of rates, to a
+    column."""
+    for j in range(3):
+        column[j] += share * (rail[j, 0] * slope[0] + rail[j, 1] * slope[1] + rail[j, 2] * slope[2])
+        column[3 + j] += share * (rail[j, 0] * slope[3] + rail[j, 1] * slope[4] + rail[j, 2] * slope[5])
+    rates = slope.shape[0] - 6
+    for j in range(6, 6 + rates - rates % 2):
+        column[j + 2 * wheel] += share * slope[j]
+    if rates % 2 == 1:
+        column[column.shape[0] - 1] += share * slope[slope.shape[0] - 1]
 
 
 @jit(allocates=False, fastmath=FUSED)
-def add_slope(jacobian, k, wheel, direction, slope, columns):
-    """Add a derivative of a wheel's wrench in a direction to the ``columns`` of its wheelset; a turn about the axle
-    changes nothing."""
-    rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
-    _add_column(rail, direction, slope, 1.0, columns)
-    if direction == ROLL or direction == YAW:
-        _add_column(rail, PITCH, slope, -(m.ex if direction == ROLL else m.ez) / m.ey, columns)
+def _add_column(rail, wheel, direction, slope, scale, columns):
+    """Add ``scale`` times a derivative in a direction of a rail's frame."""
+    i, first = direction % 3, direction - direction % 3
+    for axis in range(3):
+        if rail[axis, i] != 0.0:
+            _add_share(rail, wheel, slope, scale * rail[axis, i], columns[first + axis])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def _turn_apart(m, half, inertia, slopes):
+    """Add the row by half the difference of the rolling rates (rad/s) to a wheel's ``slopes``, and the column of its
+    rate. The wheel turns by it about an axle that moves."""
+    row, column, apart = slopes.shape[0] - 1, slopes.shape[1] - 1, m.side * half
+    for i in range(column):
+        wx, wy, wz = slopes[SPINS, i], slopes[SPINS + 1, i], slopes[SPINS + 2, i]
+        slopes[row, i] = m.side * (m.ex * wx + m.ey * wy + m.ez * wz)
+        slopes[OF_ROLL, i] += apart * (m.ey * wz - m.ez * wy)
+        slopes[OF_YAW, i] += apart * (m.ex * wy - m.ey * wx)
+    for i in range(row + 1):
+        slopes[i, column] = m.side / inertia * (m.ex * slopes[i, 3] + m.ey * slopes[i, 4] + m.ez * slopes[i, 5])
+
+
+@jit(allocates=False, fastmath=FUSED)
+def add_slopes(jacobian, state, model, columns):
+    """Add the slopes of all wheels at a ``state`` to the ``columns`` of their wheelsets; a turn about the axle changes
+    nothing."""
+    flexible = model.flexible_track.mass.shape[0] > 0
+    for k in range(columns.shape[0]):
+        for wheel in range(2):
+            rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
+            slopes = jacobian.slopes[k, wheel]
+            if flexible:
+                give_way(model.flexible_track, wheel, slopes)
+            number = jacobian.column_numbers[k, columns.shape[1] - 1]
+            if model.bodies.independent.shape[0] > 0 and number >= 0:
+                half, body = state[number + model.bodies.mass.shape[0]], model.bodies.wheelsets[k]
+                _turn_apart(m, half, model.bodies.inertia[body, 1], slopes)
+                _add_share(rail, wheel, slopes[slopes.shape[0] - 1], 1.0, columns[k, columns.shape[1] - 1])
+            for j in range(SLOPES):
+                direction = _direction_of(j)
+                _add_column(rail, wheel, direction, slopes[j], 1.0, columns[k])
+                if direction == ROLL or direction == YAW:
+                    share = -(m.ex if direction == ROLL else m.ez) / m.ey
+                    _add_column(rail, wheel, PITCH, slopes[j], share, columns[k])
+            for i in range((columns.shape[1] - DIRECTIONS) // 2):  # of rails: four or eight columns, or none
+                column = DIRECTIONS + 2 * wheel + i + (2 if i > 1 else 0)
+                _add_share(rail, wheel, slopes[SLOPES + i], 1.0, columns[k, column])
 
 
 @jit(allocates=False)
@@ -143,14 +196,17 @@ def _take_rails(jacobian, angle, work):
 
 
 @jit(allocates=False)
-def contact_blocks(jacobian, angle, state, model, work, fine, columns):
-    """Fill ``columns`` (k, 12, 6) with the derivatives of the rails' force and moment by displacement, rotation,
-    velocity and angular velocity of their wheelsets, in axes turned by an ``angle`` (rad). Differences of velocities
-    are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
+def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
+    """Fill ``columns`` (k, c, 6 + r) with the derivatives of the rails' force and moment, and of some rates, by
+    displacement, rotation, velocity and angular velocity of their wheelsets, and by some internal states, see
+    `wrcore.dynamics.links.contact_places`, in axes turned by an ``angle`` (rad), at a ``state`` of a ``rate``.
+    Differences of velocities are multiplied by ``fine``; what ``work`` holds of wheels and patches is overwritten."""
     wheelsets, base = model.bodies.wheelsets, jacobian.motions
     for k in range(wheelsets.shape[0]):
         rotation_matrix(state, STATE_SIZE * wheelsets[k], work.rotations[wheelsets[k]])
     wheel_motions(model, state, work)
+    if model.flexible_track.mass.shape[0] > 0:
+        over_rails(model, state, rate, work.motions)
     _take_rails(jacobian, angle, work)
     for k in range(wheelsets.shape[0]):
         for wheel in range(2):
@@ -158,32 +214,31 @@ def contact_blocks(jacobian, angle, state, model, work, fine, columns):
     columns[:] = 0.0
     jacobian.counts[:] = UNCOUNTED
     if model.slopes != 0:
-        call_address(model.slopes, jacobian, model, work, columns)
+        call_address(model.slopes, jacobian, model, work)
     for k in range(wheelsets.shape[0]):
         if jacobian.counts[k, 0] == UNCOUNTED or jacobian.counts[k, 1] == UNCOUNTED:
-            _difference_wrenches(jacobian, model, work, fine, columns)
+            _difference_wrenches(jacobian, model, work, fine)
             break
+    add_slopes(jacobian, state, model, columns)
 
 
 @jit(allocates=False)
-def blocks_of_patches(jacobian, model, work, columns):
-    """`contact_blocks` by the slopes of ellipses; ``jacobian.counts`` are `UNCOUNTED` where these are not enough."""
+def slopes_of_patches(jacobian, model, work):
+    """Fill ``jacobian.slopes`` with those of ellipses; ``jacobian.counts`` are `UNCOUNTED` where these are not
+    enough."""
     base, difference = jacobian.motions, _move_patches(jacobian, model, work)
     if difference == 0.0:
         jacobian.counts[:] = UNCOUNTED
         return
-    slopes = jacobian.slopes
+    jacobian.slopes[:] = 0.0
     for k in range(base.shape[0]):
         for wheel in range(2):
-            slopes[:], m, found = 0.0, motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
+            m, found = motion_of(base[k, wheel]), jacobian.patches[:, k, wheel]
             for patch in range(jacobian.counts[k, wheel]):
                 patch_slopes(
                     contact_of(model.contact, k, wheel), m, found[0, patch], found, patch, difference,
-                    jacobian.law, slopes,
+                    jacobian.law, jacobian.slopes[k, wheel],
                 )  # fmt: skip
-            for j in range(SLOPES):
-                direction = MOVING[j] if j < MOVES else j + 2
-                add_slope(jacobian, k, wheel, direction, slopes[j], columns[k])
 
 
 @jit(allocates=False)
@@ -230,9 +285,9 @@ def _search_moved(jacobian, model, work):
 
 
 @jit(allocates=False)
-def _difference_wrenches(jacobian, model, work, fine, columns):
-    """`contact_blocks` by differences of the wrenches, of the wheels that are `UNCOUNTED`."""
-    base, found, slope = jacobian.motions, jacobian.wrenches, jacobian.slopes[0]
+def _difference_wrenches(jacobian, model, work, fine):
+    """Fill ``jacobian.slopes`` by differences of the wrenches, of the wheels that are `UNCOUNTED`."""
+    base, found = jacobian.motions, jacobian.wrenches
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(work.motions[k, wheel], base[k, wheel])
@@ -240,11 +295,10 @@ def _difference_wrenches(jacobian, model, work, fine, columns):
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
-    for step in range(DIRECTIONS):
-        direction = (step + 6) % DIRECTIONS  # velocities first: the patches are those of the pose
+    for step in range(SLOPES):
+        j = (step + MOVES) % SLOPES  # velocities first: the patches are those of the pose
+        direction = _direction_of(j)
         mode = BARE | ELLIPSES | PATCHES_HELD if direction >= 6 else BARE | ELLIPSES
-        if direction == ALONG or direction == PITCH:
-            continue
         difference = DISPLACEMENT if direction < 3 else TURN
         if direction >= 6:
             difference = fine * (SPEED if direction < 9 else SPIN)
@@ -257,8 +311,8 @@ def _difference_wrenches(jacobian, model, work, fine, columns):
                 if jacobian.counts[k, wheel] != UNCOUNTED:
                     continue
                 for i in range(6):
-                    slope[i] = (work.rail_wrenches[k, wheel, i] - found[k, wheel, i]) / difference
-                add_slope(jacobian, k, wheel, direction, slope, columns[k])
+                    slope = (work.rail_wrenches[k, wheel, i] - found[k, wheel, i]) / difference
+                    jacobian.slopes[k, wheel, j, i] = slope
 
 
 @jit(allocates=False, fastmath=FUSED)
@@ -281,20 +335,23 @@ def _respond(mobility, axes, c, s, wrench, body, out):
 
 
 @jit(allocates=False)
-def renew_contacts(joined, whole, jacobian, angle, t, state, model, work, fine):
+def renew_contacts(joined, whole, jacobian, angle, t, state, rate, model, work, fine):
     """Replace the contacts' part of the Jacobian, or add it where the ``whole`` has just been taken at the wrenches of
     the rails. ``joined``: bodies that accelerate with each wheelset; ``angle``: of the axes in which increments are
-    counted, rad."""
-    columns, out = jacobian.columns, jacobian.idle
-    contact_blocks(jacobian, angle, state, model, work, fine, columns)
+    counted, rad; ``rate``: of the state."""
+    columns, out, bodies = jacobian.columns, jacobian.idle, model.bodies.mass.shape[0]
+    contact_blocks(jacobian, angle, state, rate, model, work, fine, columns)
     if whole:
         take_mobility(jacobian, t, state, model, work)
     c, s = math.cos(angle), math.sin(angle)
     for k in range(columns.shape[0]):
         wheelset = model.bodies.wheelsets[k]
-        for direction in range(DIRECTIONS):
-            column = jacobian.by_position[6 * wheelset + direction] if direction < 6 else \
-                jacobian.by_velocity[6 * wheelset + direction - 6]  # fmt: skip
+        for direction in range(columns.shape[1]):
+            number = jacobian.column_numbers[k, direction]
+            if number < 0:
+                continue
+            by_position = number < 6 * bodies
+            column = jacobian.by_position[number] if by_position else jacobian.by_velocity[number - 6 * bodies]
             for j in range(joined.starts[k], joined.starts[k + 1]):
                 body = joined.bodies[j]
                 _respond(jacobian.mobility[k], work.rotations[wheelset], c, s, columns[k, direction], body, out)
@@ -302,3 +359,8 @@ def renew_contacts(joined, whole, jacobian, angle, t, state, model, work, fine):
                     known = jacobian.contact[k, direction, 6 * body + row]
                     jacobian.contact[k, direction, 6 * body + row] = out[row]
                     column[6 * body + row] += out[row] - (0.0 if whole else known)
+            for i in range(columns.shape[2] - 6):
+                known, new = jacobian.contact[k, direction, 6 * bodies + i], columns[k, direction, 6 + i]
+                jacobian.contact[k, direction, 6 * bodies + i] = new
+                if jacobian.row_numbers[k, i] >= 0:
+                    column[jacobian.row_numbers[k, i]] += new - (0.0 if whole else known)

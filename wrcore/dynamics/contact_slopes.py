@@ -35,11 +35,14 @@ SAME = 1e-5
 TABLE = LAWS["table"]
 
 
-def slope_scratch(wheelsets):
-    """Scratch arrays of the slopes of a number of wheelsets: patches as found and as moved, their counts, slopes of a
-    wheel, and of a law."""
+def slope_scratch(model):
+    """Scratch arrays of the slopes of all wheels: patches as found and as moved, their counts, the wheels' slopes, and
+    those of a law. To a wheel's `SLOPES` of the wrench come four rows of its rail where track is flexible and one of
+    wheels that turn independently, and two columns and one, of the rates of these."""
+    flexible, apart = len(model.flexible_track.mass) > 0, len(model.bodies.independent) > 0
+    wheelsets, size = len(model.bodies.wheelsets), (SLOPES + 4 * flexible + apart, 6 + 2 * flexible + apart)
     patches = np.zeros((1 + MOVES, wheelsets, 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
-    return patches, np.zeros((wheelsets, 2), np.int64), np.zeros((SLOPES, 6)), np.zeros((8, 1 + MOVES))
+    return patches, np.zeros((wheelsets, 2), np.int64), np.zeros((wheelsets, 2, *size)), np.zeros((8, 1 + MOVES))
 
 
 @jit(allocates=False)

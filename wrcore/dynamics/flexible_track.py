@@ -29,7 +29,7 @@ import numpy as np
 
 from wrcore.contact.reduction import COSINE, ETA, FX, FY, NORMAL, SINE, Y, Z
 from wrcore.dynamics.body import STATE_SIZE
-from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD
+from wrcore.dynamics.modes import BARE, ELLIPSES, PATCHES_HELD, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.vector import copy_into
 from wrcore.dynamics.wheel import COUNTERS, press_wheels
@@ -75,6 +75,8 @@ class FlexibleTrackWork(NamedTuple):
     steps: np.ndarray  # (k, 4): of Newton's method, m/s
     slopes: np.ndarray  # (k, 4, 2): derivatives of f by both q' of its rail (last index), N s/m
     matrix: np.ndarray  # (k, 2, 2, 2): derivatives of a rail's residuals by its q' (last index), N s/m
+    inverse: np.ndarray  # (k, 2, 2, 2): of it, as held for `SPEEDS_GIVEN`
+    by_speed: np.ndarray  # (k, 4, 6): derivatives of the wheels' wrenches by q', held with it
     left: np.ndarray  # (k, 2): size of a rail's residuals, N
     parts: np.ndarray  # (k, 2): of Newton's full steps
     power: np.ndarray  # (1,): f q', summed over all rails, W; 0 for a rigid track
@@ -94,7 +96,7 @@ def track_size(track):
 def track_work(track, wheelsets):
     """Scratch arrays for a `FlexibleTrack` and a number of wheelsets."""
     k = wheelsets if len(track.mass) else 0
-    shapes = [(k, RAILS)] * 7 + [(k, RAILS, 2), (k, 2, 2, 2), (k, 2), (k, 2), (1,)]
+    shapes = [(k, RAILS)] * 7 + [(k, RAILS, 2), (k, 2, 2, 2), (k, 2, 2, 2), (k, RAILS, 6), (k, 2), (k, 2), (1,)]
     return FlexibleTrackWork(*(np.zeros(shape) for shape in shapes), np.zeros(1, np.int64))
 
 
@@ -112,53 +114,96 @@ def rails_at(model, state, k):
 
 
 @jit(allocates=False, forceinline=True)
+def first_place(model, k):
+    """Place of the first state of the track under the k-th wheelset in the state."""
+    track = model.flexible_track
+    size = track.mass.shape[0] * (1 if track.mass[0] == 0.0 else 2)
+    return STATE_SIZE * model.bodies.mass.shape[0] + track.first + size * k
+
+
+@jit(allocates=False, forceinline=True)
 def displacement(model, state, k, wheel):
     """How far the rail under a wheel is displaced to the left and up, m."""
-    track = model.flexible_track
-    d = track.mass.shape[0]
-    if d == 0:
+    if model.flexible_track.mass.shape[0] == 0:
         return 0.0, 0.0
-    size = d if track.mass[0] == 0.0 else 2 * d
-    at = STATE_SIZE * model.bodies.mass.shape[0] + track.first + size * k + 2 * wheel
+    at = first_place(model, k) + 2 * wheel
     return state[at], state[at + 1]
 
 
 @jit(allocates=False)
 def flexible_wrenches(model, state, work, rate, mode):
     """Wrenches of the rails on all wheels, as by the kernel of the wheels, and the rates of the track's states, written
-    into ``rate``; the motions in ``work``, over rails at rest, become those over the rails as they move."""
-    track, scratch, mode = model.flexible_track, work.flexible_track, mode & ~BARE
-    d, massless = track.mass.shape[0], track.mass[0] == 0.0
-    size = d if massless else 2 * d
-    first = STATE_SIZE * model.bodies.mass.shape[0] + track.first
+    into ``rate``; the motions in ``work``, over rails at rest, become those over the rails as they move. While wrenches
+    are held, the rates alone, by the forces found last."""
+    if not mode & WRENCHES_HELD:
+        _find_wrenches(model, state, work, mode)
+    _write_rates(model, state, work, rate)
+
+
+@jit(allocates=False)
+def _find_wrenches(model, state, work, mode):
+    """Wrenches on all wheels, forces on the rails, and the rails' speeds."""
+    scratch, massless, given = work.flexible_track, model.flexible_track.mass[0] == 0.0, mode & SPEEDS_GIVEN
+    if massless and not given:
+        mode &= ~BARE
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
-            at, motion = first + size * k + i, work.motions[k, i // 2]
-            motion[MOTION.y + i % 2] -= displacement(model, state, k, i // 2)[i % 2]
+            at, motion = first_place(model, k) + i, work.motions[k, i // 2]
+            motion[MOTION.y + i % 2] -= state[at]
             scratch.ground[k, i] = motion[MOTION.vy + i % 2]
-            scratch.speeds[k, i] = 0.0 if massless else state[at + d]
+            if not massless:
+                scratch.speeds[k, i] = state[at + model.flexible_track.mass.shape[0]]
+            elif not given:
+                scratch.speeds[k, i] = 0.0
     c = work.counters
     counted = c[0], c[1], c[2], c[3], c[4]
     _press(model, work, -1, mode)
-    if massless:
+    if massless and given:
+        _step_on(model, state, work)
+    elif massless:
         if _follow_where_sliding(model, work):
             _press(model, work, -1, mode | PATCHES_HELD)
-        _give_way(model, state, work, first, counted, mode)
+        _give_way(model, state, work, counted, mode)
     scratch.power[0] = 0.0
     for k in range(scratch.speeds.shape[0]):
-        at = first + size * k
+        at = first_place(model, k)
         for i in range(RAILS):
             scratch.power[0] += scratch.forces[k, i] * scratch.speeds[k, i]
+        for wheel in range(0 if mode & BARE else 2):
+            for patch in range(work.counts[k, wheel]):
+                work.patches[k, wheel, patch, Y] += state[at + 2 * wheel]
+                work.patches[k, wheel, patch, Z] += state[at + 2 * wheel + 1]
+
+
+@jit(allocates=False)
+def _step_on(model, state, work):
+    """Lead the speeds of rails without mass, and the wrenches, on by a step with the slopes that are held."""
+    scratch = work.flexible_track
+    _find_residuals(model, state, scratch)
+    for k in range(scratch.speeds.shape[0]):
+        for i in range(RAILS):
+            inverse, first, step = scratch.inverse[k, i // 2], 2 * (i // 2), 0.0
+            for j in range(2):
+                step -= inverse[i % 2, j] * scratch.residuals[k, first + j]
+            scratch.speeds[k, i] += step
+            for j in range(6):
+                work.rail_wrenches[k, i // 2, j] += scratch.by_speed[k, i, j] * step
+
+
+@jit(allocates=False)
+def _write_rates(model, state, work, rate):
+    """Rates of the track's states by the forces on the rails, or by their speeds where they have no mass."""
+    track, scratch = model.flexible_track, work.flexible_track
+    d, massless = track.mass.shape[0], track.mass[0] == 0.0
+    for k in range(scratch.speeds.shape[0]):
+        at = first_place(model, k)
+        for i in range(RAILS if massless else 0):
             rate[at + i] = scratch.speeds[k, i]
         for i in range(0 if massless else d):
             total = scratch.forces[k, i] if i < RAILS else 0.0
             for j in range(d):
                 total -= track.stiffness[i, j] * state[at + j] + track.damping[i, j] * state[at + d + j]
             rate[at + i], rate[at + d + i] = state[at + d + i], total / track.mass[i]
-        for wheel in range(2):
-            for patch in range(work.counts[k, wheel]):
-                work.patches[k, wheel, patch, Y] += state[at + 2 * wheel]
-                work.patches[k, wheel, patch, Z] += state[at + 2 * wheel + 1]
 
 
 @jit(allocates=False)
@@ -255,12 +300,12 @@ def _step(track, scratch, k, wheel, differences):
 
 
 @jit(allocates=False)
-def _find_residuals(track, scratch, state, first):
+def _find_residuals(model, state, scratch):
     """Fill the residuals of all rails; whether one is out of balance."""
-    out = False
+    track, out = model.flexible_track, False
     for k in range(scratch.speeds.shape[0]):
         for i in range(RAILS):
-            spring = track.stiffness[i, i] * state[first + RAILS * k + i]
+            spring = track.stiffness[i, i] * state[first_place(model, k) + i]
             damper, force = track.damping[i, i] * scratch.speeds[k, i], scratch.forces[k, i]
             left = spring + damper - force
             scratch.residuals[k, i] = left
@@ -275,12 +320,12 @@ def _moves(scratch, k, wheel):
 
 
 @jit(allocates=False)
-def _give_way(model, state, work, first, counted, mode):
+def _give_way(model, state, work, counted, mode):
     """Find the speeds of rails without mass, with all wrenches there; the counters start from ``counted`` each time."""
     track, scratch, differences = model.flexible_track, work.flexible_track, True
     scratch.left[:] = math.inf
     for n in range(MOST_STEPS):
-        _find_residuals(track, scratch, state, first)
+        _find_residuals(model, state, scratch)
         if differences:
             _find_slopes(model, work, mode)
         fresh, differences, moving = differences, False, False
@@ -294,4 +339,4 @@ def _give_way(model, state, work, first, counted, mode):
         _press(model, work, -1, mode | PATCHES_HELD)
         if not moving:
             break
-    scratch.unbalanced[0] += _find_residuals(track, scratch, state, first)
+    scratch.unbalanced[0] += _find_residuals(model, state, scratch)

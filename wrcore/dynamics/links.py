@@ -5,7 +5,7 @@ import numpy as np
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.control import control_links
 from wrcore.dynamics.drive import BRAKE, CONTROLLED, KIND, NUMBER, REACTION, WHEEL, drive_links, drive_state_bodies
-from wrcore.dynamics.flexible_track import track_places
+from wrcore.dynamics.flexible_track import RAILS, track_places
 from wrcore.dynamics.marker import FRAME
 from wrcore.elements.law import INNER, LAW, NUMBERS
 
@@ -83,18 +83,41 @@ def _wheels_driven_apart(model):
 
 
 def _track_groups(model):
-    """For each wheelset the list of internal states that act on one another, those of a flexible track; else none."""
+    """For each wheelset the list of internal states of the flexible track under it; else none."""
     if not len(model.flexible_track.mass):
         return []
-    groups = [[int(state) for state in row] for row in track_places(model) - STATE_SIZE * len(model.bodies.mass)]
-    for wheelset, state in model.bodies.independent:
-        groups[wheelset].append(int(state))
-    return groups
+    return [[int(state) for state in row] for row in track_places(model) - STATE_SIZE * len(model.bodies.mass)]
+
+
+def contact_places(model):
+    """Numbers of the Jacobian's columns that a wheelset's contacts are part of, (k, c), and of the rates among the rows
+    (k, r), both as in `wrcore.integrate.jacobian.Sweep`; -1: none. First its displacements and velocities; then the
+    displacements of its rails, the velocities of those with masses, and half the difference of rolling rates of wheels
+    that turn independently. Rates: of the rails' velocities, or displacements where they have no mass, and of that."""
+    n, wheelsets, apart = len(model.bodies.mass), model.bodies.wheelsets, dict(model.bodies.independent.tolist())
+    groups, freedoms, columns, rows = _track_groups(model), len(model.flexible_track.mass), [], []
+    for k, body in enumerate(wheelsets):
+        rails, speeds = (groups[k][:RAILS], groups[k][freedoms:][:RAILS]) if groups else ([], [])
+        own = [apart.get(k, -1 - 12 * n)] if apart else []
+        columns.append([*range(6 * body, 6 * body + 6), *range(6 * (n + body), 6 * (n + body) + 6),
+                        *(12 * n + state for state in [*rails, *speeds, *own])])  # fmt: skip
+        rows.append([6 * n + state for state in [*(speeds or rails), *own]])
+    if not columns:
+        return np.zeros((0, 12), int), np.zeros((0, 0), int)
+    return np.array(columns), np.maximum(np.array(rows, int), -1)
+
+
+def track_displacements(model):
+    """For each internal state that is a velocity of the track the one that is its displacement."""
+    freedoms = len(model.flexible_track.mass)
+    return {v: q for states in _track_groups(model) for q, v in zip(states, states[freedoms:], strict=False)}
 
 
 def internal_state_groups(model):
     """Lists of internal states that act on one another: those of a flexible track, of own laws, of control."""
     groups = _track_groups(model)
+    for wheelset, state in model.bodies.independent if groups else ():
+        groups[wheelset].append(int(state))
     elements = [list(_states_of(model.elements, k)) for k in range(len(model.elements.law))]
     more = [*elements, *(sorted(states) for _, states in [*control_links(model), *_wheels_driven_apart(model)])]
     for states in more:

@@ -18,7 +18,7 @@ from wrcore.contact.patch.gap import group_end
 from wrcore.contact.scan import leaves_cells
 from wrcore.contact.strip import changed_here, make_pose
 from wrcore.creep.kalker import coefficients_at
-from wrcore.dynamics.contact_blocks import MOVING, UNCOUNTED, add_slope
+from wrcore.dynamics.contact_blocks import UNCOUNTED
 from wrcore.dynamics.contact_slopes import (
     SLOPES,
     TABLE,
@@ -70,23 +70,21 @@ MIRRORED = np.array([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 @jit(allocates=False)
-def blocks_of_lobes(jacobian, model, work, columns):
-    """`contact_blocks` by the slopes of lobes; wheels with others are `UNCOUNTED` in ``jacobian.counts``."""
-    base, slopes = jacobian.motions, jacobian.slopes
+def slopes_of_lobes(jacobian, model, work):
+    """Fill ``jacobian.slopes`` with those of lobes; wheels with others are `UNCOUNTED` in ``jacobian.counts``."""
+    base = jacobian.motions
     press_wheels(model, work, PATCHES_ONLY)
     for k in range(base.shape[0]):
         for wheel in range(2):
             contact, seen = contact_of(model.contact, k, wheel), motion_of(base[k, wheel])
+            rows, count, slopes = work.patches[k, wheel], work.counts[k, wheel], jacobian.slopes[k, wheel]
             slopes[:], jacobian.counts[k, wheel] = 0.0, 0
-            rows, count = work.patches[k, wheel], work.counts[k, wheel]
             if not lobe_slopes(contact, as_left(seen), rows, count, jacobian.law, slopes, work.strips):
                 jacobian.counts[k, wheel] = UNCOUNTED
                 continue
-            for j in range(SLOPES):
-                if seen.side < 0.0:
-                    for i in range(6):
-                        slopes[j, i] *= MIRRORED[j] * (-1.0 if i % 2 else 1.0)
-                add_slope(jacobian, k, wheel, MOVING[j] if j < MOVES else j + 2, slopes[j], columns[k])
+            for j in range(SLOPES if seen.side < 0.0 else 0):
+                for i in range(6):
+                    slopes[j, i] *= MIRRORED[j] * (-1.0 if i % 2 else 1.0)
 
 
 @jit(allocates=False, fastmath=FUSED)

@@ -22,5 +22,9 @@ PATCHES_ONLY = 16
 BARE = 32
 """Wrenches and counts alone: of patches that are looked up no rows are filled, which nobody reads within a step."""
 
+SPEEDS_GIVEN = 64
+"""Speeds of rails without mass are about those in the work; one step of Newton's method leads on, see
+:mod:`wrcore.dynamics.track_blocks`."""
+
 STAGE = WARM | BARE
 """What integrators ask for."""

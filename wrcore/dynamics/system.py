@@ -216,12 +216,12 @@ def _add_rail_wrenches(model, state, work, rate, mode):
     wheelsets, tangent, held = model.bodies.wheelsets, model.track.tangent, mode & WRENCHES_HELD
     if not held:
         wheel_motions(model, state, work)
-        if model.rails != 0:
-            call_address(model.rails, model, state, work, rate, mode)
-        else:
-            press_wheels(model, work, mode)
-        if model.guards != 0:
-            call_address(model.guards, model, state, work)
+    if model.rails != 0:
+        call_address(model.rails, model, state, work, rate, mode)
+    elif not held:
+        press_wheels(model, work, mode)
+    if model.guards != 0 and not held:
+        call_address(model.guards, model, state, work)
     for k in range(wheelsets.shape[0]):
         if not (tangent or held):
             turn_back_wrenches(work.rails[k], work.shifts[k], work.rail_wrenches[k], work.patches[k], work.counts[k])

@@ -4,9 +4,9 @@ With sigma = 1/(h gamma), the unknowns of a body are its displacement q and its 
 to no body. The displacements change at the rate of the velocities, q' = Q q + R v with a block of each per body, and go
 first: q = (sigma - Q)^-1 (g + R v). Internal states that act on bodies alone go next, one number each. What is left has
 a block of 6 x 6 for each pair of bodies that elements or joints link. Internal states that act on one another, those of
-the track under a wheelset, stand there as bodies do, by up to six. The blocks are eliminated in an order that creates
-few others (track, wheelsets, bogies, car body). All loops are written out, without a linear algebra library: a step is
-the same to the bit on every run.
+the track under a wheelset, stand there as bodies do, by up to six; its displacements, q' = v, go first, too. The blocks
+are eliminated in an order that creates few others (track, wheelsets, bogies, car body). All loops are written out,
+without a linear algebra library: a step is the same to the bit on every run.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.body import EULER, STATE_SIZE, VELOCITY
-from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, packed, reached_bodies
+from wrcore.dynamics.links import (
+    internal_state_bodies,
+    internal_state_groups,
+    packed,
+    reached_bodies,
+    track_displacements,
+)
 from wrcore.dynamics.vector import dot
 from wrcore.integrate.moving_axes import RATE
 from wrcore.kernels.jit import jit
@@ -26,6 +32,7 @@ class Pattern(NamedTuple):
 
     first: np.ndarray  # (m,) int: first unknown of each node
     width: np.ndarray  # (m,) int: number of its unknowns
+    displaced: np.ndarray  # (m,) int: first of the internal states whose rates these are, -1: none
     order: np.ndarray  # (m,) int: nodes
     place: np.ndarray
     """(m, m) int: number of the block of row i and column j, with those that the elimination creates; -1: none."""
@@ -56,12 +63,14 @@ def plan_elimination(model):
     """Pattern of an elimination by minimum degree: the node with the fewest neighbours left goes next and links
     them."""
     n, reached, linked = len(model.bodies.mass), reached_bodies(model), internal_state_bodies(model)
+    displaced = track_displacements(model)
     pairs, nodes = {(i, j) for j in range(n) for i in reached[j]}, [range(6 * b, 6 * b + 6) for b in range(n)]
     together = internal_state_groups(model)
     for states in together:
         packs: list[list[int]] = []
-        for state in sorted(states):  # one after the other in the state vector
-            if packs and state == packs[-1][-1] + 1 and len(packs[-1]) < 6:
+        for state in sorted({*states} - {*displaced.values()}):
+            alike = packs and (state in displaced) == (packs[-1][0] in displaced)
+            if alike and len(packs[-1]) < 6 and state == packs[-1][-1] + 1:  # one after the other in the state vector
                 packs[-1].append(state)
             else:
                 packs.append([state])
@@ -90,7 +99,8 @@ def plan_elimination(model):
 
     return Pattern(
         *(np.array(items) for items in zip(*((node[0], len(node)) for node in nodes), strict=True)),
-        np.array(order), place, *packed(later), np.array(sorted(pairs)),
+        np.array([6 * n + displaced.get(node[0] - 6 * n, -1 - 6 * n) for node in nodes]), np.array(order), place,
+        *packed(later), np.array(sorted(pairs)),
         6 * n + np.array(alone, np.int64), *packed([sorted(linked[state]) for state in alone]),
     )  # fmt: skip
 
@@ -233,6 +243,9 @@ def factorise(jacobian, system, sigma):
             for column in range(pattern.width[j]):
                 for row in range(pattern.width[i]):
                     block[row, column] = -jacobian.by_velocity[pattern.first[j] + column, pattern.first[i] + row]
+                    if pattern.displaced[j] >= 0:
+                        known = jacobian.by_velocity[pattern.displaced[j] + column, pattern.first[i] + row]
+                        block[row, column] -= known / sigma
         elif i < bodies:
             _fill(jacobian, system, 6 * i, 6, j, block)
         else:
@@ -345,12 +358,19 @@ def solve_stage(jacobian, system, sigma, increment):
     for node in range(n, right.shape[0]):
         for k in range(6):  # beyond its width, too, where a stage that was not finite may have left its marks
             right[node, k] = unknowns[pattern.first[node] + k] if k < pattern.width[node] else 0.0
+            if k < pattern.width[node] and pattern.displaced[node] >= 0:
+                unknowns[pattern.displaced[node] + k] /= sigma
     for q in range(pattern.pairs.shape[0]):
         i, j = pattern.pairs[q, 0], pattern.pairs[q, 1]
         if j < n and i < n:
             _add_shift(jacobian, shift, 6 * i, 6, j, right[i])
         elif j < n:
             _add_shift(jacobian, shift, pattern.first[i], pattern.width[i], j, right[i])
+        elif pattern.displaced[j] >= 0:
+            for k in range(pattern.width[j]):
+                column, share = jacobian.by_velocity[pattern.displaced[j] + k], unknowns[pattern.displaced[j] + k]
+                for row in range(pattern.width[i]):
+                    right[i, row] += share * column[pattern.first[i] + row]
     for s in range(pattern.states.shape[0]):
         state = pattern.states[s]
         for q in range(pattern.state_starts[s], pattern.state_starts[s + 1]):
@@ -359,6 +379,8 @@ def solve_stage(jacobian, system, sigma, increment):
     for node in range(n, right.shape[0]):
         for k in range(pattern.width[node]):
             unknowns[pattern.first[node] + k] = right[node, k]
+            if pattern.displaced[node] >= 0:
+                unknowns[pattern.displaced[node] + k] += right[node, k] / sigma
     for b in range(n):
         at, axes, turning = STATE_SIZE * b, jacobian.axes[b], jacobian.turning[b]
         carried, to, velocity = system.carried[b], shift[b], right[b]

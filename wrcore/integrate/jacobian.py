@@ -30,17 +30,26 @@ from wrcore.dynamics.contact_blocks import (
     SPEED,
     SPIN,
     TURN,
-    blocks_of_patches,
     contacts_alone,
     renew_contacts,
+    slopes_of_patches,
+    speeds_implied,
 )
 from wrcore.dynamics.contact_slopes import differentiable, slope_scratch
 from wrcore.dynamics.contract import turn_rate
-from wrcore.dynamics.links import internal_state_bodies, internal_state_groups, joined_sets, packed, reached_bodies
-from wrcore.dynamics.modes import BARE, ELLIPSES, WRENCHES_HELD
+from wrcore.dynamics.links import (
+    contact_places,
+    internal_state_bodies,
+    internal_state_groups,
+    joined_sets,
+    packed,
+    reached_bodies,
+)
+from wrcore.dynamics.modes import BARE, ELLIPSES, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.strip_wheel import STOOD_IN
 from wrcore.dynamics.system import derivatives_at, state_size
+from wrcore.dynamics.track_blocks import hold_speeds
 from wrcore.dynamics.vector import copy_into, cross, dot
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
@@ -94,7 +103,7 @@ class Jacobian(NamedTuple):
     turn: np.ndarray
     """(2,): turn rate of the axes that increments are counted in (rad/s), and their turn since they were those of the
     track (rad); see `wrcore.integrate.moving_axes`."""
-    contact: np.ndarray  # (k, 12, 6 n): what is in it of each wheelset's contacts
+    contact: np.ndarray  # (k, c, 6 n + r): what is in it of each wheelset's contacts
     mobility: np.ndarray  # (k, 6, 6 n): accelerations of all bodies by a wrench on a wheelset, in the wheelset's axes
     columns: np.ndarray
     rails: np.ndarray
@@ -106,6 +115,8 @@ class Jacobian(NamedTuple):
     slopes: np.ndarray
     law: np.ndarray
     """Scratch of :mod:`wrcore.dynamics.contact_blocks`."""
+    column_numbers: np.ndarray  # (k, c) int: see `wrcore.dynamics.contact_blocks.contact_places`
+    row_numbers: np.ndarray  # (k, r) int
 
 
 def _groups(reach):
@@ -157,32 +168,35 @@ def new_jacobian(equations):
     """Blocks of zeros for a model's equations, which get the kernel of what patches change where these are ellipses."""
     _, model, work = equations.arguments
     jacobian = _empty_jacobian(model.value)
-    blocks = _blocks_by_hand(model.value.contact)
-    if (blocks is not None) != (model.value.slopes != 0):
-        slopes = Kernel(blocks, jacobian, model, work, jacobian.columns).address if blocks else 0
+    by_hand = _slopes_by_hand(model.value.contact)
+    if (by_hand is not None) != (model.value.slopes != 0):
+        slopes = Kernel(by_hand, jacobian, model, work).address if by_hand else 0
         model.lay(model.value._replace(slopes=slopes))
     return jacobian
 
 
-def _blocks_by_hand(contact):
+def _slopes_by_hand(contact):
     """Kernel of what a contact model's patches change by, None where there is none."""
     if differentiable.py_func(contact):
-        return blocks_of_patches
+        return slopes_of_patches
     if not contact.strips.looked_up:
         return None
-    from wrcore.dynamics.lobe_slopes import blocks_of_lobes
+    from wrcore.dynamics.lobe_slopes import slopes_of_lobes
 
-    return blocks_of_lobes
+    return slopes_of_lobes
 
 
 def _empty_jacobian(model):
     n, size = len(model.bodies.mass), state_size(model)
     m, k = size - 7 * n, len(model.bodies.wheelsets)
+    columns, rows = contact_places(model)
+    contacts, rates = columns.shape[1], rows.shape[1]
     return Jacobian(
         np.zeros((6 * n, m)), np.zeros((m, m)), np.zeros((n, 4, 6)), np.zeros(1), np.zeros((n, 3)), np.zeros(size),
-        np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, 12, 6 * n)), np.zeros((k, 6, 6 * n)),
-        np.zeros((k, 12, 6)), np.zeros((k, 2, 3, 3)), np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)),
-        np.zeros(6 * n), *slope_scratch(k),
+        np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, contacts, 6 * n + rates)),
+        np.zeros((k, 6, 6 * n)), np.zeros((k, contacts, 6 + rates)), np.zeros((k, 2, 3, 3)),
+        np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)), np.zeros(6 * n),
+        *slope_scratch(model), columns, rows,
     )  # fmt: skip
 
 
@@ -323,11 +337,14 @@ def refresh_jacobian(
         moment = MOMENT if in_time else 0.0
         if in_time and wheels:  # before the base's rates turn into the derivative by time
             work.strips.flags[STOOD_IN] = 0.0
-            renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, model, work, fine)
+            renew_contacts(joined, whole, jacobian, jacobian.turn[ANGLE], t, state, base, model, work, fine)
             if not (rough or whole) and work.strips.flags[STOOD_IN] > 0.0:
                 rough = True
                 derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
                 rates_of_increments(n, axes, drift, 0.0, state, state, base)
+        if in_time and speeds_implied(along, model):
+            hold_speeds(jacobian.slopes, rate, model, work)
+            mode |= SPEEDS_GIVEN
         if in_time and along:
             for j in range(state.shape[0]):
                 if j >= STATE_SIZE * n or j % STATE_SIZE >= EULER:

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.contact_blocks import contacts_alone
+from wrcore.dynamics.contact_blocks import contacts_alone, speeds_implied
 from wrcore.dynamics.contract import after_rejection, before_attempt, touching
-from wrcore.dynamics.modes import STAGE
+from wrcore.dynamics.modes import SPEEDS_GIVEN, STAGE
 from wrcore.dynamics.system import derivatives_at
+from wrcore.dynamics.track_blocks import hold_speeds, imply_speeds
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import factorise, solve_stage
@@ -126,7 +127,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
-    hold = HOLD if tableau.reuse > 1 else 1.0
+    hold, implied = HOLD if tableau.reuse > 1 else 1.0, speeds_implied(tableau.reuse == 1, model)
     while True:
         take_samples(control, memory, scratch, equations, model, work)
         keep_short(control, memory, model, work)
@@ -146,8 +147,11 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                         trial[k] += weight * stages[j, k]
             moment = tableau.nodes[i] * step
             carry(bodies, turn_of(linear.jacobian), drift, moment, state, trial)
+            if i > 0 and implied:
+                imply_speeds(tableau.begun[i], tableau.speeds[i, :i], step, memory.rate, drift, stages, model, work)
             if i > 0 or not counters[engine.HAS_RATE]:
-                derivatives_at(equations, clock[engine.T] + moment, trial, model, work, slope, STAGE)
+                mode = STAGE | SPEEDS_GIVEN if i > 0 and implied else STAGE
+                derivatives_at(equations, clock[engine.T] + moment, trial, model, work, slope, mode)
                 counters[engine.EVALUATIONS] += 1
             if i == 0:
                 if not counters[engine.HAS_RATE]:
@@ -156,6 +160,8 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                 regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
+                if implied:
+                    hold_speeds(linear.jacobian.slopes, memory.rate, model, work)
             rates_of_increments(bodies, turn_of(linear.jacobian), drift, moment, state, trial, slope)
             increment, by_time = stages[i], step * tableau.by_time[i]
             for k in range(n):

@@ -51,6 +51,8 @@ class RosenbrockTableau(NamedTuple):
     reuse: int  # steps for which a Jacobian serves: 1 where the order rests on an exact one
     looked_at: float  # theta at which the dense output is held against the equations; 0 for none
     residual: float  # what the error found there counts
+    speeds: np.ndarray  # (s, s): see `implied_speeds`
+    begun: np.ndarray  # (s,)
 
 
 def _lower(*rows):
@@ -59,6 +61,17 @@ def _lower(*rows):
     for i, row in enumerate(rows, 1):
         matrix[i, : len(row)] = row
     return matrix
+
+
+def implied_speeds(stages, couplings, gamma):
+    """How the increments u of a method's stages imply those of their rates, where q' = v and v is a state, too.
+
+    For q the stages are 1/(h gamma) u_i - w_i = v0 + a_ij w_j - d + c_ij u_j/h, where w are the increments of v, which
+    begins at v0, and d is the drift. So w = (1 + a)^-1 ((1/gamma - c) u/h - (v0 - d)), and v of stage i is
+    v0 + D_ij u_j/h + f_i (v0 - d). Returns D (s, s) and f (s,).
+    """
+    inverse = np.linalg.inv(np.eye(len(stages)) + stages)
+    return stages @ inverse @ (np.eye(len(stages)) / gamma - couplings), -(stages @ inverse).sum(axis=1)
 
 
 def _hermite(weights):
@@ -133,9 +146,10 @@ def _rodas(nodes, by_time, stages, couplings, *bends, exponent=4.0, gamma=0.25, 
     weights, size = np.array([*stages[-1], 1.0, 1.0]), len(nodes) + 2
     bent = [np.zeros(size), *(np.append(bend, np.zeros(size - len(bend))) for bend in bends), np.zeros(size)]
     dense = np.diff(bent, axis=0).T + np.outer(weights, np.arange(len(bends) + 1) == 0)
+    stages, couplings = _lower(*stages, [*stages[-1], 1.0]), _lower(*couplings)
     return RosenbrockTableau(
-        np.array([*nodes, 1.0, 1.0]), np.array([*by_time, 0.0, 0.0]), _lower(*stages, [*stages[-1], 1.0]),
-        _lower(*couplings), weights, np.eye(size)[-1], dense, exponent, gamma, 1, looked_at, residual,
+        np.array([*nodes, 1.0, 1.0]), np.array([*by_time, 0.0, 0.0]), stages, couplings, weights, np.eye(size)[-1],
+        dense, exponent, gamma, 1, looked_at, residual, *implied_speeds(stages, couplings, gamma),
     )  # fmt: skip
 
 
@@ -235,9 +249,10 @@ def _ros34pw2():
         [-1.045260255335102, 2.398120075195581, -0.9169932983520199],
     ])  # fmt: skip
     inverse = np.linalg.inv(coupling)
+    stages, couplings = alpha @ inverse, np.eye(4) / gamma - inverse
     return RosenbrockTableau(
-        alpha.sum(axis=1), coupling.sum(axis=1), alpha @ inverse, np.eye(4) / gamma - inverse,
-        b @ inverse, (b - embedded) @ inverse, inverse.T @ dense, 3.0, gamma, 20, 0.0, 0.0,
+        alpha.sum(axis=1), coupling.sum(axis=1), stages, couplings, b @ inverse, (b - embedded) @ inverse,
+        inverse.T @ dense, 3.0, gamma, 20, 0.0, 0.0, *implied_speeds(stages, couplings, gamma),
     )  # fmt: skip
 
 
