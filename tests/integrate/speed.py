@@ -1,6 +1,7 @@
 """Speed of an evaluation, and of runs on irregular track: ``python -m tests.integrate.speed``.
 
-Processor time, the best of four runs; nothing else should run. Errors: `snakemake speed_against_error`.
+Processor time, the best of four runs; nothing else should run. Beside it evaluations a step, and errors as in
+`tests.integrate.auto`: root mean squares of y, and of N over its mean. A star: y to 1 um and N to 0.5 %.
 """
 
 import time
@@ -8,8 +9,8 @@ import time
 import numpy as np
 
 from tests.conftest import SCENES
+from tests.integrate.auto import BARS, Measured
 from wrcore.dynamics.system import Equations
-from wrcore.integrate.integrator import integrate
 from wrcore.scene.description import compile_scene, load_scene
 
 SPECTRUM = {"spectrum": {"level": "low", "seed": 1, "length": 2000.0, "begin": 20.0}}
@@ -25,18 +26,16 @@ GIVING = {"rigid track": {}, "track that gives": {"track.support": {"rail": RAIL
           "rails without mass": {"track.support": {"rail": SOFT}}}  # fmt: skip
 """The values of `reports/tracks.md`."""
 CASES = [
-    *(
-        ("trailer_vehicle", {"speed": v, **ROUGH, **track}, 5.0)
-        for v in (20.0, 40.0, 60.0)
-        for track in GIVING.values()
-    ),
-    ("trailer_vehicle", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
-    ("metro_car", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
-    ("suspended_wheelset", {"speed": 20.0}, 10.0),
-    ("suspended_wheelset", {"speed": 60.0}, 10.0),
-]
-CHOICES = ("rodas5", 3e-4), ("rodas4p2", 3e-4), ("rk4", 3e-4), ("auto", 1e-4)
-"""Near the cheapest that keep y to 1 um and N to 0.5 % (`tests.integrate.auto`), and the default."""
+    *((f"trailer_vehicle, {track}", {"speed": v, **ROUGH, **GIVING[track]}, 5.0)
+      for v in (20.0, 40.0, 60.0) for track in GIVING),
+    ("trailer_vehicle, R 300", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
+    ("metro_car, R 300", {"speed": 16.7, **CURVE, **ROUGH}, 20.0),
+    ("guided_car, independent wheels", {"speed": 15.0, "track.path": "tangent", **ROUGH}, 10.0),
+    ("suspended_wheelset, smooth", {"speed": 20.0}, 10.0),
+    ("suspended_wheelset, smooth", {"speed": 60.0}, 10.0),
+]  # fmt: skip
+CHOICES = ("rodas5", 3e-4), ("rodas5", 1e-4), ("rodas4p2", 3e-4), ("rk4", 1e-3), ("rk4", 3e-4), ("auto", 1e-4)
+"""Near the cheapest that keep y to 1 um and N to 0.5 %, and the default."""
 
 
 def evaluation(name):
@@ -54,20 +53,18 @@ def evaluation(name):
 def main():
     for name in ("suspended_wheelset", "trailer_vehicle"):
         print(f"{name}: {1e6 * evaluation(name):.3f} us an evaluation")
-    for name, changes, duration in CASES:
-        model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", {"contact.patch": "moment", **changes}))
-        times, best = np.linspace(0.0, duration, round(100 * duration) + 1), dict.fromkeys(CHOICES, np.inf)
-        evaluations = {}
+    for title, changes, duration in CASES:
+        scene = load_scene(SCENES / f"{title.split(',')[0]}.yaml", {"contact.patch": "moment", **changes})
+        measured, best = Measured(*compile_scene(scene), duration), dict.fromkeys(CHOICES, np.inf)
         for choice in CHOICES * 4:  # in turn
-            begun = time.process_time()
-            run = integrate(model, start, times, *choice)
-            evaluations[choice] = run.rhs_evaluations / run.steps
-            best[choice] = min(best[choice], time.process_time() - begun)
-        support = {key: value for key, value in changes.items() if key == "track.support"}
-        of = ", R 300" * ("track.path" in changes) + f", {next(name for name in GIVING if GIVING[name] == support)}"
-        print(f"{name}, {changes['speed']:g} m/s{of}, times real time (evaluations a step):")
-        print(*(f"    {choice[0]} {choice[1]:g}: {duration / best[choice]:.0f} ({evaluations[choice]:.0f})"
-                for choice in CHOICES))  # fmt: skip
+            measured.once(choice)
+            best[choice] = min(best[choice], measured.taken[choice])
+        print(f"{title}, {changes['speed']:g} m/s, times real time (evaluations a step; y in um, N in %):")
+        for choice in CHOICES:
+            run, (y, normal) = measured.runs[choice], measured.found[choice][:2]
+            star, each = "*" if np.all([y, normal] <= BARS) else " ", run.rhs_evaluations / run.steps
+            speed = f"{star} {choice[0]} {choice[1]:g}: {duration / best[choice]:.0f}"
+            print(f"  {speed} ({each:.0f}; {1e6 * y:.2g}, {100 * normal:.2g})", flush=True)
 
 
 if __name__ == "__main__":
