@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENES
+from tests.integrate import test_jacobian as jacobian_tests
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.check_rail import CHORD, DOWN, STRIDE
+from wrcore.dynamics.flexible_track import track_places
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.geometry.standards import named_profile
+from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 
@@ -141,3 +144,35 @@ def test_bad_input_names_its_key(changes, field, expected):
 def test_its_friction_has_no_account_of_energy():
     with pytest.raises(InputError, match="no energy with track.check_rails"):
         load_scene(SCENE, {"track.check_rails": [RAIL], "output.channels": ["energy"]})
+
+
+def test_the_jacobian_of_a_wheelset_that_leans_on_one():
+    """Beside one, and elsewhere, steps take no more evaluations than without."""
+    model, state = compile_scene(load_scene(SCENE, {"track.check_rails": [RAIL], "initial.y": 0.0, "speed": 20.0}))
+    at = STATE_SIZE * model.bodies.wheelsets[0]
+    state[at + 1] += FACE - 1e-3
+    state[at + 8 : at + 13] += [0.02, 0.01, 0.01, 0.02, 0.01]
+    equations = Equations(model)
+    moving = model, 0.0, state, equations(0.0, state), equations
+    assert abs(equations.work.rail_wrenches[0, 0, 1]) > 4e4
+    jacobian_tests.test_every_entry_against_central_differences(moving)
+    jacobian_tests.test_stages_are_solved_as_a_dense_system_would_be(moving)
+    run = integrate(model, state, [0.0, 0.5], "rodas5", 1e-4)
+    assert run.rhs_evaluations < 16 * run.steps
+
+
+def test_it_stands_on_the_ground_beside_a_rail_that_gives():
+    """Its force is that of where the wheel is, wherever its own rail has moved."""
+    support = {"rail": {way: {"stiffness": 5e7, "damping": 1e5} for way in ("lateral", "vertical")}}
+    forces = []
+    for aside in (0.0, 2e-4):
+        for rails in ([RAIL], []):
+            changes = {"track": {"check_rails": rails, "support": support}, "initial.y": 0.0}
+            model, state = compile_scene(load_scene(SCENE, changes))
+            state[STATE_SIZE * model.bodies.wheelsets[0] + 1] += FACE - 1e-3
+            state[track_places(model)[0, 0]] += aside
+            equations = Equations(model)
+            equations(0.0, state)
+            forces.append(equations.work.rail_wrenches[0, 0, 1])
+    assert forces[0] - forces[1] == pytest.approx(STIFFNESS * 1e-3, rel=1e-6)
+    assert forces[2] - forces[3] == pytest.approx(STIFFNESS * 1e-3, rel=1e-6)

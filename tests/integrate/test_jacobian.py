@@ -8,7 +8,6 @@ import pytest
 from tests.conftest import SCENES
 from tests.dynamics.test_control import STEERING
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
-from wrcore.dynamics.contact_blocks import contacts_alone
 from wrcore.dynamics.system import Equations, internal_states
 from wrcore.integrate.blocks import factorise, new_system, solve_stage
 from wrcore.integrate.integrator import integrate
@@ -155,7 +154,6 @@ def test_the_drift_of_the_whole_state(moving):
 def test_refreshing_the_contacts_is_taking_the_whole_anew(moving):
     """Taken where the wheelsets are a bit aside, then refreshed where they are: only contacts are that nonlinear."""
     model, t, state, rate, function = moving
-    assert contacts_alone.py_func(model)
     n, aside = len(model.bodies.mass), state.copy()
     for body in model.bodies.wheelsets:
         aside[13 * body + 1] += 2e-4

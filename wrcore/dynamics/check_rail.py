@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.dynamics.crossing import shorten_step
+from wrcore.dynamics.flexible_track import displacement
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.track import arc_length_at
 from wrcore.kernels.jit import jit
@@ -55,9 +56,9 @@ def face_at(row, s):
 
 
 @jit(allocates=False)
-def check_force(row, s, motion, wrench):
-    """Normal force of a check rail on a wheel with a motion in its rail's frame, N; adds what acts on the wheelset to
-    its ``wrench`` about its centre."""
+def check_force(row, s, aside, motion, wrench):
+    """Normal force of a check rail on a wheel with a motion in its rail's frame, N, where that rail has moved ``aside``
+    (m); adds what acts on the wheelset to its ``wrench`` about its centre."""
     side, total = row[SIDE], 0.0
     if motion[MOTION.side] != side:
         return total
@@ -65,7 +66,7 @@ def check_force(row, s, motion, wrench):
     for sign in (1.0, -1.0):
         px, pz = sign * row[CHORD], -row[DOWN]
         py = (side * row[BACK] - ex * px - ez * pz) / ey
-        normal = 0.5 * row[STIFFNESS] * (face_at(row, s + px) - side * (motion[MOTION.y] + py))
+        normal = 0.5 * row[STIFFNESS] * (face_at(row, s + px) - side * (motion[MOTION.y] + aside + py))
         if not normal > 0.0:
             continue
         total += normal
@@ -87,8 +88,9 @@ def press_check_rails(model, state, work):
     for k in range(work.rail_wrenches.shape[0]):
         s = arc_length_at(model, state, work, k)
         for wheel in range(2):
+            aside, _ = displacement(model, state, k, wheel)
             for j in range(rows.shape[1]):
-                check_force(rows[k, j], s, work.motions[k, wheel], work.rail_wrenches[k, wheel])
+                check_force(rows[k, j], s, aside, work.motions[k, wheel], work.rail_wrenches[k, wheel])
 
 
 @jit(allocates=False)

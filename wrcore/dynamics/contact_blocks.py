@@ -49,19 +49,12 @@ UNCOUNTED = -1
 
 
 @jit(allocates=False, inline="always")
-def contacts_alone(model):
-    """Whether the contacts' part of the Jacobian is known from the rails' wrenches alone: check rails press wheels
-    too."""
-    return model.bodies.wheelsets.shape[0] > 0 and model.check_rails.rows.shape[0] == 0
-
-
-@jit(allocates=False, inline="always")
 def speeds_implied(along, model):
     """Whether stages go by the rails' speeds that they imply: on rails without mass, with a Jacobian ``along`` the
     drift of the whole state, where derivatives are those of the model itself."""
     track, strips = model.flexible_track, model.contact.strips
     exact = strips.strips == 0 or strips.looked_up > 0.0
-    return along and exact and contacts_alone(model) and track.mass.shape[0] > 0 and track.mass[0] == 0.0
+    return along and exact and track.mass.shape[0] > 0 and track.mass[0] == 0.0
 
 
 @jit(allocates=False)
@@ -119,6 +112,23 @@ def _moved(base, direction, difference, row):
         row[direction] += difference
 
 
+@jit(allocates=False, inline="always")
+def _difference(slope, fine):
+    """Difference of a row of slopes, those of velocities multiplied by ``fine``."""
+    direction = _direction_of(slope)
+    if direction >= 6:
+        return fine * (SPEED if direction < 9 else SPIN)
+    return DISPLACEMENT if direction < 3 else TURN
+
+
+@jit(allocates=False)
+def _move_all(base, slope, difference, work):
+    """Write all wheels' motions, with a difference in the direction of a row of slopes, into the work."""
+    for k in range(base.shape[0]):
+        for wheel in range(2):
+            _moved(base[k, wheel], _direction_of(slope), difference, work.motions[k, wheel])
+
+
 @jit(allocates=False, fastmath=FUSED)
 def _add_share(rail, wheel, slope, share, column):
     """Add a share of a derivative of a wrench in a rail's frame (axes: columns of ``rail``), and of rates, to a
@@ -160,13 +170,10 @@ def _turn_apart(m, half, inertia, slopes):
 def add_slopes(jacobian, state, model, columns):
     """Add the slopes of all wheels at a ``state`` to the ``columns`` of their wheelsets; a turn about the axle changes
     nothing."""
-    flexible = model.flexible_track.mass.shape[0] > 0
     for k in range(columns.shape[0]):
         for wheel in range(2):
             rail, m = jacobian.rails[k, wheel], motion_of(jacobian.motions[k, wheel])
             slopes = jacobian.slopes[k, wheel]
-            if flexible:
-                give_way(model.flexible_track, wheel, slopes)
             number = jacobian.column_numbers[k, columns.shape[1] - 1]
             if model.bodies.independent.shape[0] > 0 and number >= 0:
                 half, body = state[number + model.bodies.mass.shape[0]], model.bodies.wheelsets[k]
@@ -219,6 +226,11 @@ def contact_blocks(jacobian, angle, state, rate, model, work, fine, columns):
         if jacobian.counts[k, 0] == UNCOUNTED or jacobian.counts[k, 1] == UNCOUNTED:
             _difference_wrenches(jacobian, model, work, fine)
             break
+    for k in range(wheelsets.shape[0] if model.flexible_track.mass.shape[0] > 0 else 0):
+        for wheel in range(2):
+            give_way(model.flexible_track, wheel, jacobian.slopes[k, wheel])
+    if model.guards != 0:
+        _difference_check_rails(jacobian, state, model, work, fine)
     add_slopes(jacobian, state, model, columns)
 
 
@@ -267,10 +279,7 @@ def _search_moved(jacobian, model, work):
     """The same by searches; False where a difference makes other patches."""
     base, found = jacobian.motions, jacobian.patches
     for move in range(MOVES):
-        direction = MOVING[move]
-        for k in range(base.shape[0]):
-            for wheel in range(2):
-                _moved(base[k, wheel], direction, DISPLACEMENT, work.motions[k, wheel])
+        _move_all(base, move, DISPLACEMENT, work)
         press_wheels(model, work, ELLIPSES | PATCHES_ONLY)
         for k in range(base.shape[0]):
             for wheel in range(2):
@@ -288,24 +297,16 @@ def _search_moved(jacobian, model, work):
 def _difference_wrenches(jacobian, model, work, fine):
     """Fill ``jacobian.slopes`` by differences of the wrenches, of the wheels that are `UNCOUNTED`."""
     base, found = jacobian.motions, jacobian.wrenches
-    for k in range(base.shape[0]):
-        for wheel in range(2):
-            copy_into(work.motions[k, wheel], base[k, wheel])
+    _move_all(base, 0, 0.0, work)
     press_wheels(model, work, BARE | ELLIPSES)
     for k in range(base.shape[0]):
         for wheel in range(2):
             copy_into(found[k, wheel], work.rail_wrenches[k, wheel])
     for step in range(SLOPES):
         j = (step + MOVES) % SLOPES  # velocities first: the patches are those of the pose
-        direction = _direction_of(j)
-        mode = BARE | ELLIPSES | PATCHES_HELD if direction >= 6 else BARE | ELLIPSES
-        difference = DISPLACEMENT if direction < 3 else TURN
-        if direction >= 6:
-            difference = fine * (SPEED if direction < 9 else SPIN)
-        for k in range(base.shape[0]):
-            for wheel in range(2):
-                _moved(base[k, wheel], direction, difference, work.motions[k, wheel])
-        press_wheels(model, work, mode)
+        difference = _difference(j, fine)
+        _move_all(base, j, difference, work)
+        press_wheels(model, work, BARE | ELLIPSES if j < MOVES else BARE | ELLIPSES | PATCHES_HELD)
         for k in range(base.shape[0]):
             for wheel in range(2):
                 if jacobian.counts[k, wheel] != UNCOUNTED:
@@ -313,6 +314,23 @@ def _difference_wrenches(jacobian, model, work, fine):
                 for i in range(6):
                     slope = (work.rail_wrenches[k, wheel, i] - found[k, wheel, i]) / difference
                     jacobian.slopes[k, wheel, j, i] = slope
+
+
+@jit(allocates=False)
+def _difference_check_rails(jacobian, state, model, work, fine):
+    """Add to ``jacobian.slopes`` what check rails change by, by differences of their own forces."""
+    for j in range(-1, SLOPES):
+        difference = 0.0 if j < 0 else _difference(j, fine)
+        _move_all(jacobian.motions, max(j, 0), difference, work)
+        work.rail_wrenches[:] = 0.0
+        call_address(model.guards, model, state, work)
+        for k in range(work.motions.shape[0]):
+            for wheel in range(2):
+                if j < 0:
+                    copy_into(jacobian.wrenches[k, wheel], work.rail_wrenches[k, wheel])
+                for i in range(0 if j < 0 else 6):
+                    more = work.rail_wrenches[k, wheel, i] - jacobian.wrenches[k, wheel, i]
+                    jacobian.slopes[k, wheel, j, i] += more / difference
 
 
 @jit(allocates=False, fastmath=FUSED)

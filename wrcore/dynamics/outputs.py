@@ -4,6 +4,7 @@ import numpy as np
 
 from wrcore.dynamics.check_rail import check_force
 from wrcore.dynamics.drive import actuator, controlled_force
+from wrcore.dynamics.flexible_track import displacement
 from wrcore.dynamics.system import derivatives_at
 from wrcore.dynamics.track import arc_length_at
 from wrcore.kernels.jit import jit
@@ -42,9 +43,10 @@ def _fill_check_rails(times, states, equations, model, work, rate, wrench, force
         for k in range(forces.shape[1]):
             s = arc_length_at(model, states[i], work, k)
             for wheel in range(2):
+                aside, _ = displacement(model, states[i], k, wheel)
                 for j in range(model.check_rails.rows.shape[1]):
                     row, motion = model.check_rails.rows[k, j], work.motions[k, wheel]
-                    forces[i, k, wheel] += check_force(row, s, motion, wrench)
+                    forces[i, k, wheel] += check_force(row, s, aside, motion, wrench)
 
 
 def check_rail_history(equations, times, states):

@@ -30,7 +30,6 @@ from wrcore.dynamics.contact_blocks import (
     SPEED,
     SPIN,
     TURN,
-    contacts_alone,
     renew_contacts,
     slopes_of_patches,
     speeds_implied,
@@ -321,7 +320,7 @@ def refresh_jacobian(
     fine = min(
         1.0, pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * HALF_GAUGE / FINE_BELOW
     ) * min(1.0, model.contact.friction / USUAL)
-    strips, wheels = model.contact.strips, contacts_alone(model)
+    strips, wheels = model.contact.strips, model.bodies.wheelsets.shape[0] > 0
     rough = strips.strips > 0 and strips.looked_up == 0.0
     copy_into(base, rate)
     if rough or whole:  # of a smooth neighbour of the model

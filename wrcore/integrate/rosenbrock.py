@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.contact_blocks import contacts_alone, speeds_implied
+from wrcore.dynamics.contact_blocks import speeds_implied
 from wrcore.dynamics.contract import after_rejection, before_attempt, touching
 from wrcore.dynamics.modes import SPEEDS_GIVEN, STAGE
 from wrcore.dynamics.system import derivatives_at
@@ -53,7 +53,7 @@ def _renew(tableau, memory, scratch, linear, system, equations, model, work):
     clock, counters = memory.clock, memory.counters
     age, step = counters[engine.AGE], clock[engine.NEXT]
     if age < 0 or age >= tableau.reuse or (age > 0 and counters[engine.RETRY]):
-        whole = age < 0 or not contacts_alone(model) or counters[engine.SINCE_FULL] >= CONTACT_REFRESHES
+        whole = age < 0 or not model.bodies.wheelsets.shape[0] or counters[engine.SINCE_FULL] >= CONTACT_REFRESHES
         if whole:
             counters[engine.SINCE_FULL], linear.jacobian.turn[ANGLE] = 0, 0.0
         counters[engine.EVALUATIONS] += refresh_jacobian(
