@@ -282,7 +282,8 @@ def test_tables_serve_the_round_part_and_the_solver_the_flat():
     models = ({"contact.patch": name} for name in ("exact", "tabulated"))
     exact, table = (rolling(FLAT, speed, travel, **changes, **model) for model in models)
     solved = table.counters["patches_not_tabulated"]
-    assert 0 < solved < table.counters["rhs_evaluations"]  # of the left wheel, where its flat is
+    # of the left wheel, where its flat is; an evaluation presses both wheels some six times on rails without mass
+    assert 0 < solved < 0.2 * 2 * 6 * table.counters["rhs_evaluations"]
     assert np.abs(load_of(table) - load_of(exact)).max() < 1e-3 * LOAD
     left = [np.nansum(run["wheelset/left"]["N_N"], axis=1) for run in (table, exact)]
     assert left[1].max() > 1.5 * LOAD

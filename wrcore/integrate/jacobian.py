@@ -116,6 +116,7 @@ class Jacobian(NamedTuple):
     """Scratch of :mod:`wrcore.dynamics.contact_blocks`."""
     column_numbers: np.ndarray  # (k, c) int: see `wrcore.dynamics.contact_blocks.contact_places`
     row_numbers: np.ndarray  # (k, r) int
+    rough: np.ndarray  # (1,): 1 where it is that of a smooth neighbour of the model, ellipses for patches on strips
 
 
 def _groups(reach):
@@ -195,7 +196,7 @@ def _empty_jacobian(model):
         np.zeros(size), np.zeros((n, 4, 4)), np.zeros(2), np.zeros((k, contacts, 6 * n + rates)),
         np.zeros((k, 6, 6 * n)), np.zeros((k, contacts, 6 + rates)), np.zeros((k, 2, 3, 3)),
         np.zeros((k, 2, len(MOTION))), np.zeros((k, 2, 6)), np.zeros(6 * n),
-        *slope_scratch(model), columns, rows,
+        *slope_scratch(model), columns, rows, np.zeros(1),
     )  # fmt: skip
 
 
@@ -341,7 +342,9 @@ def refresh_jacobian(
                 rough = True
                 derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
                 rates_of_increments(n, axes, drift, 0.0, state, state, base)
-        if in_time and speeds_implied(along, model):
+        if in_time:
+            jacobian.rough[0] = 1.0 if rough or (wheels and work.strips.flags[STOOD_IN] > 0.0) else 0.0
+        if in_time and speeds_implied(along, jacobian, model):
             hold_speeds(jacobian.slopes, rate, model, work)
             mode |= SPEEDS_GIVEN
         if in_time and along:

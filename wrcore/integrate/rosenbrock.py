@@ -127,7 +127,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
     clock, counters, state, stages = memory.clock, memory.counters, memory.state, memory.stages
     trial, slope, drift = scratch.trial, scratch.slope, linear.jacobian.drift
     n, last, bodies = state.shape[0], stages.shape[0] - 1, model.bodies.mass.shape[0]
-    hold, implied = HOLD if tableau.reuse > 1 else 1.0, speeds_implied(tableau.reuse == 1, model)
+    hold, implied = HOLD if tableau.reuse > 1 else 1.0, False
     while True:
         take_samples(control, memory, scratch, equations, model, work)
         keep_short(control, memory, model, work)
@@ -158,6 +158,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                     copy_into(memory.rate, slope)
                     counters[engine.HAS_RATE], counters[engine.TOUCHING] = 1, touching(work)
                 regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
+                implied = speeds_implied(tableau.reuse == 1, linear.jacobian, model)
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
                 if implied:
