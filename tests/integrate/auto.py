@@ -40,11 +40,11 @@ TOO_DEAR = 4.0
 """A choice that takes this many times as many evaluations as `auto` is given up."""
 
 
-def cost(run):
+def cost(model, run):
     """What a run did, in evaluations."""
     if run.end is not None and len(run.end.notes):
-        return work_of(run.end)
-    return work(run.method, run.rhs_evaluations, run.steps + run.rejected, run.jacobians)
+        return work_of(model, run.end)
+    return work(model, run.method, run.rhs_evaluations, run.steps + run.rejected, run.jacobians)
 
 
 class Measured:
@@ -87,7 +87,7 @@ class Measured:
         default = self.once(DEFAULT)
         for method in ("auto", *METHODS):
             tableau = (EXPLICIT | ROSENBROCK)["rk4" if method == "auto" else method]
-            most = round(TOO_DEAR * cost(default) / len(tableau.nodes))
+            most = round(TOO_DEAR * cost(self.model, default) / len(tableau.nodes))
             for rtol in RTOLS:
                 if self.once((method, rtol), most).status == "stalled":
                     break  # tighter ones are dearer
@@ -100,7 +100,7 @@ class Measured:
         return [min(group, key=self.cost, default=None) for group in (enough, strict, own)]
 
     def cost(self, choice):
-        return cost(self.runs[choice])
+        return cost(self.model, self.runs[choice])
 
     def once(self, choice, most=0):
         self.taken[choice], run = self.run(choice, most)

@@ -48,14 +48,6 @@ UNCOUNTED = -1
 """Count of patches whose slopes have not been found."""
 
 
-@jit(allocates=False, inline="always")
-def speeds_implied(along, jacobian, model):
-    """Whether stages go by the rails' speeds that they imply: on rails without mass, with a Jacobian ``along`` the
-    drift of the whole state, where it is that of the model itself."""
-    track = model.flexible_track
-    return along and jacobian.rough[0] == 0.0 and track.mass.shape[0] > 0 and track.mass[0] == 0.0
-
-
 @jit(allocates=False)
 def take_mobility(jacobian, t, state, model, work):
     """Write the accelerations of all bodies by a wrench on each wheelset, at the rotations in ``work``, into

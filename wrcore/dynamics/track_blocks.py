@@ -17,6 +17,8 @@ damping goes from one extreme to the other over 0.05 m/s, and a stage whose q is
 0.05 m/s.
 """
 
+import math
+
 from wrcore.contact.moved import ACROSS, MOVES
 from wrcore.dynamics.contact_slopes import SLOPES
 from wrcore.dynamics.flexible_track import RAILS, first_place
@@ -28,6 +30,9 @@ PLACES, SPEEDS = SLOPES, SLOPES + 2
 
 RATES = 6
 """First of two columns of slopes: rates of a rail's velocities, or of its displacements where it has no mass."""
+
+BALANCED = 1e-4
+"""What a step of Newton's method may move rails that are in balance, m/s."""
 
 
 @jit(allocates=False)
@@ -75,6 +80,22 @@ def give_way(track, wheel, slopes):
             slopes[row, column] += by_y[column] * vy + by_z[column] * vz
 
 
+@jit(allocates=False, inline="always")
+def without_mass(model):
+    """Whether track is flexible and rails have no mass."""
+    return model.flexible_track.mass.shape[0] > 0 and model.flexible_track.mass[0] == 0.0
+
+
+@jit(allocates=False)
+def in_balance(rate, model, work):
+    """Whether the rails' speeds in the work are those in a ``rate``, or nearly so."""
+    for k in range(work.flexible_track.speeds.shape[0]):
+        for i in range(RAILS):
+            if not abs(work.flexible_track.speeds[k, i] - rate[first_place(model, k) + i]) < BALANCED:
+                return False
+    return True
+
+
 @jit(allocates=False)
 def hold_speeds(slopes, rate, model, work):
     """Let the work have what `SPEEDS_GIVEN` needs: of the wheels' ``slopes``, and the speeds in the ``rate`` of where
@@ -93,13 +114,31 @@ def hold_speeds(slopes, rate, model, work):
 
 
 @jit(allocates=False)
+def _implied(at, begun, weights, step, rate, drift, stages):
+    """What the increments of the ``stages`` of a step (s) imply for the speed of a rail whose place is ``at``, by a
+    method's ``begun`` and ``weights`` of them; ``rate``: where the step began."""
+    speed = begun * (rate[at] - drift[at])
+    for j in range(weights.shape[0]):
+        speed += weights[j] / step * stages[j, at]
+    return speed
+
+
+@jit(allocates=False)
 def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
-    """Write the rails' speeds that the increments of the ``stages`` of a step (s) imply, by a method's ``begun`` and
-    ``weights`` of them; ``rate``: where it began."""
+    """Write the rails' speeds in a stage into the work; arguments as for `_implied`."""
     for k in range(work.flexible_track.speeds.shape[0]):
         for i in range(RAILS):
             at = first_place(model, k) + i
-            speed = rate[at] + begun * (rate[at] - drift[at])
-            for j in range(weights.shape[0]):
-                speed += weights[j] / step * stages[j, at]
+            speed = rate[at] + _implied(at, begun, weights, step, rate, drift, stages)
             work.flexible_track.speeds[k, i] = speed
+
+
+@jit(allocates=False)
+def speeds_error(begun, weights, step, rate, drift, stages, tolerances, pace, model):
+    """Error of the rails' speeds in a step, root mean square over what a velocity is allowed."""
+    total, wheelsets, allowed = 0.0, model.bodies.wheelsets.shape[0], pace * tolerances[0, first_place(model, 0)]
+    for k in range(wheelsets):
+        for i in range(RAILS):
+            at = first_place(model, k) + i
+            total += (_implied(at, begun, weights, step, rate, drift, stages) / allowed) ** 2
+    return math.sqrt(total / (RAILS * wheelsets))

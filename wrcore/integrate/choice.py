@@ -18,6 +18,7 @@ import numpy as np
 from wrcore.dynamics.contract import places
 from wrcore.dynamics.modes import ELLIPSES
 from wrcore.dynamics.system import derivatives_at
+from wrcore.dynamics.track_blocks import without_mass
 from wrcore.errors import InputError
 from wrcore.integrate.engine import EVALUATIONS, JACOBIANS, REJECTED, STEPS, T
 from wrcore.integrate.tableaus import ROSENBROCK
@@ -34,6 +35,10 @@ evaluations that one takes."""
 LINEAR, CONTACTS = 0.6, 3.0
 """Price of a stage's linear system, and of the contacts' part of a Jacobian, in evaluations, as timed: of six stages
 with a Jacobian 4.8 for a wheelset, 6 for a coach, 8.5 for a metro car."""
+
+BALANCE = 3.2
+"""Price of the balance of rails without mass, in evaluations: explicit methods look for it in each, those that go by
+implied speeds in two of a step."""
 
 FIRST, LAST, APART = {"rodas5": 16, "rk4": 120}, {"rodas5": 320, "rk4": 1600}, {"rodas5": 2.0, "rk4": 4.0}
 """Attempts by a method, once its steps have found their length and a trial is over, before the first look, and between
@@ -117,23 +122,29 @@ def attempts(counters):
     return int(counters[STEPS] + counters[REJECTED])
 
 
-def work(method, evaluations, tried, jacobians):
+def work(model, method, evaluations, tried, jacobians):
     """What was done, in evaluations of the right-hand side: so many, attempts, and Jacobians."""
     stages = len(ROSENBROCK[method].nodes) if method in ROSENBROCK else 0
-    return evaluations + LINEAR * stages * tried + CONTACTS * jacobians
+    balances = 2 * tried if method in ROSENBROCK and ROSENBROCK[method].reuse == 1 else evaluations
+    return evaluations + LINEAR * stages * tried + CONTACTS * jacobians + _balance(model) * balances
 
 
-def work_of(checkpoint):
+def _balance(model):
+    """Price of a balance, 0 where rails are rigid or have masses."""
+    return BALANCE if without_mass.py_func(model) else 0.0
+
+
+def work_of(model, checkpoint):
     """What a run by ``auto`` that ended with a checkpoint did in all but its looks, in evaluations."""
     notes = checkpoint.notes
-    return notes[Note.WORK] + work(checkpoint.method, *(_reached(checkpoint.memory) - notes[Note.SINCE :])[1:])
+    return notes[Note.WORK] + work(model, checkpoint.method, *(_reached(checkpoint.memory) - notes[Note.SINCE :])[1:])
 
 
 def method_after(notes, method, model, equations, memory):
     """The method by which a run at a look goes on; notes the look."""
     other = CHOICES[1 - CHOICES.index(method)]
     gone = _reached(memory) - notes[Note.SINCE :]
-    done, phase, interval = work(method, *gone[1:]), int(notes[Note.PHASE]), notes[Note.INTERVAL]
+    done, phase, interval = work(model, method, *gone[1:]), int(notes[Note.PHASE]), notes[Note.INTERVAL]
     spent = COUNTED[method] * done / gone[0] if gone[0] > 0.0 else np.inf
     later = min(APART[method] * interval, LAST[method])
     notes[Note.WORK] += done
@@ -158,7 +169,8 @@ def _promised(method, model, equations, memory):
     """Evaluations per s, as `COUNTED`, that a method may take from here on, at least."""
     if method in ROSENBROCK:
         return 0.0
-    return COUNTED[method] * EXPLICIT * fastest_rate(model, equations, memory.clock[T], memory.state) / STABLE
+    rate = fastest_rate(model, equations, memory.clock[T], memory.state)
+    return COUNTED[method] * EXPLICIT * (1.0 + _balance(model)) * rate / STABLE
 
 
 def _reached(memory):

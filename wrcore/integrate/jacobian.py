@@ -32,7 +32,6 @@ from wrcore.dynamics.contact_blocks import (
     TURN,
     renew_contacts,
     slopes_of_patches,
-    speeds_implied,
 )
 from wrcore.dynamics.contact_slopes import differentiable, slope_scratch
 from wrcore.dynamics.contract import turn_rate
@@ -48,7 +47,7 @@ from wrcore.dynamics.modes import BARE, ELLIPSES, SPEEDS_GIVEN, WRENCHES_HELD
 from wrcore.dynamics.motion import MOTION
 from wrcore.dynamics.strip_wheel import STOOD_IN
 from wrcore.dynamics.system import derivatives_at, state_size
-from wrcore.dynamics.track_blocks import hold_speeds
+from wrcore.dynamics.track_blocks import hold_speeds, in_balance, without_mass
 from wrcore.dynamics.vector import copy_into, cross, dot
 from wrcore.integrate.moving_axes import ANGLE, RATE, carry, rates_of_increments, turn_of
 from wrcore.integrate.tolerances import HALF_GAUGE, pace
@@ -61,6 +60,10 @@ saturates at creepages of some 1e-3, and a difference must not come near that.""
 
 USUAL = 0.3
 """The same below this coefficient of friction."""
+
+SLIPS = 2.0
+"""Slower than this at the usual friction (m/s; in proportion at a lower one) friction saturates at speeds of rails that
+no stage implies as well as that."""
 
 MOMENT = 1e-7
 """Difference of time, s."""
@@ -116,7 +119,9 @@ class Jacobian(NamedTuple):
     """Scratch of :mod:`wrcore.dynamics.contact_blocks`."""
     column_numbers: np.ndarray  # (k, c) int: see `wrcore.dynamics.contact_blocks.contact_places`
     row_numbers: np.ndarray  # (k, r) int
-    rough: np.ndarray  # (1,): 1 where it is that of a smooth neighbour of the model, ellipses for patches on strips
+    implied: np.ndarray
+    """(1,): 1 where stages go by the speeds of rails that they imply: of rails without mass that were in balance, where
+    the Jacobian serves one step and is that of the model itself, and wheels do not roll too slowly (`SLIPS`)."""
 
 
 def _groups(reach):
@@ -318,9 +323,9 @@ def refresh_jacobian(
     axes = turn_of(jacobian)
     _take_drift(jacobian, state)
     jacobian.length[0] = -2.0 * model.alpha
-    fine = min(
-        1.0, pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * HALF_GAUGE / FINE_BELOW
-    ) * min(1.0, model.contact.friction / USUAL)
+    speed = pace(model.bodies.wheelsets, model.contact.least_speed, state, state) * HALF_GAUGE
+    saturating = min(1.0, model.contact.friction / USUAL)
+    fine, slips = min(1.0, speed / FINE_BELOW) * saturating, speed * saturating
     strips, wheels = model.contact.strips, model.bodies.wheelsets.shape[0] > 0
     rough = strips.strips > 0 and strips.looked_up == 0.0
     copy_into(base, rate)
@@ -342,11 +347,11 @@ def refresh_jacobian(
                 rough = True
                 derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
                 rates_of_increments(n, axes, drift, 0.0, state, state, base)
-        if in_time:
-            jacobian.rough[0] = 1.0 if rough or (wheels and work.strips.flags[STOOD_IN] > 0.0) else 0.0
-        if in_time and speeds_implied(along, jacobian, model):
-            hold_speeds(jacobian.slopes, rate, model, work)
-            mode |= SPEEDS_GIVEN
+            rough = rough or work.strips.flags[STOOD_IN] > 0.0
+            jacobian.implied[0] = 1.0 if along and without_mass(model) and not rough and slips > SLIPS else 0.0
+            if jacobian.implied[0] > 0.0:
+                hold_speeds(jacobian.slopes, rate, model, work)
+                mode |= SPEEDS_GIVEN
         if in_time and along:
             for j in range(state.shape[0]):
                 if j >= STATE_SIZE * n or j % STATE_SIZE >= EULER:
@@ -358,6 +363,9 @@ def refresh_jacobian(
         for k in range(first, end):
             differences[k - first] = _resolved(differences[k - first], sweep.columns[k], n, axes, state, trial)
         derivatives_at(equations, t + moment, trial, model, work, slope, mode)
+        if mode & SPEEDS_GIVEN and not in_balance(rate, model, work):
+            jacobian.implied[0] = 0.0
+            derivatives_at(equations, t + moment, trial, model, work, slope, mode ^ SPEEDS_GIVEN)
         rates_of_increments(n, axes, drift, moment, state, trial, slope)
         if in_time:
             for j in range(state.shape[0]):

@@ -9,11 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wrcore.dynamics.contact_blocks import speeds_implied
 from wrcore.dynamics.contract import after_rejection, before_attempt, touching
 from wrcore.dynamics.modes import SPEEDS_GIVEN, STAGE
 from wrcore.dynamics.system import derivatives_at
-from wrcore.dynamics.track_blocks import hold_speeds, imply_speeds
+from wrcore.dynamics.track_blocks import hold_speeds, imply_speeds, speeds_error
 from wrcore.dynamics.vector import copy_into
 from wrcore.integrate import engine
 from wrcore.integrate.blocks import factorise, solve_stage
@@ -158,7 +157,7 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
                     copy_into(memory.rate, slope)
                     counters[engine.HAS_RATE], counters[engine.TOUCHING] = 1, touching(work)
                 regular = _renew(tableau, memory, scratch, linear, system, equations, model, work)
-                implied = speeds_implied(tableau.reuse == 1, linear.jacobian, model)
+                implied = linear.jacobian.implied[0] > 0.0
                 copy_into(slope, memory.rate)
                 copy_into(trial, state)
                 if implied:
@@ -180,6 +179,12 @@ def advance_rosenbrock(tableau, control, memory, scratch, linear, system, record
         carry(bodies, turn_of(linear.jacobian), drift, step, state, trial)
         rate = pace(model.bodies.wheelsets, model.contact.least_speed, state, trial)
         error = error_size(control.tolerances, rate, bodies, trial, slope) if regular else np.nan
+        if implied and error <= 1.0:
+            found = speeds_error(
+                tableau.begun[last + 1], tableau.speeds[last + 1], step, memory.rate, drift, stages,
+                control.tolerances, rate, model,
+            )  # fmt: skip
+            error = found if not found <= error else error
         if error <= 1.0 and tableau.looked_at > 0.0:
             found = _error_between(tableau, control, memory, scratch, linear, system, rate, equations, model, work)
             error = found if not found <= error else error

@@ -51,8 +51,8 @@ class RosenbrockTableau(NamedTuple):
     reuse: int  # steps for which a Jacobian serves: 1 where the order rests on an exact one
     looked_at: float  # theta at which the dense output is held against the equations; 0 for none
     residual: float  # what the error found there counts
-    speeds: np.ndarray  # (s, s): see `implied_speeds`
-    begun: np.ndarray  # (s,)
+    speeds: np.ndarray  # (s + 1, s): see `implied_speeds`
+    begun: np.ndarray  # (s + 1,)
 
 
 def _lower(*rows):
@@ -63,15 +63,15 @@ def _lower(*rows):
     return matrix
 
 
-def implied_speeds(stages, couplings, gamma):
+def implied_speeds(stages, couplings, gamma, error):
     """How the increments u of a method's stages imply those of their rates, where q' = v and v is a state, too.
 
     For q the stages are 1/(h gamma) u_i - w_i = v0 + a_ij w_j - d + c_ij u_j/h, where w are the increments of v, which
     begins at v0, and d is the drift. So w = (1 + a)^-1 ((1/gamma - c) u/h - (v0 - d)), and v of stage i is
-    v0 + D_ij u_j/h + f_i (v0 - d). Returns D (s, s) and f (s,).
+    v0 + D_ij u_j/h + f_i (v0 - d). Returns D (s + 1, s) and f (s + 1,), last what the error of v in the step is.
     """
-    inverse = np.linalg.inv(np.eye(len(stages)) + stages)
-    return stages @ inverse @ (np.eye(len(stages)) / gamma - couplings), -(stages @ inverse).sum(axis=1)
+    inverse, mixed = np.linalg.inv(np.eye(len(stages)) + stages), np.vstack([stages, error])
+    return mixed @ inverse @ (np.eye(len(stages)) / gamma - couplings), -(mixed @ inverse).sum(axis=1)
 
 
 def _hermite(weights):
@@ -146,10 +146,10 @@ def _rodas(nodes, by_time, stages, couplings, *bends, exponent=4.0, gamma=0.25, 
     weights, size = np.array([*stages[-1], 1.0, 1.0]), len(nodes) + 2
     bent = [np.zeros(size), *(np.append(bend, np.zeros(size - len(bend))) for bend in bends), np.zeros(size)]
     dense = np.diff(bent, axis=0).T + np.outer(weights, np.arange(len(bends) + 1) == 0)
-    stages, couplings = _lower(*stages, [*stages[-1], 1.0]), _lower(*couplings)
+    stages, couplings, error = _lower(*stages, [*stages[-1], 1.0]), _lower(*couplings), np.eye(size)[-1]
     return RosenbrockTableau(
-        np.array([*nodes, 1.0, 1.0]), np.array([*by_time, 0.0, 0.0]), stages, couplings, weights, np.eye(size)[-1],
-        dense, exponent, gamma, 1, looked_at, residual, *implied_speeds(stages, couplings, gamma),
+        np.array([*nodes, 1.0, 1.0]), np.array([*by_time, 0.0, 0.0]), stages, couplings, weights, error, dense,
+        exponent, gamma, 1, looked_at, residual, *implied_speeds(stages, couplings, gamma, error),
     )  # fmt: skip
 
 
@@ -249,10 +249,10 @@ def _ros34pw2():
         [-1.045260255335102, 2.398120075195581, -0.9169932983520199],
     ])  # fmt: skip
     inverse = np.linalg.inv(coupling)
-    stages, couplings = alpha @ inverse, np.eye(4) / gamma - inverse
+    stages, couplings, error = alpha @ inverse, np.eye(4) / gamma - inverse, (b - embedded) @ inverse
     return RosenbrockTableau(
-        alpha.sum(axis=1), coupling.sum(axis=1), stages, couplings, b @ inverse, (b - embedded) @ inverse,
-        inverse.T @ dense, 3.0, gamma, 20, 0.0, 0.0, *implied_speeds(stages, couplings, gamma),
+        alpha.sum(axis=1), coupling.sum(axis=1), stages, couplings, b @ inverse, error, inverse.T @ dense, 3.0, gamma,
+        20, 0.0, 0.0, *implied_speeds(stages, couplings, gamma, error),
     )  # fmt: skip
 
 
