@@ -465,3 +465,10 @@ def test_auto_goes_by_the_cheaper_method_on_rails_without_mass():
     changes = {"speed": 45.0, "contact.patch": "moment", "track": {"support": MASSLESS, "irregularity": ROUGH}}
     run = integrate(*compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", changes)), [0.0, 2.0], "auto")
     assert run.method == "rodas5"
+
+
+def test_steps_do_not_grow_ever_shorter_where_speeds_of_rails_jump():
+    """Hunting on the flanges: smallest step found 20 us, 443 attempts; 50 ns and 779 where speeds count in full."""
+    model, start = compile_scene(scene_on(MASSLESS, speed=80.0, initial__y=0.006, contact__patch="moment"))
+    run = integrate(model, start, [0.0, 0.3], "rodas5", 1e-4)
+    assert run.steps + run.rejected < 600

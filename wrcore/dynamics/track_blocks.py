@@ -34,6 +34,10 @@ RATES = 6
 BALANCED = 1e-4
 """What a step of Newton's method may move rails that are in balance, m/s."""
 
+SHORT = 20.0
+"""Speeds of rails jump where patches do. Steps are not to grow ever shorter on that: times a step's length, what a
+speed errs by is no more than 1/20 of what a displacement may. Chosen."""
+
 
 @jit(allocates=False)
 def over_rails(model, state, rate, motions):
@@ -135,10 +139,11 @@ def imply_speeds(begun, weights, step, rate, drift, stages, model, work):
 
 @jit(allocates=False)
 def speeds_error(begun, weights, step, rate, drift, stages, tolerances, pace, model):
-    """Error of the rails' speeds in a step, root mean square over what a velocity is allowed."""
+    """Error of the rails' speeds in a step, root mean square over what a velocity is allowed; in short steps over more,
+    `SHORT`."""
     total, wheelsets, allowed = 0.0, model.bodies.wheelsets.shape[0], pace * tolerances[0, first_place(model, 0)]
     for k in range(wheelsets):
         for i in range(RAILS):
             at = first_place(model, k) + i
             total += (_implied(at, begun, weights, step, rate, drift, stages) / allowed) ** 2
-    return math.sqrt(total / (RAILS * wheelsets))
+    return min(1.0, SHORT * pace * step) * math.sqrt(total / (RAILS * wheelsets))

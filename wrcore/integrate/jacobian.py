@@ -327,7 +327,7 @@ def refresh_jacobian(
     saturating = min(1.0, model.contact.friction / USUAL)
     fine, slips = min(1.0, speed / FINE_BELOW) * saturating, speed * saturating
     strips, wheels = model.contact.strips, model.bodies.wheelsets.shape[0] > 0
-    rough = strips.strips > 0 and strips.looked_up == 0.0
+    rough, repeated = strips.strips > 0 and strips.looked_up == 0.0, False
     copy_into(base, rate)
     if rough or whole:  # of a smooth neighbour of the model
         derivatives_at(equations, t, state, model, work, base, BARE | ELLIPSES)
@@ -364,7 +364,7 @@ def refresh_jacobian(
             differences[k - first] = _resolved(differences[k - first], sweep.columns[k], n, axes, state, trial)
         derivatives_at(equations, t + moment, trial, model, work, slope, mode)
         if mode & SPEEDS_GIVEN and not in_balance(rate, model, work):
-            jacobian.implied[0] = 0.0
+            jacobian.implied[0], repeated = 0.0, True
             derivatives_at(equations, t + moment, trial, model, work, slope, mode ^ SPEEDS_GIVEN)
         rates_of_increments(n, axes, drift, moment, state, trial, slope)
         if in_time:
@@ -372,4 +372,4 @@ def refresh_jacobian(
                 jacobian.by_time[j] = (slope[j] - base[j]) / MOMENT
         for k in range(first, end):
             _take_column(sweep, jacobian, k, differences[k - first], n, base, slope)
-    return sweep.starts.shape[0] + 1 if whole else 1 + rough
+    return (sweep.starts.shape[0] + 1 if whole else 1 + rough) + repeated
