@@ -9,6 +9,7 @@ import time
 import numpy as np
 
 from tests.conftest import SCENES
+from tests.dynamics.giving_track import EXAMPLES
 from tests.integrate.auto import BARS, Measured
 from wrcore.dynamics.system import Equations
 from wrcore.scene.description import compile_scene, load_scene
@@ -17,14 +18,11 @@ SPECTRUM = {"spectrum": {"level": "low", "seed": 1, "length": 2000.0, "begin": 2
 ROUGH = {"track.irregularity": SPECTRUM}
 CURVE = {"track.path": [{"tangent": 20}, {"transition": 40}, {"curve": 250, "radius": 300, "cant": 0.1},
                         {"transition": 40}, {"tangent": 100}]}  # fmt: skip
-RAIL = {"mass": 79, "lateral": {"stiffness": 4.34e7, "damping": 1.45e5},
-        "vertical": {"stiffness": 1.88e8, "damping": 2.17e5}}  # fmt: skip
-SLEEPER = {"mass": 544, "roll_inertia": 306, "lateral": {"stiffness": 6.0e7, "damping": 1.5e5},
-           "vertical": {"stiffness": 2.87e8, "damping": 1.18e5}}  # fmt: skip
-SOFT = {"lateral": {"stiffness": 1.8e7, "damping": 5.0e4}, "vertical": {"stiffness": 8.1e7, "damping": 6.0e4}}
-GIVING = {"rigid track": {}, "track that gives": {"track.support": {"rail": RAIL, "sleeper": SLEEPER}},
-          "rails without mass": {"track.support": {"rail": SOFT}}}  # fmt: skip
-"""The values of `reports/tracks.md`."""
+GIVING = {"rigid track": {}} | {
+    name: {"track.support": example["support"]}
+    for name, example in zip(("track that gives", "rails without mass"), EXAMPLES, strict=True)
+}
+"""The examples of `reports/tracks.md`."""
 CASES = [
     *((f"trailer_vehicle, {track}", {"speed": v, **ROUGH, **GIVING[track]}, 5.0)
       for v in (20.0, 40.0, 60.0) for track in GIVING),
