@@ -1,7 +1,12 @@
 """reports/first_result.md and the site's first page work as written, from an empty folder, and print what they show."""
 
+import re
+
+import numpy as np
 import pytest
 
+import wrcore as wr
+from tests.conftest import ROOT
 from tests.pages import blocks, run_blocks
 
 PAGE = "first_result.md"
@@ -10,6 +15,26 @@ PAGE = "first_result.md"
 def test_it_has_less_than_twenty_lines():
     (code,) = (text for kind, text in blocks(PAGE) if kind == "python")
     assert len([line for line in code.splitlines() if line.strip()]) < 20
+
+
+WORN = re.compile(r"wr\.named_profile\(\W+\w+\W+, \W*wheel\W*\)\(u\) [^\n#]*np\.exp\([^\n#]*")
+"""A worn wheel as pages and notebooks write it, up to its comment."""
+
+
+def test_hollow_wheel_of_every_page_lowers_the_tread():
+    u = np.linspace(-0.055, 0.055, 600)
+    new, found = wr.named_profile("S1002", "wheel")(u), {}
+    pages = [ROOT / "README.md", *(ROOT / "reports").glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    for path in [*pages, *(ROOT / "notebooks").glob("*.ipynb")]:
+        for text in WORN.findall(path.read_text("utf-8").replace('\\"', '"')):
+            found[path.name] = eval(text, {"wr": wr, "np": np, "u": u})
+    assert {"first_result.md", "bring_your_own.md"} <= set(found)
+    for name, f in found.items():
+        radius = 0.46 - f  # f = r0 - r: a smaller radius lies higher
+        lost = (0.46 - new) - radius
+        assert lost.min() >= 0.0, f"{name}: wear adds material"
+        assert lost[np.abs(u) < 1e-3].min() == pytest.approx(3e-4, rel=0.01), name
+        assert lost[np.abs(u) > 0.04].max() < 1e-8, name
 
 
 def test_it_prints_what_it_shows(tmp_path, monkeypatch, capsys):

@@ -217,14 +217,15 @@ def vampire(folder, name, left, right, head):
 )
 def test_vampire_wheels(tmp_path, datum, distance):
     u, f = with_sides(U, wheel(U), 25.0, 20.0)
-    worn = f - 0.5 * np.exp(-((u / 10.0) ** 2))
+    worn = f + 0.5 * np.exp(-((u / 10.0) ** 2))  # mm; f = r0 - r: a hollow
     y = u + 680.0 + distance
     head = f"WHEELPROFILE\na title\nTREADDATUM {datum}\nFLANGEBACK 1360.0\n! y z y z\n"
     path = vampire(tmp_path, "pair.whe", (-y, -worn), (y, -f), head)
     right, left = read_profile(path, "wheel"), read_profile({"points": path, "side": "left"}, "wheel")
     assert off(right) < 1e-6 and f"{distance:.2f} mm from the flange back" in right.source
     hollow = left(SEEN) - wheel(SEEN)
-    assert np.ptp(hollow) == pytest.approx(0.5e-3, rel=1e-3) and "left side" in left.source
+    lost = hollow[np.abs(SEEN).argmin()] - hollow.min()
+    assert lost == pytest.approx(0.5e-3, rel=1e-3) == np.ptp(hollow) and "left side" in left.source
 
 
 def test_vampire_rails(tmp_path):
