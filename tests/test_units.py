@@ -45,6 +45,30 @@ def test_a_named_rail_needs_its_inclination(tmp_path, capsys, command):
     assert "inclination: expected a ratio for 60E1, such as 1/40, 1/20 or 0 (upright)" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", ["contact", "conicity", "profiles"])
+def test_inclination_without_effect_on_a_file_is_refused(tmp_path, capsys, command):
+    (tmp_path / "poses.csv").write_text(POSES)
+    rail, out = tmp_path / "rail.csv", str(tmp_path / "out.csv")
+    rail.write_text("u_m,f_m\n" + "".join(f"{u},{-2 * u * u}\n" for u in np.linspace(-0.036, 0.036, 73)))
+    pair = ["--wheel", "S1002", "--rail", str(rail), "--out", out]
+    words = {"contact": ["--poses", str(tmp_path / "poses.csv"), "--wheel-load", "54500", *pair], "conicity": pair,
+             "profiles": [str(rail), "--kind", "rail"]}[command]  # fmt: skip
+    assert main([command, *words, "--inclination", "1/40"]) == 2
+    said = capsys.readouterr().err
+    assert "inclination" in said and "inclined: false" in said and said.count("\n") == 1
+
+
+def test_inclination_beside_a_rail_of_slices_or_a_wheel_is_refused(tmp_path, capsys):
+    (tmp_path / "slices.csv").write_text("s_m,profile\n0,a.csv\n1,a.csv\n")
+    (tmp_path / "poses.csv").write_text(POSES)
+    rail = ["--rail", str(tmp_path / "slices.csv"), "--out", str(tmp_path / "out.csv"), "--inclination", "1/40"]
+    words = ["contact", "--poses", str(tmp_path / "poses.csv"), "--wheel-load", "54500", "--wheel", "S1002", *rail]
+    assert main(words) == 2
+    assert "--inclination: expected none or 0 beside a rail of slices" in capsys.readouterr().err
+    with pytest.raises(wr.InputError, match="only rails have one"):
+        wr.named_profile("S1002", "wheel", 1 / 40)
+
+
 def test_a_scene_with_a_named_rail_needs_its_inclination():
     data = dict(wr.load_scene(SCENES / "wheelset.yaml").data, rail={"profile": "60E1"})
     data["vehicle"]["parameters"] = str(SCENES.parent / "vehicles" / "wheelset.yaml")

@@ -11,6 +11,29 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene.description import compile_scene, load_scene
 
+
+@pytest.mark.parametrize("gauge", [1.0, 1.668, 1.9])
+def test_a_gauge_that_does_not_fit_the_wheelset_is_named(gauge):
+    with pytest.raises(InputError, match="expected a gauge that fits tape circles 1.5 m apart") as caught:
+        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"track.gauge": gauge}))
+    assert caught.value.field == "track.gauge" and f"got {gauge:g} m" in str(caught.value)
+
+
+def test_a_place_at_which_no_wheel_stands_is_still_the_initial_ones():
+    with pytest.raises(InputError, match="expected a position in which both wheels stand") as caught:
+        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"track.gauge": 1.6, "initial.y": 0.02}))
+    assert caught.value.field == "initial"
+
+
+@pytest.mark.parametrize("mass", [1e-9, 1e-3, 0.09])
+def test_a_rail_too_light_for_a_vehicle_to_rest_on_is_named(mass):
+    spring = {"stiffness": 1e8, "damping": 1e5}
+    support = {"rail": {"mass": mass, "lateral": spring, "vertical": spring}}
+    with pytest.raises(InputError, match="expected at least 0.1 kg, or 0") as caught:
+        load_scene(SCENES / "suspended_wheelset.yaml", {"track.support": support})
+    assert caught.value.field == "track.support.rail.mass"
+
+
 UNLIKE = {"rail.left": {"profile": "54E1", "inclination": 0.025}}
 
 

@@ -302,6 +302,53 @@ BAD_PATHS = [
 ]
 
 
+def test_two_transitions_between_opposite_curves_meet_in_an_inflection():
+    left, right = {**CURVE, "cant": 0.12}, {"curve": 50.0, "radius": -472.0, "cant": 0.12}
+    path = [{"transition": 68.0}, right, {"transition": 68.0}, {"transition": 65.0}, left]
+    line = [{"transition": 68.0}, right, {"transition": 68.0, "radius": -1e12}, {"transition": 65.0}, left]
+    found, wanted = (build_track({"path": one}, "test").path for one in (path, line))
+    for s in np.linspace(0.0, 300.0, 61):
+        np.testing.assert_allclose(centreline(found, s), centreline(wanted, s), rtol=0.0, atol=1e-8)
+    assert centreline(found, 186.0).curvature == pytest.approx(0.0, abs=1e-18)
+    assert centreline(found, 170.0).curvature < 0.0 < centreline(found, 200.0).curvature
+
+
+@pytest.mark.parametrize("between", [CURVE, {"tangent": 20.0}, {"curve": 50.0, "radius": 472.0}])
+def test_two_transitions_without_an_inflection_are_refused(between):
+    path = [{"transition": 68.0}, CURVE, {"transition": 68.0}, {"transition": 65.0}, between]
+    with pytest.raises(InputError, match=r"track.path.2.transition: .*in an inflection"):
+        build_track({"path": path}, "test")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("about", ["lower_rail", "inner_rail", "centreline"])
+def test_cant_ramp_on_straight_track_raises_the_outer_rail_of_the_curve(sign, about):
+    ramp = {"transition": 30.0, "cant": 0.05}
+    curve = {"curve": 100.0, "radius": 500.0 * sign, "cant": 0.15}
+    back = [{"transition": 60.0, "cant": 0.04}, {"transition": 9.0}, {"tangent": 9.0}]
+    path = [{"tangent": 50.0}, ramp, {"transition": 60.0}, curve, *back]
+    found = build_track({"path": path, "cant_about": about}, "test").path
+    high = 0.5 if about != "centreline" else 0.0
+    for s, cant in ((65.0, 0.025), (110.0, 0.1), (200.0, 0.15), (270.0, 0.095), (304.5, 0.02)):
+        here = centreline(found, s)
+        assert here.sin_roll == pytest.approx(-sign * cant / CANT_BASE, abs=1e-12)
+        assert here.z == pytest.approx(high * cant, abs=1e-9)
+    assert centreline(found, 79.0).curvature == 0.0 == centreline(found, 301.0).curvature
+
+
+def test_a_tangent_with_cant_is_told_how_a_ramp_is_written():
+    path = [{"tangent": 50.0}, {"tangent": 30.0, "cant": 0.05}, {"transition": 60.0}, {**CURVE, "cant": 0.15}]
+    with pytest.raises(InputError, match=r"track.path.1.cant: .*{transition: LENGTH, cant: CANT}"):
+        build_track({"path": path}, "test")
+
+
+def test_a_large_radius_without_transition_is_told_how_to_write_it():
+    path = [{"tangent": 18.0}, {"curve": 10.0, "radius": 30e3}, {"tangent": 50.0}]
+    with pytest.raises(InputError, match=r"track.path.1.curve: .*write {transition: 4}"):
+        build_track({"path": path}, "test")
+    build_track({"path": [path[0], {"transition": 4}, path[1], {"transition": 4}, path[2]]}, "test")
+
+
 @pytest.mark.parametrize(("path", "field", "expected"), BAD_PATHS)
 def test_bad_paths_name_segment_and_field(path, field, expected):
     with pytest.raises(InputError) as caught:

@@ -120,7 +120,7 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
     upright, inclined = named_profile("60E1", "rail", 0), named_profile("60E1", "rail", 1 / 40)
     path = str(write(tmp_path, "rail.csv", "u_mm,f_mm\n" + columns(upright.u, upright.f)))
     inside = np.linspace(-0.030, 0.020, 101)
-    as_is = named_profile(path, "rail", 1 / 40)
+    as_is = named_profile(path, "rail")
     turned = named_profile({"points": path, "inclined": False}, "rail", 1 / 40)
     assert np.max(np.abs(as_is(inside) - upright(inside))) < 0.2e-6
     assert np.max(np.abs(turned(inside) - inclined(inside))) < 0.2e-6

@@ -327,6 +327,23 @@ def test_a_named_rail_has_no_silent_inclination(tmp_path):
     )
     with pytest.raises(InputError, match="inclination: expected a ratio for"):
         named_profile({"points": path, "inclined": False}, "rail")
-    assert named_profile(path, "rail").gauge_offset(1e-4) == pytest.approx(
-        named_profile(path, "rail", 0.02).gauge_offset(1e-4)
-    )
+    assert named_profile(path, "rail", 0.0).gauge_offset(1e-4) == named_profile(path, "rail").gauge_offset(1e-4)
+
+
+@pytest.mark.parametrize(
+    ("spec", "kind", "says"),
+    [
+        ("FILE", "rail", "inclination: expected none or 0, as the points of FILE lie in the track pose already"),
+        ({"points": "FILE", "inclined": True}, "rail", "points of FILE, inclined: true, lie in the track pose"),
+        ({"points": "FILE", "smoothing": 1e-5}, "rail", "write {points: FILE, inclined: false}"),
+        ("S1002", "wheel", "inclination: expected none for the wheel S1002"),
+    ],
+)
+def test_inclination_without_effect_is_refused(tmp_path, spec, kind, says):
+    """0.127 instead of 0.353: the conicity at 1 mm on upright points whose inclination is passed over."""
+    path = tmp_path / "rail.csv"
+    path.write_text("u_m,f_m\n" + "".join(f"{u},{-5 * u * u}\n" for u in np.linspace(-0.03, 0.03, 61)))
+    spec = {**spec, "points": str(path)} if isinstance(spec, dict) else spec.replace("FILE", str(path))
+    with pytest.raises(InputError) as caught:
+        named_profile(spec, kind, 1 / 40)
+    assert says.replace("FILE", str(path)) in str(caught.value)

@@ -13,6 +13,7 @@ from wrcore.contact.reduction import ANGLE, FY, NORMAL
 from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
+from wrcore.geometry.standards import named_profile
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene
 
 
@@ -199,6 +200,41 @@ def test_a_rail_that_ends_above_the_gauge_depth_is_named(tmp_path):
     with pytest.raises(InputError, match="expected a rail down to 0.014 m") as error:
         load_scene(SCENES / "wheelset.yaml", {"rail.profile": str(path), "rail.inclination": 0})
     assert (error.value.source, error.value.field) == (str(path), "gauge")
+
+
+@pytest.fixture
+def upright(tmp_path):
+    """File of points of an upright rail, not inclined."""
+    curve, path = named_profile("60E1", "rail", 0), tmp_path / "upright.csv"
+    np.savetxt(path, np.column_stack([curve.u, curve.f])[::4], delimiter=",", header="u_m,f_m", comments="")
+    return str(path)
+
+
+def test_inclination_beside_points_in_track_pose_is_refused(upright):
+    for changes, field in (
+        ({"rail": {"profile": upright, "inclination": "1/40"}}, "rail.inclination"),
+        ({"rail.profile": upright}, "rail.inclination"),  # beside the inclination of the scene's file
+        ({"rail": {"profile": {"points": upright, "inclined": True}, "inclination": "1/40"}}, "rail.inclination"),
+        ({"rail.left": {"profile": upright}}, "rail.left.inclination"),  # that of both
+        (
+            {"rail.left": {"profile": {"points": upright, "inclined": True}, "inclination": 0.05}},
+            "rail.left.inclination",
+        ),
+    ):
+        with pytest.raises(InputError, match="inclined: false") as caught:
+            load_scene(SCENES / "wheelset.yaml", changes)
+        assert caught.value.field == field
+
+
+def test_inclination_turns_points_that_are_said_to_be_upright(upright):
+    turned = {"rail.profile": {"points": upright, "inclined": False}, "rail.inclination": "1/20"}
+    named = {"rail": {"profile": "60E1", "inclination": "1/20"}}
+    one, other = (load_scene(SCENES / "wheelset.yaml", changes).rail for changes in (turned, named))
+    u = np.linspace(-0.02, 0.02, 41)
+    np.testing.assert_allclose(one(u), other(u), rtol=0.0, atol=1e-6)
+    said = {"rail.left": {"profile": {"points": upright, "inclined": True}}}  # beside that of the right rail
+    left, right = (pair.rail for pair in load_scene(SCENES / "wheelset.yaml", said).pairs)
+    assert abs(left(0.02) - right(0.02)) > 1e-4
 
 
 def test_null_takes_a_key_out():

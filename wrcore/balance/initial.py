@@ -108,7 +108,7 @@ def _standing(scene, model, offset):
                 got = f"expected wheels pressed onto the rails, got a wheel load of {load:.6g} N"
                 raise InputError(scene.source, "vehicle", got)
             k = int(np.flatnonzero(wheelsets == body)[0])
-            roll, state[at + 2] = _settled(scene, model, k, sides[k], offset, 0.0, load, state)
+            roll, state[at + 2] = _settled(scene, model, k, sides[k], offset, 0.0, load, state, "track.gauge")
             if model.contact.geometries:
                 state[at + EULER : at + VELOCITY] = euler_parameters(roll, 0.0, 0.0)
     return state
@@ -174,18 +174,22 @@ def _radii(scene, model, k, sides, state, roll, yaw):
     return radii
 
 
-def _settled(scene, model, k, sides, y, yaw, load, state):
+def _settled(scene, model, k, sides, y, yaw, load, state, blamed="initial"):
     """Roll and height of the k-th wheelset whose wheels carry the load (N) each, at the damping factor of rest; the
-    ``sides`` are its `_geometries`. Rails of a flexible track are where the state has them."""
+    ``sides`` are its `_geometries`. Rails of a flexible track are where the state has them. Where there is no such
+    position, an InputError names the key that is ``blamed``."""
     contact, (left, right) = model.contact, rails_at(model, state, k)
     modulus = contact_modulus(contact.shear_modulus, contact.poisson_ratio) * 0.5 * (1.0 + contact.damping)
     spatial, nominal = scene.detection != "planar", scene.vehicle.rolling_radius
     roll, z = settle(*sides, contact.hertz, modulus, y, yaw, spatial, contact.reduction, load, nominal)
     if not math.isfinite(z):
-        raise InputError(
-            scene.source, "initial", "expected a position in which both wheels stand on the rails under their load,"
-            f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel",
-        )  # fmt: skip
+        expected = "expected a position in which both wheels stand on the rails under their load,"
+        expected += f" got y = {y:g} m, yaw = {yaw:g} rad and {load:.6g} N per wheel"
+        if blamed == "track.gauge":
+            apart = f"{2.0 * scene.vehicle.half_distance:g} m apart (tape_circle_half_distance of the vehicle, twice)"
+            expected = f"expected a gauge that fits tape circles {apart} on these profiles, got {scene.track.gauge:g} m"
+            expected += f": centred, the wheels do not stand on the rails under {load:.6g} N each"
+        raise InputError(scene.source, blamed, expected)
     if len(model.flexible_track.mass):
         roll, z = roll + 0.5 * (left[1] - right[1]) / contact.geometry.rail_distance, z + 0.5 * (left[1] + right[1])
     return roll, z

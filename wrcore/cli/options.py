@@ -67,7 +67,9 @@ def add_pair(command, slices=""):
     command.add_argument("--rail", required=True, metavar="NAME|FILE", help=what + slices)
     command.add_argument("--unit", choices=("m", "mm", "inch"), help="of profile files that do not state it")
     command.add_argument("--smoothing", type=float, metavar="m", help="by which the curve may leave a file's points, m")
-    command.add_argument("--inclination", metavar="1/40", help="of a named rail, which needs one; 0: upright")
+    command.add_argument(
+        "--inclination", metavar="1/40", help="of a rail, named (0: upright) or {..., inclined: false}"
+    )
     command.add_argument("--gauge", type=float, default=1.435, metavar="m", help="m, 14 mm below the rails' tops")
     command.add_argument("--rolling-radius", type=float, default=0.46, metavar="m", help="at the tape circle, m")
     command.add_argument(
@@ -89,10 +91,12 @@ def pair_of(options):
 
 
 def profile_of(options, spec, kind):
-    """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply."""
+    """A named profile, or one of a file, to which ``--unit`` and ``--smoothing`` apply. ``--inclination`` is that of
+    the rail in a pair."""
     from wrcore.geometry.standards import named_profile
 
-    return named_profile(profile_spec(options, spec), kind, ratio(options.inclination))
+    beside_a_rail = kind == "wheel" and hasattr(options, "rail")
+    return named_profile(profile_spec(options, spec), kind, None if beside_a_rail else ratio(options.inclination))
 
 
 def profile_spec(options, spec):
@@ -119,6 +123,9 @@ def slices_of(options, kind):
     described = parse_value(spec) if said else {"slices": spec}
     if not isinstance(described, dict) or "slices" not in described or not (said or is_slices(spec, kind)):
         return None
+    if kind == "rail" and ratio(options.inclination):
+        expected = "expected none or 0 beside a rail of slices, whose sections lie in the track pose already"
+        raise InputError("wrcore", "--inclination", expected)
     if options.unit:
         described.setdefault("unit", options.unit)
     return read_slices(described, kind)

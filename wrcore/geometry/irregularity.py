@@ -113,9 +113,10 @@ def sum_of(parts):
     return IrregularityData(*joined, np.cumsum([0, *sizes]))
 
 
-def irregularity_end(data):
-    """Arc length of the last sample, m: beyond it rails are perfect again; infinite without an irregularity."""
-    return max(data.starts + data.steps * (np.diff(data.first) - _PADDING), default=math.inf)
+def irregularity_extents(data):
+    """Arc lengths of the first and the last sample of each irregularity, (n, 2), m: elsewhere rails are perfect."""
+    ends = data.starts + data.steps * (np.diff(data.first) - _PADDING)
+    return np.column_stack([data.starts + _PADDING * data.steps, ends])
 
 
 def combine(alignment, level, cross_level, gauge):

@@ -23,7 +23,7 @@ ROLL, RAISE, WIDENING, COLUMNS = 22, 26, 30, 34
 
 CANT_ABOUT = {
     "lower_rail": lambda cant, curvature: 0.5 * np.abs(cant),
-    "inner_rail": lambda cant, curvature: 0.5 * cant * np.sign(curvature),
+    "inner_rail": lambda cant, curvature: 0.5 * np.where(curvature == 0.0, np.abs(cant), cant * np.sign(curvature)),
     "centreline": lambda cant, curvature: np.zeros_like(cant),
 }
 """What keeps its height where cant (right rail higher) turns the track, and the centre line's height with it."""

@@ -149,8 +149,8 @@ def named_profile(
     kind : {"wheel", "rail"}
         What the profile is used for.
     inclination : float, optional
-        Of the rail, for instance 1/40; 0 stands upright. Named rails and point files with ``inclined: False`` need one;
-        other point files lie in their track pose already.
+        Of the rail, for instance 1/40; 0 stands upright. Named rails and point files with ``inclined: False`` need one.
+        Other point files lie in the track pose already: beside them it must be 0 or absent, as beside wheels.
     window : float
         Averaging length of the curvature, m.
     spacing : float
@@ -178,14 +178,29 @@ def named_profile(
     if kind == "rail" and inclination is None and (upright or (isinstance(spec, str) and spec in RAIL_HEADS)):
         name = spec["points"] if isinstance(spec, dict) and "points" in spec else spec
         raise InputError(kind, "inclination", f"expected a ratio for {name}, such as 1/40, 1/20 or 0 (upright)")
+    is_file = isinstance(spec, dict) or _is_file(spec)
+    if inclination and (kind == "wheel" or (is_file and not upright)):
+        raise InputError(kind, "inclination", _without_effect(spec, kind))
     inclination = inclination or 0.0
     options = {"window": window, "spacing": spacing}
-    if isinstance(spec, dict) or _is_file(spec):
+    if is_file:
         return profile_files.read_profile(spec, kind, inclination, **options)
     sections, source = _sections(spec, kind)
     if kind == "rail":
         sections = incline(sections, inclination)
     return ProfileCurve.from_sections(spec, kind, sections, source, **options)
+
+
+def _without_effect(spec, kind):
+    """Why an inclination is refused beside a profile that it would not turn, and what to write instead."""
+    name = spec.get("points") if isinstance(spec, dict) else spec
+    if kind == "wheel":
+        return f"expected none for the wheel {name}: only rails have one"
+    said = ", inclined: true," if isinstance(spec, dict) and "inclined" in spec else ""
+    return (
+        f"expected none or 0, as the points of {name}{said} lie in the track pose already; for points of an upright"
+        f" rail write {{points: {name}, inclined: false}}, which the inclination then turns"
+    )
 
 
 def _is_file(spec):

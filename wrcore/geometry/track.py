@@ -112,14 +112,14 @@ def _knots(segments, rounding, source):
     kinds = [_kind(i, segment, source) for i, segment in enumerate(segments)]
     followers = [*kinds[1:], ""]
     values = [_values(i, *item, source) for i, item in enumerate(zip(kinds, segments, followers, strict=True))]
+    values = _completed(values, kinds, segments, source)
     shapes = [_SYNONYMS.get(shape, shape) for shape in (segment.get("shape", "linear") for segment in segments)]
     joints = [np.zeros(3)]
     for i, kind in enumerate(kinds):
         if values[i] is None:
             values[i] = values[i + 1]
         if kind != "transition" and np.any(values[i] != joints[-1]):
-            expected = f"expected a transition before this {kind}: curvature, cant or widening would jump"
-            raise InputError(source, f"track.path.{i}.{kind}", expected)
+            raise InputError(source, f"track.path.{i}.{kind}", _jump(kind, values[i] - joints[-1], rounding))
         joints.append(values[i])
         if kind == "transition":
             _check_ramp(i, segments[i], joints[-1] - joints[-2], shapes[i], rounding, source)
@@ -133,12 +133,16 @@ def _kind(i, segment, source):
         raise InputError(source, f"track.path.{i}", f"expected one of {', '.join(_KINDS)}, got {sorted(segment)}")
     extra = sorted(set(segment) - {kinds[0]} - _OWN_KEYS[kinds[0]])
     if extra:
-        raise InputError(source, f"track.path.{i}.{extra[0]}", f"expected no such key in a {kinds[0]}")
+        ramp = ": a cant ramp on straight track is {transition: LENGTH, cant: CANT} before the transition of the curve"
+        expected = f"expected no such key in a {kinds[0]}{ramp * (extra[0] == 'cant')}"
+        raise InputError(source, f"track.path.{i}.{extra[0]}", expected)
     return kinds[0]
 
 
 def _values(i, kind, segment, after, source):
-    """Curvature, cant and widening at the end of a segment; None for a transition to those of the next one."""
+    """Curvature, cant and widening at the end of a segment; None for a transition to those of the next one.
+
+    A transition with cant or widening alone ends in a straight line; `_completed` gives its cant a sign."""
     own = [key for key in ("radius", "cant", "widening") if key in segment]
     if kind == "tangent":
         return np.zeros(3)
@@ -147,8 +151,9 @@ def _values(i, kind, segment, after, source):
             raise InputError(source, f"track.path.{i}.{own[0]}", f"expected no such key in a transition to a {after}")
         return None
     if kind == "transition" and not own:
-        expected = "expected a tangent or a curve after a transition, or a radius of its own at its end"
-        raise InputError(source, f"track.path.{i}.transition", expected)
+        return None
+    if kind == "transition" and "radius" not in segment:
+        return np.array([0.0, segment.get("cant", 0.0), segment.get("widening", 0.0)])
     if "radius" not in segment:
         raise InputError(source, f"track.path.{i}.radius", "expected a radius in m, but the key is missing")
     radius = segment["radius"]
@@ -156,6 +161,41 @@ def _values(i, kind, segment, after, source):
         raise InputError(source, f"track.path.{i}.radius", f"expected {LEAST_RADIUS:g} m or more, got {radius!r}")
     cant = np.copysign(1.0, radius) * segment.get("cant", 0.0)
     return np.array([1.0 / radius, cant, segment.get("widening", 0.0)])
+
+
+def _completed(values, kinds, segments, source):
+    """Values at the ends of segments, with those of transitions that lead to another transition or end the path.
+
+    Between curves to either side they are zero, an inflection. A cant without a radius, on straight track, raises the
+    rail that is higher before, or else the outer one of the next curve."""
+    found = list(values)
+    for i in [k for k, segment in enumerate(segments) if kinds[k] == "transition" and "radius" not in segment]:
+        before = found[i - 1] if i else np.zeros(3)
+        if values[i] is not None:
+            ahead = next((value[0] for value in values[i + 1 :] if value is not None and value[0]), 0.0)
+            side = before[1] or before[0] or ahead
+            if values[i][1] and not side:
+                expected = "expected a curve before or after straight track with cant: it says which rail is higher"
+                raise InputError(source, f"track.path.{i}.cant", expected)
+            found[i] = values[i] * np.array([1.0, np.copysign(1.0, side), 1.0])
+        elif kinds[i + 1 : i + 2] in ([], ["transition"]):
+            after = next((value for value in values[i + 1 : i + 3] if value is not None), np.zeros(3))
+            if before[0] * after[0] >= 0.0:
+                expected = (
+                    "expected a tangent or a curve after a transition, or a radius or a cant of its own at its end"
+                )
+                expected += "; two transitions without meet between curves to either side, in an inflection"
+                raise InputError(source, f"track.path.{i}.transition", expected)
+            found[i] = np.zeros(3)
+    return found
+
+
+def _jump(kind, change, rounding):
+    """What is expected where curvature, cant or widening would jump."""
+    expected = f"expected a transition before this {kind}: curvature, cant or widening would jump"
+    if not np.any(change[1:]):
+        expected += f"; where the radius is so large that the line has none, write {{transition: {rounding:g}}}"
+    return expected
 
 
 def _check_ramp(i, segment, change, shape, rounding, source):
@@ -194,13 +234,17 @@ def _irregularity(data, source, folder):
     key = "track.irregularity"
     if not data.keys() & {"points", "spectrum", "own"}:
         raise InputError(source, key, "expected points, spectrum or own")
-    points = data.get("points", [])
+    points, shift = data.get("points", []), data.get("chainage_at_start", 0.0)
+    if "chainage_at_start" in data and not points:
+        expected = "expected points beside it: it is the chainage of their files at which the run begins"
+        raise InputError(source, f"{key}.chainage_at_start", expected)
     sampled = []
     for name in [points] if isinstance(points, str) else points:
         found = [base / name for base in (folder, folder.parent) if os.path.isfile(base / name)]
         if not found:
             raise InputError(source, f"{key}.points", f"expected an existing file, got {name!r}")
-        sampled.append(read_irregularity(found[0]))
+        s, values = read_irregularity(found[0])
+        sampled.append((s - shift, values))
     if "spectrum" in data:
         sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))
     if "own" in data:

@@ -26,6 +26,7 @@ from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.run.asked import Named, condition_of, on_grid, value_of
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.inputs import Input, inputs_of, with_own_arrays
+from wrcore.run.reach import check_reach
 from wrcore.run.run import Run
 from wrcore.run.simulate import STARTS, opened
 from wrcore.run.simulation import DERAILED_Y, Simulation
@@ -465,4 +466,6 @@ def start(
     True
     """
     scene, begin_at, begin = opened("start", scene, overrides, start, changes)
+    if begin_at is None:
+        check_reach(scene)
     return Session(Simulation(scene, begin_at, show_progress), begin, record)

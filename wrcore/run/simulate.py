@@ -19,6 +19,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import Threads, checked
 from wrcore.integrate.trajectory import Checkpoint
 from wrcore.run.progress import counted, simulated_time
+from wrcore.run.reach import check_reach, warn_of_unreached
 from wrcore.run.run import Run
 from wrcore.run.simulation import Simulation
 from wrcore.run.state import State
@@ -76,9 +77,13 @@ def simulate(
     scene, begin_at, begin = opened("simulate", scene, overrides, start, changes)
     settings, rate = scene.data["integration"], scene.data["output"]["rate"]
     check_memory(scene)
+    if begin_at is None:
+        check_reach(scene, settings["duration"])
     with simulated_time(settings["duration"], begin) if progress is None else nullcontext(progress or None) as advance:
         simulation = Simulation(scene, begin_at, show_progress if progress is None else None)
-        return simulation.advance(output_times(begin, settings["duration"], rate), advance)
+        run = simulation.advance(output_times(begin, settings["duration"], rate), advance)
+    warn_of_unreached(scene, simulation.places)
+    return run
 
 
 def opened(source: str, scene: Source, overrides: Any, start: Any, changes: dict[str, Any]) -> tuple[Scene, Any, float]:

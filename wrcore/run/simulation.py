@@ -24,7 +24,7 @@ from wrcore.dynamics.track import track_poses
 from wrcore.dynamics.wheel import shaped
 from wrcore.errors import InputError
 from wrcore.errors.input_files import digest_of_all
-from wrcore.geometry.irregularity import irregularity_end
+from wrcore.geometry.irregularity import irregularity_extents
 from wrcore.geometry.track import SIDES
 from wrcore.integrate.integrator import integrate, needed_last
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
@@ -106,6 +106,11 @@ class Simulation:
         self.arc_lengths = ArcLengths(unknown, scene.vehicle.positions[:, 0].astype(float))
         if start is not None:
             self.begin_at(start)
+
+    @property
+    def places(self) -> np.ndarray:
+        """Arc lengths (k,) of the wheelsets at the last output, m."""
+        return self.arc_lengths.bodies[self.model.bodies.wheelsets]
 
     def begin_at(self, start: Checkpoint | np.ndarray, arc_lengths: ArcLengths | None = None) -> None:
         """Begin the next stretch elsewhere; a checkpoint must be of this very model and method."""
@@ -194,9 +199,12 @@ class Simulation:
             groups["energy"] = energies
         groups |= self._drive_channels(trajectory, equations)
         standing = poses[:, model.bodies.wheelsets]
-        beyond = np.sum(standing[..., 0] > irregularity_end(model.track.irregularity))
+        extents = irregularity_extents(model.track.irregularity)
+        first, last = extents[:, 0].min(initial=np.inf), extents[:, 1].max(initial=-np.inf)
+        beyond = np.sum(standing[..., 0] > last) if len(extents) else 0
+        before = np.sum(standing[..., 0].max(axis=1, initial=-np.inf) < first) if len(extents) else 0
         limits = exceeded(model.contact, patches, standing[..., 3], standing[..., 4])
-        limits |= {"beyond_irregularity": int(beyond)}
+        limits |= {"before_irregularity": int(before), "beyond_irregularity": int(beyond)}
         return groups, limits | look_up_errors(equations.arguments[1].value.contact, patches)
 
     def present(

@@ -29,6 +29,7 @@ from wrcore.errors.new_files import hold, remove_folder, remove_remains
 from wrcore.integrate.integrator import REFERENCES
 from wrcore.kernels.cache import source_digest
 from wrcore.run.checkpoints import digest_of
+from wrcore.run.reach import check_reach, warn_of_unreached
 from wrcore.run.results import join_runs, read_part, write_going_on, write_run
 from wrcore.run.run import Run
 from wrcore.run.simulate import bytes_per_time, check_memory, output_blocks
@@ -86,7 +87,9 @@ def simulate_to(
     between checkpoints, ``block`` the output times in a block, ``record`` further settings to keep. InputError if
     another process writes the same file; OSError names the file where the disk is full, with the blocks kept.
     """
-    simulation, settings = Simulation(scene), scene.data["integration"]
+    settings = scene.data["integration"]
+    check_reach(scene, settings["duration"])
+    simulation = Simulation(scene)
     if settings["method"] not in REFERENCES:
         size = block or _block_size(simulation)
     else:  # methods of other libraries have no checkpoints
@@ -111,6 +114,7 @@ def simulate_to(
                     blocks.add(run, simulation, end or summary.over)
         if blocks is not None:
             blocks.join(summary)
+    warn_of_unreached(scene, simulation.places)
     return summary.run(), interrupts.caught
 
 

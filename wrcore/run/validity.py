@@ -5,6 +5,7 @@
 `conformal`            patches in a hollow of the wheel over which the normal turns by more than `WIDEST_TURN`
 `profile_edge`         patches that reach beyond the end of a profile
 `search_fallback`      wheels whose roll or yaw is so large that the search looked up every strip one by one
+`before_irregularity`  output times at which no wheelset has reached the first sample of the track's irregularity
 `beyond_irregularity`  wheelsets past the last sample of the track's irregularity, on perfect rails again
 `hollow_ahead`         patches of a yawed wheel (spatial detection) whose surface there is hollow along the rail
 `both_flanges`         wheelsets that touch with the flanges of both wheels: too wide for the gauge
@@ -45,6 +46,7 @@ LIMITS = {
     "table_out_of_range": "creep look-ups out of the table's range",
     "step_collapses": "collapses of the step size",
     "rails_unbalanced": "evaluations without a balance of rails without mass",
+    "before_irregularity": "output times before the beginning of the irregularity",
     "beyond_irregularity": "wheelsets past the end of the irregularity",
 }
 """Counters of a run, as a person reads them."""

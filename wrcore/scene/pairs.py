@@ -92,10 +92,14 @@ def differing_pairs(data, vehicle, wheel, rail, track, folder, source):
 
 
 def _rail_of(spec, side, rail, folder, source):
-    """The rail of one side; its inclination is that of both unless it has one of its own."""
+    """The rail of one side; its inclination is that of both unless it has one of its own, or says that its points lie
+    in the track pose."""
     if not spec.get(side):
         return rail
     both = {key: spec[key] for key in ("profile", "inclination") if key in spec}
+    profile = spec[side].get("profile")
+    if isinstance(profile, dict) and profile.get("inclined") is True:
+        both.pop("inclination", None)
     return _profile({**both, **spec[side]}, "rail", f"rail.{side}", folder, source)
 
 

@@ -8,9 +8,20 @@ from wrcore.errors import InputError
 SLEEPER_Y, SLEEPER_Z, SLEEPER_ROLL = RAILS, RAILS + 1, RAILS + 2  # freedoms of the sleeper
 
 
+LEAST_RAIL_MASS = 0.1
+"""Least mass of a rail under a wheel that has one, kg: at 0.001 kg the rounding of contact forces alone accelerates it
+by 1e-5 m/s^2, and no vehicle is found to rest on it (suspended wheelset, springs of 1e8 and 1e12 N/m)."""
+
+
 def check_support(spec, source):
     """Raise an InputError where the parts of ``track.support``, checked against the schema, do not go together."""
-    if spec is None or spec["rail"]["mass"] > 0.0:
+    if spec is None:
+        return
+    mass = spec["rail"]["mass"]
+    if 0.0 < mass < LEAST_RAIL_MASS:
+        expected = f"expected at least {LEAST_RAIL_MASS:g} kg, or 0 for rails without mass, got {mass:g}"
+        raise InputError(source, "track.support.rail.mass", expected)
+    if mass > 0.0:
         return
     if "sleeper" in spec:
         raise InputError(source, "track.support.rail.mass", "expected a mass above 0 in kg on a sleeper")

@@ -1,0 +1,154 @@
+"""Which inputs of a scene lie outside the path, or the time, of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wrcore.errors import InputError
+from wrcore.geometry.irregularity import irregularity_extents
+from wrcore.kernels.told import warn_once
+from wrcore.scene.description import Scene
+
+SLACK, SLACK_M = 0.01, 1.0
+"""Part of the way, and length (m), by which a run may go beyond speed times duration: its wheels slip and sway."""
+
+FAR_M = 1000.0
+"""Irregularity in a file that begins farther ahead of a session's vehicle than this counts from elsewhere, m."""
+
+POINTS = "track.irregularity.points"
+
+
+class Extent(NamedTuple):
+    """Where an input of a scene has an effect."""
+
+    field: str
+    begin: float
+    """Arc length in m, or time in s."""
+    end: float
+    what: str
+    """The input, for a message."""
+    unit: str = "m"
+
+
+def extents(scene: Scene) -> Iterator[Extent]:
+    """Extents of a scene's inputs over arc length or time; -inf and inf where an input has no end."""
+    data = scene.data
+    yield from _irregularities(scene)
+    yield from _path(data["track"])
+    for crossing in scene.crossings:
+        yield Extent("track.crossing.at", *crossing.ends, "rails that change")
+    for k, rail in enumerate(data["track"].get("check_rails", ())):
+        yield Extent(f"track.check_rails.{k}.begin", rail["begin"], rail["begin"] + rail["length"], "a check rail")
+    if "corrugation" in data["track"]:
+        wave = data["track"]["corrugation"]
+        yield Extent("track.corrugation.begin", wave["begin"], wave["begin"] + wave["length"], "a corrugation")
+    friction = data["contact"]["friction"]
+    friction = friction if isinstance(friction, dict) else {}
+    if "law" in friction:
+        begin = friction.get("begin", 0.0)
+        yield Extent("contact.friction.begin", begin, begin + friction["length"], "friction along the track")
+    for name, spec in (("", friction), (".left", friction.get("left")), (".right", friction.get("right"))):
+        yield from _table(spec, f"contact.friction{name}", "a friction table")
+    drive = data.get("drive") or {"motors": [], "brakes": []}
+    for kind in ("motors", "brakes"):
+        for item in drive[kind]:
+            for key in ("torque", "force"):
+                yield from _table(item.get(key), f"drive.{kind}.{item['name']}.{key}", f"a table of {key}")
+    if "controller" in drive:
+        yield from _table(drive["controller"]["speed"], "drive.controller.speed", "a table of speed")
+
+
+def _irregularities(scene: Scene) -> Iterator[Extent]:
+    spec = scene.data["track"].get("irregularity", {})
+    points = spec.get("points", [])
+    names = [points] if isinstance(points, str) else points
+    fields = [POINTS] * len(names)
+    fields += [f"track.irregularity.{key}.begin" for key in ("spectrum", "own") if key in spec]
+    whats = [f"irregularity in {name}" for name in names] + ["an irregularity"] * 2
+    for field, what, ends in zip(fields, whats, irregularity_extents(scene.track.irregularity), strict=False):
+        yield Extent(field, float(ends[0]), float(ends[1]), what)
+
+
+def _path(track: dict[str, Any]) -> Iterator[Extent]:
+    """Segments of the path and gradients, each with all that follows: what comes last goes on without end."""
+    begin = 0.0
+    for k, segment in enumerate(track["path"] if isinstance(track["path"], list) else ()):
+        kind = next(key for key in ("tangent", "transition", "curve") if key in segment)
+        if kind != "tangent":
+            yield Extent(f"track.path.{k}.{kind}", begin, math.inf, f"a {kind}")
+        begin += segment[kind]
+    begin = 0.0
+    for k, gradient in enumerate(track["gradients"]):
+        if k:
+            yield Extent(f"track.gradients.{k}.gradient", begin, math.inf, "a change of gradient")
+        begin += gradient.get("length", math.inf)
+
+
+def _table(spec: Any, field: str, what: str) -> Iterator[Extent]:
+    """A table over arc length or time, constant beyond its ends: it has an effect where its values change."""
+    for key, unit in (("arc_length", "m"), ("time", "s")):
+        if isinstance(spec, dict) and key in spec:
+            yield Extent(f"{field}.{key}", float(spec[key][0]), float(spec[key][-1]), what, unit)
+
+
+def check_reach(scene: Scene, duration: float = math.inf) -> None:
+    """Refuse inputs that a run from the scene's initial state cannot reach, and warn of those beyond its end.
+
+    Refused are inputs behind the last wheelset or before time 0, and files of irregularity that begin beyond the end:
+    their chainage is another one. ``duration`` in s; where it is infinite, as of sessions, nothing lies beyond the end.
+    The end of a run with a drive or gradients is not known before it (`warn_of_unreached`).
+    """
+    way = duration * scene.data["speed"]
+    behind, ahead = _places(scene)
+    ends = {"m": (behind - SLACK_M, ahead + SLACK_M + (1.0 + SLACK) * way), "s": (0.0, duration)}
+    for one in extents(scene) if math.isfinite(behind) else ():
+        low, high = ends[one.unit]
+        expected = f"expected {one.what} on the way of the run, {low:.6g} to {high:.6g} {one.unit}"
+        expected += f", got {one.begin:.6g} to {one.end:.6g} {one.unit}"
+        if one.field == POINTS and not (one.begin < high and one.end > low):
+            hint = f"track.irregularity.chainage_at_start says where in the file the run begins, such as {one.begin:g}"
+            raise InputError(scene.source, one.field, f"{expected}; {hint}")
+        if one.end <= low:
+            raise InputError(scene.source, one.field, expected)
+        if one.field == POINTS and high == math.inf and one.begin > ahead + FAR_M:
+            _warn(scene, one, f"begins {one.begin - ahead:.6g} m ahead of the vehicle, see chainage_at_start")
+    if math.isfinite(duration):
+        _warn_ahead(scene, {"s": duration} if _is_free(scene) else {unit: high for unit, (_, high) in ends.items()})
+
+
+def warn_of_unreached(scene: Scene, arc_lengths: np.ndarray) -> None:
+    """Warn of inputs ahead of the arc lengths (n,), m, that wheelsets have reached, where speed and duration do not say
+    beforehand how far a run goes."""
+    if _is_free(scene) and len(arc_lengths):
+        _warn_ahead(scene, {"m": float(np.max(arc_lengths))})
+
+
+def _places(scene: Scene) -> tuple[float, float]:
+    """Arc lengths of the last and the first wheelset at the beginning, m; infinite without wheelsets."""
+    vehicle, moved = scene.vehicle, scene.data["initial"]["bodies"]
+    nominal = zip(vehicle.wheelset_names, vehicle.positions[vehicle.bodies.wheelsets, 0], strict=True)
+    places = [float(moved.get(name, {}).get("x", x)) for name, x in nominal]
+    return min(places, default=math.inf), max(places, default=math.inf)
+
+
+def _is_free(scene: Scene) -> bool:
+    """Whether a drive or gradients change the speed."""
+    return "drive" in scene.data or bool(scene.data["track"]["gradients"])
+
+
+def _warn_ahead(scene: Scene, ends: dict[str, float]) -> None:
+    """Warn of inputs that begin beyond the end of a run, by unit; of a path's segments, and gradients, of the first."""
+    said = set()
+    for one in extents(scene):
+        group = one.field.rpartition(".")[0] if one.end < math.inf else one.field.split(".")[1]
+        if one.unit in ends and one.begin >= ends[one.unit] and group not in said:
+            said.add(group)
+            _warn(scene, one, f"begins at {one.begin:.6g} {one.unit}, the run ends at {ends[one.unit]:.6g} {one.unit}")
+
+
+def _warn(scene: Scene, one: Extent, text: str) -> None:
+    warn_once(f"{scene.source}: {one.field}: {one.what} {text}")
