@@ -203,13 +203,19 @@ BAD_FILES = [
     ("", "header", "s_m and columns"),
     (f"x,level_m\n{GOOD}", "header", "s_m and columns"),
     (f"s_m\n{GOOD}", "header", "s_m and columns"),
-    (f"s_m,level_mm\n{GOOD}", "header", "s_m and columns"),
+    (f"s_m,level\n{GOOD}", "level", "a column such as level_m or level_mm, got 'level' without a unit"),
+    (f"s_m,level_mrad\n{GOOD}", "level_mrad", "a column such as level_m or level_mm"),
     (f"s_m,level_m,left_lateral_m\n{GOOD}", "header", "s_m and columns"),
     (f"s_m,level_m,level_m\n{GOOD}", "header", "s_m and columns"),
     ("s_m,level_m\n0,0\n1,0\n2,0\n", "", "four rows"),
-    ("s_m,level_m\n0,0\n1,high\n2,0\n3,0\n", "line 3", "2 finite numbers"),
+    ("s_m,level_m\n0,0\n1,high\n2,0\n3,0\n", "line 3", "two numbers, got '1,high'"),
     ("s_m,level_m\n0,0\n1,nan\n2,0\n3,0\n", "line 3", "2 finite numbers"),
-    ("s_m,level_m\n0,0\n1,0,0\n2,0\n3,0\n", "line 3", "2 finite numbers"),
+    ("s_m,level_m\n0,0\n1,0,0\n2,0\n3,0\n", "line 3", "2 cells in each row, as in the header, got 3"),
+    ("s_m,level_m\n3,0\n2,0.001\n1,0.001\n0,0\n", "line 3", "all of it decreases: reverse the lines"),
+    ("s_m,level_m\n0,0\n1,0\n2,1.5\n3,0\n", "line 4", "looks like mm: name the column level_mm"),
+    ("s_m,gauge_m\n0,1435\n1,1436\n2,1435.5\n3,1435\n", "line 3", "name the column gauge_mm (and gauge is its"),
+    ("s_m,gauge_m\n0,1.435\n1,1.436\n2,1.435\n3,1.437\n", "gauge_m", "subtract the design gauge"),
+    ("s_m;level_m\n0;0\n1,0;0,001\n2.0;0.001\n3;0\n", "line 3", "one decimal mark in a file"),
     ("s_m,level_m\n0,0\n2,0\n2,0\n3,0\n", "line 4", "to increase"),
     ("s_m,level_m\n0,0\n1,0\n2,1.5\n3,0\n", "line 4", "level_m in m"),
     ("s_m,level_m\n0,0\n1e-9,0\n2,0\n3,0\n", "s_m", "vary so much"),
@@ -226,10 +232,56 @@ def test_bad_files_name_the_line(tmp_path, text, field, expected):
 
 
 def test_unreadable_files_are_named(tmp_path):
-    (tmp_path / "track.csv").write_bytes(b"s_m,level_m\n\xff\xfe")
-    for path in (tmp_path / "missing.csv", tmp_path / "track.csv"):
-        with pytest.raises(InputError, match="readable CSV"):
+    for path in (tmp_path / "missing.csv", tmp_path):
+        with pytest.raises(InputError, match="expected a CSV file with a header line: "):
             read_irregularity(path)
+
+
+S = np.arange(0.0, 50.0, 0.25)
+WAVE = 1e-3 * np.sin(0.5 * S) * np.sin(np.pi * S / S[-1])
+
+
+def columns(header, separator, decimal, *values, more=""):
+    rows = (separator.join(f"{v:.6f}" for v in row).replace(".", decimal) for row in zip(*values, strict=True))
+    return "\n".join([header, *(row + more for row in rows)]) + "\n"
+
+
+@pytest.mark.parametrize("text", [
+    columns("s_m;level_m", ";", ",", S, WAVE), columns("s_m\tlevel_m", "\t", ",", S, WAVE),
+    columns("s_m level_m", " ", ",", S, WAVE), columns("s_m level_m", "  ", ".", S, WAVE),
+    columns("s [m];level [mm]", ";", ".", S, 1e3 * WAVE), columns("s,level\nm,mm", ",", ".", S, 1e3 * WAVE),
+    columns("Level (mm), Chainage (km)", ",", ".", 1e3 * WAVE, 1e-3 * S),
+    columns("km\tlevel/mm", "\t", ",", 1e-3 * S, 1e3 * WAVE),
+    columns("s_m,level_inch", ",", ".", S, WAVE / 0.0254), columns("# s_m level_mm", " ", ".", S, 1e3 * WAVE),
+    "\ufeff" + columns("s_m;level_mm", ";", ",", S, 1e3 * WAVE, more=";"),
+    columns('"s_m","level_m', '","', ",", S, WAVE, more="").replace("\n", '"\n"')[:-1],
+    columns("s_m,level_mm", ",", ".", S, 1e3 * WAVE),
+], ids=["semicolons", "tabs", "blanks with commas", "blanks", "units in brackets", "units in a line", "km", "km alone",
+        "inch", "comment", "byte order mark", "quotes", "plain"])  # fmt: skip
+def test_track_in_every_form_of_columns_is_the_same(tmp_path, text):
+    s, values = read_irregularity(write(tmp_path, text))
+    assert s == pytest.approx(S, abs=2e-3) and np.diff(s).max() == pytest.approx(0.25, rel=1e-2)
+    assert values[:, 1] == pytest.approx(WAVE, abs=2e-6) and np.abs(values[:, 0]).max() == 0.0
+
+
+def test_kilometre_plus_metres_is_a_chainage(tmp_path):
+    rows = "\n".join(f"12+{450 + at:06.2f};{1e3 * value:.4f}" for at, value in zip(S, WAVE, strict=True))
+    s, _ = read_irregularity(write(tmp_path, f"chainage_m;level_mm\n{rows}\n"))
+    assert s == pytest.approx(12450 + S, abs=1e-9)
+
+
+def test_absolute_gauge_becomes_its_change(tmp_path, capsys):
+    _, change = read_irregularity(write(tmp_path, columns("s_m;gauge_mm", ";", ",", S, 1e3 * WAVE)))
+    _, absolute = read_irregularity(write(tmp_path, columns("s_m;gauge_mm", ";", ",", S, 1435.0 + 1e3 * WAVE)), 1.435)
+    assert absolute == pytest.approx(change, abs=1e-9)
+    assert "gauge_m is an absolute gauge, 1.43" in capsys.readouterr().err
+    keys = {"irregularity": {"points": "track.csv", "fade_in": 5.0, "fade_out": 5.0}}
+    assert np.abs(at(build_track(keys, "test", tmp_path).irregularity, 20.0)[0]).max() < 1e-3
+    curve = [{"transition": 50.0}, {"curve": 50.0, "radius": 200.0, "widening": 0.01}]
+    with pytest.raises(InputError, match="subtract the design gauge with its widening"):
+        build_track({**keys, "path": curve}, "test", tmp_path)
+    with pytest.raises(InputError, match="within 0.05 m of track.gauge 1.668, got an absolute gauge"):
+        build_track({**keys, "gauge": 1.668}, "test", tmp_path)
 
 
 KEY = "track.irregularity"

@@ -73,6 +73,12 @@ def deviation(curve):
         ("", "mm", 1e3, "   "),
         ("", "m", 1.0, "\t"),
         ("\ufeffu_mm,f_mm\n", None, 1e3, " , "),
+        ("u,f\nmm,mm\n", None, 1e3, ","),
+        ("u [mm];f [mm]\n", "mm", 1e3, ";"),
+        ("u (m)  f (m)\n", None, 1.0, "  "),
+        ("u_inch,f_inch\n", None, 1.0 / 0.0254, ","),
+        ("# u_mm f_mm\n", None, 1e3, " "),
+        ("u f\n", "mm", 1e3, " "),
     ],
 )
 def test_columns_in_every_accepted_form(tmp_path, header, unit, scale, separator):
@@ -137,7 +143,8 @@ def test_a_point_file_is_inclined_only_on_request(tmp_path):
         ("u_mm,f_mm\n1,2\nx,2\n", {}, "line 3: expected two numbers, got 'x,2'"),
         ("x,y\n1,2\n", {}, "line 1: expected two numbers, got 'x,y'; a header above them is u_m,f_m or u_mm,f_mm"),
         ("x1_mm;y1_mm\n1;2\n", {}, "got 'x1_mm;y1_mm'; a header above them is u_m,f_m or u_mm,f_mm: u to"),
-        ("u,f\nmm,mm\n1,2\n", {"unit": "mm"}, "line 1: expected two numbers, got 'u,f'; a header above them"),
+        ("u,f\nmm,m\n1,2\n", {"unit": "mm"}, "line 1: expected one unit for both columns (m, mm or inch), got u in mm"),
+        ("u_kg,f_kg\n1,2\n", {}, "line 1: expected two numbers, got 'u_kg,f_kg'; a header above them is u_m,f_m"),
         ("u_mm,f_mm,w\n1,2\n", {}, "line 2: expected 3 numbers, got '1,2'"),
         ("u_mm,f_mm\n# c\n1\n", {}, "line 3: expected two numbers, got '1'\n"),
         ("u_mm,f_mm\n1,2\nu_mm,f_mm\n", {}, "line 3: expected two numbers"),

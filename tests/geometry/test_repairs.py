@@ -38,19 +38,20 @@ def rows_of(separator, decimal=".", header="u_mm{0}f_mm", more=""):
     rows_of(";", ",", "", "; 1,5"), rows_of(",", ".", "", ",1"), rows_of(",", ".", "", " 1.0"),
     rows_of(";", ",", more=";"),
     rows_of("\t", ","), rows_of("\t", ",", "", "\t1,5"), rows_of(",\t"), rows_of("\t\t", ","),
+    rows_of(" ", ","), rows_of(" ", ",", ""), rows_of(" ", ",", "", " 0,5"),
 ])  # fmt: skip
 def test_every_way_to_write_the_same_points(tmp_path, rows, said):
-    """Decimal commas beside semicolons and tabs are read: their decimals were dropped, without a word."""
+    """Decimal commas beside semicolons, tabs and blanks are read."""
     curve = read_profile({"points": written(tmp_path, rows), "unit": "mm"}, "wheel")
     assert np.abs(curve(U[5:-5]) - 1e-3 * POINTS[1][5:-5]).max() < 1e-8 and said() == ""
 
 
 @pytest.mark.parametrize("rows", [
-    rows_of(",", ","), rows_of(" ", ","), rows_of("\t", ",", "", ",5"), rows_of(",", ",", ""), rows_of(" ", ",", ""),
+    rows_of(",", ","), rows_of("\t", ",", "", ",5"), rows_of(",", ",", ""), rows_of(" ", ",", "", ", 1.5"),
     rows_of(";", ".")[:5] + ["-59.6;1.234,5"] + rows_of(";")[6:], rows_of(",")[:3] + ["-59.8,26,7"],
     ["-60,5,-26,9", "-50,2,-20,1", "-40,3,-10,2"], ["-6,05e1,-2,69e1", "-5,02e1,-2,01e1", "-4,03e1,-1,02e1"],
     ["u_mm f_mm w", "-60 -26,9", "-50 -20,1"],
-], ids=["commas", "blanks", "tabs", "no header", "blanks, no header", "thousands", "one row", "whole", "powers",
+], ids=["commas", "tabs", "no header", "blanks and commas", "thousands", "one row", "whole", "powers",
         "a column short"])  # fmt: skip
 def test_decimal_commas_that_may_be_read_in_two_ways_are_refused(tmp_path, rows):
     with pytest.raises(

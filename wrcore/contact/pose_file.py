@@ -3,7 +3,7 @@
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.errors.checked_csv import read_csv_table
+from wrcore.errors.column_files import read_table
 
 POSE_LIMITS = {"y_m": 0.1, "yaw_rad": 0.5, "roll_rad": 0.5, "z_m": 2.0, "s_m": 1e6, "pitch_rad": 1e6}
 MOTION_LIMITS = {"V_m_per_s": 200.0, "omega_rad_per_s": 4e3, "vy_m_per_s": 200.0, "yaw_rate_rad_per_s": 1e3, "mu": 2.0}
@@ -19,8 +19,8 @@ def read_poses(path):
     pose_id. InputError names the file, the column, the row and what was expected."""
     import pandas as pd
 
-    frame = read_csv_table(path, "pose_id")
     limits = POSE_LIMITS | MOTION_LIMITS
+    frame = read_table(path, "pose_id", limits)
     known = ("pose_id", *limits)
     for name in _WANTED:
         if name not in frame:

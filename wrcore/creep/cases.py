@@ -13,7 +13,7 @@ from wrcore.creep.laws import LAWS, creep_data, creep_forces
 from wrcore.creep.table import DEFAULT_TOLERANCE, CreepTable, ensure_table, load_table
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked, same_shape
-from wrcore.errors.checked_csv import read_csv_table
+from wrcore.errors.column_files import read_table
 
 MODELS = (*LAWS, "exact")
 POSITIVE = ("a_m", "b_neg_m", "b_pos_m", "N_N", "mu", "G_Pa")
@@ -31,7 +31,7 @@ _LARGEST = 1e100
 
 def read_cases(path):
     """Read a case list (pandas.DataFrame) from a CSV file; `solve_cases` then names the file in its messages."""
-    frame = read_csv_table(path, "case_id")
+    frame = read_table(path, "case_id", NUMBERS)
     if frame.empty:
         raise InputError(path, "", "expected at least one case, got none")
     frame.attrs["source"] = str(path)

@@ -9,14 +9,14 @@ Measured or generated quantities are combined into the channels as follows: alig
 rails' lateral and vertical deviation, cross level is left minus right height, gauge is the change of the gauge.
 """
 
-import csv
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
 
 from wrcore.errors import InputError
-from wrcore.errors.input_files import check_regular
+from wrcore.errors.column_files import named_columns, read_column_file
 from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
 
@@ -29,6 +29,10 @@ MEANS = ("alignment", "level", "cross_level", "gauge")
 LARGEST = 0.05
 """Deviations beyond this are taken for another unit, m."""
 
+_CHAINAGES = ("chainage", "distance", "station", "position")
+"""Other names of the column of arc lengths."""
+
+_STATION = re.compile(r"(\d+)\+(\d{3}(?:[.,]\d*)?)")  # 12+450: kilometre and metres
 _PADDING = 40  # a cubic spline forgets a node by 0.268 per cell: 0.268^40 = 1e-23
 _MOST_CELLS = 2_000_000
 _WIDEST = 5.0
@@ -144,23 +148,29 @@ def faded(s, values, fade_in, fade_out, source, field):
     return irregularity_data(s[0], (s[-1] - s[0]) / (len(s) - 1), values)
 
 
-def read_irregularity(path):
-    """Uniform arc lengths (n,) and deviations (n, 4), both in m, of a CSV file of measured irregularity.
+def read_irregularity(path, gauge=None):
+    """Uniform arc lengths (n,) and deviations (n, 4), both in m, of a file of measured irregularity.
 
-    The header names ``s_m`` and either any of `CHANNELS` or any of `MEANS`, each with ``_m``; columns that are missing
-    are zero. Lines that begin with ``#`` are comments. Samples at varying distances are carried over, by a cubic
-    spline, to a grid of the smallest distance, which is said. InputError names the file and the line or column at
-    fault: also where such a spline would make up what lies between samples."""
-    names, lines, table = _read_table(path)
-    s, columns = table[:, 0], dict(zip(names[1:], table[:, 1:].T, strict=True))
+    The header names the chainage (``s_m``; also chainage, distance, station, position or km, which may be written
+    12+450) and either any of `CHANNELS` or any of `MEANS`, each with its unit (`wrcore.errors.column_files`); columns
+    that are missing are zero. An absolute gauge becomes its change where the track's ``gauge`` (m) is given, which is
+    said. Samples at varying distances are carried over, by a cubic spline, to a grid of the smallest distance, which is
+    said. InputError names the file and the line or column at fault: also where such a spline would make up what lies
+    between samples."""
+    s, columns, lines = _read_table(path)
     wrong = np.flatnonzero(np.diff(s) <= 0.0)
     if wrong.size:
-        raise InputError(path, f"line {lines[wrong[0] + 1]}", "expected s_m to increase")
+        back = ", but all of it decreases: reverse the lines, and left and right" * (wrong.size == s.size - 1)
+        raise InputError(path, f"line {lines[wrong[0] + 1]}", f"expected s_m to increase{back}")
+    if "gauge_m" in columns and 0.5 < columns["gauge_m"].min() and columns["gauge_m"].max() < 2.0:
+        columns["gauge_m"] = _change_of_gauge(columns["gauge_m"], gauge, path)
     for name, column in columns.items():
-        if np.abs(column).max() > LARGEST:
-            line = lines[int(np.abs(column).argmax())]
-            got = f"got {column[np.abs(column).argmax()]:g}"
-            raise InputError(path, f"line {line}", f"expected {name} in m, within {LARGEST:g}, {got}")
+        size, k = np.abs(column).max(), int(np.abs(column).argmax())
+        if size > LARGEST:
+            base, expected = name.removesuffix("_m"), f"expected {name} in m, within {LARGEST:g}, got {column[k]:g}"
+            absolute = " (and gauge is its change, or absolute)" * (name == "gauge_m")
+            hint = f"; looks like mm: name the column {base}_mm{absolute}" if size > 0.5 else ""
+            raise InputError(path, f"line {lines[k]}", expected + hint)
     zero = np.zeros_like(s)
     if set(columns) <= {f"{name}_m" for name in MEANS}:
         values = combine(*(columns.get(f"{name}_m", zero) for name in MEANS))
@@ -169,34 +179,48 @@ def read_irregularity(path):
     return _uniform(s, values, path, lines)
 
 
+def _change_of_gauge(absolute, gauge, path):
+    """Change of the gauge (m) from what a file has of it, absolute."""
+    got = f"an absolute gauge, {absolute.mean():.4f} m in the mean"
+    if gauge is None:
+        expected = "expected the change of the gauge: subtract the design gauge with its widening"
+        raise InputError(path, "gauge_m", f"{expected}, got {got}")
+    change = absolute - gauge
+    if np.abs(change).max() > LARGEST:
+        expected = f"expected a gauge within {LARGEST:g} m of track.gauge {gauge:g}"
+        raise InputError(path, "gauge_m", f"{expected}, got {got}: set track.gauge to the design gauge")
+    warn(f"{path}: gauge_m is {got}: track.gauge {gauge:g} m is subtracted")
+    return change
+
+
 def _read_table(path):
-    """Column names, line numbers and numbers of a CSV file."""
-    try:
-        check_regular(path)
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if row and not row[0].startswith("#")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, "", f"expected a readable CSV file: {error}") from None
-    names = [name.strip() for name in rows[0][1]] if rows else []
+    """Arc lengths (n,), columns by their names, in m, and line numbers of a file."""
+    file = read_column_file(path)
+    file = file._replace(names=tuple("s_km" if name.lower() == "km" else name for name in file.names))
     known = [{f"{name}_m" for name in group} for group in (CHANNELS, MEANS)]
-    found = set(names[1:])
-    if names[:1] != ["s_m"] or not found or len(found) < len(names) - 1 or not any(found <= group for group in known):
+    found = named_columns(file, ("s_m", *sorted(known[0] | known[1])), dict.fromkeys(_CHAINAGES, "s"))
+    names = [name for name, _ in found.values()]
+    extra = len(names) < len(file.names) or len(set(names)) < len(names)
+    rest = set(names) - {"s_m"}
+    if extra or "s_m" not in names or not rest or not any(rest <= group for group in known):
         expected = " or ".join(", ".join(f"{name}_m" for name in group) for group in (CHANNELS, MEANS))
-        raise InputError(path, "header", f"expected s_m and columns out of {expected}; got {','.join(names)!r}")
-    if len(rows) < 5:
-        raise InputError(path, "", f"expected four rows or more, got {len(rows) - 1}")
-    numbers = [_numbers(path, line, row, len(names)) for line, row in rows[1:]]
-    return names, [line for line, _ in rows[1:]], np.array(numbers)
-
-
-def _numbers(path, line, row, count):
-    try:
-        numbers = [float(cell) for cell in row]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise InputError(path, f"line {line}", f"expected {count} finite numbers, got {','.join(row)!r}")
-    return numbers
+        got = ",".join(file.names)
+        raise InputError(path, "header", f"expected s_m and columns out of {expected} (or in mm, ...); got {got!r}")
+    if len(file.cells) < 4:
+        raise InputError(path, "", f"expected four rows or more, got {len(file.cells)}")
+    at = next(k for k in found if found[k][0] == "s_m")
+    for row, cells in enumerate(file.cells):
+        if len(cells) == len(file.names) and "+" in cells[at] and (parts := _STATION.fullmatch(cells[at])):
+            metres = 1e3 * float(parts[1]) + float(parts[2].replace(",", "."))
+            file.cells[row] = [*cells[:at], repr(metres / found[at][1]), *cells[at + 1 :]]
+    table = file.numbers(list(found), [factor for _, factor in found.values()])
+    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if bad.size:
+        row = bad[0]
+        expected = f"expected {len(names)} finite numbers, got {file.texts[row][:40]!r}"
+        raise InputError(path, f"line {file.lines[row]}", expected)
+    columns = dict(zip(names, table.T, strict=True))
+    return columns.pop("s_m"), columns, file.lines
 
 
 def _uniform(s, values, path, lines):

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.errors import InputError, one_of
-from wrcore.errors.input_files import check_regular
+from wrcore.errors.column_files import read_column_file, read_text, split_unit
 from wrcore.geometry import profile_meters
 from wrcore.geometry.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
-from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated, split
+from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated
 from wrcore.kernels.cache import warn
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "inch": 0.0254}
@@ -34,7 +34,6 @@ _KEYS = {
     "points", "unit", "inclined", "smoothing", "mirrored", "downwards", "shift", "tape_circle", "flange_back", "within",
     "part", "side",
 }  # fmt: skip
-_SEPARATED = "; decimal commas are read beside semicolons and tabs only"
 _INSTEAD = {"tape_circle": ("shift", "flange_back")}
 _FACE, _BACK = 2e-3, 5e-3
 """Points this near to a wheel's innermost one are its flange back, m, if they rise so far above the flange's tip, m."""
@@ -78,7 +77,7 @@ def read_points(spec, kind):
     what was done, and which keys were assumed."""
     spec = _checked(spec, kind)
     path = Path(spec["points"])
-    u, f, lines, stated = _read(path, _text(path), spec, kind)
+    u, f, lines, stated = _read(path, read_text(path, "a readable profile file"), spec, kind)
     inside = _within(path, spec, u)
     u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside], path)
     return u, f, lines, inside, stated, told, assumed
@@ -104,7 +103,7 @@ def _read(path, text, spec, kind):
     elif profile_meters.is_meter_file(path, text):
         u, f, lines, stated = profile_meters.read_meter(path, text, kind, _UNITS[unit or "mm"], spec.get("part"))
     else:
-        u, f, lines = read_columns(path, text, unit)
+        u, f, lines, unit = read_columns(path, text, unit)
         stated = Stated("columns", trimmed=False)
     for key, form in (("part", "MiniProf"), ("side", "Vampire")):
         if key in spec and not stated.about.startswith(form):
@@ -210,64 +209,39 @@ def _is_distance(value):
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1.0
 
 
-def _text(path):
-    try:
-        check_regular(path)
-        data = path.read_bytes()
-        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-        return data.decode("utf-16" if wide else "utf-8-sig", errors="replace")
-    except (OSError, ValueError) as error:
-        fault = getattr(error, "strerror", None) or error
-        raise InputError(path, "", f"expected a readable profile file: {fault}") from None
-
-
-def _numbers(path, line, text):
-    """Two numbers or more of one line; a comma within is a decimal one beside semicolons and tabs, elsewhere it
-    separates."""
-    text, words = text.strip(" \t,;"), split(text)
-    mixed = not re.search(r"[;\t]", text) and "," in text and re.search(r"[^\s,]\s+[^\s,]", text)
-    try:
-        numbers = [float(word) for word in words]
-    except ValueError:
-        numbers = []
-    if len(numbers) < 2 or (mixed and not all(re.search("[.eE]", word) for word in words)):
-        hint = _HEADED if re.search(r"[^\W\d_eE]", text) else _SEPARATED if "," in text else ""
-        raise InputError(path, f"line {line}", f"expected two numbers, got {text[:40]!r}{hint}")
-    return numbers
-
-
 def read_columns(path, text, unit=None):
-    """Points u, f (n,) in m of a CSV or blank-separated file and the line number of each; a header line may state the
+    """Points u, f (n,) in m of a file of columns, the line number of each, and the unit; a header may state the
     ``unit``, or must agree with it."""
-    points, lines, stated, whole = [], [], 0, True
-    for number, line in enumerate(text.splitlines(), 1):
-        line = re.split("[#%!]", line)[0].strip()
-        names = re.findall(r"[^\s,;]+", line.replace('"', "").lower())
-        header = re.fullmatch(r"u_(m|mm) f_(m|mm)", " ".join(names[:2]))
-        if header and not points:
-            unit, stated = _agreed(path, number, header.groups(), unit), len(names)
-        elif re.match(r"[A-Za-z]\w*\s*=", line) and not points:
-            continue
-        elif line:
-            points.append(_numbers(path, number, line))
-            lines.append(number)
-            count = stated or len(points[0])
-            if len(points[-1]) != count:
-                raise InputError(path, f"line {number}", f"expected {count} numbers, got {line[:40]!r}{_SEPARATED}")
-            whole = whole and "," in line and not re.search("[.;\t]", line)
-    if points and whole and not stated and len(points[0]) > 2:
-        raise InputError(path, f"line {lines[0]}", f"expected numbers with decimal points{_SEPARATED}")
+    file = read_column_file(path, text, header=False)
+    columns = [0, 1]
+    if file.names:
+        named = [split_unit(name) for name in file.names]
+        bases = [base for base, _ in named]
+        if not {"u", "f"} <= set(bases):
+            line, got = file.header
+            raise InputError(path, f"line {line}", f"expected two numbers, got {got[:40]!r}{_HEADED}")
+        columns = [bases.index("u"), bases.index("f")]
+        unit = _agreed(path, file.header[0], [named[k][1] for k in columns], unit)
+    points = file.numbers(columns)
     if unit is None:
-        raise InputError(path, "unit", "expected a header u_m,f_m or u_mm,f_mm, or unit: m or mm beside the path")
-    u, f = np.array([point[:2] for point in points], dtype=float).reshape(-1, 2).T * _UNITS[unit]
-    return u, f, lines
+        span = np.ptp(points[:, 0]) if points.size else 0.0
+        likely = next((name for name in _UNITS if 0.04 < span * _UNITS[name] < 0.2), None)
+        guess = f"; u spans {span:g}, as of {likely}" if likely else ""
+        raise InputError(
+            path, "unit", f"expected a header u_m,f_m or u_mm,f_mm, or unit: m, mm or inch beside the path{guess}"
+        )
+    u, f = points.T * _UNITS[unit]
+    return u, f, file.lines, unit
 
 
 def _agreed(path, line, stated, declared):
-    if stated[0] != stated[1] or declared not in (None, stated[0]):
-        got = f"u in {stated[0]}, f in {stated[1]}" + (f", declared {declared}" if declared else "")
-        raise InputError(path, f"line {line}", f"expected one unit for both columns, got {got}")
-    return stated[0]
+    """The unit that a header states of both columns, or that is declared where it states none."""
+    known = [{"in": "inch", "": declared}.get(unit.lower(), unit.lower()) for unit in stated]
+    if known[0] != known[1] or declared not in (None, known[0]) or known[0] not in (None, *_UNITS):
+        got = f"u in {stated[0] or 'no unit'}, f in {stated[1] or 'no unit'}"
+        got += f", declared {declared}" if declared else ""
+        raise InputError(path, f"line {line}", f"expected one unit for both columns (m, mm or inch), got {got}")
+    return known[0]
 
 
 def _header(path, text):
@@ -328,16 +302,16 @@ def read_simpack(path, text, smoothed=False):
 
 
 def _simpack_points(path, text, begin):
-    points, lines = [], []
+    rows = []
     for number, line in enumerate(text.splitlines(), 1):
         line = re.split("[!%]", line)[0].strip()
         if number <= begin or not line:
             continue
         if line == "point.end":
-            y, z = np.array(points, dtype=float).reshape(-1, 2).T
-            return y, z, np.array(lines, dtype=int)
-        points.append(_numbers(path, number, line)[:2])
-        lines.append(number)
+            file = read_column_file(path, rows, header=None)
+            y, z = file.numbers([0, 1]).T
+            return y, z, np.array(file.lines, dtype=int)
+        rows.append((number, line))
     raise InputError(path, "point.end", "expected a line point.end after the points, got the end of file (truncated?)")
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.errors.column_files import read_column_file
 
 METER_FILES = (".whl", ".ban", ".mpt")
 VAMPIRE_FILES = (".whe", ".rai")
@@ -27,6 +28,7 @@ TAPE_CIRCLE = 0.070
 _INCH = 0.0254
 _DATUMS = {"EUROPEAN": 0.070, "US1": (2 + 27 / 32) * _INCH, "US2": (3 + 1 / 16) * _INCH}
 _GAUGE_POINTS = {"EUROPEAN": 0.014, "US": 5 / 8 * _INCH}
+_FOUR = "y and z of the left and of the right side, four numbers"
 _END = 0.05  # of the points: extremes that close to an end are side faces
 
 
@@ -61,16 +63,9 @@ def read_meter(path, text, kind, unit, part=None):
     rows = _rows(text)
     rows, about = _part(path, rows, part)
     keys, rows = _meter_header(path, rows)
-    column = _columns(path, keys)
-    points, lines = [], []
-    for number, line in rows:
-        words = split(line)
-        try:
-            points.append([float(words[k]) for k in column])
-        except (ValueError, IndexError):
-            raise InputError(path, f"line {number}", f"expected two numbers, got {line[:40]!r}") from None
-        lines.append(number)
-    x, y = np.array(points, dtype=float).reshape(-1, 2).T * unit
+    file = read_column_file(path, rows, header=None)
+    x, y = file.numbers(_columns(path, keys)).T * unit
+    lines = file.lines
     count = keys.get("xypoints", "")
     odd = f", {count} by its header" if count.isdecimal() and int(count) != len(lines) else ""
     offset = tuple(_key(path, keys, name) * unit for name in ("xoffset", "yoffset"))
@@ -145,13 +140,6 @@ def _key(path, keys, name):
     return value
 
 
-def split(line):
-    """Words of a line of numbers; a comma is a decimal one beside semicolons and tabs, elsewhere it separates."""
-    line = line.strip(" \t,;")
-    apart = re.split(r"[\s,]*[;\t]\s*", line)
-    return [word.replace(",", ".") for word in apart] if len(apart) > 1 else re.split(r"\s*,\s*|\s+", line)
-
-
 def seen(kind, x, y):
     """Whether the abscissa counts to the track's centre, and the ordinate down, as the points show: side faces of
     wheels and rails point away from where they touch. A wheel's flange is beside its flange back; a rail's gauge side
@@ -180,20 +168,9 @@ def read_vampire(path, text, kind, side="right"):
     named = ("TREADDATUM", _DATUMS) if wheel else ("GAUGEPOINT", _GAUGE_POINTS)
     datum, point = _vampire_key(path, rows, 3, *named)
     width, _ = _vampire_key(path, rows, 4, "FLANGEBACK" if wheel else "GAUGE", {})
-    points, lines = [], []
-    for number, line in rows[4:]:
-        words = split(re.split('["%!]', line)[0])
-        if words == [""]:
-            continue
-        try:
-            points.append([float(word) for word in words[:4]])
-        except ValueError:
-            points.append([])
-        if len(points[-1]) < 4:
-            expected = "expected y and z of the left and of the right side, four numbers"
-            raise InputError(path, f"line {number}", f"{expected}, got {line[:40]!r}")
-        lines.append(number)
-    table = 1e-3 * np.array(points, dtype=float).reshape(-1, 4).T
+    points = ((number, re.split('["%!]', line)[0].strip()) for number, line in rows[4:])
+    file = read_column_file(path, [row for row in points if row[1]], header=None)
+    table, lines = 1e-3 * file.numbers([0, 1, 2, 3], expected=_FOUR).T, file.lines
     y, z = table[:2] if side == "left" else table[2:]
     if wheel:
         about = f"Vampire, {side} side, tread datum {point}, {1e3 * datum:.2f} mm from the flange back"

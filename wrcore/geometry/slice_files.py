@@ -15,6 +15,7 @@ Paths are relative to the file. Source: CONTACT's user guide and its test bank.
 
 import csv
 import io
+import itertools
 import re
 from contextlib import suppress
 from dataclasses import replace
@@ -23,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from wrcore.errors import InputError, check_number, one_of
+from wrcore.errors.column_files import header_of, named_columns, read_column_file, split_unit
 from wrcore.errors.input_files import check_regular
 from wrcore.geometry.profile_files import read_points
 from wrcore.geometry.slices import TURN, RailSlices, Slice, WheelSlices, sheets_of
@@ -50,9 +52,7 @@ def is_slices(path, kind="rail"):
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    with path.open(errors="replace") as file:
-        names = [name.strip() for name in file.readline().lstrip("\ufeff").split(",")]
-    return PLACES[kind] in names and "profile" in names
+    return {PLACES[kind], "profile"} <= set(_names(header_of(path), kind))
 
 
 def read_slices(spec, kind="rail", described_by=None):
@@ -76,11 +76,7 @@ def _read(spec, kind):
     how = {key: value for key, value in spec.items() if key != "slices"}
     if "wavelength" in how:
         check_number(how["wavelength"], 0.0, 0.1, kind, "wavelength", "m")
-    read = _read_slcs if path.suffix.lower() in SLICE_FILES.values() else _read_table
-    try:
-        return read(path, how, kind)
-    except csv.Error as error:
-        raise InputError(path, "", f"expected a table: {error}") from None
+    return (_read_slcs if path.suffix.lower() in SLICE_FILES.values() else _read_table)(path, how, kind)
 
 
 def with_profiles(path, renamed):
@@ -90,22 +86,21 @@ def with_profiles(path, renamed):
     text = Path(path).read_text(errors="replace")
     if Path(path).suffix.lower() in SLICE_FILES.values():
         return re.sub(_QUOTED, lambda name: f"'{renamed(name[1] or name[2])}'", text)
-    header, *rows = list(csv.reader(text.lstrip("\ufeff").splitlines())) or [[]]
-    names = [name.strip() for name in header]
-    if "profile" not in names:
+    file = read_column_file(path) if "profile" in _names(header_of(path), "rail") else None
+    if file is None:
         return text
-    column, out = names.index("profile"), io.StringIO()
-    for row in rows:
-        if len(row) > column:
-            row[column] = renamed(row[column].strip())
-    csv.writer(out, lineterminator="\n").writerows([header, *rows])
+    column, out = _names(file, "rail").index("profile"), io.StringIO()
+    for cells in file.cells:
+        if len(cells) > column:
+            cells[column] = renamed(cells[column])
+    csv.writer(out, lineterminator="\n").writerows([file.names, *file.cells])
     return out.getvalue()
 
 
 def profiles_in(path):
     """Paths of the profiles that a file lists if it is one of slices, each once."""
     found = {}
-    with suppress(OSError, ValueError, csv.Error):
+    with suppress(OSError, ValueError):
         with_profiles(path, lambda name: found.setdefault(name, name))
     return [Path(path).parent / name for name in found]
 
@@ -204,30 +199,30 @@ def _places(lines, path, features, value):
 
 def _read_table(path, how, kind):
     """Slices of a CSV by their heads."""
-    header, *body = [(k, [word.strip() for word in next(csv.reader([line]))]) for k, line in _lines(path)] or [(0, [])]
-    names = [name.lstrip("\ufeff") for name in header[1]]
-    place = PLACES[kind]
+    file, place = read_column_file(path), PLACES[kind]
+    names = _names(file, kind)
     for wanted in (place, "profile"):
         if wanted not in names:
             raise InputError(path, wanted, f"expected this column; found {', '.join(filter(None, names)) or 'none'}")
-    cuts = [name for name in names if re.fullmatch(r"cut_\d+_m", name)]
-    for name in names:
-        if name not in (place, "profile", *cuts) and not (name == "head" and kind == "rail"):
+    cuts = [k for k, name in enumerate(names) if re.fullmatch(r"cut_\d+_m", name)]
+    for k, name in enumerate(names):
+        if name not in (place, "profile") and k not in cuts and not (name == "head" and kind == "rail"):
             expected = f"unknown column; expected {place}, profile, {'head, ' * (kind == 'rail')}cut_1_m, ..."
             raise InputError(path, name, expected)
+    found = _known(file, kind)
+    s = file.numbers([names.index(place)], [found[names.index(place)][1]])[:, 0]
+    given = file.numbers(cuts, [found[k][1] for k in cuts], empty=True)
     heads = {}
-    for number, words in body:
-        if len(words) != len(names):
-            raise InputError(path, f"line {number}", f"expected {len(names)} fields, got {len(words)}")
-        row = dict(zip(names, words, strict=True))
+    for number, cells, at, places in zip(file.lines, file.cells, s, given, strict=True):
+        row = dict(itertools.zip_longest(names, cells, fillvalue=""))
         if not row["profile"]:
             raise InputError(path, f"profile, line {number}", "expected the name of a file, got none")
-        given = np.array([_number(path, number, name, row[name], optional=True) for name in cuts])
-        places = given[np.isfinite(given)]
+        if not np.isfinite(at) or np.isinf(places).any():
+            raise InputError(path, f"line {number}", "expected finite numbers")
+        places = places[np.isfinite(places)]
         if np.any(np.diff(places, prepend=0.0) <= 0.0):
             raise InputError(path, f"line {number}", "expected cuts above 0 that increase")
-        s = _number(path, number, place, row[place])
-        heads.setdefault(row.get("head", ""), []).append((number, s, row["profile"], how, (number, places)))
+        heads.setdefault(row.get("head", ""), []).append((number, float(at), row["profile"], how, (number, places)))
     if not heads:
         raise InputError(path, "", "expected at least one slice, got none")
     if "" in heads and len(heads) > 1:
@@ -237,14 +232,16 @@ def _read_table(path, how, kind):
     return _assembled(path, list(heads.items()), kind)
 
 
-def _number(path, line, name, text, optional=False):
-    try:
-        value = float(text) if text or not optional else np.nan
-    except ValueError:
-        value = np.inf
-    if np.isinf(value) or (np.isnan(value) and not optional):
-        raise InputError(path, f"{name}, line {line}", f"expected a number, got {text!r}")
-    return value
+def _known(file, kind):
+    """Known names of a table's columns and factors to their units, by their indices."""
+    cuts = [f"{base}_m" for base, _ in map(split_unit, file.names) if re.fullmatch(r"cut_\d+", base)]
+    return named_columns(file, (PLACES[kind], "profile", "head", *cuts))
+
+
+def _names(file, kind):
+    """Names of a table's columns, known ones as they are with SI units."""
+    found = _known(file, kind)
+    return [found[k][0] if k in found else name for k, name in enumerate(file.names)]
 
 
 def _assembled(path, heads, kind, told="", through=True):

@@ -103,7 +103,8 @@ def build_track(data, source, folder="."):
         path = path_data(knots, *values, data["rounding"], shapes, about, climb, aside, climbs)
     irregularity = no_irregularity()
     if "irregularity" in data:
-        irregularity = _irregularity(data["irregularity"], source, Path(folder))
+        widened = any(segment.get("widening") for segment in segments)
+        irregularity = _irregularity(data["irregularity"], source, Path(folder), None if widened else data["gauge"])
     return Track(float(data["gauge"]), path, irregularity, float(data["gauge_depth"]))
 
 
@@ -229,8 +230,8 @@ def _incline(gradients, rounding, source):
     return climb
 
 
-def _irregularity(data, source, folder):
-    """IrregularityData of the key ``track.irregularity``."""
+def _irregularity(data, source, folder, gauge):
+    """IrregularityData of the key ``track.irregularity``; an absolute gauge is measured from ``gauge`` (m)."""
     key = "track.irregularity"
     if not data.keys() & {"points", "spectrum", "own"}:
         raise InputError(source, key, "expected points, spectrum or own")
@@ -243,7 +244,7 @@ def _irregularity(data, source, folder):
         found = [base / name for base in (folder, folder.parent) if os.path.isfile(base / name)]
         if not found:
             raise InputError(source, f"{key}.points", f"expected an existing file, got {name!r}")
-        s, values = read_irregularity(found[0])
+        s, values = read_irregularity(found[0], gauge)
         sampled.append((s - shift, values))
     if "spectrum" in data:
         sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))

@@ -6,7 +6,7 @@ import numpy as np
 
 from wrcore.contact.out_of_round import SlicedWheel
 from wrcore.errors import InputError
-from wrcore.errors.checked_csv import read_csv_table
+from wrcore.errors.column_files import named_columns, read_column_file
 from wrcore.geometry.out_of_round import Flat, Measured, OutOfRound, Wave
 from wrcore.geometry.slice_files import read_slices
 from wrcore.geometry.slices import TURN
@@ -113,13 +113,16 @@ def _sliced(spec, pair, field, folder, source):
 
 def _measured(path):
     """`Measured` of a CSV file."""
-    frame = read_csv_table(path, "")
-    for name in ("angle_rad", "deviation_m"):
-        if name not in frame:
-            raise InputError(path, name, f"expected this column; found {', '.join(map(str, frame.columns))}")
-        if frame[name].dtype.kind not in "if" or not np.isfinite(frame[name]).all():
-            raise InputError(path, name, "expected numbers in all rows")
-    angles, deviations = (frame[name].to_numpy(float) for name in ("angle_rad", "deviation_m"))
+    file, known = read_column_file(path), ("angle_rad", "deviation_m")
+    found = {name: (k, factor) for k, (name, factor) in named_columns(file, known).items()}
+    for name in known:
+        if name not in found:
+            raise InputError(path, name, f"expected this column; found {', '.join(file.names)}")
+    columns, factors = zip(*(found[name] for name in known), strict=True)
+    angles, deviations = file.numbers(columns, factors).T
+    bad = np.flatnonzero(~np.isfinite(angles + deviations))
+    if bad.size:
+        raise InputError(path, f"line {file.lines[bad[0]]}", "expected finite numbers")
     if angles.size < 8 or np.any(np.diff(angles) <= 0.0) or angles[-1] - angles[0] > TURN + 1e-9:
         raise InputError(path, "angle_rad", "expected at least 8 angles that increase, within one turn")
     if np.abs(deviations).max() > LARGEST:

@@ -227,7 +227,7 @@ def test_only_what_moves_has_creep_forces(tmp_path):
 
 
 @pytest.mark.parametrize(("columns_", "expected"), [
-    ({"V_km_per_h": 60}, "V_km_per_h: unknown column"), ({"V_m_per_s": -3}, "V_m_per_s, row 1: expected 0 to 200"),
+    ({"V_knots": 60}, "V_knots: unknown column"), ({"V_m_per_s": -3}, "V_m_per_s, row 1: expected 0 to 200"),
     ({"mu": 30}, "mu, row 1: expected 0 to 2"), ({"omega_rad_per_s": 3}, "V_m_per_s, row 1: expected a speed above 0"),
     ({"y_m": None}, "y_m, row 1: expected a number within 0.1, got nothing"),
 ])  # fmt: skip
