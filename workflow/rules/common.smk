@@ -25,6 +25,7 @@ def check_config():
         raise WorkflowError(f"configuration: {key}: {error.message} ({meaning})")
     chosen = {
         "paper.timing.cases": config["paper"]["timing"]["cases"],
+        "paper.timing.first": config["paper"]["timing"]["first"],
         "paper.comparison.case": [config["paper"]["comparison"]["case"]],
         "paper.figures.contact_points": [config["paper"]["figures"]["contact_points"]],
     }

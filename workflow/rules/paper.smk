@@ -77,6 +77,8 @@ rule time_runs:
     params:
         cases={case: [config["paper"]["cases"][case]["scene"], overrides(case)] for case in config["paper"]["timing"]["cases"]},
         repetitions=config["paper"]["timing"]["repetitions"],
+        shift=config["paper"]["timing"]["shift"],
+        first=config["paper"]["timing"]["first"],
     # all cores: nothing else may run beside it
     threads: workflow.cores
     script:

@@ -90,7 +90,7 @@ def test_horizons_only_where_there_is_a_twin():
     assert horizons({"free": with_twin, "suspended": {"spatial": hunting_run()}}, 1e-4) == {"free": 4.0}
 
 
-def test_time_runs_drops_the_warm_up_and_takes_planar_and_spatial_in_turn(monkeypatch):
+def test_timed_pairs_alternate_and_the_first_pair_is_left_out(monkeypatch):
     walls = iter([9.0, 9.0, 1.0, 2.0, 3.0, 4.0])
     order = []
 
@@ -99,8 +99,9 @@ def test_time_runs_drops_the_warm_up_and_takes_planar_and_spatial_in_turn(monkey
         return hunting_run(wall_s=next(walls))
 
     monkeypatch.setattr(tables, "simulate", fake)
-    samples = time_runs({"free": {"planar": "p", "spatial": "s"}}, repetitions=2)
-    assert order == ["p", "s"] * 3
+    samples = time_runs({"free": lambda detection, repetition: (detection, repetition)}, repetitions=2)
+    first, second = [("planar", 1), ("spatial", 1)], [("spatial", 2), ("planar", 2)]
+    assert order == [("spatial", 1), ("planar", 1), *first, *second]
     assert samples["wall_s"].tolist() == [1.0, 2.0, 3.0, 4.0]
     assert samples["simulated_s"].tolist() == [4.0] * 4
     timing_table(samples)
@@ -126,6 +127,9 @@ def test_timing_table_pairs_planar_with_spatial():
     # median of 0.9, 0.9, 0.5; the ratio of the medians would be 0.9 / 1.0 as well, of the means 0.8
     assert table["ratio_per_run"].tolist() == pytest.approx([0.9, 0.9])
     assert table["ratio_per_call"].tolist() == pytest.approx([1.8, 1.8])
+    assert table["ratio_of_calls"].tolist() == pytest.approx([0.5, 0.5])
+    spread = table.loc["planar", ["ratio_per_run_least", "ratio_per_run_largest"]]
+    assert spread.tolist() == pytest.approx([0.5, 0.9])
 
 
 def test_comparison_table_says_within_only_where_there_is_a_tolerance_and_a_value():
@@ -138,7 +142,9 @@ def test_comparison_table_says_within_only_where_there_is_a_tolerance_and_a_valu
             "source": "test",
         }
     )
-    table = comparison_table(reference, {"lowering": 1.05, "ratio": 0.5, "spread": 2.2})
+    table = comparison_table(reference, {"lowering": 1.05, "ratio": [0.5, 0.4, 0.7], "spread": 2.2})
+    assert table[["ours_least", "ours_largest"]].loc[1].tolist() == [0.4, 0.7]
+    assert table[["ours_least", "ours_largest"]].drop(1).isna().all(axis=None)
     assert table["within"].tolist() == ["yes", "", "no", ""]
     assert table["ours"].tolist()[:3] == [1.05, 0.5, 2.2]
 
@@ -161,9 +167,13 @@ def test_our_values_are_the_papers_case_with_spatial_detection():
     motion = pd.DataFrame({"case": ["a", "free", "free"], "detection": ["spatial", "planar", "spatial"]})
     for column in ("frequency_Hz", "growth_per_s", "first_flange_contact_s"):
         motion[column] = [1.0, 2.0, 3.0]
-    timing = pd.DataFrame({"case": ["free", "free"], "ratio_per_run": [0.8, 0.8]})
+    ratios = {"per_run": (0.8, 0.7, 1.0), "per_call": (1.1, 1.05, 1.12), "of_calls": (0.75, 0.6, 0.9)}
+    ends = ("", "_least", "_largest")
+    columns = {f"ratio_{name}{end}": [x] * 2 for name, found in ratios.items() for end, x in zip(ends, found, strict=True)}
+    timing = pd.DataFrame({"case": ["free", "free"], **columns})
     values = our_values(geometry, motion, timing, "free")
     assert values["hunting frequency"] == 3.0
-    assert values["time planar / spatial"] == 0.8
+    assert values["time planar / spatial"] == [0.8, 0.7, 1.0]
+    assert values["evaluations planar / spatial"] == [0.75, 0.6, 0.9]
     assert values["rolling radius difference at y = 3 mm"] == 9.9e-4
     assert values["wheelset lowering at y = 0 mm"] == 1.8e-4

@@ -1,16 +1,29 @@
-"""Time planar and spatial runs in turn, with nothing beside them."""
+"""Time planar and spatial runs in pairs, with nothing beside them."""
 
 import os
 import sys
+from functools import partial
 
 from study.paper.tables import time_runs
 from wrcore.scene.description import load_scene
 
 sys.stdout = sys.stderr = open(snakemake.log[0], "w", buffering=1)
+params = snakemake.params
+
+
+def scene_of(scene, changes, detection, repetition):
+    """Scene of one run of a pair; each repetition starts a little further aside."""
+    start = load_scene(scene, changes).data["initial"]["y"] + params.shift * (repetition - 1)
+    return load_scene(scene, [*changes, f"contact.detection={detection}", f"initial.y={start}"])
+
+
 cases = {}
-for case, (scene, overrides) in snakemake.params.cases.items():
+for case, (scene, overrides) in params.cases.items():
     # a scene names files relative to its own folder
     table = os.path.relpath(snakemake.input.table[0], os.path.dirname(scene))
     changes = [*overrides, f"contact.creep.table={table}"]
-    cases[case] = {d: load_scene(scene, [*changes, f"contact.detection={d}"]) for d in ("planar", "spatial")}
-time_runs(cases, snakemake.params.repetitions).to_csv(snakemake.output[0], index=False)
+    cases[case] = partial(scene_of, scene, changes)
+    if case in params.first:
+        short = f"integration.duration={params.first[case]}"
+        cases[f"{case}, first {params.first[case]:g} s"] = partial(scene_of, scene, [*changes, short])
+time_runs(cases, params.repetitions).to_csv(snakemake.output[0], index=False)

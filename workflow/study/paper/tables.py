@@ -63,14 +63,18 @@ def motion_table(cases, bound):
 
 
 def time_runs(cases, repetitions):
-    """Time ``planar`` and ``spatial`` runs of scenes by case, in turn, after one of each that warms up compiled kernels
-    and caches: what `timing_table` takes.
+    """Time runs with ``planar`` and ``spatial`` detection in pairs: the samples that `timing_table` takes.
+
+    ``cases`` maps a case to a function of the detection and the repetition (from 1) that returns the scene. Each
+    repetition may start from another state, so that the scatter contains that of the motion. The first run of a pair
+    alternates. One pair before the first repetition loads compiled kernels and caches and is left out.
     """
     rows = []
-    for case, scenes in cases.items():
+    for case, scene_of in cases.items():
         for repetition in range(repetitions + 1):
-            for detection, scene in scenes.items():
-                run = simulate(scene)
+            order = ("planar", "spatial") if repetition % 2 else ("spatial", "planar")
+            for detection in order:
+                run = simulate(scene_of(detection, max(repetition, 1)))
                 counters = {name: run.counters[name] for name in ("wall_s", "rhs_evaluations", "steps", "rejected")}
                 row = {"case": case, "detection": detection, "repetition": repetition, "simulated_s": run.t[-1]}
                 rows.append(row | counters)
@@ -117,45 +121,67 @@ def geometry_table(scene, y):
     return rigid_contact(scene.alike.geometry, y, scene.detection)
 
 
-def timing_table(samples):
-    """Cost per run and per right-hand-side call, medians over the repetitions of the samples of `time_runs`;
-    ``ratio_per_run`` and ``ratio_per_call`` are the medians of the paired ratios planar / spatial, equal in both rows
-    of a case.
+RATIOS = {"per_run": "wall_s", "per_call": "us_per_call", "of_calls": "rhs_evaluations"}
+"""Ratios planar / spatial of a pair of runs: time of the run, time of one evaluation of the right-hand side, and number
+of evaluations."""
 
-    Planar and spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
+SPREAD = {"": "median", "_least": "min", "_largest": "max"}
+"""Ends of the columns of a ratio, and what of all pairs they hold."""
+
+
+def timing_table(samples):
+    """Cost per run and per evaluation of the right-hand side: medians over the repetitions of `time_runs`.
+
+    ``ratio_per_run``, ``ratio_per_call`` and ``ratio_of_calls`` (`RATIOS`) are medians of the paired ratios planar /
+    spatial, those with ``_least`` and ``_largest`` the extremes of all pairs; equal in both rows of a case. Planar and
+    spatial runs of one repetition follow each other, so that a slow moment of the machine hits both.
     """
     samples = samples.assign(us_per_call=1e6 * samples["wall_s"] / samples["rhs_evaluations"])
     columns = ["simulated_s", "wall_s", "rhs_evaluations", "steps", "rejected", "us_per_call"]
     table = samples.groupby(["case", "detection"], sort=False)[columns].median()
     table.insert(0, "runs", samples.groupby(["case", "detection"]).size())
     table["real_time_factor"] = table["simulated_s"] / table["wall_s"]
-    paired = samples.pivot(index=["case", "repetition"], columns="detection", values=["wall_s", "us_per_call"])
-    for name, column in (("ratio_per_run", "wall_s"), ("ratio_per_call", "us_per_call")):
-        ratio = (paired[column]["planar"] / paired[column]["spatial"]).groupby("case").median()
-        table[name] = ratio.reindex(table.index.get_level_values("case")).to_numpy()
+    paired = samples.pivot(index=["case", "repetition"], columns="detection", values=list(RATIOS.values()))
+    for name, column in RATIOS.items():
+        ratio = (paired[column]["planar"] / paired[column]["spatial"]).groupby("case")
+        for end, statistic in SPREAD.items():
+            found = ratio.agg(statistic).reindex(table.index.get_level_values("case"))
+            table[f"ratio_{name}{end}"] = found.to_numpy()
     return table.reset_index()
 
 
 def comparison_table(reference, ours):
     """Reference values (quantity, unit, value, tolerance: absolute, empty where a value is only shown, source) beside
-    ours by quantity, with the columns ours and within (yes, no, or empty without a tolerance or a value of ours).
+    ours by quantity, with the columns ours, ours_least and ours_largest (of repeated measurements) and within (yes, no,
+    or empty without a tolerance or a value of ours). A quantity of ours is a number, or median, least and largest.
     """
     table = reference.copy()
-    table.insert(3, "ours", [ours.get(quantity, np.nan) for quantity in table["quantity"]])
+    found = [np.atleast_1d(ours.get(quantity, np.nan)) for quantity in table["quantity"]]
+    for place, name in enumerate(("ours", "ours_least", "ours_largest")):
+        table.insert(3 + place, name, [values[place] if place < len(values) else np.nan for values in found])
     gap = (table["ours"] - table["value"]).abs()
     verdict = np.where(gap <= table["tolerance"], "yes", "no")
     table["within"] = np.where(gap.isna() | table["tolerance"].isna(), "", verdict)
     return table
 
 
+TIMED = {
+    "time planar / spatial": "per_run",
+    "time of an evaluation planar / spatial": "per_call",
+    "evaluations planar / spatial": "of_calls",
+}
+"""Quantities of the reference table that are ratios of timed pairs (`RATIOS`)."""
+
+
 def our_values(geometry, motion, timing, case):
     """Our side of the comparison with published values, by the quantity's name in the reference table, for the paper's
-    case: from contact geometry over the lateral position, `motion_table` and `timing_table`.
+    case: from contact geometry over the lateral position, `motion_table` and `timing_table`; ratios of timed pairs with
+    their least and largest.
     """
     run = motion[(motion["case"] == case) & (motion["detection"] == "spatial")].iloc[0]
     cost = timing[timing["case"] == case].iloc[0]
     values = {
-        "time planar / spatial": cost["ratio_per_run"],
+        **{quantity: [cost[f"ratio_{name}{end}"] for end in SPREAD] for quantity, name in TIMED.items()},
         "hunting frequency": run["frequency_Hz"],
         "growth rate": run["growth_per_s"],
         "first flange contact": run["first_flange_contact_s"],
