@@ -4,6 +4,7 @@
 # make smoke    the reduced study alone: results/smoke
 # make report   the study's report anew: results/report/index.html, results/report.zip
 # make figures  the study's pictures into reports/figures, those that are there by name
+# make tables   tables of results/ that pages quote into reports/tables, and their numbers into the pages
 # make docs     the documentation site, without a network: results/docs/index.html
 # make check-cpus   all tests with the code of two other processors, each from an empty kernel cache
 # make lint     ruff, mypy;   make bench   speed measurements;   make clean   remove everything generated
@@ -19,7 +20,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 # One worker per core: threads of their BLAS would wait for each other, ten times as long as they calculate.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder
 
-.PHONY: study test check check-cpus smoke report figures docs lint bench clean
+.PHONY: study test check check-cpus smoke report figures tables docs lint bench clean
 
 study: $(STAMP)
 	$(SNAKEMAKE)
@@ -46,6 +47,9 @@ report: $(STAMP)
 figures:
 	for path in $(wildcard results/*/*.png); do \
 	    if [ -e reports/figures/$${path##*/} ]; then cp $$path reports/figures/ || exit 1; fi; done
+
+tables: $(STAMP)
+	$(BIN)/python -m study.report.quoted --write results
 
 docs: $(DOCS_STAMP)
 	$(BIN)/python docs/build.py results/docs

@@ -176,7 +176,7 @@ rule claims:
         contact=rules.contact_reductions.output.cases,
         creep=rules.creep_errors.output[0],
         patch=rules.patch_errors.output.summary,
-        front="wrcore/run/accuracy_front.csv",
+        front=rules.speed_against_error.output[3],
     output:
         table="<results>/accuracy/claims.csv",
         text="<results>/accuracy/claims.md",

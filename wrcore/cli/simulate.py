@@ -11,7 +11,8 @@ NOT_REACHED = 4
 
 ABOUT = """
 Run a scene: a file that names vehicle, profiles, track, speed and integration. 'wrcore keys scene'
-lists every key with unit, range and default. Kernels are compiled when a model runs for the first time: up to a minute.
+lists every key with unit, range and default. Kernels are compiled when a model runs for the first time: about
+half a minute.
 """
 
 FILES = """

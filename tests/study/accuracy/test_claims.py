@@ -25,12 +25,3 @@ def test_each_claim_names_its_cases_and_its_worst():
     whole = claims(contact, creep, patches, front)
     assert "Polach" in claims_markdown(whole) and len(whole) == 8 + 3 + 1 + len(speed_claims(front))
     assert whole[whole["of"] == "exact, coarse"]["cases"].tolist() == ["poses everywhere"]
-
-
-def test_vehicles_are_as_fast_as_the_readme_says():
-    front = pd.read_csv(ROOT / "wrcore" / "run" / "accuracy_front.csv")
-    rows = speed_claims(front)
-    best = rows[rows["what"].str.endswith("vehicle")]["best"]
-    accurate = front[(front["kind"] == "vehicle") & (front["y_rms_m"] <= 1e-7)]
-    least = accurate.groupby("speed_m_per_s")["real_time_factor"].max().min()
-    assert f"{least:.0f} to {best.max():.0f} times" in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -169,7 +169,9 @@ def test_our_values_are_the_papers_case_with_spatial_detection():
         motion[column] = [1.0, 2.0, 3.0]
     ratios = {"per_run": (0.8, 0.7, 1.0), "per_call": (1.1, 1.05, 1.12), "of_calls": (0.75, 0.6, 0.9)}
     ends = ("", "_least", "_largest")
-    columns = {f"ratio_{name}{end}": [x] * 2 for name, found in ratios.items() for end, x in zip(ends, found, strict=True)}
+    columns = {
+        f"ratio_{name}{end}": [x] * 2 for name, found in ratios.items() for end, x in zip(ends, found, strict=True)
+    }
     timing = pd.DataFrame({"case": ["free", "free"], **columns})
     values = our_values(geometry, motion, timing, "free")
     assert values["hunting frequency"] == 3.0

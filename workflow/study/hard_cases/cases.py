@@ -190,8 +190,10 @@ def sound(setting, trajectory):
     ]
 
 
-def rows(family, case, condition, setting, trajectory, checks, expected="completed"):
-    """Rows of the table for one run: one per check; ``expected`` is the status that counts as survived."""
+def rows(family, case, condition, setting, trajectory, checks, expected="completed", known_limit=""):
+    """Rows of the table for one run: one per check; ``expected`` is the status that counts as survived, and
+    ``known_limit`` a reason for which a run may end otherwise.
+    """
     used = trajectory.method
     label = setting.label | {"integrator": used if setting.control["step"] == 0.0 else f"{used}, fixed step"}
     outcome = "survived" if trajectory.status in ("completed", expected) else "failed"
@@ -202,7 +204,14 @@ def rows(family, case, condition, setting, trajectory, checks, expected="complet
         "smallest_step_s": trajectory.smallest_step, "wall_s": trajectory.wall_s,
         "out_of_range": trajectory.out_of_range,
     }  # fmt: skip
-    finished = Check("ends as expected", float(trajectory.status != expected), 0.0, "1", f"expected: {expected}")
+    finished = Check(
+        "ends as expected",
+        float(trajectory.status != expected),
+        0.0,
+        "1",
+        f"expected: {expected}",
+        known_limit=known_limit,
+    )
     return [_row(family, case, condition, label | cost, check) for check in (finished, *checks)]
 
 

@@ -15,11 +15,18 @@ from wrcore.dynamics.joint import evaluate_joints
 from wrcore.dynamics.system import Equations
 from wrcore.integrate.integrator import integrate
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.integrate.tolerances import LENGTH
+from wrcore.integrate.tolerances import LENGTH, SHARE
 from wrcore.run.simulate import output_times
 
 LARGEST_ERROR = 30.0
 """Global error over what a step may err by (rtol times 1 cm) that a run of a second may have."""
+
+TO_FLANGE = 4e-3
+"""Travel of a wheelset that was released at 2 mm to the flange contact at 6 mm, m. A run whose single steps may have a
+larger error may leave the track. rk4 (`SHARE` 5) may have 5 mm in a step at rtol 0.1: its steps of 3 to 6 ms are longer
+than the 2.1 ms that are stable, and all six runs derail that start at 1.8 to 2.01 mm; at 0.05 none does."""
+
+OVER_THE_FLANGE = "one step may have a larger error than the travel to the flange: a run can derail"
 
 STABILITY_MATCH = 0.15
 """Largest stable step found less the predicted one, of the predicted one: friction bends what is linear."""
@@ -66,11 +73,14 @@ def tolerance_ladder(vehicles, names, speed, rtols, methods, detections, duratio
             label = {"vehicle": name, "detection": detection, "integrator": method, "rtol": rtol}
             curve.append(label | {"error_m": error, "steps": trajectory.steps, "wall_s": trajectory.wall_s})
             limit = LARGEST_ERROR * rtol * LENGTH + 1e-10
+            loose = OVER_THE_FLANGE if SHARE.get(method, 1.0) * rtol * LENGTH > TO_FLANGE else ""
+            source = f"{LARGEST_ERROR:g} times what a step may err by"
             checks = [
                 *sound(setting, trajectory)[:1],
-                Check("error of y", error, limit, "m", f"{LARGEST_ERROR:g} times what a step may err by"),
+                Check("error of y", error, limit, "m", source, known_limit=loose),
             ]
-            found += rows("integration", "tolerances", f"{speed:g} m/s, rtol {rtol:g}", setting, trajectory, checks)
+            condition = f"{speed:g} m/s, rtol {rtol:g}"
+            found += rows("integration", "tolerances", condition, setting, trajectory, checks, known_limit=loose)
     return found, curve
 
 
