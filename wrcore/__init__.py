@@ -11,8 +11,8 @@ Axes and signs (everywhere in the package)::
 
 Profiles use a lateral coordinate u, positive to the field side on both wheels and both rails, and an ordinate f,
 positive up; for a wheel f(u) = r0 - r(u) with r the radius and r0 that at the tape circle, where f is 0. ``left`` is
-y > 0 and comes first in arrays over sides. Penetration is positive in contact. Creepages are velocities of the wheel relative to the rail over the
-rolling speed; forces act on the wheel. Units are SI throughout.
+y > 0 and comes first in arrays over sides. Penetration is positive in contact. Creepages are velocities of the wheel
+relative to the rail over the rolling speed; forces act on the wheel. Units are SI throughout.
 """
 
 from importlib import import_module
