@@ -206,7 +206,7 @@ def test_a_rail_that_ends_above_the_gauge_depth_is_named(tmp_path):
 def upright(tmp_path):
     """File of points of an upright rail, not inclined."""
     curve, path = named_profile("60E1", "rail", 0), tmp_path / "upright.csv"
-    np.savetxt(path, np.column_stack([curve.u, curve.f])[::4], delimiter=",", header="u_m,f_m", comments="")
+    np.savetxt(path, np.column_stack([curve.u, curve.f]), delimiter=",", header="u_m,f_m", comments="")
     return str(path)
 
 
@@ -232,7 +232,7 @@ def test_inclination_turns_points_that_are_said_to_be_upright(upright):
     one, other = (load_scene(SCENES / "wheelset.yaml", changes).rail for changes in (turned, named))
     u = np.linspace(-0.02, 0.02, 41)
     np.testing.assert_allclose(one(u), other(u), rtol=0.0, atol=1e-6)
-    said = {"rail.left": {"profile": {"points": upright, "inclined": True}}}  # beside that of the right rail
+    said = {"rail.left": {"profile": {"points": upright, "inclined": True}}, "track.gauge_depth": 0.01}
     left, right = (pair.rail for pair in load_scene(SCENES / "wheelset.yaml", said).pairs)
     assert abs(left(0.02) - right(0.02)) > 1e-4
 
