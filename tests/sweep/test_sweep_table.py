@@ -547,3 +547,57 @@ def test_runs_that_differ_in_their_models_are_those_of_scenes_alone():
         run = wr.simulate(sweep.scene, overrides=sweep.runs.loc[row].to_dict())
         assert table["rhs_evaluations"][row] == run.counters["rhs_evaluations"]
         assert table["y_rms_m"][row] == pytest.approx(np.sqrt(np.mean(run["wheelset"].y_m ** 2)), rel=1e-14)
+
+
+def keyed(keys, **changes):
+    return small(sampling={"kind": "list"}, measures=["y_rms_m", "y_max_m"], keys=keys, **changes)
+
+
+def test_keys_below_a_mapping_that_the_scene_leaves_out_are_runs_of_their_own():
+    keys = {
+        "initial.bodies.wheelset.vy": {"values": [0.0, 0.05]},
+        "initial.bodies.wheelset.yaw": {"values": [0.0, 1e-3]},
+    }
+    table = wr.run_sweep(keyed(keys))
+    for row, values in wr.load_sweep(keyed(keys)).runs.iterrows():
+        run = wr.simulate(SCENES / "suspended_wheelset.yaml", values.to_dict(), integration__duration=0.05)
+        assert table.loc[row, "y_max_m"] == np.abs(run["wheelset"].y_m).max()
+    assert table.loc[1, "y_rms_m"] != table.loc[0, "y_rms_m"]
+
+
+def test_null_among_the_values_of_a_key_is_refused():
+    with pytest.raises(InputError, match="keys.initial.y: expected values, got null"):
+        wr.load_sweep(keyed({"initial.y": {"values": [0.003, None]}}))
+
+
+STIFFNESS = "vehicle.elements.axle_box_left.stiffness"
+
+
+@pytest.mark.parametrize(
+    ("keys", "field"),
+    [
+        ({f"{STIFFNESS}.y": {"values": [0.75e6]}, STIFFNESS: {"values": [[1.5e6, 0.75e6, 0.0]]}}, f"{STIFFNESS}.y"),
+        ({STIFFNESS: {"values": [[1.5e6, 0.75e6, 0.0]]}, f"{STIFFNESS}.y": {"values": [0.75e6]}}, f"{STIFFNESS}.y"),
+        ({f"{STIFFNESS}.y": {"values": [0.75e6]}, f"{STIFFNESS}.1": {"values": [5e6]}}, f"{STIFFNESS}.y"),
+        ({"contact.friction": {"values": [0.3]}, "contact.friction.mu": {"values": [0.3]}}, "contact.friction.mu"),
+        ({"initial": {"values": [{"y": 0.0}]}, "initial.bodies.wheelset.vy": {"values": [0.1]}},
+         "initial.bodies.wheelset.vy"),
+    ],
+)  # fmt: skip
+def test_keys_that_hold_each_other_are_refused(keys, field):
+    with pytest.raises(InputError, match="expected keys of which none holds another one") as caught:
+        wr.load_sweep(keyed(keys))
+    assert caught.value.field == f"keys.{field}"
+    whole = {key: entry["values"][0] for key, entry in keys.items()}
+    if "initial" not in whole:  # a mapping whose keys are changed one by one
+        with pytest.raises(InputError, match="changes: .*none holds another one"):
+            wr.load_sweep(keyed({"speed": {"values": [20]}}, set=whole))
+
+
+def test_values_that_do_not_go_together_are_refused_before_the_first_run():
+    keys = {"contact.patch": {"values": ["exact", "moment"]}, "contact.creep.model": {"values": ["table", "polach"]}}
+    base = {"contact.patch": "moment", "integration.duration": 0.05}
+    wr.load_sweep(keyed(keys, set=base))
+    both = keyed(keys, set=base) | {"sampling": {"kind": "grid"}}
+    with pytest.raises(InputError, match="keys, run 1: expected values that go together, got contact.patch 'exact'"):
+        wr.load_sweep(both)

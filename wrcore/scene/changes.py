@@ -1,7 +1,8 @@
 """Changes to a scene's data: values by key path, from the command line or from keywords."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +16,47 @@ WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.param
 def changes_of(overrides, changes):
     """Option, key path and value of each change that `load_scene` is asked for."""
     texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
-    return [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in _flat(changes)]
+    flat = list(_flat(changes))
+    check_apart({key for key, _ in flat}, "changes")  # of equal ones the last one counts
+    return [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in flat]
+
+
+PLACES = ({"x": "0", "y": "1", "z": "2"}, {"roll": "0", "pitch": "1", "yaw": "2"})
+"""What a change of a vehicle may call the numbers of a key that holds three."""
+
+
+def check_apart(keys: Iterable[str], source, above=""):
+    """Raise an InputError where one of several keys holds another one, or is it by another name: which of them counts
+    would depend on their order. ``above`` is the field that holds the keys."""
+    for (path, key), (inner, other) in pairwise(sorted((_places_of(key), key) for key in keys)):
+        if inner[: len(path)] == path:
+            what = "is" if len(inner) == len(path) else "is a part of"
+            expected = f"expected keys of which none holds another one, but {other} {what} {key}"
+            raise InputError(source, ".".join(filter(None, [above, other])), f"{expected}: write one of them")
+
+
+def _places_of(key):
+    """A key path in parts, in which numbers of lists, and of points of a vehicle, have one name."""
+    first, *parts = key.split(".")
+    last = next((places[parts[-1]] for places in PLACES if parts and parts[-1] in places), None)
+    if first == "vehicle" and parts[0] in ("elements", "joints") and len(parts) > 3 and last:
+        parts[-1] = last
+    return [first, *(str(int(part)) if part.isdecimal() else part for part in parts)]
+
+
+def with_value(data, key, value):
+    """A copy of a scene's data, as far as it changes, with another value at a path of keys."""
+    return _with(data, key.split("."), value)
+
+
+def _with(inner, path, value):
+    if not path:
+        return value
+    first, *following = path
+    if isinstance(inner, list):
+        k = int(first)
+        return [*inner[:k], _with(inner[k], following, value), *inner[k + 1 :]]
+    return {**inner, first: _with(inner.get(first, {}), following, value)}
 
 
 def of_a_change(error, source, asked):

@@ -36,6 +36,7 @@ from wrcore.run.channels import unit_of
 from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y, counters_of
+from wrcore.scene.changes import with_value
 from wrcore.scene.description import Scene, compile_scene, load_scene
 from wrcore.sweep.measures import COUNTERS, FORCES, MOTION, Motions, wheel_forces, wheelset_motion
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
@@ -154,13 +155,9 @@ def _tasks(sweep: Sweep, rows: pd.DataFrame) -> Iterator[_Task]:
 
 def _changed(scene: Scene, values: dict[str, Any]) -> Scene:
     """A scene with other values of keys that need nothing read anew; they have been checked before."""
-    data = dict(scene.data)
+    data = scene.data
     for key, value in values.items():
-        *path, last = key.split(".")
-        inner = data
-        for part in path:
-            inner[part] = inner = dict(inner[part])
-        inner[last] = value
+        data = with_value(data, key, value)
     changed = dataclasses.replace(scene, data=data)
     vars(changed)["alike"] = scene.alike  # made of parts that are shared
     return changed

@@ -16,11 +16,13 @@ import numpy as np
 import pandas as pd
 
 from wrcore import __version__
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError, one_of, short
 from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_yaml import read_source, validate
 from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
+from wrcore.run.reach import check_reach
+from wrcore.scene.changes import check_apart
 from wrcore.scene.description import Scene, load_scene
 from wrcore.scene.pairs import find_file
 from wrcore.sweep.measures import MEASURES
@@ -112,11 +114,13 @@ def load_sweep(
         if measure not in MEASURES:
             raise InputError(name, "measures", one_of(MEASURES, measure))
     read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
+    check_apart(data["keys"], name, "keys")
     scene = load_scene(load_scene(read_from, data["set"]), overrides)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     read = scene.files | _check_values(scene, data["keys"], name)
     runs = pd.DataFrame(RUNS[data["sampling"]["kind"]](values, data["sampling"], name), columns=list(values))
     runs.index.name = "run"
+    _check_rows(scene, runs, name)
     shortest = float(min(runs.get("integration.duration", [scene.data["integration"]["duration"]])))
     if data["begin"] >= shortest:
         raise InputError(name, "begin", f"expected less than the shortest run's {shortest:g} s, got {data['begin']:g}")
@@ -132,6 +136,8 @@ def _values(entry, sampling, field, source):
     if "values" in entry:
         if {"from", "to", "steps"} & set(entry):
             raise InputError(source, field, "expected either values or from and to")
+        if None in entry["values"]:
+            raise InputError(source, field, "expected values, got null: write the key's default instead")
         return entry["values"]
     if not {"from", "to"} <= set(entry):
         raise InputError(source, field, "expected values, or from and to")
@@ -159,6 +165,30 @@ def _check_values(scene, entries, source):
                 raise InputError(source, f"keys.{key}", one_of(("auto", *METHODS), value))
             files |= changed.files
     return files
+
+
+def _check_rows(scene, runs, source):
+    """Try keys together, as some of the rows have them: the first of each combination of what are no numbers, and those
+    in which a number is least or largest."""
+    numbers = [key for key, column in runs.items() if column.dtype.kind in "iuf"]
+    others = runs.drop(columns=numbers)
+    tried = others.map(repr).drop_duplicates().index[:FEW] if others.size else runs.index[:1]
+    ends = [row for key in numbers for row in (runs[key].idxmin(), runs[key].idxmax())]
+    for row in dict.fromkeys([*tried, *ends]):
+        values = {key: runs.at[row, key] for key in runs.columns}
+        try:
+            changed = load_scene(scene, values)
+            check_reach(changed, changed.data["integration"]["duration"])
+        except InputError as error:
+            said = ", ".join(f"{key} {short(_plain(value))}" for key, value in values.items())
+            raise InputError(
+                source, f"keys, run {row}", f"expected values that go together, got {said}: {error}"
+            ) from None
+
+
+def _plain(value):
+    """A number of a table as a person writes it."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _trials(entry):
