@@ -14,6 +14,7 @@ from wrcore.dynamics.system import Equations, workspace
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.geometry.standards import named_profile
+from wrcore.scene import description
 from wrcore.scene.description import GRAVITY, compile_scene, load_scene
 
 
@@ -188,7 +189,8 @@ def test_the_wheel_on_its_rail_of_a_side():
 @pytest.mark.parametrize("patch", ["exact", "tabulated"])
 @pytest.mark.parametrize("law", ["polach", "linear", "fastsim"])
 def test_creep_laws_are_refused_where_contact_has_forces_of_its_own(patch, law):
-    with pytest.raises(InputError, match="expected 'table' with contact.patch") as error:
+    expected = "expected 'table' with contact.patch .*; set contact.patch to maximum or moment"
+    with pytest.raises(InputError, match=expected) as error:
         load_scene(SCENES / "wheelset.yaml", {"contact.patch": patch, "contact.creep.model": law})
     assert error.value.field == "contact.creep.model"
 
@@ -244,3 +246,55 @@ def test_null_takes_a_key_out():
     for key, expected in (("track.suport", "that the scene has"), ("speed", "the key is missing")):
         with pytest.raises(InputError, match=f"{key}.*{expected}"):
             load_scene(SCENES / "crossing.yaml", [f"{key}=null"])
+
+
+def test_actuator_and_motor_of_one_name_are_refused(tmp_path):
+    vehicle = read_yaml(SCENES.parent / "vehicles" / "suspended_wheelset.yaml")
+    actuator = {"kind": "actuator", "bodies": ["wheelset", "frame"], "at": [0, 0, 0.46], "direction": "y", "force": 9.0}
+    motor = {"bodies": ["wheelset", "frame"], "force": 50.0}
+    for one, kind, field in (("a", "motors", "drive.motors.a"), ("b", "brakes", "drive.brakes.b")):
+        vehicle["elements"] = [*vehicle["elements"][:-1], vehicle["elements"][-1], {"name": one, **actuator}]
+        changes = {"vehicle.parameters": vehicle, "drive": {kind: [{"name": one, **motor}]}}
+        with pytest.raises(
+            InputError, match=f"another name, as elements.{one} of the vehicle is an actuator"
+        ) as caught:
+            load_scene(SCENES / "suspended_wheelset.yaml", changes)
+        assert caught.value.field == field
+        load_scene(SCENES / "suspended_wheelset.yaml", {**changes, "drive": {kind: [{"name": "c", **motor}]}})
+
+
+def test_a_control_law_has_a_name_of_letters():
+    with pytest.raises(InputError, match="a control law's name in letters, digits and underscores"):
+        load_scene(
+            SCENES / "suspended_wheelset.yaml", {"control": {"a/b": {"law": "a:b", "inputs": [], "outputs": ["m"]}}}
+        )
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"level": "fra_4"}, "FRA track classes 5 and 6 only), got 'fra_4'"),
+        ({"level": "hihg"}, "did you mean 'high'?"),
+        ({"shortest": 0.05}, "expected the shortest wavelength in m, at least 0.1, got 0.05"),
+        ({"longest": 2000.0}, "expected the longest wavelength in m, at most 1000, got 2000.0"),
+        ({"length": 1.0}, "expected the length of disturbed track in m, 10 to 1e5, got 1.0"),
+    ],
+)
+def test_a_spectrum_beyond_its_bounds_is_told_them(changes, says):
+    spectrum = {"level": "low", "seed": 1, "length": 200.0, **changes}
+    with pytest.raises(InputError) as caught:
+        load_scene(SCENES / "suspended_wheelset.yaml", {"track.irregularity.spectrum": spectrum})
+    assert str(caught.value).endswith(says)
+
+
+def test_planar_detection_beside_a_lookup_table_is_told_what_to_set(monkeypatch):
+    class Told(Exception):
+        pass
+
+    def tell(text):
+        raise Told(text)
+
+    monkeypatch.setattr(description, "tell", tell)
+    changes = {"contact.patch": "tabulated", "contact.detection": "planar"}
+    with pytest.raises(Told, match="set contact.patch to moment, or contact.detection to spatial"):
+        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))

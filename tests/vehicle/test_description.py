@@ -6,6 +6,7 @@ import pytest
 from tests.conftest import SCENES
 from tests.vehicle.conftest import element
 from wrcore.cli import main
+from wrcore.errors import InputError
 from wrcore.scene.description import load_scene
 from wrcore.vehicle.description import build_vehicle
 
@@ -29,6 +30,14 @@ def test_wheelsets_are_numbered_from_the_front_wherever_they_stand_in_the_file(t
 def test_templates_hold_anchors_and_nothing_else(trailer):
     trailer["templates"] = {"spring": {"stiffness": "whatever"}}
     assert build_vehicle(trailer, "trailer", axle_boxes=False).elements.springs.shape == (15, 15)
+
+
+@pytest.mark.parametrize("name", ["t", "end", "energy", "drive", "control"])
+def test_a_body_named_as_a_part_of_runs_is_refused(trailer, name):
+    trailer["bodies"][name] = trailer["bodies"].pop("car_body")
+    with pytest.raises(InputError, match=f"expected another name, as {name} stands for ") as caught:
+        build_vehicle(trailer, "trailer", axle_boxes=False)
+    assert (caught.value.source, caught.value.field) == ("trailer", f"bodies.{name}")
 
 
 def set_in(element_name, /, **keys):

@@ -1,6 +1,9 @@
 """The one error that a user can cause, and what it says of a number or a word that cannot be."""
 
+import re
 from numbers import Real
+
+_DIGIT = re.compile(r"\d")
 
 
 class InputError(ValueError):
@@ -62,11 +65,14 @@ def check_number(value, low, high, source, field, unit=""):
 
 def similar(word, known):
     """``; did you mean 'speed'?`` where one of the known words is close to a word, or is it but for a unit; else
-    nothing."""
+    nothing, as of another number of a series: fra_4 is neither fra_5 nor fra_6."""
     from difflib import get_close_matches
 
     words = {name.lower(): name for name in map(str, known)}
     word = word.lower() if isinstance(word, str) else ""
+    series = [name for name in words if _DIGIT.sub("0", name) == _DIGIT.sub("0", word)]
+    if len(series) > 1 and word not in words:
+        return ""
     near = get_close_matches(word, words, n=1) or [name for name in words if word.startswith(name + "_")]
     return f"; did you mean {words[near[0]]!r}?" if near else ""
 

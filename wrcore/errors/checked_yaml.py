@@ -331,7 +331,25 @@ def _explain(error, schema):
         if isinstance(schema, dict) and isinstance(schema.get("description"), str):
             description = schema["description"]
     hint = similar(error.instance, error.validator_value) if error.validator == "enum" else ""
-    return field, f"expected {description}, got {_short(error.instance)}{hint}"
+    return field, f"expected {description}{_bound(error, description)}, got {_short(error.instance)}{hint}"
+
+
+_BOUNDS = {
+    "minimum": "at least", "maximum": "at most", "exclusiveMinimum": "above", "exclusiveMaximum": "below",
+    "minItems": "of at least", "maxItems": "of at most",
+}  # fmt: skip
+
+
+def _bound(error, description):
+    """The bound of a schema that a number or the length of a list exceeds, where the description leaves it out."""
+    said = {float(number) for number in _NUMBER.findall(description)} | ({0.0} if "negative" in description else set())
+    value = error.validator_value
+    if error.validator not in _BOUNDS or {float(value), abs(float(value))} & said:
+        return ""
+    return f", {_BOUNDS[error.validator]} {value:g}"
+
+
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def _short(value):

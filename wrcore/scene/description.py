@@ -239,11 +239,12 @@ def _check_creep(contact, source, folder):
         except InputError as error:
             raise InputError(source, "contact.creep.model", error.expected) from None
         if contact["patch"] not in REDUCTIONS:
-            expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}"
+            expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}:"
+            expected += " set contact.patch to one of them"
             raise InputError(source, "contact.patch", expected)
     elif creep["model"] != "table" and contact["patch"] not in REDUCTIONS:
         expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
-        got = f"got {creep['model']}; contact.patch {' and '.join(REDUCTIONS)} take any"
+        got = f"got {creep['model']}; set contact.patch to {' or '.join(REDUCTIONS)}, which take any, beside it"
         raise InputError(source, "contact.creep.model", f"{expected}, {got}")
     if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
         raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
@@ -322,8 +323,10 @@ def compile_scene(
     material, damping = contact["material"], contact["normal"]["damping"]
     changing = scene.crossings, scene.out_of_round, scene.corrugation
     if contact["patch"] == "tabulated" and scene.detection != "spatial":
-        tell(f"contact.detection {scene.detection}: patches are solved, not looked up, some hundred times as slow; "
-             "contact.patch moment, or contact.detection spatial, does without")  # fmt: skip
+        tell(
+            f"{scene.source}: contact.detection {scene.detection} beside contact.patch tabulated: each patch is solved,"
+            " some hundred times as slow as the table; set contact.patch to moment, or contact.detection to spatial"
+        )
     parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
     folder = Path(scene.source).parent
     friction = read_friction(contact["friction"], scene.source, folder)

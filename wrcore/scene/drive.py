@@ -19,9 +19,7 @@ def read_drive(spec, vehicle, source, commanded=()):
     if spec is None:
         return no_drive()
     items = [("motors", item) for item in spec["motors"]] + [("brakes", item) for item in spec["brakes"]]
-    names = [item["name"] for _, item in items]
-    for name in {name for name in names if names.count(name) > 1} | {"controller"} & set(names):
-        raise InputError(source, "drive", f"expected another name, got {name!r} twice or for what it is not")
+    _check_names(items, vehicle, source)
     rows, levers = [], []
     tables: list[np.ndarray] = []
     for group, item in items:
@@ -38,6 +36,21 @@ def read_drive(spec, vehicle, source, commanded=()):
         np.array(rows, np.int64).reshape(-1, 7), np.array(levers, float), np.array(control, np.int64).reshape(-1, 4),
         np.array(gains, float).reshape(-1, 4), pack_schedules(tables),
     )  # fmt: skip
+
+
+def _check_names(items, vehicle, source):
+    """Motors, brakes, the controller and the vehicle's actuators are inputs of a session and outputs of control laws by
+    their names: no two have the same."""
+    known = {"controller": "the speed controller is drive.controller"}
+    known |= {
+        item["name"]: f"elements.{item['name']} of the vehicle is an actuator"
+        for item in vehicle.data["elements"] if item["kind"] == "actuator"
+    }  # fmt: skip
+    for group, item in items:
+        field = f"drive.{group}.{item['name']}"
+        if item["name"] in known:
+            raise InputError(source, field, f"expected another name, as {known[item['name']]}")
+        known[item["name"]] = f"{field} is a {group.removesuffix('s')}"
 
 
 def _actuator(group, item, vehicle, source, tables, commanded):

@@ -162,8 +162,17 @@ def _validated(data, source):
         raise InputError(source, ".".join([group, *path]), error.expected) from None
 
 
+RESERVED = {
+    "t": "the times of a run", "end": "the end of a run", "energy": "the energies of a run",
+    "drive": "motors and brakes of a run", "control": "control laws of a run",
+}  # fmt: skip
+"""Names in runs and their files that no body may have, with what they stand for."""
+
+
 def _check_names(data, source):
-    """No two elements, and no two joints, of the same name."""
+    """No two elements, and no two joints, of the same name, and no body of a name that runs have for something else."""
+    for name in sorted(RESERVED.keys() & data["bodies"]):
+        raise InputError(source, f"bodies.{name}", f"expected another name, as {name} stands for {RESERVED[name]}")
     for group in ("elements", "joints"):
         names = [item["name"] for item in data[group]]
         for k, name in enumerate(names):
