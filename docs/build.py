@@ -86,6 +86,14 @@ def findings():
     return "\n".join(parts)
 
 
+def guide_text(text):
+    """Text of a page of `reports/` as a page of the site: links to figures and theory lead there, those to files that
+    are not part of the site are plain text.
+    """
+    text = text.replace("](figures/", "](../figures/").replace("](../docs/theory/", "](../theory/")
+    return re.sub(r"\]\(\.\./(?!figures/|theory/)[^)]*\)", "]", text)
+
+
 def lay_out(folder):
     """Write all sources of the site.
 
@@ -103,8 +111,7 @@ def lay_out(folder):
     tutorials.mkdir()
     shutil.copytree(ROOT / "reports/figures", folder / "figures")
     for path in (ROOT / "reports").glob("*.md"):
-        text = path.read_text("utf-8").replace("](figures/", "](../figures/")
-        (guides / path.name).write_text(re.sub(r"\]\(\.\./(?!figures/)[^)]*\)", "]", text), "utf-8")
+        (guides / path.name).write_text(guide_text(path.read_text("utf-8")), "utf-8")
     names = ordered([path.stem for path in guides.glob("*.md")], GUIDES)
     (guides / "findings.md").write_text(findings(), "utf-8")
     (guides / "index.md").write_text(f"# How to\n\n{toctree(names)}", "utf-8")

@@ -101,6 +101,17 @@ def test_paths_in_code_style_exist(page):
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
+def test_links_from_reports_to_theory_survive_on_the_site(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    build, links = importlib.import_module("build"), []
+    for page in (ROOT / "reports").glob("*.md"):
+        text = page.read_text("utf-8")
+        here = re.findall(r"\]\(\.\./docs/(theory/[^)]*)\)", text)
+        assert re.findall(r"\]\(\.\./(theory/[^)]*)\)", build.guide_text(text)) == here
+        links += here
+    assert links and build.guide_text("[how](../docs/theory/a.md) [b](../wrcore/b.py)") == "[how](../theory/a.md) [b]"
+
+
 def test_a_lost_link_is_found():
     page = ROOT / "docs/index.md"
     assert lost(page, "guide/nothing.md").endswith("no such file") and lost(page, "nothing.md")

@@ -51,6 +51,38 @@ LIMITS = {
 }
 """Counters of a run, as a person reads them."""
 
+MEANINGS = {
+    "patches": "patches that were looked at",
+    "half_space": "a patch wider than a third of the smaller lateral radius of curvature (semi-axis over radius)",
+    "conformal": "a patch in a hollow of the wheel over which the contact normal turns by more than 0.35 rad",
+    "profile_edge": "a patch that reaches beyond the end of the wheel's or the rail's profile",
+    "search_fallback": "a wheel with so large a roll or yaw that the search evaluated every strip (exact, but slower)",
+    "hollow_ahead": "a patch of a wheel so yawed that its surface there is hollow along the rail: spatial detection "
+    "finds no deepest point",
+    "both_flanges": "a wheelset that touches with both flanges: it does not fit between the rails",
+    "before_irregularity": "an output time at which no wheelset has reached the first sample of the irregularity",
+    "beyond_irregularity": "a wheelset past the last sample of the track's irregularity, on perfect rails again",
+    "look_up_normal_error": "largest interpolation error of the normal force in the cells used, relative to it",
+    "look_up_force_error": "largest interpolation error of the creep force in the cells used, relative to μN",
+    "look_up_pressure_error": "largest interpolation error of the maximum pressure in the cells used, relative to it",
+    "steps": "accepted steps",
+    "rejected": "steps that the error estimate refused",
+    "rhs_evaluations": "evaluations of the equations of motion",
+    "jacobians": "Jacobians that were computed",
+    "factorisations": "factorisations of the linear system of a step",
+    "smallest_step_s": "shortest accepted step, s",
+    "step_collapses": "a step that was rejected three times in a row or more",
+    "table_out_of_range": "a creep look-up outside the table; the nearest patch inside is taken. With `tabulated` the "
+    "parts of a patch that is bent are looked up, too: some hundred counts in a tight curve",
+    "patches_on_grid": "a patch of `exact` for which no strips converged: solved on a uniform grid",
+    "patches_on_fixed_strips": "a patch of `exact` for which no strips end at its tips: solved on fixed strips",
+    "patches_not_tabulated": "a patch of `tabulated` outside its table: solved directly, at the price of `exact`",
+    "rails_unbalanced": "an evaluation in which [rails without mass](tracks.md) found no balance of spring, damper and "
+    "wheel; the last try is taken",
+    "wall_s": "time of the integration on the clock, s",
+}
+"""What each counter of a run counts or measures; ``python -m study.report.counters`` writes it into how_runs_end.md."""
+
 LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error", "look_up_pressure_error"
 """Counters of a run that looks exact contact up: how far its cells are from the exact solver, see
 :func:`look_up_errors`."""

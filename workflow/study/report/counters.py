@@ -1,0 +1,30 @@
+"""The table of a run's counters in reports/how_runs_end.md, from `wrcore.run.validity`.
+
+``python -m study.report.counters`` writes it into the page.
+"""
+
+from study.report.page_tables import markdown
+from study.report.quoted import ROOT, block
+from wrcore.run.simulation import COUNTERS
+from wrcore.run.validity import LOOK_UP_ERRORS, MEANINGS
+
+PAGE = ROOT / "reports/how_runs_end.md"
+
+
+def counted(name):
+    """Where a counter is counted."""
+    if name in LOOK_UP_ERRORS:
+        return "output times, with `tabulated`"
+    return "integration" if name in COUNTERS else "output times"
+
+
+def counters_table():
+    """All counters in Markdown: name, where it is counted, what it counts."""
+    heads = ["counter", "from", "what it counts or measures"]
+    return markdown(heads, [[f"`{name}`", counted(name), text] for name, text in MEANINGS.items()])
+
+
+if __name__ == "__main__":
+    text, made = PAGE.read_text("utf-8"), counters_table()
+    begin, end = block(text, made.splitlines()[0])
+    PAGE.write_text(text[:begin] + made + "\n" + text[end:], "utf-8")
