@@ -294,7 +294,7 @@ def test_a_disk_that_fills_up_is_one_line(folder, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("wrcore.run.results._create_dataset", full)
+    monkeypatch.setattr("wrcore.run.results.Datasets", full)
     status, _, err = run_command(["simulate", folder / "scene.yaml", "--out", out])
     assert status == 2 and err == f"wrcore: {out}: No space left on device\n"
     assert not list((folder / "out").iterdir())

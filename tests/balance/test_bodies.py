@@ -123,6 +123,25 @@ def test_a_moved_wheelset_stands_on_the_rails_and_carries_its_axle_boxes():
     np.testing.assert_allclose(np.linalg.norm(box - axle, axis=0), 1.0, atol=1e-6)  # a velocity off would part them
 
 
+@pytest.mark.parametrize("path", ["tangent", CURVE], ids=["tangent", "curve"])
+def test_axle_box_begins_with_its_pitch_and_stays_on_its_axle(path):
+    bodies = {
+        "axle_box_1_left": {"pitch": 0.02, "wy": 0.5},
+        "wheelset_1": {"x": 40.0, "y": 0.002, "yaw": 0.003, "wz": 0.01},
+    }
+    changes = {"speed": 20, "initial.bodies": bodies, "track.path": path, **BOXES}
+    scene = wr.load_scene(TRAILER, {**changes, "integration.duration": 0.01, "contact.patch": "moment"})
+    found = wr.simulate(scene)["axle_box_1_left"]
+    assert found["pitch_rad"][0] == pytest.approx(0.02, rel=1e-6)
+    assert found["wy_rad_per_s"][0] == pytest.approx(0.5, rel=1e-6)
+    model, state = compile_scene(scene)
+    equations = Equations(model)
+    equations(0.0, state)
+    joints, box = equations.work.constraints.joints, scene.vehicle.body_names.index("axle_box_1_left")
+    held = np.flatnonzero((model.joints.bodies == box).any(axis=1))
+    assert np.max(np.abs(joints.phi[held])) < 1e-12 and np.max(np.abs(joints.rate[held])) < 1e-12
+
+
 def test_a_run_goes_on_from_the_channels_of_another():
     scene = SCENES / "suspended_wheelset.yaml"
     changes = {"speed": 20, "integration.duration": 1.0, "integration.rtol": 1e-6, "initial.y": 0.003}
@@ -146,7 +165,8 @@ def test_a_wheelset_may_begin_rolling_back():
 
 BAD = [
     ({"cab": {"y": 0.0}}, "initial.bodies.cab", "car_body"),
-    ({"axle_box_1_left": {"y": 0.0}}, "initial.bodies.axle_box_1_left", "axle box"),
+    ({"axle_box_1_left": {"y": 0.0}}, "initial.bodies.axle_box_1_left.y", "set y of wheelset_1"),
+    ({"axle_box_1_left": {"pitch": 0.0, "wz": 0.1}}, "initial.bodies.axle_box_1_left.wz", "pitch and wy alone"),
     ({"wheelset_1": {"pitch": 0.1}}, "initial.bodies.wheelset_1.pitch", "wy"),
     ({"car_body": {"height": 0.1}}, "initial.bodies.car_body.height", "unknown key"),
     ({"car_body": {"roll": 2.0}}, "initial.bodies.car_body.roll", "within 0.5"),

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from scipy.fft import next_fast_len
 from scipy.integrate import quad
 
 from wrcore.errors import InputError
 from wrcore.geometry.irregularity import (
     CHANNELS,
+    _fast_length,
     combine,
     generate,
     irregularity_at,
@@ -111,7 +113,7 @@ def test_spectra_have_their_published_values(quantity, level, value):
 @pytest.mark.parametrize("level", ["low", "high", "fra_5"])
 def test_variance_of_a_whole_period_is_the_integral_of_the_one_sided_spectrum(monkeypatch, level):
     # over a whole period each cosine has variance a^2 / 2 exactly: what is left is Simpson's rule on 1500 shares
-    monkeypatch.setattr("scipy.fft.next_fast_len", lambda n, real: n // 2)
+    monkeypatch.setattr("wrcore.geometry.irregularity._fast_length", lambda least: least // 2)
     s, values = generate(level, 3, 2400.0 - 0.25, 0.25, 3.0, 80.0)
     assert len(s) == 9600
     mean, difference = 0.5 * (values[:, :2] + values[:, 2:]), values[:, 1] - values[:, 3]
@@ -339,3 +341,8 @@ def test_several_files_and_a_spectrum_add_up_each_on_its_own_grid(tmp_path):
     )
     assert irregularity_extents(whole)[:, 1].max() == pytest.approx(114.75)
     assert (at(whole, 300.0) == 0.0).all()
+
+
+def test_period_of_a_spectrum_is_the_fast_length_of_scipy():
+    counts = [*range(1, 3000), 123_457, 1_000_001, 7_999_999]
+    assert [_fast_length(count) for count in counts] == [next_fast_len(count, real=True) for count in counts]

@@ -59,6 +59,15 @@ def test_the_type_of_an_array_needs_no_masked_ones():
     assert found.split("\n")[0] == "Tuple(array(float64, 1d, A), int64) False"
 
 
+def test_named_tuples_are_compared_with_no_type_of_numba():
+    class Pair(NamedTuple):
+        one: int
+
+    assert numba.types.Type.__subclasshook__(Pair) is False  # so that its subclasses are not asked one by one
+    assert issubclass(numba.types.Float, numba.types.Type) and isinstance(numba.float64, numba.types.Type)
+    assert str(numba.typeof(Pair(1))) == "Pair(int64 x 1)"
+
+
 def test_a_handle_holds_what_a_kernel_would_write():
     class Inner(NamedTuple):
         flag: bool

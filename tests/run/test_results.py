@@ -75,6 +75,22 @@ def test_same_run_gives_same_bytes(tmp_path):
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
 
 
+def test_every_channel_has_the_times_as_its_scale(written):
+    run, path = written
+    with h5py.File(path) as file:
+        names = [f"{group}/{name}" for group, channels in run.groups.items() for name in channels]
+        assert all(file[name].dims[0].keys() == ["t"] and file[name].dims[0]["t"] == file["t"] for name in names)
+        listed = file["t"].attrs["REFERENCE_LIST"]
+        assert {file[entry["dataset"]].name[1:] for entry in listed} == set(names)
+
+
+def test_run_of_a_long_train_has_more_channels_than_a_scale_can_list(tmp_path):
+    groups = {f"body_{k}": {"y_m": np.full(2, float(k)), "z_m": np.zeros((2, 3))} for k in range(2100)}
+    write_run(tmp_path / "run.h5", Run({"name": "train"}, "completed", "", np.array([0.0, 0.5]), groups))
+    found = load_run(tmp_path / "run.h5")
+    assert len(found.groups) == 2100 and found["body_2099"].y_m.tolist() == [2099.0, 2099.0]
+
+
 def test_failed_write_leaves_the_old_file_and_no_remains(written):
     run, path = written
     before = path.read_bytes()

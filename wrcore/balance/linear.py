@@ -55,13 +55,11 @@ def linearise(model, state):
     """Linearise the equations of motion about a steady state on a tangent track, in which all bodies run ahead without
     turning (wheelsets spin) and without acceleration, as in :func:`steady_running`: central differences in all
     independent coordinates, all right-hand sides in one compiled call."""
-    from scipy.linalg import block_diag  # a tenth of a second that runs need not wait
-
     size = 6 * len(model.bodies.mass)
     equations = Equations(model)
     equations(0.0, state)  # leaves the joints' Jacobian
     places, speeds = _independent_motions(model, state, equations.work)
-    basis = block_diag(places, speeds, np.eye(internal_states(model)))
+    basis = _block_diagonal(places, speeds, np.eye(internal_states(model)))
     steps = np.full(basis.shape[1], STEP)
     steps[places.shape[1] : places.shape[1] + speeds.shape[1]] = VELOCITY_STEP
     moves = steps[:, None] * basis.T
@@ -73,6 +71,16 @@ def linearise(model, state):
     matrix = np.vstack([kinematic, speeds.T @ slopes[:size], slopes[size:]])
     rest = np.concatenate([np.zeros(places.shape[1]), changes[-1, :size] @ speeds, changes[-1, size:]])
     return Linearisation(matrix, basis, state, float(model.speed), places.shape[1], rest, steps)
+
+
+def _block_diagonal(*blocks):
+    """Return the matrix with these matrices along its diagonal. ``scipy.linalg`` has it, too; its import takes 0.05 s,
+    which each run would wait."""
+    ends = np.cumsum([block.shape for block in blocks], axis=0)
+    whole = np.zeros(ends[-1])
+    for block, (row, column) in zip(blocks, ends, strict=True):
+        whole[row - block.shape[0] : row, column - block.shape[1] : column] = block
+    return whole
 
 
 def steady_running(model, state, iterations=10):

@@ -17,6 +17,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.column_files import named_columns, read_column_file
+from wrcore.geometry.spline import clamped_cubics
 from wrcore.kernels.cache import warn
 from wrcore.kernels.jit import jit
 
@@ -101,11 +102,8 @@ def irregularity_at(data, s, out):
 def irregularity_data(start, step, values):
     """IrregularityData of samples (n, 4), m, in the order of `CHANNELS`, from arc length ``start`` on by ``step`` (m),
     that begin and end at zero: a spline that dies out, C2, in cells of zeros added at both ends."""
-    from scipy.interpolate import CubicSpline  # a third of a second that other scenes need not wait
-
     values = np.pad(np.asarray(values, float), ((_PADDING, _PADDING), (0, 0)))
-    spline = CubicSpline(step * np.arange(len(values)), values, bc_type="clamped")
-    coefficients = np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2))
+    coefficients = clamped_cubics(step * np.arange(len(values)), values)
     first, steps = np.array([start - _PADDING * step], float), np.array([step], float)
     return IrregularityData(coefficients, first, steps, np.array([0, len(coefficients)]))
 
@@ -288,15 +286,27 @@ def generate(level, seed, length, spacing, shortest, longest):
     least twice the length, and each carries the variance of its own share of the band. Alignment, level and cross level
     are independent; the gauge stays as it is (the spectra know none)."""
     s = spacing * np.arange(math.floor(length / spacing + 1e-9) + 1)
-    from scipy.fft import next_fast_len
-
-    period = next_fast_len(2 * len(s), real=True)
+    period = _fast_length(2 * len(s))
     random = np.random.default_rng(seed)
     alignment, level_, angle = (
         _realise(quantity, level, random, period, spacing, shortest, longest)[: len(s)]
         for quantity in ("alignment", "level", "cross_angle")
     )
     return s, combine(alignment, level_, 2.0 * HALF_BASE * angle, np.zeros_like(s))
+
+
+def _fast_length(least):
+    """Return the smallest product of powers of 2, 3 and 5 that is no less than ``least``: a Fourier transform of this
+    length is fast. The import of ``scipy.fft``, which has it as ``next_fast_len``, takes 0.1 s."""
+    best = 1 << (least - 1).bit_length()
+    five = 1
+    while five < best:
+        odd = five
+        while odd < best:
+            best = min(best, odd << (-(-least // odd) - 1).bit_length())
+            odd *= 3
+        five *= 5
+    return best
 
 
 def _realise(quantity, level, random, period, spacing, shortest, longest):

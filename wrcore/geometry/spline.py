@@ -1,9 +1,11 @@
-"""Cubic splines through equally spaced values, for small tables that every run wants.
+"""Cubic splines for tables and tracks that most runs have.
 
-The same as scipy's ``CubicSpline``, whose import takes a third of the time in which a short run starts and ends.
+They equal scipy's ``CubicSpline``, whose import takes a fifth of the time of a short run.
 """
 
 import numpy as np
+
+from wrcore.kernels.jit import jit
 
 
 def spline_slopes(step, values):
@@ -30,3 +32,36 @@ def spline_cubics(step, values):
     first, last = step * slopes[:-1], step * slopes[1:]
     powers = [values[:-1], first, 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise]
     return np.stack([part / step**k for k, part in enumerate(powers)], axis=1)
+
+
+def clamped_cubics(x, values):
+    """Return the coefficients (n - 1, 4, m) of the cubic splines through ``values`` (n, m), n >= 2, at increasing
+    ``x`` (n,), whose slopes are zero at both ends, in ascending powers of the distance from a cell's first node. They
+    are bitwise those of ``CubicSpline(x, values, bc_type="clamped")``."""
+    steps = np.diff(x)
+    wide = steps[:, None]
+    rises = np.diff(values, axis=0) / wide
+    diagonal, slopes = np.ones(len(x)), np.zeros(values.shape)
+    below, above = np.zeros(len(steps)), np.zeros(len(steps))
+    diagonal[1:-1], below[:-1], above[1:] = 2.0 * (steps[:-1] + steps[1:]), steps[1:], steps[:-1]
+    slopes[1:-1] = 3.0 * (wide[1:] * rises[:-1] + wide[:-1] * rises[1:])
+    _solve_tridiagonal(below, diagonal, above, slopes)
+    bend = (slopes[:-1] + slopes[1:] - 2.0 * rises) / wide
+    powers = [values[:-1], slopes[:-1], (rises - slopes[:-1]) / wide - bend, bend / wide]
+    return np.stack(powers, axis=1)
+
+
+@jit
+def _solve_tridiagonal(below, diagonal, above, right):
+    """Solve a diagonally dominant tridiagonal system for all columns of ``right`` (n, m), which becomes the solution;
+    ``diagonal`` (n,) is overwritten."""
+    last = len(diagonal) - 1
+    for i in range(last):
+        factor = below[i] / diagonal[i]
+        diagonal[i + 1] -= factor * above[i]
+        for j in range(right.shape[1]):
+            right[i + 1, j] -= factor * right[i, j]
+    for j in range(right.shape[1]):
+        right[last, j] /= diagonal[last]
+        for i in range(last - 1, -1, -1):
+            right[i, j] = (right[i, j] - above[i] * right[i + 1, j]) / diagonal[i]

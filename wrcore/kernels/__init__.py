@@ -20,6 +20,7 @@ lanes     ``intrinsic`` and ``register_model`` for a type of one's own, its oper
           ``lower_builtin``; ``cgutils.get_or_insert_function``, ``unpack_tuple``; ``context.make_array``
 handles   ``compute_fingerprint`` of a named tuple as the key of its layout; ``AttributeTemplate``, ``infer_getattr``,
           ``lower_getattr_generic`` for fields behind a pointer; ``NativeValue``; ``cpu_target``'s sizes of types;
+          ``types.Type`` as an abstract base class with a ``__subclasshook__``;
           ``typeof_impl.dispatch`` of arrays, which ``from_dtype`` and ``map_layout`` of ``numba.np.numpy_support`` do;
           ``overloads[...].library.get_pointer_to_function`` and the calling convention (``context.call_conv``)
 """

@@ -140,6 +140,14 @@ def other_at(_, reference, address):
     return reference(reference, types.int64), generate
 
 
+def _no_type_of_numba(kind, other):
+    """Answer ``issubclass`` of numba's types for a class of another metaclass at once. Without it each class of named
+    tuples, when ``typeof`` meets it for the first time, is compared with some 200 types, which takes 1 ms."""
+    return NotImplemented if isinstance(other, type(types.Type)) else False
+
+
+types.Type.__subclasshook__ = classmethod(_no_type_of_numba)
+
 _TYPE_OF_ARRAY = typeof_impl.dispatch(np.ndarray)
 
 

@@ -15,8 +15,10 @@ from wrcore import __version__
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import checked
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
-from wrcore.run.channels import DESCRIPTIONS, unit_of
+from wrcore.run.channels import DESCRIPTIONS as DESCRIPTIONS
+from wrcore.run.channels import unit_of as unit_of
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
+from wrcore.run.datasets import ROWS, Datasets, describe, write_values
 from wrcore.run.run import Run
 from wrcore.run.state import State
 
@@ -27,14 +29,11 @@ KIND = "a complete run file (HDF5)"
 STATUSES = ("completed", "derailed", "stalled", "failed")
 RECORDS = ("scene", "settings", "counters")
 END = "end"  # group that is no body: the last valid state
-ROWS = 8192  # output times of a joined run that are in memory at once
-
-COMPRESSION = {"compression": "gzip", "shuffle": True}
 
 
 @checked
 def write_run(
-    path: str | PathLike[str], run: Run, also: Callable[[h5py.File, Run], object] | None = None, **options: Any
+    path: str | PathLike[str], run: Run, also: Callable[[h5py.File, Run], object] | None = None, compressed: bool = True
 ) -> None:
     """Write a run; the file appears under its name only when it is complete.
 
@@ -48,8 +47,8 @@ def write_run(
         What to write.
     also : callable, optional
         Adds to the file.
-    **options
-        Of its datasets, instead of `COMPRESSION`.
+    compressed : bool
+        Whether datasets are compressed.
 
     Examples
     --------
@@ -65,12 +64,12 @@ def write_run(
         file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, wrcore_version=__version__)
         file.attrs.update(status=run.status, reason=run.reason)
         file.attrs.update({name: _record(getattr(run, name)) for name in RECORDS})
-        time = _create_dataset(file, "t", data=run.t, **options)
-        time.make_scale("t")
+        datasets = Datasets(file, len(run.t), compressed)
+        write_values(file["t"], run.t)
         for group in sorted(run.groups):
             for name, values in sorted(run.groups[group].items()):
-                dataset = _create_dataset(file.require_group(group), name, data=np.asarray(values), **options)
-                dataset.dims[0].attach_scale(time)
+                write_values(datasets.create(group, name, np.shape(values)[1:]), values)
+        datasets.finish()
         if run.end_state is not None:
             _write_end(file.create_group(END), run)
         if also is not None:
@@ -88,21 +87,12 @@ def _plain(value):
     raise TypeError(f"{type(value).__name__} cannot be written to a run file")
 
 
-def _create_dataset(group, name, **options):
-    return _described(group, name, unit_of(name), DESCRIPTIONS.get(name, name.replace("_", " ")), COMPRESSION | options)
-
-
-def _described(group, name, unit, text, options):
-    dataset = group.create_dataset(name, **options)
-    dataset.attrs["units"], dataset.attrs["description"] = unit, text
-    return dataset
-
-
 def _write_end(group, run):
     """The last valid state, and all that a run needs to go on from there."""
-    _described(group, "t", "s", "time of the last valid state", {"data": run.end_t})
     text = "13 numbers per body, then own states of force elements and of wheels"
-    _described(group, "state", "SI", text, {"data": run.end_state})
+    described = (("t", "s", "time of the last valid state", run.end_t), ("state", "SI", text, run.end_state))
+    for name, unit, description, values in described:
+        describe(group.create_dataset(name, data=values).id, unit, description)
     if isinstance(run.end_state, State):
         group.attrs["frame_m"], group.attrs["vehicle"] = run.end_state.frame, _record(run.end_state.vehicle)
 
@@ -121,20 +111,15 @@ def join_runs(path: str | PathLike[str], parts: Sequence[str | PathLike[str]], c
     stretch in memory at a time; status, reason and end are those of the last one.
     """
     lengths = [_length(part) for part in parts]
-    rows = min(max(lengths), ROWS)
     with new_hdf5(path) as file:
         with checked_hdf5(parts[0], KIND) as first:
             shapes = {name: item.shape[1:] for name, item in _items(first) if isinstance(item, h5py.Dataset)}
-        for name, shape in sorted(shapes.items(), key=lambda item: item[0] != "t"):
-            group, _, channel = name.rpartition("/")
-            dataset = _create_dataset(
-                file.require_group(group or "/"), channel, shape=(sum(lengths), *shape), dtype=float,
-                chunks=(max(rows, 1), *(1 for _ in shape)),
-            )  # fmt: skip
-            if name == "t":
-                dataset.make_scale("t")
-            else:
-                dataset.dims[0].attach_scale(file["t"])
+        datasets = Datasets(file, sum(lengths), rows=max(lengths))
+        for name, shape in sorted(shapes.items()):
+            if name != "t":
+                group, _, channel = name.rpartition("/")
+                datasets.create(group, channel, shape)
+        datasets.finish()
         begin = 0
         for part, length in zip(parts, lengths, strict=True):
             with checked_hdf5(part, KIND) as content:

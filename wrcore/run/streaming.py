@@ -40,7 +40,6 @@ from wrcore.scene.description import Scene
 BLOCK_BYTES, LONGEST_BLOCK = 32e6, 8192
 """Size of a block's channels in memory, bytes, and its number of output times at most."""
 
-PLAIN = {"compression": None, "shuffle": False}  # blocks are compressed when they are joined
 WHOLE = 2**62  # output times in a block that holds all of them
 
 STOP, INTERRUPTED = "stop", "interrupted"
@@ -242,7 +241,7 @@ class Blocks:
                 write_run(self.path, run, also)
                 return
             self._open()
-            write_run(self._part(self.count), run, also, **PLAIN)
+            write_run(self._part(self.count), run, also, compressed=False)  # compressed when they are joined
             self.count += 1
 
     def join(self, summary):
