@@ -20,7 +20,7 @@ STEP = 1e-3
 """Length over which friction changes, m."""
 
 UNBOUNDED = "linear theory knows no friction limit"
-NO_SPIN_IN_BOUND = "Shen-Hedrick-Elkins and Polach reduce linear forces; the power of a large spin may come out wrong"
+NO_SPIN_IN_BOUND = "Shen-Hedrick-Elkins and FASTSIM: the power of a large spin may come out wrong"
 
 
 def used_friction(patches, friction):
@@ -114,7 +114,7 @@ def law_ends(vehicles, name, ratios, sizes, tolerance=1e-3):
             Check("largest force over mu N", float(np.max(size)), 1.0 + TABLE_ERROR, "1", "Coulomb",
                   known_limit=UNBOUNDED if law == "linear" else ""),
             Check("largest power gained, over mu N and creepage", float(np.max(power / scale)), TABLE_ERROR, "1",
-                  "friction takes energy", known_limit=NO_SPIN_IN_BOUND if law in ("she", "polach", "fastsim") else ""),
+                  "friction takes energy", known_limit=NO_SPIN_IN_BOUND if law in ("she", "fastsim") else ""),
             Check("step of the force over 1e-4 of a/b", float(jump), tolerance, "1", "continuous at a table's ends"),
         ]  # fmt: skip
         condition = f"a/b {min(ratios):g} to {max(ratios):g}, creepages to {max(sizes):g}; {outside} out of range"
