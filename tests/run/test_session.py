@@ -249,6 +249,80 @@ def test_a_session_ends_where_a_run_ends_and_says_so():
         session.step(0.01)
 
 
+@pytest.mark.parametrize("rate, steps", [(200.0, (0.003, 0.07, 0.0005, 0.1, 0.0265)), (7.0, (0.01,) * 20)])
+def test_session_run_has_the_output_times_of_a_run(rate, steps):
+    scene = scene_of(**{"output.rate": rate, "integration.method": "rodas4"}, **APART)
+    session = wr.start(scene)
+    for dt in steps:
+        session.step(dt)
+    once = wr.simulate(scene, {"integration.duration": session.time}, progress=False)
+    run = session.run()
+    np.testing.assert_allclose(run.t, once.t, rtol=0.0, atol=1e-15)
+    if np.array_equal(run.t, once.t):
+        same(run, once)
+    saved = session.save()  # a step's end that is no output time is the last one alone
+    session.step(0.0301, {"friction.left": 0.1})
+    session.restore(saved)
+    same(session.run(), run)
+
+
+def test_session_step_refused_sets_no_input(tmp_path):
+    session = wr.start(scene_of(**active(tmp_path), **APART))
+    before = session.inputs
+    for dt, inputs in (
+        (0.01, {"left.force": 1e4, "nope": 1.0}), (-1.0, {"left.force": 1e4}), (np.nan, {"left.force": 1e4}),
+        (0.01, {"left.force": 1e4, "friction.left": -1.0}), (0.01, {"left.force": 1e4, "right.force": np.ma.masked}),
+        (0.01, [("left.force", 1e4)]),
+    ):  # fmt: skip
+        with pytest.raises(wr.InputError):
+            session.step(dt, inputs)
+        assert session.inputs == before and session.time == 0.0
+    session.set("left.force", 1e3)
+    with pytest.raises(wr.InputError):
+        session.step(0.01, {"left.force": 0.0, "nope": 1.0})
+    assert session.inputs["left.force"] == 1e3
+
+
+def test_run_until_takes_numbers_of_numpy():
+    sessions = [wr.start(scene_of()) for _ in range(2)]
+    assert sessions[0].run_until(np.float32(0.25), dt=np.float32(0.0625)) and sessions[1].run_until(0.25, dt=0.0625)
+    assert sessions[0].time == sessions[1].time == 0.25 and type(sessions[0].time) is float
+    np.testing.assert_array_equal(sessions[0].state, sessions[1].state)
+    assert not sessions[0].run_until("wheelset.y_m > 1", np.float32(0.0625), np.float64(0.5))
+
+
+@pytest.mark.parametrize("end", ["wheelset.y_m > nan", "wheelset.y_m < inf", float("nan"), None, [0.1]])
+def test_run_until_no_condition_is_one_line(end):
+    session = wr.start(scene_of())
+    with pytest.raises(wr.InputError, match="end: expected a"):
+        session.run_until(end)
+    assert session.time == 0.0
+
+
+@pytest.mark.parametrize("answer", [None, 3, float("nan"), np.array([True, False]), "no"])
+def test_run_until_function_without_yes_or_no_is_one_line(answer):
+    with pytest.raises(wr.InputError, match="end: expected a function that returns True or False"):
+        wr.start(scene_of()).run_until(lambda channels: answer)
+
+
+def test_session_interrupted_in_a_step_goes_on_from_before_it(monkeypatch):
+    session = stepped(scene_of(), 3)
+    state, advance = session.state, session._run.advance
+
+    def stopped(record, attempts):
+        advance(record, 3)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session._run, "advance", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        session.step(1.0)
+    monkeypatch.undo()
+    assert session.time == 0.03 and np.array_equal(session.state, state)
+    session.step(0.001)
+    once = stepped(scene_of(), 31, 0.001)
+    np.testing.assert_allclose(session.state[:7], once.state[:7], atol=1e-6)
+
+
 def test_states_and_checkpoints_are_starts():
     scene = scene_of(**{"integration.method": "tsit5"})
     whole = stepped(scene, 20)

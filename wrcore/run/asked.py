@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, short
 from wrcore.run.run import Run
 
 COMPARED: dict[str, Callable[[float, float], bool]] = {"<": operator.lt, ">": operator.gt}
@@ -34,14 +35,30 @@ class Named(dict[str, float]):
         return self._find(name)[name]
 
 
+def told_by(
+    function: Callable[[Mapping[str, float]], bool],
+    values: Mapping[str, float],
+    find: Callable[[str], Mapping[str, float]],
+) -> bool:
+    """Whether a function of a user's own says of channels (:class:`Named`) that its condition holds."""
+    found = function(Named(values, find))
+    if not isinstance(found, bool | np.bool_):
+        raise InputError(
+            "session", "end", f"expected a function that returns True or False, it returned {short(found)}"
+        )
+    return bool(found)
+
+
 def condition_of(text: str) -> tuple[tuple[str], Callable[[Mapping[str, float]], bool]]:
     """Names of channels and the test that a text such as ``wheelset.y_m > 0.004`` stands for."""
     parts = re.fullmatch(r"\s*(\S+)\s*([<>])\s*(\S+)\s*", text)
     try:
         name, sign, bound = parts[1], parts[2], float(parts[3])  # type: ignore[index]
     except (TypeError, ValueError):
-        expected = f"expected a time, a function, or a channel, < or >, and a number, got {text!r}"
-        raise InputError("session", "end", expected) from None
+        bound = math.nan
+    if not math.isfinite(bound):
+        expected = f"expected a time, a function, or a channel, < or >, and a finite number, got {short(text)}"
+        raise InputError("session", "end", expected)
     return (name,), lambda values: COMPARED[sign](values[name], bound)
 
 

@@ -9,10 +9,11 @@ before, so that no step runs across the change.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -23,12 +24,12 @@ from wrcore.errors.checked_calls import Within, checked
 from wrcore.integrate import engine
 from wrcore.integrate.integrator import CHUNK, REFERENCES, STALL_STEP, Headway, Integration, beginning
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
-from wrcore.run.asked import Named, condition_of, on_grid, value_of
+from wrcore.run.asked import condition_of, on_grid, told_by, value_of
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.run.inputs import Input, inputs_of, with_own_arrays
 from wrcore.run.reach import check_reach
 from wrcore.run.run import Run
-from wrcore.run.simulate import STARTS, opened
+from wrcore.run.simulate import LARGEST_RUN, STARTS, bytes_per_time, opened
 from wrcore.run.simulation import DERAILED_Y, Simulation
 from wrcore.run.state import State
 from wrcore.run.validity import LOOK_UP_ERRORS
@@ -40,11 +41,24 @@ RESOLUTION = 1e-9
 PARTS = 16
 """Of an interval in which a crossing is sought, at a time."""
 
+ROUNDING = 1e-9
+"""Of an output time, over the distance of two."""
+
 STEP = Within(1e-12, 1e5, "s")
 """Bounds of a step."""
 
 Values = tuple[np.ndarray, ...]
 """Of all inputs, in their order."""
+
+
+class _Output(NamedTuple):
+    """A time (s) of a session's history with the state and the inputs that held up to it."""
+
+    t: float
+    state: np.ndarray
+    values: Values
+    is_output: bool
+    """Whether it is an output time; else it is kept while it is the last one."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +124,9 @@ class Session:
         self.status, self.reason = "running", ""
         self._record = self._run.record(np.array([begin]))
         self._run.without_dispatch(self._record)
-        self._history: Any = None  # the last step (time, state, inputs) and, before it, what was the history then
+        self._rate = float(self.scene.data["output"]["rate"])
+        self._begin, self._most = begin, LARGEST_RUN / bytes_per_time(self.scene.vehicle)
+        self._history: Any = None  # the last `_Output` and, before it, what was the history then
         self._self = object()
         self.time, self._state = begin, np.array(self._run.memory.state)
         self._reach(begin)
@@ -178,16 +194,27 @@ class Session:
         Raises
         ------
         InputError
-            If the session has ended, for a time that is none, and as :meth:`set`.
+            If the session has ended, for a time that is none, and as :meth:`set`; then no input is changed.
         """
-        if inputs is not None:
-            if not isinstance(inputs, Mapping):
-                raise InputError("session", "inputs", f"expected values by names, got {short(inputs)}")
-            for name, value in inputs.items():
-                self.set(name, value)
         if type(dt) is not float or not STEP.low <= dt <= STEP.high:
             dt = check_number(dt, STEP.low, STEP.high, "session", "dt", "s")
-        self._reach(on_grid(self.time + dt, dt))
+        if inputs is not None:
+            self._check_running()
+            self._set_all(inputs)
+        self._reach(self._after(dt))
+
+    def _set_all(self, inputs):
+        """Set all of some inputs, or none of them where one is refused."""
+        if not isinstance(inputs, Mapping):
+            raise InputError("session", "inputs", f"expected values by names, got {short(inputs)}")
+        before, values = self._present_values(), self._values
+        try:
+            for name, value in inputs.items():
+                self.set(name, value)
+        except BaseException:
+            self._put(before)
+            self._values = values
+            raise
 
     @checked
     def channels(self, *names: str) -> dict[str, float]:
@@ -275,7 +302,8 @@ class Session:
         Raises
         ------
         InputError
-            For a text that is no condition, a channel that there is not, or if the session has ended before.
+            For a text that is no condition, a channel that there is not, a function that returns neither True nor
+            False, or if the session has ended before.
 
         Notes
         -----
@@ -283,27 +311,29 @@ class Session:
         """
         if not isinstance(end, str) and not callable(end):
             while self.time < end and self.status == "running":
-                self._reach(min(on_grid(self.time + dt, dt), float(end)))
+                self._reach(min(self._after(dt), end))
             return self.time >= end
-        names, holds = ((), lambda values: end(Named(values, self.channels))) if callable(end) else condition_of(end)
+        names, holds = ((), lambda values: told_by(end, values, self.channels)) if callable(end) else condition_of(end)
         while not holds(self.channels(*names)):
             if self.time >= latest or self.status != "running":
                 return False
             before = self.save()
-            self._reach(min(on_grid(self.time + dt, dt), latest))
+            self._reach(min(self._after(dt), latest))
             if self.status == "running" and holds(self.channels(*names)):
                 self._locate(before, lambda: holds(self.channels(*names)))
                 return True
         return True
 
     def run(self) -> Run:
-        """Everything so far as a run, whose output times are those of the steps.
+        """Everything so far as a run.
 
         Returns
         -------
         Run
-            Each time with the inputs that held up to it. ``status`` is ``completed`` while the session is running. The
-            ``end_state`` is a start for any run, ``end`` for one whose scene says what the inputs are now.
+            Output times are those of :func:`simulate`: multiples of 1/``output.rate``, the beginning and the present
+            time, whatever the steps were. Each time with the inputs that held up to it. ``status`` is ``completed``
+            while the session is running. The ``end_state`` is a start for any run, ``end`` for one whose scene says
+            what the inputs are now.
 
         Raises
         ------
@@ -318,9 +348,9 @@ class Session:
         groups: dict[str, dict[str, list[np.ndarray]]] = {}
         limits: dict[str, Any] = {}
         try:
-            for _, items in groupby(history, key=lambda item: id(item[2])):
+            for _, items in groupby(history, key=lambda item: id(item.values)):
                 piece = list(items)
-                self._put(piece[0][2])
+                self._put(piece[0].values)
                 times, states = _times_and_states(piece)
                 part = Trajectory(self._run.method, times, states, "completed", "")
                 found, more = simulation.channels(part, self._equations_of_outputs())
@@ -373,36 +403,68 @@ class Session:
         self._run.begin_anew(self.time, self._state)
         first, before = self._history
         if before is None:  # nothing has happened yet: they hold from the beginning
-            self._history = (*first[:2], self._values), None
+            self._history = first._replace(values=self._values), None
         self._held = self._values
 
     def _reach(self, t):
         """Integrate to a time (s) and keep what is there."""
         if self.status != "running":
-            raise InputError(
-                "session", "", f"expected no further step: {self.status} at {self.time:g} s, {self.reason}"
-            )
+            self._check_running()
         if self._values is not self._held:
             self._settle()
-        record, given_up = self._record, ""
-        record.times[0], record.reached[0] = t, 0
-        outcome = self._run.advance(record, CHUNK)
-        while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
-            outcome = self._run.advance(record, min(CHUNK, self._headway.attempts_left()))
+        record, given_up = self._record_to(t), ""
+        try:
+            outcome = self._run.advance(record, CHUNK)
+            while outcome == engine.RUNNING and not (given_up := self._headway.lost()):
+                outcome = self._run.advance(record, min(CHUNK, self._headway.attempts_left()))
+        except BaseException:  # Ctrl-C: the session stays where it was
+            self._run.begin_anew(self.time, self._state)
+            raise
+        times = record.times[: record.reached[0]].tolist()
+        for time, state in zip(times, record.states, strict=False):
+            self._keep(time, state.copy(), time < t or self._is_output(t))
         if outcome == engine.COMPLETED:
-            self.time, self._state = t, record.states[0].copy()
-            self._keep(t, self._state)
+            self.time, self._state = t, self._history[0].state
             return
-        if record.reached[0]:
-            self._keep(t, record.states[0].copy())
         self.status, self.reason = self._run.ending(outcome, given_up)
         self.time, self._state = float(self._run.memory.clock[engine.T]), self._run.memory.state.copy()
 
-    def _keep(self, t, state):
-        self._history = (t, state, self._held), self._history if self._recorded else None
+    def _check_running(self):
+        if self.status != "running":
+            expected = f"expected no further step: {self.status} at {self.time:g} s, {self.reason}"
+            raise InputError("session", "", expected)
+
+    def _record_to(self, t):
+        """A record of the output times from here on to a time (s), and of this."""
+        first = math.floor(self.time * self._rate + ROUNDING) + 1
+        count = math.ceil(t * self._rate - ROUNDING) - first
+        if not self._recorded or self._history is None or count <= 0:
+            self._record.times[0], self._record.reached[0] = t, 0
+            return self._record
+        if (t - self._begin) * self._rate > self._most:
+            expected = f"expected at most {self._most:.2g} output times in memory; or a session with record=False"
+            raise InputError(self.scene.source, "output.rate", expected)
+        return self._run.record(np.append(np.arange(first, first + count) / self._rate, t))
+
+    def _after(self, dt):
+        """The time a step (s) ahead; but for rounding a whole multiple of it, or an output time, where it is one."""
+        t, rate = on_grid(self.time + dt, dt), self._rate
+        near = round(t * rate) / rate
+        return near if abs(near - t) <= ROUNDING * min(dt, 1.0 / rate) else t
+
+    def _is_output(self, t):
+        """Whether a time (s) is an output time but for rounding."""
+        return abs(t * self._rate - round(t * self._rate)) <= ROUNDING
+
+    def _keep(self, t, state, is_output):
+        """Add a time (s) to the history; a step's end that is no output time goes when the next one comes."""
+        before = self._history if self._recorded else None
+        if before is not None and before[1] is not None and not before[0].is_output:
+            before = before[1]
+        self._history = _Output(t, state, self._held, is_output), before
 
     def _steps(self):
-        """All steps so far, in their order."""
+        """All output times so far, in their order."""
         steps, rest = [], self._history
         while rest is not None:
             step, rest = rest
@@ -425,7 +487,7 @@ class Session:
 
 def _times_and_states(items):
     """Of pieces of a session's history, (n,) and (n, size)."""
-    return np.array([t for t, _, _ in items]), np.array([state for _, state, _ in items])
+    return np.array([item.t for item in items]), np.array([item.state for item in items])
 
 
 @checked
