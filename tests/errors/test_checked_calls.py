@@ -50,7 +50,8 @@ def drawn(length: Annotated[float, Within(0.0, 2.0, "m")] = 1.0, *names: str, si
 
 def test_what_is_refused_and_how():
     value = np.float32(1.5)
-    assert drawn(value, "a", "b", side="x", other=None)[0] is value and drawn() == (1.0, (), "left", {})
+    assert drawn(value, "a", "b", side="x", other=None)[0] == 1.5 and drawn() == (1.0, (), "left", {})
+    assert [type(part) for part in (drawn(value)[0], drawn(np.int8(1))[0])] == [float, int]  # not of fewer digits
     for call, says in ((lambda: drawn("1"), "drawn: length: expected a number, at least 0 and at most 2 m, got '1'"),
                        (lambda: drawn(1.0, "a", 2), "drawn: names: expected text, got 2"),
                        (lambda: wr.ensure_table(planes=10**5000), "ensure_table: planes: expected one of .* got a int"),
@@ -123,3 +124,31 @@ def test_a_pose_deep_in_the_rail_is_refused_at_once():
         with pytest.raises(InputError, match="patch: z: expected at most 1 mm of overlap"):
             wr.patch(pair, z=z)
     assert wr.patch(pair, z=0.5) == [] and wr.patch(pair, z=0.4597)[0].normal > 1e3
+
+
+MASKED = np.ma.array([1e-3, 2e-3, 3e-3], mask=[False, True, False])
+
+
+@pytest.mark.parametrize("values", [MASKED, [MASKED, MASKED], np.ma.masked, [np.ma.masked, 1e-3], (1e-3, np.ma.masked)])
+def test_masked_values_are_refused_wherever_arrays_go(values):
+    """They would count as numbers: numpy drops the mask when it converts an array."""
+    pair = wr.WheelsetOnTrack.alike(wr.named_profile("S1002", "wheel"), wr.named_profile("60E1", "rail", 1 / 40))
+    scene = wr.example("suspended_wheelset")
+    for call in (
+        lambda: wr.creep_force("she", 6e-3, 4e-3, 5e4, values, 0.0, 0.0),
+        lambda: wr.contacts(pair, y=values), lambda: wr.first_touch(pair, values),
+        lambda: wr.conicity_curve(pair, values), lambda: wr.Settling(window=values),
+        lambda: wr.hunting_frequency(values, values), lambda: wr.frequency_response(scene, values),
+        lambda: wr.limit_cycles(scene, values), lambda: wr.quasi_static_curving(scene, values),
+        lambda: wr.simulate(scene, start=values), lambda: wr.simulate(scene, {"initial.y": values}),
+        lambda: wr.load_scene(scene, initial={"y": values}), lambda: wr.start(scene, start=values),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as error:
+            call()
+        assert "\n" not in str(error.value)
+
+
+def test_masked_arrays_without_masked_values_are_arrays():
+    whole = np.ma.array([1e-3, 2e-3], mask=False)
+    same = wr.creep_force("she", 6e-3, 4e-3, 5e4, whole.filled(), 0.0, 0.0)
+    np.testing.assert_array_equal(wr.creep_force("she", 6e-3, 4e-3, 5e4, whole, 0.0, 0.0), same)

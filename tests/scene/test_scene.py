@@ -298,3 +298,20 @@ def test_planar_detection_beside_a_lookup_table_is_told_what_to_set(monkeypatch)
     changes = {"contact.patch": "tabulated", "contact.detection": "planar"}
     with pytest.raises(Told, match="set contact.patch to moment, or contact.detection to spatial"):
         compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+
+
+def test_overrides_from_a_generator_are_those_of_a_list():
+    scene = SCENES / "suspended_wheelset.yaml"
+    made = load_scene(scene, (f"{key}={value}" for key, value in {"speed": 31, "initial.y": 0.001}.items()))
+    assert (made.data["speed"], made.data["initial"]["y"]) == (31, 0.001)
+    for wrong in (3, None, ("speed", 30), b"speed=30", np.array(["speed=30"])):
+        with pytest.raises(InputError, match="--set: .*expected key.path=value"):
+            load_scene(scene, (text for text in [wrong]))
+
+
+def test_changes_that_contain_themselves_are_one_line():
+    deep: dict = {}
+    deep["a"] = deep
+    for changes in ({"initial": deep}, {"initial": [deep]}):
+        with pytest.raises(InputError, match="^changes: "):
+            load_scene(SCENES / "suspended_wheelset.yaml", changes)

@@ -1,7 +1,8 @@
 """A checked front to public functions: their annotations say what an argument may be, `checked` refuses the rest.
 
-An annotation is a type, a union or a list of types, or ``Annotated`` with the marks below. Nothing is converted: what
-passes reaches the function as it was given. Wrong call shapes (missing or unknown arguments) stay Python's own.
+An annotation is a type, a union or a list of types, or ``Annotated`` with the marks below. A number of numpy reaches
+the function as Python's own number, all else as it was given. Wrong call shapes (missing or unknown arguments) stay
+Python's own.
 """
 
 import errno
@@ -47,6 +48,9 @@ ARRAY = {*typing.get_args(ArrayLike)}
 ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
+UNMASKED = "expected numbers without masked ones among them: leave these out (.compressed()) or fill them (.filled())"
+"""What is said of arrays of numpy.ma with masked values: these would count as numbers."""
+
 UNFIT = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.ENAMETOOLONG, errno.ELOOP)
 """What a system says of a path that cannot be one; a full disk or missing rights stay its own errors."""
 
@@ -86,11 +90,13 @@ def checked(thing: Thing) -> Thing:
         given += [(*pair, value) for pair in more for value in args[len(in_order) :]]
         given += [(name, by_name[name], value) for name, value in options.items() if name in by_name]
         for name, kind, value in given:
+            if is_masked(value):
+                raise InputError(thing.__qualname__.removesuffix(".__init__"), name, UNMASKED)
             if not kind.fits(value):
                 expected = one_of(kind.words, value) if kind.words else f"expected {kind.text}, got {short(value)}"
                 raise InputError(thing.__qualname__.removesuffix(".__init__"), name, expected)
         try:
-            return thing(*args, **options)
+            return thing(*map(_plain, args), **{name: _plain(value) for name, value in options.items()})
         except OSError as error:
             if error.errno not in UNFIT:
                 raise
@@ -98,6 +104,19 @@ def checked(thing: Thing) -> Thing:
             raise InputError(thing.__qualname__, short(error.filename), expected) from error
 
     return typing.cast(Thing, front)
+
+
+def _plain(value):
+    """A number or a text of numpy as Python's own: its arithmetic would have fewer digits, or another range."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def is_masked(value, depth=4):
+    """Whether an array, or one in a list of lists to a ``depth``, has masked values."""
+    if isinstance(value, list | tuple):
+        inner = [item for item in value if isinstance(item, np.ma.MaskedArray | list | tuple)] if depth else []
+        return any(is_masked(item, depth - 1) for item in inner)
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
 
 
 def same_shape(source, **arrays):

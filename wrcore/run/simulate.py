@@ -92,7 +92,7 @@ def opened(source: str, scene: Source, overrides: Any, start: Any, changes: dict
     """
     begin_at = None if isinstance(start, str) and start == "initial" else start
     overrides = overrides if isinstance(overrides, Mapping) else list(overrides)
-    if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", key) for key in (*overrides, *changes)):
+    if begin_at is not None and any(re.match(r"initial(__|[.=]|$)", str(key)) for key in (*overrides, *changes)):
         raise InputError(source, "initial", "expected either this or a start")
     if overrides or changes or not isinstance(scene, Scene):
         scene = load_scene(scene, overrides, **changes)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from wrcore.errors import InputError, short
+from wrcore.errors.checked_calls import UNMASKED, is_masked
 from wrcore.errors.checked_yaml import name_of_function, parse_value
 
 WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.parameters")
@@ -16,7 +17,10 @@ WHOLE = (".profile", ".slices", ".friction", ".controller.speed", "vehicle.param
 def changes_of(overrides, changes):
     """Option, key path and value of each change that `load_scene` is asked for."""
     texts, changes = ((), {**overrides, **changes}) if isinstance(overrides, Mapping) else (overrides, changes)
-    flat = list(_flat(changes))
+    try:
+        flat = list(_flat(changes))
+    except RecursionError:
+        raise InputError("changes", "", "expected mappings that do not contain themselves") from None
     check_apart({key for key, _ in flat}, "changes")  # of equal ones the last one counts
     return [("--set", *_pair(text)) for text in texts] + [("changes", *pair) for pair in flat]
 
@@ -70,9 +74,9 @@ def of_a_change(error, source, asked):
 
 def _pair(text):
     """Key path and value of ``key.path=value``."""
-    key, equals, value = text.partition("=")
+    key, equals, value = text.partition("=") if isinstance(text, str) else ("", "", "")
     if not equals or not key.strip():
-        raise InputError("--set", text, "expected key.path=value")
+        raise InputError("--set", text if isinstance(text, str) else short(text), "expected key.path=value")
     return key.strip(), parse_value(value)
 
 
@@ -83,6 +87,8 @@ def _flat(changes, prefix=""):
         if isinstance(value, Mapping) and not path.endswith(WHOLE):
             yield from _flat(value, f"{path}.")
         else:
+            if is_masked(value):
+                raise InputError("changes", path, UNMASKED)
             try:
                 yield path, json.loads(json.dumps(value, default=_plain))
             except (ValueError, RecursionError):  # what contains itself, and numbers of thousands of digits
