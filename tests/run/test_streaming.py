@@ -13,13 +13,14 @@ import h5py
 import numpy as np
 import pytest
 
+import wrcore as wr
 from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import sign
 from wrcore.run.results import load_run
 from wrcore.run.simulate import output_blocks, output_times, simulate
-from wrcore.run.streaming import Blocks, simulate_to
+from wrcore.run.streaming import Blocks, Interrupts, simulate_to
 from wrcore.scene.description import load_scene
 
 HUNTING = {
@@ -326,3 +327,46 @@ def test_output_blocks_are_the_output_times(begin, duration, rate):
     for size in (1, 7, 1000):
         blocks = list(output_blocks(begin, duration, rate, size))
         assert np.array_equal(np.concatenate(blocks), whole) and all(map(len, blocks))
+
+
+FULL = ["pose", "velocity", "acceleration", "contact", "energy", "wheel_motion", "wear_number", "wheel_forces"]
+
+
+@pytest.mark.parametrize("name", ["suspended_wheelset", "crossing", "locomotive"])
+def test_pieces_without_output_times_change_nothing(tmp_path, name):
+    """Checkpoints, and interruptions, more often than output times; contact as the example has it."""
+    changes = {"integration.duration": 0.4, "output.rate": 4.0, "output.channels": FULL}
+    scene = load_scene(wr.example(name), changes)
+    run, _ = simulate_to(scene, tmp_path / "run.h5", checkpoint_s=0.0)
+    assert run.status == "completed"
+    assert_same(load_run(tmp_path / "run.h5"), simulate(scene, progress=False))
+
+
+def test_interrupted_twice_between_output_times_goes_on(tmp_path, monkeypatch):
+    scene = load_scene(wr.example("suspended_wheelset"), {"integration.duration": 0.4, "output.rate": 4.0})
+    told = []
+    monkeypatch.setattr(Interrupts, "caught", signal.SIGINT)
+    for _ in range(2):
+        run, number = simulate_to(scene, tmp_path / "run.h5", say=told.append)
+        assert number == signal.SIGINT and run.reason.startswith("interrupted") and not len(run.t[1:])
+        load_run(tmp_path / "run.h5")
+    monkeypatch.undo()
+    simulate_to(scene, tmp_path / "run.h5", say=told.append)
+    assert_same(load_run(tmp_path / "run.h5"), simulate(scene, progress=False))
+    assert told and all(text.startswith("goes on at t = ") for text in told)
+
+
+def test_a_second_signal_at_once_loses_nothing(tmp_path, monkeypatch):
+    """Who presses Ctrl-C twice has what was computed; much later the second one does as ever."""
+    sent = []
+
+    def twice(t):
+        if t >= 1.0 and len(sent) < 2:
+            sent.extend(os.kill(os.getpid(), signal.SIGINT) or t for _ in range(2))
+
+    run, number = simulate_to(scene_of(HUNTING), tmp_path / "run.h5", twice)
+    assert number == signal.SIGINT and load_run(tmp_path / "run.h5").t[-1] > 0.9
+    sent.clear()
+    monkeypatch.setattr("wrcore.run.streaming.PATIENCE", -1.0)
+    with pytest.raises(KeyboardInterrupt):
+        simulate_to(scene_of(HUNTING | {"speed": 59.0}), tmp_path / "other.h5", twice)

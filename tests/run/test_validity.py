@@ -7,7 +7,7 @@ from tests.conftest import SCENES
 from wrcore.cli import main
 from wrcore.contact import reduction
 from wrcore.run.simulate import simulate
-from wrcore.run.validity import LIMITS, WIDEST, WIDEST_TURN, exceeded
+from wrcore.run.validity import LIMITS, LOOK_UP_ERRORS, WIDEST, WIDEST_TURN, exceeded, look_up_errors
 from wrcore.scene.description import compile_scene, load_scene
 
 RADIUS = 0.3
@@ -102,3 +102,10 @@ def test_both_flanges_on_the_rails(contact):
     changes = {"initial": {"y": 0.0}, "integration": {"duration": 0.02}, "contact": {"creep": {"model": "she"}}}
     tight = simulate(SCENES / "wheelset.yaml", track={"gauge": 1.42}, **changes)
     assert tight.counters["both_flanges"] == len(tight.t)
+
+
+def test_look_up_errors_without_output_times_are_zero(contact):
+    """A piece of a run may hold no output time."""
+    looked_up = contact._replace(strips=contact.strips._replace(looked_up=0.3))
+    none = np.zeros((0, 1, 2, reduction.MAX_PATCHES, reduction.PATCH_COLUMNS))
+    assert look_up_errors(looked_up, none) == dict.fromkeys(LOOK_UP_ERRORS, 0.0)

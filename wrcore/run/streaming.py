@@ -45,13 +45,18 @@ WHOLE = 2**62  # output times in a block that holds all of them
 STOP, INTERRUPTED = "stop", "interrupted"
 """Reason of a block that ends for a checkpoint, and how that of an interrupted run begins."""
 
+PATIENCE = 10.0
+"""Time within which an interrupted run ends, s: an attempt of a step with exact patches takes up to half a second, a
+block of channels as much to write. With less a second Ctrl-C loses up to a minute of work."""
+
 CHECKPOINT_S = 60.0  # wall time between two checkpoints at most, s
 
 
 class Interrupts:
-    """SIGINT and SIGTERM as a question: ``caught`` is the signal's number or 0; a second one does as ever."""
+    """SIGINT and SIGTERM as a question: ``caught`` is the signal's number or 0. One that follows `PATIENCE` later does
+    as ever; before, what was computed is being written."""
 
-    caught = 0
+    caught, since = 0, 0.0
 
     def __enter__(self):
         self._before = {}
@@ -60,8 +65,11 @@ class Interrupts:
         return self
 
     def _catch(self, number, _):
-        self.caught = number
-        signal.signal(number, self._before[number])
+        if not self.caught:
+            self.caught, self.since = number, time.monotonic()
+        elif time.monotonic() - self.since > PATIENCE:
+            signal.signal(number, self._before[number])
+            signal.raise_signal(number)
 
     def __exit__(self, *_):
         for number, handler in self._before.items():

@@ -128,6 +128,8 @@ def look_up_errors(contact, patches):
     patches are not looked up."""
     if not contact.strips.looked_up:
         return {}
+    if not len(patches):
+        return dict.fromkeys(LOOK_UP_ERRORS, 0.0)
     wheels = values_of(contact.wheels) or (contact,) * (2 * patches.shape[1])
     cells = np.nan_to_num(patches[..., reduction.CELL]).astype(int).reshape(len(patches), -1, reduction.MAX_PATCHES)
     misses = [one.strips.table.misses[np.unique(cells[:, i])] for i, one in enumerate(wheels)]
