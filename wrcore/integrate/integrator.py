@@ -42,6 +42,7 @@ from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
 from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.kernels.aside import planning
+from wrcore.kernels.told import reaching
 
 METHODS = (*EXPLICIT, *ROSENBROCK)
 """Methods of the compiled engine."""
@@ -101,9 +102,15 @@ def integrate(
     before, run.compiled_s, started = run.memory.counters.copy(), 0.0, time.perf_counter()
     headway = Headway(run.memory, most_steps, 0.0 if step else min(STALL_STEP, 0.1 * longest_step))
     attempts = min(FIRST_CHUNK, chunk)
+    clock = run.memory.clock
+
+    def reached():
+        return f"the run is at t = {clock[engine.T]:.3g} of {times[-1]:.6g} s"
+
     while outcome == engine.RUNNING and not given_up:
         begun = time.perf_counter()
-        outcome = run.advance(record, min(attempts, headway.attempts_left()))
+        with reaching(reached):
+            outcome = run.advance(record, min(attempts, headway.attempts_left()))
         spent = time.perf_counter() - begun
         if spent < 0.5 * BREATH:
             attempts = min(2 * attempts, chunk)

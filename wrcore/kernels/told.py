@@ -3,6 +3,7 @@
 import _thread
 import os
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from threading import Timer
 
@@ -14,6 +15,8 @@ _AFTER = 0.2
 PATIENCE = 3.0
 """Work takes this long before it says so, s."""
 
+
+_REACHED = ContextVar("reached", default=str)
 
 _again: list[Timer] = []
 """Of Ctrl-C that is to be said again."""
@@ -49,6 +52,21 @@ def handed_on(outcome):
 
 def _silent():
     return os.environ.get("WRCORE_PROGRESS") == "0"
+
+
+@contextmanager
+def reaching(reached):
+    """Let what is said of long work in this thread end with the text that ``reached()`` returns: how far the run is."""
+    before = _REACHED.set(reached)
+    try:
+        yield
+    finally:
+        _REACHED.reset(before)
+
+
+def reached_so_far():
+    """The function of this thread's `reaching`; without one it returns an empty text."""
+    return _REACHED.get()
 
 
 def tell(text):

@@ -210,3 +210,29 @@ def test_a_ramp_dies_below_the_fold_and_comes_nearer_when_it_is_slower(oscillato
 def test_a_ramp_falls():
     with pytest.raises(InputError, match="speed_ramp: end: expected less than the start of 40 m/s"):
         speed_ramp(SCENES / "suspended_wheelset.yaml", 40.0, 50.0)
+
+
+@pytest.mark.parametrize("after, branches", [(2, {"falling"}), (6, {"falling", "rising"})])
+def test_limit_cycles_stopped_returns_the_rows_so_far(oscillator, suspended, monkeypatch, capsys, after, branches):
+    monkeypatch.setattr(analysis_limit_cycles, "straight_ahead", lambda scene: suspended)
+    speeds, settling, said, left = [42.0, 48.0, 52.0, 54.0], Settling(longest=400.0), [], [after]
+    scene = SCENES / "suspended_wheelset.yaml"
+    whole = limit_cycles(scene, speeds, settling, [0.005], 5.0, said.append)
+    assert "stopped" not in whole.attrs and len(said) == len(whole) and said[0].endswith("at most 3 speeds remain")
+    settle = settle_motion
+
+    def stopped(*given):
+        left[0] -= 1
+        if left[0] < 0:
+            raise KeyboardInterrupt
+        return settle(*given)
+
+    monkeypatch.setattr(analysis_limit_cycles, "settle_motion", stopped)
+    table = limit_cycles(scene, speeds, settling, [0.005], 5.0)
+    assert table.attrs["stopped"] and set(table["branch"]) == branches and list(table.columns) == list(whole.columns)
+    known = whole.merge(table, on=["branch", "speed_m_per_s", "amplitude_m", "status"])
+    assert len(known) == len(table) < len(whole)
+    assert "limit_cycles: stopped; the table holds what was found" in capsys.readouterr().err
+    left[0] = 0
+    with pytest.raises(KeyboardInterrupt):  # there is nothing to return
+        limit_cycles(scene, speeds, settling, [0.005], 5.0)

@@ -13,5 +13,7 @@ table = os.path.relpath(snakemake.input.table[0], os.path.dirname(source))
 changes = [f"contact.creep.table={table}", "initial.y=0.0", f"contact.detection={snakemake.wildcards.detection}"]
 settling = Settling(**settings.pop("settling"))
 cycles = limit_cycles(load_scene(source, [*params.overrides, *changes]), params.speeds, settling, **settings)
+if cycles.attrs.get("stopped"):
+    raise KeyboardInterrupt  # a part of the table is no result of the job
 cycles.insert(0, "detection", snakemake.wildcards.detection)
 cycles.to_csv(snakemake.output[0], index=False)

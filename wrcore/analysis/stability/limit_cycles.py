@@ -8,7 +8,10 @@ the branches differ, the disturbance decides.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -20,10 +23,15 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.errors.checked_calls import ABOVE_ZERO, OneOf, Within, checked
 from wrcore.integrate.integrator import METHODS, integrate
+from wrcore.kernels.cache import say as say_aloud
+from wrcore.kernels.told import PATIENCE, tell
 from wrcore.run.motion import hunting_frequency
 from wrcore.run.simulation import DERAILED_Y
 from wrcore.scene.description import Source, as_scene
 
+COLUMNS = (
+    "speed_m_per_s", "amplitude_m", "frequency_Hz", "offset_m", "simulated_s", "status",
+)  # fmt: skip
 CYCLES = ("limit cycle", "irregular")  # status of motions that do not die away
 DISTURBANCES = (0.006, 0.0065, 0.007, 0.008, 0.009)  # sideways shifts that may end on a cycle, m
 
@@ -130,7 +138,43 @@ def shifted(model, state, shift):
     return state
 
 
-def falling_branch(model, state, speeds, settling, disturbances, resolution):
+class Watch:
+    """What is said of the speeds of a branch, and whether it was stopped: ``say`` gets a line after each speed; without
+    it lines go to standard error once the work takes long. Ctrl-C ends a branch, which keeps its rows, where it may be
+    ``stoppable``; else it is an error as ever."""
+
+    def __init__(self, say=None, stoppable=False):
+        self.say, self.stoppable, self.stopped, self.begun = say, stoppable, False, time.monotonic()
+
+    @contextmanager
+    def branch(self):
+        """Around the speeds of a branch."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if not self.stoppable:
+                raise
+            self.stopped = True
+
+    def tell(self, name, row, remaining):
+        """Say what a speed of a branch has shown, and how many speeds remain at most."""
+        text = f"{name}, {row['speed_m_per_s']:g} m/s: {row['status']}; at most {remaining} speeds remain"
+        if self.say is not None:
+            self.say(text)
+        elif time.monotonic() - self.begun > PATIENCE:
+            tell(f"limit cycles: {text}")
+
+    def end(self, table, asker):
+        """The table, or the interrupt where it is empty; a table that was stopped says so (``attrs``)."""
+        if self.stopped:
+            if table.empty:
+                raise KeyboardInterrupt
+            table.attrs["stopped"] = True
+            say_aloud(f"{asker}: stopped; the table holds what was found, {len(table)} rows")
+        return table
+
+
+def falling_branch(model, state, speeds, settling, disturbances, resolution, watch=None):
     """Amplitude of the limit cycle from the highest speed downwards: rows of `settle_motion`, fastest first, the last
     one the fastest motion that comes to rest. The speed at which the limit cycle ends is halved to ``resolution``.
 
@@ -140,39 +184,46 @@ def falling_branch(model, state, speeds, settling, disturbances, resolution):
     Where every disturbance derails, the next lower speed is tried.
     """
     rows: list[dict[str, Any]] = []
-    lost, below, queue = [], None, list(speeds)
+    lost, below, queue, watch = [], None, list(speeds), watch or Watch()
     carried: list[Any] = []
-    while queue:
-        there, straight = at_speed(model, state, queue.pop())
-        tried = [settle_motion(there, at_speed(before, end, there.speed)[1], settling) for before, end in carried]
-        if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
-            tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
-        row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
-        if row["status"] in CYCLES:
-            rows.append(row)
-            carried = [(there, end)]
-        elif row["status"] == "derailed":
-            lost.append(row)
-        else:
-            below, queue = row, []
-        if below and rows and rows[-1]["speed_m_per_s"] - below["speed_m_per_s"] > resolution:
-            queue = [0.5 * (rows[-1]["speed_m_per_s"] + below["speed_m_per_s"])]
-    table = pd.DataFrame([*lost, *rows, *([below] if below else [])])
+    with watch.branch():
+        while queue:
+            there, straight = at_speed(model, state, queue.pop())
+            tried = [settle_motion(there, at_speed(before, end, there.speed)[1], settling) for before, end in carried]
+            if not tried or not tried[0][0]["amplitude_m"] >= 0.67 * rows[-1]["amplitude_m"]:
+                tried += [settle_motion(there, shifted(model, straight, shift), settling) for shift in disturbances]
+            row, end = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
+            if row["status"] in CYCLES:
+                rows.append(row)
+                carried = [(there, end)]
+            elif row["status"] == "derailed":
+                lost.append(row)
+            else:
+                below, queue = row, []
+            gap = rows[-1]["speed_m_per_s"] - below["speed_m_per_s"] if below and rows else 0.0
+            if gap > resolution:
+                queue = [0.5 * (rows[-1]["speed_m_per_s"] + below["speed_m_per_s"])]
+            watch.tell(
+                "falling", row, len(queue) + (math.ceil(math.log2(gap / resolution)) - 1 if queue and gap else 0)
+            )
+    table = pd.DataFrame([*lost, *rows, *([below] if below else [])], columns=COLUMNS)
     return table.sort_values("speed_m_per_s", ascending=False, ignore_index=True)
 
 
-def rising_branch(model, state, speeds, settling):
+def rising_branch(model, state, speeds, settling, watch=None):
     """Amplitude that a small disturbance leaves, from the lowest speed upwards; arguments as for `falling_branch`. The
     motion is carried from speed to speed and disturbed again (``settling.disturbance``) at each.
     """
-    rows = []
-    for speed in speeds:
-        model, state = at_speed(model, state, speed)
-        row, state = settle_motion(model, shifted(model, state, settling.disturbance), settling)
-        rows.append(row)
-        if row["status"] == "derailed":
-            break
-    return pd.DataFrame(rows)
+    rows, watch = [], watch or Watch()
+    with watch.branch():
+        for k, speed in enumerate(speeds, 1):
+            model, state = at_speed(model, state, speed)
+            row, state = settle_motion(model, shifted(model, state, settling.disturbance), settling)
+            rows.append(row)
+            watch.tell("rising", row, len(speeds) - k)
+            if row["status"] == "derailed":
+                break
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 @checked
@@ -182,8 +233,9 @@ def limit_cycles(
     settling: Settling | None = None,
     disturbances: Annotated[Sequence[float], Within(-DERAILED_Y, DERAILED_Y, "m")] = DISTURBANCES,
     resolution: Annotated[float, Within(1e-3, 150.0, "m/s")] = 0.25,
+    say: Callable[[str], object] | None = None,
 ) -> pd.DataFrame:
-    """Both branches of a scene's vehicle.
+    """Both branches of a scene's vehicle. Ctrl-C stops it: it then returns the rows that it has.
 
     Parameters
     ----------
@@ -198,11 +250,15 @@ def limit_cycles(
         Sideways shifts of the vehicle that may end on a cycle, one or more, within 0.05 m.
     resolution : float
         Of the lowest speed with a limit cycle, m/s, at least 1e-3.
+    say : callable, optional
+        Called with a line after each speed: what was found there, and how many speeds remain at most. Left out: lines
+        on standard error, once the work takes three seconds (none with ``WRCORE_PROGRESS=0``).
 
     Returns
     -------
     pandas.DataFrame
-        Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch.
+        Rows of :func:`falling_branch` and :func:`rising_branch` after a column branch. Where Ctrl-C stopped it,
+        ``table.attrs["stopped"]`` is True, and a line on standard error says so.
 
     Raises
     ------
@@ -222,12 +278,12 @@ def limit_cycles(
     3   rising           60.0  limit cycle
     """
     speeds, settling = rising(speeds), settling or Settling()
-    model, state = straight_ahead(as_scene(scene))
-    tables = {
-        "falling": falling_branch(model, state, speeds, settling, disturbances, resolution),
-        "rising": rising_branch(model, state, speeds, settling),
-    }
-    return pd.concat(tables, names=["branch"]).reset_index("branch").reset_index(drop=True)
+    (model, state), watch = straight_ahead(as_scene(scene)), Watch(say, stoppable=True)
+    tables = {"falling": falling_branch(model, state, speeds, settling, disturbances, resolution, watch)}
+    if not watch.stopped:
+        tables["rising"] = rising_branch(model, state, speeds, settling, watch)
+    table = pd.concat(tables, names=["branch"]).reset_index("branch").reset_index(drop=True)
+    return watch.end(table, "limit_cycles")
 
 
 @checked
@@ -260,7 +316,7 @@ def speed_ramp(
     -------
     pandas.DataFrame
         A row per window: t_s at its end; speed_m_per_s, amplitude_m (NaN: derailed), frequency_Hz, offset_m as in
-        :func:`limit_cycles`.
+        :func:`limit_cycles`; stopped by Ctrl-C, the rows so far, as there.
 
     Raises
     ------
@@ -287,15 +343,16 @@ def speed_ramp(
     model, straight = at_speed(model, state, start)
     tried = [settle_motion(model, shifted(model, straight, shift), settling) for shift in disturbances]
     _, state = max(tried, key=lambda motion: np.nan_to_num(motion[0]["amplitude_m"], nan=-1.0))
-    rows, elapsed = [], 0.0
-    for speed in np.arange(start, end, -rate * settling.window):
-        model, state = at_speed(model, state, float(speed))
-        row, state, lasted = _window(model, state, settling)
-        elapsed += lasted
-        rows.append({"t_s": elapsed, **row})
-        if not row["amplitude_m"] >= settling.rest:
-            break
-    return pd.DataFrame(rows)
+    rows, elapsed, watch = [], 0.0, Watch(stoppable=True)
+    with watch.branch():
+        for speed in np.arange(start, end, -rate * settling.window):
+            model, state = at_speed(model, state, float(speed))
+            row, state, lasted = _window(model, state, settling)
+            elapsed += lasted
+            rows.append({"t_s": elapsed, **row})
+            if not row["amplitude_m"] >= settling.rest:
+                break
+    return watch.end(pd.DataFrame(rows), "speed_ramp")
 
 
 def nonlinear_critical_speed(table):
