@@ -1,7 +1,10 @@
 """The command line explains itself: every option, every column, the word that was perhaps meant; ``wrcore init``."""
 
+import errno
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
@@ -124,6 +127,29 @@ def test_files_to_start_from_are_copied_and_never_written_over(tmp_path, capsys)
         assert wr.load_scene(path).data == wr.load_scene(wr.example(path.stem)).data
     wr.load_sweep(tmp_path / "mine" / "sweeps" / "smoke.yaml")
     assert main(["init", str(tmp_path / "mine")]) == 2 and "not written over" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fault", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
+def test_init_that_fails_leaves_nothing_and_can_be_repeated(tmp_path, monkeypatch, capsys, fault):
+    copy, left = shutil.copyfile, [12]
+
+    def until_full(source, target):
+        left[0] -= 1
+        if not left[0]:
+            Path(target).touch()
+            raise fault
+        return copy(source, target)
+
+    monkeypatch.setattr(shutil, "copyfile", until_full)
+    folder = tmp_path / "new" / "mine"
+    assert main(["init", str(folder)]) in (2, 130)
+    said = capsys.readouterr().err
+    assert said in (f"wrcore: {folder}: No space left on device\n", "wrcore: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.undo()
+    assert main(["init", str(folder)]) == 0 and not [
+        p for p in folder.rglob("*") if p.is_file() and not p.stat().st_size
+    ]
 
 
 def test_a_profile_of_a_file_is_shown(tmp_path, monkeypatch, capsys):

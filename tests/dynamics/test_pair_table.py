@@ -2,7 +2,10 @@
 
 import math
 import signal
+import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from types import SimpleNamespace
 
@@ -555,6 +558,54 @@ def test_a_full_table_is_left_as_it_is(own_cache, monkeypatch, capsys):
     (pair,) = pair_store._PAIRS.values()
     assert pair._full()
     pair.write()
+
+
+def contact_for_a_table():
+    contact = compile_scene(load_scene(wr.example("suspended_wheelset"), {"contact.patch": "exact"}))[0].contact
+    return contact._replace(strips=contact.strips._replace(looked_up=0.271))
+
+
+def test_threads_that_meet_a_new_pair_share_its_table(own_cache, monkeypatch):
+    made, barrier = [], threading.Barrier(4)
+
+    class Slow(pair_store.Pair):
+        def __init__(self, *given):
+            made.append(given)
+            time.sleep(0.2)
+            super().__init__(*given)
+
+    contact = contact_for_a_table()
+    monkeypatch.setattr(pair_store, "Pair", Slow)
+
+    def pair(_):
+        barrier.wait()
+        return pair_store.pair_of(contact)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert len(set(map(id, pool.map(pair, range(4))))) == len(made) == 1
+
+
+def test_a_pair_that_is_dropped_at_exit_says_nothing(monkeypatch):
+    """Modules are being taken apart then; what it knows has been written before."""
+    pair = pair_of_known_numbers()
+    pair._new, pair.write = 3, lambda: pytest.fail("written")
+    monkeypatch.setattr(sys, "is_finalizing", lambda: True)
+    pair.__del__()
+    monkeypatch.undo()
+    pair._new = 0
+    pair_store.Pair.__del__(pair_store.Pair.__new__(pair_store.Pair))  # one that was never made
+
+
+def test_what_is_said_of_solving_says_how_far_the_run_is(own_cache, monkeypatch):
+    said = []
+    monkeypatch.setattr(pair_store, "tell", said.append)
+    pair = pair_store.Pair(contact_for_a_table(), "told")
+    pair._next_told = 0.0
+    pair._reached = lambda: "the run is at t = 0.4 of 10 s"
+    with pair._told():
+        pass
+    (text,) = said
+    assert text.startswith("pair_told.h5 has ") and text.endswith("s of solving; the run is at t = 0.4 of 10 s")
 
 
 def test_an_interrupt_is_handed_on_after_the_call():

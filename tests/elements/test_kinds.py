@@ -1,6 +1,7 @@
 """What every kind of force element says of itself, and laws of the user's own."""
 
 import math
+import sys
 import time
 from importlib.metadata import EntryPoint
 from types import SimpleNamespace
@@ -265,3 +266,16 @@ def test_a_kind_of_another_package_is_as_a_file_beside_the_others(tmp_path, monk
     assert [len(vehicle.elements.own) for vehicle in vehicles] == [0, 1]  # its text is in the model's fingerprint
     del KINDS["other_rod"]
     law.LAWS[:] = before
+
+
+@pytest.mark.parametrize("text", ["", "KIND = 3", "import not_there", "raise SystemExit(3)", "1 +"])
+def test_a_kind_of_a_broken_package_is_one_line(tmp_path, monkeypatch, text):
+    (tmp_path / "broken_package.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "broken_package", raising=False)
+    entry = EntryPoint("rubber", "broken_package", kinds.GROUP)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: [entry])
+    for kind, expected in (("rubber", "entry point broken_package: "), ("traction_rot", "did you mean 'traction_rod'")):
+        with pytest.raises(wr.InputError, match=rf"elements\.rod_0\.kind: .*{expected}"):
+            scene_with(tmp_path, "broken", rods({**BUILT_IN, "kind": kind}))
+    assert "rubber" not in KINDS

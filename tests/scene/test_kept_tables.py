@@ -40,6 +40,31 @@ def test_a_kept_table_is_the_one_that_was_made(tmp_path, monkeypatch):
     assert len(list(folder.glob("seen_*.npz"))) == 3
 
 
+@pytest.mark.parametrize("fault", ["a byte", "all of another", "no seal", "objects", "empty"])
+def test_kept_table_damaged_is_made_anew_without_a_word(tmp_path, monkeypatch, capsys, fault):
+    monkeypatch.setattr(kept_tables, "table_folder", lambda: tmp_path)
+    pair = WheelOnRail(named_profile("cone:1/20", "wheel"), named_profile("circle:0.3", "rail", 0.0))
+    rail = read_slices(write_rail(tmp_path, [0.0, 0.02, 0.04], lambda s: 0.01 * s)).along(pair.rail)
+    made = kept_table(pair, rail, False)
+    (path,) = tmp_path.glob("seen_*.npz")
+    whole = path.read_bytes()
+    random = np.random.default_rng(3)
+    for place in random.integers(0, len(whole), 30) if fault == "a byte" else [0]:
+        if fault == "a byte":
+            path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x11]) + whole[place + 1 :])
+        elif fault == "all of another":
+            with np.load(path) as found:
+                parts = {name: found[name] for name in found.files}
+            np.savez(path, **parts | {"sections": parts["sections"] + 1e-3})
+        elif fault == "objects":
+            np.savez(path, sections=np.array([{}], object))
+        else:
+            path.write_bytes(whole[: -kept_tables.SEAL] if fault == "no seal" else b"")
+        np.testing.assert_array_equal(kept_table(pair, rail, False).sections, made.sections)
+        assert path.read_bytes()[:4] == whole[:4] and path.stat().st_size == len(whole)
+    assert capsys.readouterr().err == ""
+
+
 def test_so_is_that_of_a_wheel_of_slices(tmp_path, monkeypatch):
     """Which hangs on its sections and their angles."""
     monkeypatch.setattr(kept_tables, "table_folder", lambda: tmp_path)

@@ -10,10 +10,11 @@ import atexit
 import ctypes
 import hashlib
 import os
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from threading import Lock
+from threading import Lock, RLock
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -37,7 +38,7 @@ from wrcore.dynamics.wheel import alone
 from wrcore.errors import InputError
 from wrcore.errors.checked_hdf5 import checked_hdf5, new_hdf5
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder, warn
-from wrcore.kernels.told import PATIENCE, handed_on, interrupted, tell, told_if_long, warn_once
+from wrcore.kernels.told import PATIENCE, handed_on, interrupted, reached_so_far, tell, told_if_long, warn_once
 
 NONSENSE = 0.1, 0.3, 0.3
 WRONG = (3e-3, 7e-3, 0.03), (3e-3, 7e-3, 0.03), (3e-3, 0.01, 0.1), (2e-3, 0.015, 0.2), NONSENSE
@@ -77,6 +78,7 @@ class Pair(PairSolver):
         self.cells, self.misses, self._known, self._others, self._ready = {}, {}, {}, set(), 0
         self._wrong = COARSE if contact.strips.strips == RESOLUTIONS["coarse"].strips else WRONG
         self._spent, self._next_told, self._next_written = 0.0, OFTEN, time.monotonic() + PATIENCE
+        self._reached = str
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64)(self._fill)
         drop_unused(self.path.parent, "pair_*.h5")
         self._take_shipped()
@@ -97,6 +99,7 @@ class Pair(PairSolver):
         with self._lock:
             if key in self.cells or key in self._others or interrupted():
                 return
+            self._reached = reached_so_far()
             if self._full():
                 warn_once(f"{self.path}: no room for more cells; patches in others are solved")
                 return
@@ -120,7 +123,8 @@ class Pair(PairSolver):
         if self._spent > self._next_told:
             self._next_told *= 2.0
             nodes, cells = len(self._solved_at), len(self.cells)
-            tell(f"{self.path.name} has {nodes} nodes and {cells} cells after {self._spent:.0f} s of solving")
+            solved = f"{self.path.name} has {nodes} nodes and {cells} cells after {self._spent:.0f} s of solving"
+            tell("; ".join(filter(None, (solved, self._reached()))))
 
     def _own(self, key):
         """The cell for which a cell stands, whichever of those that stand for each other is asked first: cells of
@@ -224,7 +228,8 @@ class Pair(PairSolver):
                 warn(f"{error}; it is solved anew")
 
     def __del__(self):
-        self.write()
+        if getattr(self, "_new", 0) and not sys.is_finalizing():  # at exit `_write_all` has written it
+            self.write()
 
     def write(self):
         """Keep what was solved since it was last kept, beside what others have."""
@@ -255,13 +260,14 @@ def with_pair(contact):
     return contact._replace(strips=contact.strips._replace(table=pair_of(contact).table()))
 
 
-_PAIRS = WeakValueDictionary()
+_PAIRS, _MAKING = WeakValueDictionary(), RLock()
 
 
 @atexit.register
 def _write_all():
     for pair in list(_PAIRS.values()):
-        pair.write()
+        with pair._lock:
+            pair.write()
 
 
 def pair_of(contact):
@@ -276,10 +282,11 @@ def pair_of(contact):
     digest.update(repr((contact.shear_modulus, contact.poisson_ratio, settings.looked_up, settings.strips,
                         settings.surfaces)).encode())  # fmt: skip
     name = digest.hexdigest()[:16]
-    pair = _PAIRS.get(name)
-    if pair is None:
-        bare = alone(contact, damping=1.0, friction=settings.looked_up)
-        pair = _PAIRS[name] = Pair(bare, name)
+    with _MAKING:  # threads share one
+        pair = _PAIRS.get(name)
+        if pair is None:
+            bare = alone(contact, damping=1.0, friction=settings.looked_up)
+            pair = _PAIRS[name] = Pair(bare, name)
     return pair
 
 

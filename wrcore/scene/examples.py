@@ -2,7 +2,9 @@
 
 import os
 import shutil
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_calls import checked
@@ -50,11 +52,26 @@ def example(name: str) -> Path:
 
 def copy_examples(folder: str | os.PathLike[str]) -> Path:
     """Copy scenes, vehicles, sweeps and wear plans into a folder (returned), to start from; an InputError where there
-    is already something of that name: nothing is written over."""
+    is already something of that name: nothing is written over. Where the disk is full nothing stays behind."""
     folder = Path(folder)
     for place in (folder, *(folder / part for part in PARTS)):
         if place.exists() and (place != folder or not place.is_dir()):
             raise InputError(place, "", "expected nothing of that name: what is there is not written over")
-    for part in PARTS:
-        shutil.copytree(examples_folder() / part, folder / part)
+    made = [place for place in (folder, *folder.parents) if not place.exists()]  # innermost first
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".init.", dir=folder) as stage:
+            for path in (path for part in PARTS for path in (examples_folder() / part).rglob("*") if path.is_file()):
+                copy = Path(stage, path.relative_to(examples_folder()))
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, copy)
+            for part in PARTS:
+                Path(stage, part).rename(folder / part)
+    except BaseException as error:
+        with suppress(OSError):
+            for place in made:
+                place.rmdir()
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(folder)) from None
+        raise
     return folder

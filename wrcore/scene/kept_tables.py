@@ -2,10 +2,10 @@
 and one serves many runs."""
 
 import hashlib
+import io
 import math
 import os
 from contextlib import suppress
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from wrcore.contact.seen_table import SeenTable, seen_table, shape_table
 from wrcore.errors.new_files import appearing
 from wrcore.kernels.cache import drop_unused, source_digest, table_folder
 from wrcore.kernels.told import told_if_long
+
+SEAL = 32
+"""Bytes of the digest behind a file's content."""
 
 OWN = "begin", "step", "sections", "strips", "bounds"
 
@@ -39,19 +42,36 @@ def kept_shape(pair, shape):
 def _kept(digest, make):
     """The table with a digest; `make` makes it where there is none."""
     path = table_folder() / f"seen_{digest}.npz"
-    try:
-        with np.load(path) as found:
-            table = _table_of(found)
-        os.utime(path)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # none yet, or no whole one
+    table = _read(path)
+    if table is None:
         with told_if_long("what wheels see of slices is worked out, once"):
             table = make()
         parts = {name: getattr(table, name) for name in OWN} | table.geometry._asdict()
         del parts["over"]
         with suppress(OSError), appearing(path) as file:
-            np.savez(file, **parts)
+            content = io.BytesIO()
+            np.savez(content, **parts)
+            file.write(content.getvalue() + _seal(content.getvalue()))
         drop_unused(table_folder(), "seen_*.npz")
     return table
+
+
+def _read(path):
+    """The `SeenTable` of a file; None where there is none, or its bytes are not those that were written."""
+    with suppress(OSError):
+        content = path.read_bytes()
+        arrays, seal = content[:-SEAL], content[-SEAL:]
+        if seal == _seal(arrays):
+            with suppress(Exception), np.load(io.BytesIO(arrays), allow_pickle=False) as found:  # of another version
+                table = _table_of(found)
+                os.utime(path)
+                return table
+    return None
+
+
+def _seal(content):
+    """The SHA-256 of a file's content, which stands behind it: readers of ZIP files pass over it."""
+    return hashlib.sha256(content).digest()
 
 
 def _table_of(found):

@@ -12,7 +12,11 @@ from wrcore.errors.checked_yaml import check
 def check_element(item, source):
     """Raise an InputError that names the element if its kind, its keys or their values are not what they should be."""
     field = f"elements.{item['name']}"
-    if kind_named(item["kind"]) is None:
+    try:
+        known = kind_named(item["kind"]) is not None
+    except InputError as error:
+        raise InputError(source, f"{field}.kind", error.expected) from None
+    if not known:
         raise InputError(source, f"{field}.kind", one_of(KINDS, item["kind"]))
     kind, given = KINDS[item["kind"]], {key: item[key] for key in item if key not in ("name", "kind", "bodies")}
     for key in kind.needed:

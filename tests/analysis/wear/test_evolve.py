@@ -174,6 +174,7 @@ DAMAGE = {
     "a pipe": ("profile_001.csv", lambda p: (p.unlink(), os.mkfifo(p))),
     "edited rails": ("rails_000.csv", lambda p: text(p, lambda t: t.replace("0.75", "0.25"))),
     "no plan": ("plan.json", lambda p: p.unlink()),
+    "a deep plan": ("plan.json", lambda p: p.write_text("[" * 200_000)),
     "no digests": ("plan.json", lambda p: text(p, lambda t: t.replace('"files"', '"others"'))),
 }
 

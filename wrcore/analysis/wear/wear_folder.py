@@ -28,7 +28,7 @@ def _read_plan(folder):
         check_regular(path)
         plan = json.loads(path.read_text(encoding="utf-8"))
         return {"digest": str(plan["digest"]), "plan": plan["plan"], "files": dict(plan["files"])}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         expected = "expected the plan of this folder with the digests of its files; remove the folder to begin anew"
         raise InputError(path, "", expected) from None
 

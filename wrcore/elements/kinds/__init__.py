@@ -7,7 +7,9 @@ when a vehicle has a kind that is none of the others.
 from importlib import import_module
 from pkgutil import iter_modules
 
+from wrcore.elements.kind import Kind
 from wrcore.elements.law import LAWS
+from wrcore.errors import InputError
 
 _MODULES = {
     name: import_module(f"{__name__}.{name}") for name in sorted(found.name for found in iter_modules(__path__))
@@ -20,16 +22,29 @@ GROUP = "wrcore.elements"
 
 
 def kind_named(name):
-    """The `KIND` of a name, or None; those of other packages join `KINDS` when the first of them is asked for."""
+    """The `KIND` of a name, or None; those of other packages join `KINDS` when the first of them is asked for. An
+    InputError without a source where the package of this very kind cannot be loaded; others are left out then."""
     if name not in KINDS:
         from importlib.metadata import entry_points  # reads what is installed: some ten milliseconds
 
         for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
             if entry.name not in KINDS:
-                kind = entry.load().KIND
-                KINDS[entry.name] = kind
-                LAWS.extend(kind.laws)
+                kind, fault = _loaded(entry)
+                if kind is not None:
+                    KINDS[entry.name] = kind
+                    LAWS.extend(kind.laws)
+                elif entry.name == name:
+                    raise InputError("", "", f"expected a module with a KIND as the entry point {entry.value}: {fault}")
     return KINDS.get(name)
+
+
+def _loaded(entry):
+    """The `KIND` that an entry point names, or None, and why."""
+    try:
+        kind = entry.load().KIND
+    except (Exception, SystemExit) as error:  # whatever the other package does
+        return None, f"{type(error).__name__}: {error}"
+    return (kind, "") if isinstance(kind, Kind) else (None, f"its KIND is a {type(kind).__name__}")
 
 
 LAWS.extend(law for kind in KINDS.values() for law in kind.laws)
