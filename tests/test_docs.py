@@ -129,7 +129,7 @@ def test_equations_have_labels_of_their_own_and_references_lead_to_one():
 
 def test_numbers_in_the_theory_are_those_of_the_code():
     """Constants that a reader will rely on, each as its page prints it."""
-    from wrcore.analysis.to_accuracy import MARGIN, TIGHTER
+    from wrcore.analysis.to_accuracy import BELIEVED, FINER, SAFETY, TIGHTER
     from wrcore.analysis.wear import wear_laws
     from wrcore.contact.geometry import SCAN_STEP
     from wrcore.contact.reduction import CURVATURE_FLOOR
@@ -180,10 +180,12 @@ def test_numbers_in_the_theory_are_those_of_the_code():
             f"{choice.FIRST['rk4']} steps after the trial, then {choice.APART['rk4']:g} times as many,",
             f"{choice.LAST['rk4']} at most",
             f"for {choice.GROWING} steps if that costs {choice.HOPELESS:g} times",
-            f"less than X/{MARGIN:g}", f"allowed {share['rodas4']:g} times", f"`rodas4p2` {share['rodas4p2']:g} times",
+            f"If {SAFETY:g} times this error", f"at least d/{BELIEVED[1]:g} and at most d",
+            f"1/{FINER[0] ** -1:.2g} and 1/{FINER[1] ** -1:.2g} of",
+            f"allowed {share['rodas4']:g} times", f"`rodas4p2` {share['rodas4p2']:g} times",
             f"allowed {share['rodas5']:g} times",
             f"`rk4` {share['rk4']:g} times",
-            "a tenth of the last",
+            "a tenth of the first",
         ],
     }  # fmt: skip
     assert share["ros34pw2"] == TIGHTER == 0.1  # in words

@@ -7,7 +7,19 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import SCENES as EXAMPLES
-from wrcore.analysis.to_accuracy import COMPLETE, Accuracy, _agree, _end, difference, simulate_to_accuracy
+from wrcore.analysis.to_accuracy import (
+    BELIEVED,
+    COMPLETE,
+    FINER,
+    SAFETY,
+    Accuracy,
+    _end,
+    _estimated,
+    _is_steady,
+    _next_ratio,
+    difference,
+    simulate_to_accuracy,
+)
 from wrcore.cli import NOT_REACHED, main
 from wrcore.errors import InputError
 
@@ -54,12 +66,50 @@ def test_beyond_the_horizon_nothing_is_promised():
     assert "stalled" not in COMPLETE
 
 
-def test_one_agreement_after_differences_that_hardly_shrank_is_not_believed():
+@pytest.mark.parametrize("order", [0.4, 0.7, 1.0])
+def test_estimated_error_of_a_power_law_is_exact(order):
+    """Runs at 1e-3, 1e-4 and 1e-5 whose errors are the tolerance to a power."""
+    errors = np.array([1e-3, 1e-4, 1e-5]) ** order
+    found, power = _estimated(list(-np.diff(errors)), [0.1, 0.1])
+    assert power == pytest.approx(order) and found == pytest.approx(SAFETY * errors[-1])
+
+
+def test_estimated_error_far_below_a_difference_is_not_believed():
+    assert _estimated([1e-5], [0.01])[0] == pytest.approx(SAFETY * 1e-5 / BELIEVED[1])
+
+
+def test_estimated_error_of_two_runs_takes_order_one():
+    assert _estimated([9e-6], [0.1]) == (pytest.approx(SAFETY * 1e-6), 1.0)
+
+
+def test_differences_that_hardly_fall_are_no_agreement():
     """A free wheelset at 79 m/s whose runs at 1e-6 and 1e-7 differ by 0.9 um, and by 27 um from tighter ones."""
-    impacts = [5.5e-5, 1.5e-5, 9.0e-7]
-    assert not _agree(impacts, 1e-5) and _agree([*impacts, 9.5e-7], 1e-5)
-    assert _agree(impacts[1:], 1e-5) and _agree([1e-4, 1e-5, 9e-7], 1e-5)
-    assert not _agree([1e-4, 1e-5, 2.1e-6], 1e-5)
+    impacts, ratios = [5.5e-5, 1.5e-5, 9.0e-7], [0.1, 0.1, 0.1, 0.1]
+    assert not _is_steady(impacts, ratios[:3], 1e-5) and _is_steady([*impacts, 9.5e-7], ratios, 1e-5)
+    assert _is_steady(impacts[1:], ratios[:2], 1e-5) and _is_steady([1e-4, 1e-5, 9e-7], ratios[:3], 1e-5)
+
+
+@pytest.mark.parametrize("before", [1e-5, 1e-6, np.inf])
+def test_estimated_error_where_differences_do_not_fall_is_theirs(before):
+    assert _estimated([before, 1e-5], [0.1, 0.1]) == (SAFETY * 1e-5, 0.0)
+    assert _estimated([before, np.inf], [0.1, 0.1])[0] == np.inf
+
+
+def test_next_tolerance_follows_from_the_missing_accuracy():
+    assert _next_ratio(10.0**1.3, 1.0) == pytest.approx(0.1)
+    assert _next_ratio(1.01, 1.0) == FINER[0] and _next_ratio(1e9, 1.0) == FINER[1]
+    assert _next_ratio(np.inf, 1.0) == _next_ratio(5.0, 0.6) == _next_ratio(0.9, 1.0) == 0.1
+    assert _next_ratio(5.0, 0.8) < _next_ratio(5.0, 1.0)
+
+
+@pytest.mark.parametrize("name", ["coach in a curve", "coach on irregular rails"])
+def test_cost_of_a_micrometre_is_below_three_default_runs(name):
+    """The default tolerance, 1e-4, keeps 1 um in both scenes."""
+    scene = wr.load_scene(*SCENES[name])
+    run, found = simulate_to_accuracy(scene, 1e-6)
+    plain = wr.simulate(scene)
+    assert found.reached and difference(plain, tight(*SCENES[name])) < 1e-6
+    assert found.cost * run.counters["rhs_evaluations"] < 3.0 * plain.counters["rhs_evaluations"]
 
 
 def test_status_of_an_accuracy_that_is_not_reached(capsys, monkeypatch):

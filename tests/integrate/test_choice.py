@@ -11,7 +11,7 @@ import wrcore as wr
 from tests.conftest import SCENES
 from tests.integrate.auto import cost
 from tests.integrate.scenes import SCENES as MEASURED
-from tests.integrate.scenes import compiled
+from tests.integrate.scenes import compiled, curve, rough
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.errors import InputError
 from wrcore.integrate import choice, engine
@@ -54,6 +54,22 @@ def test_auto_costs_little_more_than_the_cheaper_method(name, speed, duration, c
     runs = [integrate(model, start, np.linspace(0.0, duration, 11), method) for method in ("auto", "rodas5", "rk4")]
     auto, *plain = (cost(model, run) for run in runs)
     assert auto < 1.35 * min(plain)
+
+
+def test_auto_at_1e_5_takes_no_more_evaluations_than_rodas5():
+    """The work of Rodas5 counted 1.3 times at any tolerance makes it 1.5 times as many."""
+    model, start = compiled("trailer vehicle", 16.7, curve(300.0) | rough())
+    runs = [integrate(model, start, np.linspace(0.0, 6.0, 11), method, 1e-5) for method in ("auto", "rodas5", "rk4")]
+    auto, rodas5, rk4 = (run.rhs_evaluations for run in runs)
+    assert rk4 > 1.5 * rodas5 and auto < 1.1 * rodas5
+
+
+def test_factor_on_work_falls_with_the_tolerance():
+    factors = [choice.counted("rodas5", rtol) for rtol in (1e-2, 1e-4, 3e-5, 1e-5, 1e-9)]
+    assert (
+        factors[:2] == [1.3, 1.3] and 0.65 < factors[2] < 1.3 and factors[3:] == pytest.approx([0.65, 0.65], abs=0.01)
+    )
+    assert choice.counted("rk4", 1e-9) == 1.0
 
 
 @pytest.mark.parametrize("speed", [60.0, 62.0])

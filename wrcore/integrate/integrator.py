@@ -39,7 +39,7 @@ from wrcore.integrate.choice import CHOICES
 from wrcore.integrate.engine import Control, Record, advance_explicit, new_memory, new_scratch
 from wrcore.integrate.rosenbrock import advance_rosenbrock, factorise_again, new_linear
 from wrcore.integrate.tableaus import EXPLICIT, ROSENBROCK
-from wrcore.integrate.tolerances import HALF_GAUGE, pace, step_tolerances
+from wrcore.integrate.tolerances import HALF_GAUGE, LENGTH, pace, step_tolerances
 from wrcore.integrate.trajectory import Checkpoint, Trajectory
 from wrcore.kernels.aside import planning
 from wrcore.kernels.told import reaching
@@ -211,7 +211,9 @@ class Integration:
 
     def _look(self, record):
         """Go on by another method where that is worth it."""
-        method = choice.method_after(self.notes, self.method, self.model, self.equations, self.memory)
+        rtol, atol = self._tolerance
+        tolerance = rtol + atol / LENGTH
+        method = choice.method_after(self.notes, self.method, self.model, self.equations, self.memory, tolerance)
         if method != self.method:
             begun = time.perf_counter()
             self._take(method)
