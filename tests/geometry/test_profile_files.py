@@ -195,8 +195,39 @@ def test_a_header_may_be_in_quotes(tmp_path):
 
 def test_a_unit_mistake_is_noticed(tmp_path):
     path = str(write(tmp_path, "wheel.dat", columns(U, wheel()(U))))
-    with pytest.raises(InputError, match="looks like mm, declare unit: mm"):
+    with pytest.raises(InputError, match="looks like mm: declare unit: mm"):
         read_profile({"points": path, "unit": "m"}, "wheel")
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+@pytest.mark.parametrize("is_inch", [True, False])
+def test_unit_guess_names_the_unit_that_is_read(tmp_path, unit, is_inch):
+    scale = 1.0 / 0.0254 if is_inch else {"m": 1e3, "mm": 1.0}[unit]
+    path = write(tmp_path, "wheel.txt", columns(U, wheel()(U), scale))
+    with pytest.raises(InputError, match="looks like (inch|mm|m): declare unit:") as caught:
+        read_profile({"points": path, "unit": unit}, "wheel")
+    advised = str(caught.value).rpartition("unit: ")[2]
+    assert deviation(read_profile({"points": path, "unit": advised}, "wheel")) < 0.2e-6
+    with pytest.raises(InputError, match=f"as of {advised}"):
+        read_profile({"points": path}, "wheel")
+    header = f"u_{unit},f_{unit}\n"
+    with pytest.raises(InputError, match=f"looks like {advised}: u_{advised},f_{advised} in the header"):
+        read_profile(write(tmp_path, "wheel.csv", header + path.read_text()), "wheel")
+
+
+def test_side_faces_at_equal_abscissae_are_left_out_of_columns(tmp_path):
+    rail = named_profile("60E1", "rail", 0)
+    side = np.linspace(-0.030, rail.f[0] - 1e-4, 20)
+    u = np.concatenate([np.full(20, rail.u[0]), rail.u, np.full(20, rail.u[-1])])
+    path = write(tmp_path, "rail.csv", "u_mm,f_mm\n" + columns(u, np.concatenate([side, rail.f, side[::-1]])))
+    inside = np.linspace(-0.034, 0.034, 681)
+    assert np.max(np.abs(read_profile(str(path), "rail")(inside) - rail(inside))) < 1e-6
+
+
+@pytest.mark.parametrize("smoothing", [0.001, 0])
+def test_smoothing_at_its_bounds_is_accepted(tmp_path, smoothing):
+    path = write(tmp_path, "wheel.csv", "u_mm,f_mm\n" + columns(U, wheel()(U)))
+    read_profile({"points": str(path), "smoothing": smoothing}, "wheel")
 
 
 @pytest.mark.parametrize("spec", [{}, {"points": 3}, {"points": ""}, "absent.csv", "a\0b.csv"])

@@ -258,7 +258,7 @@ POINTS = "".join(f"{k} 0\n" for k in range(20))
             "part: expected none, as the file has no sections [Profile1Points], got 1",
         ),
         ("w.whl", OLD + POINTS, {"side": "left"}, "side: expected this of Vampire files only"),
-        ("w.whl", OLD + POINTS, {"tape_circle": 0.5}, "tape_circle or flange_back says where"),
+        ("w.whl", OLD + POINTS, {"tape_circle": 0.5}, "tape_circle, flange_back or shift says where"),
         ("w.csv", "u_mm,f_mm\n" + POINTS, {"part": 1}, "part: expected this of MiniProf files only"),
         ("r.ban", OLD + POINTS, {}, "r.ban: expected a wheel profile, got a rail"),
         ("w.whe", "WHEEL\n", {}, "w.whe: line 1: expected WHEELPROFILE or RAILPROFILE, got 'WHEEL'"),

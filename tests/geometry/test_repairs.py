@@ -105,7 +105,13 @@ def heads(depth, apart, form):
 
 
 @pytest.mark.parametrize("form", ["csv", "prr"])
-@pytest.mark.parametrize(("depth", "says"), [(20.0, "a steeper place"), (45.0, "another one, .* m below the highest")])
+@pytest.mark.parametrize(
+    ("depth", "says"),
+    [
+        (20.0, "points more than 15 mm beside its head, as of another head"),
+        (45.0, "another one, .* m below the highest"),
+    ],
+)
 def test_a_slice_with_two_heads_is_refused(tmp_path, depth, says, form):
     """All but the highest head was left out, without a word."""
     with pytest.raises(InputError, match=f"got {says}"):

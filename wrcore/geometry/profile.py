@@ -60,16 +60,16 @@ class ProfileCurve:
 
     @classmethod
     def from_points(cls, u, f, kind, name="points", *, lines=None, trim=False, inclination=0.0, smoothing=0.0,
-                    window=WINDOW, spacing=SPACING):  # fmt: skip
+                    window=WINDOW, spacing=SPACING, mends=None):  # fmt: skip
         """Curve through measured points u, f (m), u strictly rising or falling: a parametric cubic spline (C2 along the
         profile) that may keep ``smoothing`` (root mean square, m) from them, sampled at uniform nodes (see
         `from_sections`).
 
         Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
         stays) after a turn by ``inclination`` (0: they lie in track pose). ``trim`` keeps the single-valued portion
-        around the origin instead of refusing a profile that turns back. ``name`` and the points' ``lines`` in a file
-        are for messages."""
-        outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing)
+        around the origin instead of refusing a profile that turns back. ``name``, the points' ``lines`` in a file and
+        ``mends`` (`wrcore.geometry.profile_checks.Mends`) are for messages; False takes points of any shape."""
+        outline = profile_points.fit(u, f, kind, name, lines, trim, inclination, smoothing, mends)
         low, high = outline.working_span(STEEPEST, trim)
         nodes = _nodes(low, high, spacing)
         value, slope = outline.evaluate(nodes)

@@ -22,6 +22,7 @@ from wrcore.errors import InputError, one_of
 from wrcore.errors.column_files import read_column_file, read_text, split_unit
 from wrcore.geometry import profile_meters
 from wrcore.geometry.profile import SPACING, STEEPEST, WINDOW, ProfileCurve
+from wrcore.geometry.profile_checks import Mends, check_extent
 from wrcore.geometry.profile_meters import METER_FILES, VAMPIRE_FILES, Stated
 from wrcore.kernels.cache import warn
 
@@ -58,7 +59,7 @@ def read_profile(spec, kind, inclination=0.0, window=WINDOW, spacing=SPACING):
     turn = 0.0 if spec.get("inclined", True) or kind == "wheel" else inclination
     curve = ProfileCurve.from_points(
         u, f, kind, str(path), lines=lines[inside], trim=stated.trimmed, inclination=turn,
-        smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing,
+        smoothing=float(spec.get("smoothing", 0.0)), window=window, spacing=spacing, mends=stated.mends,
     )  # fmt: skip
     left_out = np.setdiff1d(lines, lines[inside][curve.outline.followed(STEEPEST)])
     count = f"{lines.size} points{stated.odd}"
@@ -79,7 +80,8 @@ def read_points(spec, kind):
     path = Path(spec["points"])
     u, f, lines, stated = _read(path, read_text(path, "a readable profile file"), spec, kind)
     inside = _within(path, spec, u)
-    u, f, told, assumed = _placed(spec, kind, stated, u[inside], f[inside], path)
+    u, f, told, assumed, given = _placed(spec, kind, stated, u[inside], f[inside], path)
+    stated = stated._replace(mends=_mends(spec, stated.mends, given))
     return u, f, lines, inside, stated, told, assumed
 
 
@@ -91,24 +93,33 @@ def kind_of(path):
 def _read(path, text, spec, kind):
     """Points (n,) in m as a file has them, the lines of each, and what the file states of them."""
     ending, unit = path.suffix.lower(), spec.get("unit")
+    origin = "tape_circle, flange_back or shift says where it is"
+    shape = "state mirrored and downwards, true or false"
+    mends = Mends("", "", origin, "declare unit: {}", shape, _UNITS[unit or "mm"])
     if ending not in _SIMPACK and kind_of(path) not in (kind, None):
         raise InputError(path, "", f"expected a {kind} profile, got a {kind_of(path)}")
     if ending in _SIMPACK:
         _check_type(path, text, kind)
         u, f, lines = read_simpack(path, text, "smoothing" in spec)
         beyond = _simpack_points(path, text, _header(path, text)[1])[2].size - lines.size
+        factor = 1.0 / _value(path, _header(path, text)[0], "units.len.f", float("nan"))
+        mends = Mends(
+            "mirror.y in the file", "mirror.z in the file", origin, "units.len.f in the file (of {})", "", factor, True
+        )
         stated = Stated("SIMPACK", odd=f" and {beyond} beyond its bounds" if beyond else "")
     elif ending in VAMPIRE_FILES:
         u, f, lines, stated = profile_meters.read_vampire(path, text, kind, spec.get("side", "right"))
     elif profile_meters.is_meter_file(path, text):
         u, f, lines, stated = profile_meters.read_meter(path, text, kind, _UNITS[unit or "mm"], spec.get("part"))
     else:
-        u, f, lines, unit = read_columns(path, text, unit)
+        u, f, lines, unit, headed = read_columns(path, text, unit)
+        advice = "u_{0},f_{0} in the header" if headed else "declare unit: {}"
+        mends = mends._replace(unit=advice, factor=_UNITS[unit])
         stated = Stated("columns", trimmed=False)
     for key, form in (("part", "MiniProf"), ("side", "Vampire")):
         if key in spec and not stated.about.startswith(form):
             raise InputError(path, key, f"expected this of {form} files only")
-    return u, f, np.asarray(lines, dtype=int), stated
+    return u, f, np.asarray(lines, dtype=int), stated._replace(mends=mends)
 
 
 def _within(path, spec, u):
@@ -141,6 +152,8 @@ def _placed(spec, kind, stated, u, f, path):
     f = -f if given["downwards"] else f
     told += [key + " (assumed)" * (key in assumed) for key in ("mirrored", "downwards") if given[key]]
     if "flange_back" in spec:
+        if u.size and np.isfinite([u, f]).all():
+            check_extent(u, f, kind, str(path), stated.mends)
         if not _shows_back(u, f):
             expected = (
                 f"expected points up to the flange back, got none that lie {1e3 * _BACK:g} mm above the flange's tip"
@@ -154,7 +167,18 @@ def _placed(spec, kind, stated, u, f, path):
     elif given["tape_circle"]:
         u = u - given["tape_circle"]
         told += [f"tape circle {1e3 * given['tape_circle']:g} mm from the file's origin" + " (assumed)" * bool(assumed)]
-    return u, f, ", ".join(told), assumed
+    return u, f, ", ".join(told), assumed, given
+
+
+def _mends(spec, mends, given):
+    """What messages advise, beside the keys of ``mends`` that the file's form has."""
+    if mends.u:  # a SIMPACK file states its directions
+        return mends
+    turned = {key: f"{key}: {str(not given[key]).lower()}" for key in ("mirrored", "downwards")}
+    return mends._replace(
+        u=turned["mirrored"], f=turned["downwards"], is_stated={"mirrored", "downwards"} <= set(spec),
+        is_side_stated="mirrored" in spec,
+    )  # fmt: skip
 
 
 def _ranges(lines):
@@ -210,10 +234,10 @@ def _is_distance(value):
 
 
 def read_columns(path, text, unit=None):
-    """Points u, f (n,) in m of a file of columns, the line number of each, and the unit; a header may state the
-    ``unit``, or must agree with it."""
+    """Points u, f (n,) in m of a file of columns, the line number of each, the unit, and whether a header
+    states it; it must agree with ``unit``."""
     file = read_column_file(path, text, header=False)
-    columns = [0, 1]
+    columns, headed = [0, 1], False
     if file.names:
         named = [split_unit(name) for name in file.names]
         bases = [base for base, _ in named]
@@ -221,6 +245,7 @@ def read_columns(path, text, unit=None):
             line, got = file.header
             raise InputError(path, f"line {line}", f"expected two numbers, got {got[:40]!r}{_HEADED}")
         columns = [bases.index("u"), bases.index("f")]
+        headed = bool(named[columns[0]][1])
         unit = _agreed(path, file.header[0], [named[k][1] for k in columns], unit)
     points = file.numbers(columns)
     if unit is None:
@@ -231,7 +256,7 @@ def read_columns(path, text, unit=None):
             path, "unit", f"expected a header u_m,f_m or u_mm,f_mm, or unit: m, mm or inch beside the path{guess}"
         )
     u, f = points.T * _UNITS[unit]
-    return u, f, file.lines, unit
+    return u, f, file.lines, unit, headed
 
 
 def _agreed(path, line, stated, declared):

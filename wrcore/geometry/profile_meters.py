@@ -18,6 +18,7 @@ import numpy as np
 
 from wrcore.errors import InputError
 from wrcore.errors.column_files import read_column_file
+from wrcore.geometry.profile_checks import Mends
 
 METER_FILES = (".whl", ".ban", ".mpt")
 VAMPIRE_FILES = (".whe", ".rai")
@@ -49,6 +50,8 @@ class Stated(NamedTuple):
     """What a reader should look at."""
     trimmed: bool = True
     """Whether side faces are left out instead of refused."""
+    mends: Mends = Mends()
+    """What messages advise."""
 
 
 def is_meter_file(path, text):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wrcore.errors import InputError
+from wrcore.geometry.profile_checks import Mends, check_beside, check_extent, check_rail, check_wheel
 from wrcore.kernels.cache import warn
 
 if TYPE_CHECKING:  # a third of a second that runs with standard profiles need not wait
@@ -15,7 +16,6 @@ if TYPE_CHECKING:  # a third of a second that runs with standard profiles need n
 FEWEST = 8
 """Fewest points that make a profile."""
 
-_LARGEST, _SMALLEST = 1.0, 5e-3  # m; a profile is neither wider nor narrower, so the unit must be wrong
 _CLOSE = 1e-7  # m; points closer than this carry rounding errors, not shape
 _DEEPEST = 0.025  # m below a rail's top; files often go on round the head's chin, which is never in contact
 _LEVEL = 2e-7  # m; a rail origin this close to the top's height is the top
@@ -25,11 +25,10 @@ _LEFT_OUT = 3e-3  # m; side faces of a single-valued profile take up less than t
 _WIDEST, _USUAL = 0.010, 5.0  # m; a gap is wider than so many usual distances of points, and none wider is bridged
 _STRAIGHT, _BENT = 2e-5, 5e-4  # m; a bridge that bends less is a line's, and none that bends more is believed
 _COARSE = 3e-4  # m; a file whose points leave more open between two of them is told
-_BENDS = 5.0  # 1/m; noise that bends a profile by more is told
+_BENDS = 2.0  # 1/m; noise that bends a profile by more is said: 1 um at points 0.5 mm apart bends by 4
 _MEDIAN = 0.6745  # of the size of Gaussian noise, over its standard deviation
-_FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
-_SMOOTHER = " (dents and noise: smoothing, such as 1.0e-5, evens them out)"
-_OUTSIDE = "expected u = 0 (tape circle) inside a wheel profile, got it outside: tape_circle or flange_back says where"
+_QUIET = 4e-7  # m; noise below it, and rounding to 1 um, changes conicity by less than 0.002
+_ADVISED = 1.1  # smoothing over noise (1 to 3 um, points 0.1 to 0.5 mm apart); at 0.8 conicity keeps all of its error
 _BACK = 1e-3  # m; where two passes of a meter are joined, points go back by less than this
 
 
@@ -86,7 +85,10 @@ class Outline:
             u = u[f > f[(u >= low) & (u <= high)].max() - _DEEPEST]
         for end, rest in ((low, low - u.min()), (high, u.max() - high)):
             if rest > _LEFT_OUT:
-                got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond" + _SMOOTHER
+                got = f"got a steeper place at u = {end:.4f} m with {rest:.4f} m of points beyond"
+                kept = np.isfinite(self.s)
+                size, _ = _scatter(*self.points[kept].T)
+                got += _smoother(size) if size > _QUIET else " (of dents and noise: smoothing evens them out)"
                 raise InputError(self.name, "points", f"expected slopes below {steepest:g}, {got}")
         return low, high
 
@@ -133,29 +135,39 @@ class Outline:
         return float(points[points[:, 1] >= -depth - 1e-12, 0].min())
 
 
-def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0):
+def fit(u, f, kind, name, lines=None, trim=False, inclination=0.0, smoothing=0.0, mends=None):
     """Outline through points that have been checked, in its pose: wheel f(0) = 0, rail with its origin at the highest
-    point; arguments as for `wrcore.geometry.profile.ProfileCurve.from_points`."""
+    point; arguments as for `wrcore.geometry.profile.ProfileCurve.from_points`. ``mends`` (`Mends`): what messages
+    advise, False where the shape needs no check."""
+    mends = Mends() if mends is None else mends
     u, f = np.array(u, dtype=float), np.array(f, dtype=float)
     lines = np.arange(1, u.size + 1) if lines is None else np.asarray(lines)
     _check_numbers(u, f, name, lines)
-    if not 0.0 <= smoothing < 1e-3:
+    check_extent(u, f, kind, name, mends or Mends())
+    rounding = _rounding(u, f, (mends or Mends()).factor)
+    if not 0.0 <= smoothing <= 1e-3:
         raise InputError(name, "smoothing", f"expected a distance in m, 0 to 0.001, got {smoothing:g}")
     kept = np.flatnonzero(np.append(True, (np.diff(u) != 0.0) | (np.diff(f) != 0.0)))  # a point twice says nothing more
     if u[-1] < u[0]:
         kept = kept[::-1]
     if not trim:
-        _check_monotone(u[kept], name, lines[kept])
+        trim = _has_side_faces(u[kept], f[kept], name, lines[kept])
     if inclination:
         c, s = np.cos(np.arctan(inclination)), np.sin(np.arctan(inclination))
         u, f = u * c - f * s, u * s + f * c
     if kind == "rail":
-        _check_rail(f[kept], name)
-        kept = kept[_head(u[kept], f[kept], lines[kept], name)]
+        if mends:
+            check_rail(u[kept], f[kept], name, mends)
+        head = _head(u[kept], f[kept], lines[kept], name)
+        if mends:
+            check_beside(u[kept], f[kept], name)
+        kept = kept[head]
     if trim:
         kept = kept[_forward(u[kept], f[kept])]
-    outline = _spline(u, f, kept, name, lines, smoothing)
-    return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline, u[kept], f[kept])
+    if kind == "wheel" and mends:
+        check_wheel(u[kept], f[kept], name, mends)
+    outline = _spline(u, f, kept, name, lines, smoothing, rounding)
+    return _rail_pose(outline) if kind == "rail" else _wheel_pose(outline)
 
 
 def _check_numbers(u, f, name, lines):
@@ -167,27 +179,20 @@ def _check_numbers(u, f, name, lines):
     if bad.size:
         i = bad[0]
         raise InputError(name, f"line {lines[i]}", f"expected finite numbers, got {u[i]:g}, {f[i]:g}")
-    width, height = np.ptp(u), np.ptp(f)
-    if max(width, height) > _LARGEST:
-        got = f"got an extent of {max(width, height):.4g} m"
-        raise InputError(name, "unit", f"expected a profile below 1 m; looks like mm, declare unit: mm; {got}")
-    if width < _SMALLEST:
-        got = f"got an extent of {width:.4g} m"
-        raise InputError(name, "unit", f"expected a profile wider than 5 mm; looks like m, declare unit: m; {got}")
 
 
-def _check_monotone(u, name, lines):
-    back = np.flatnonzero(np.diff(u) <= 0.0)
-    if back.size:
-        i = back[0] + 1
+def _has_side_faces(u, f, name, lines):
+    """Whether points do not advance on faces at their ends, which are left out; refuse those that do not elsewhere."""
+    du, df = np.diff(u), np.diff(f)
+    at_end = np.minimum(u[1:] - u.min(), u.max() - u[1:]) < _LEFT_OUT
+    back = du <= 0.0
+    wrong = np.flatnonzero(back & ~(at_end & (np.abs(df) > -_STEEP * du)))
+    if wrong.size:
+        i = wrong[0] + 1
         got = f"got {u[i]:.9g} m beside {u[i - 1]:.9g} m"
-        where = "leave out side faces and anything below the head or behind the flange"
+        where = "leave out anything below the head or behind the flange"
         raise InputError(name, f"line {lines[i]}", f"expected strictly monotone u ({where}), {got}")
-
-
-def _check_rail(f, name):
-    if np.argmax(f) in (0, f.size - 1):
-        raise InputError(name, "points", "expected a rail head with f positive up, got its highest point at an end")
+    return bool(back.any())
 
 
 def _head(u, f, lines, name):
@@ -238,8 +243,9 @@ def _check_gaps(u, f, name, lines):
         warn(f"{name}: line {lines[i + 1]}: {apart}: the curve may be wrong by as much")
 
 
-def _check_scatter(u, f, name):
-    """Tell of points whose noise bends the curve through them: each beside the cubic through its four neighbours."""
+def _scatter(u, f):
+    """Standard deviation of points' noise, m, and how much it bends the curve, 1/m: each point beside the cubic through
+    its four neighbours; 0 where nothing can be said."""
     around = np.stack([u[i : u.size - 4 + i] for i in (0, 1, 3, 4)])
     between, own = around[:, None] - around, np.eye(4, dtype=bool)[..., None]
     with np.errstate(all="ignore"):  # on side faces points lie above each other
@@ -247,14 +253,33 @@ def _check_scatter(u, f, name):
         missed = f[2:-2] - sum(beside[k] * f[i : u.size - 4 + i] for k, i in enumerate((0, 1, 3, 4)))
         scatter = np.abs(missed) / np.sqrt(1.0 + (beside**2).sum(axis=0)) / _MEDIAN
     level = (np.abs(f[4:] - f[:-4]) < u[4:] - u[:-4]) & np.isfinite(scatter)
-    if np.any(level):
-        bend = np.median(scatter[level] / (0.25 * (u[4:] - u[:-4])[level]) ** 2)
-        if bend > _BENDS:
-            size = np.median(scatter[level])
-            warn(f"{name}: points scatter by {size:.1g} m, which bends the curve by {bend:.2g}/m{_SMOOTHER}")
+    if not np.any(level):
+        return 0.0, 0.0
+    return float(np.median(scatter[level])), float(np.median(scatter[level] / (0.25 * (u[4:] - u[:-4])[level]) ** 2))
 
 
-def _spline(u, f, kept, name, lines, smoothing):
+def _rounding(u, f, factor):
+    """Standard deviation (m) of points that are rounded to 0.1 to 0.001 units of ``factor`` m, 0 of others."""
+    raw = np.concatenate((u, f)) / factor
+    step = next((10.0**-d for d in (1, 2, 3) if np.all(np.abs(raw - np.round(raw, d)) < 1e-3 * 10.0**-d)), 0.0)
+    return step * factor / np.sqrt(12.0)
+
+
+def _smoother(size):
+    """The smoothing that evens out noise of a size (m)."""
+    return f" (smoothing: {_ADVISED * size:.1e} evens them out)"
+
+
+def _check_scatter(u, f, name, rounding):
+    """Tell of points whose noise bends the curve through them, and of the smoothing that evens it out; ``rounding``
+    (m): standard deviation of rounded points, whose neighbours err alike."""
+    size, bend = _scatter(u, f)
+    if bend > _BENDS and size > _QUIET and not size < 0.5 * rounding:
+        advised = rounding / _ADVISED if size < 2.0 * rounding else size
+        warn(f"{name}: points scatter by {size:.1e} m, which bends the curve by {bend:.2g}/m{_smoother(advised)}")
+
+
+def _spline(u, f, kept, name, lines, smoothing, rounding):
     """Parametric cubic spline over chord length through the points ``kept``; those that nearly coincide with the one
     before are left out."""
     from scipy.interpolate import BSpline, splprep
@@ -267,7 +292,7 @@ def _spline(u, f, kept, name, lines, smoothing):
         raise InputError(name, "points", f"expected at least {FEWEST} distinct points, got {len(used)}")
     _check_gaps(u[used], f[used], name, lines[used])
     if smoothing == 0.0:
-        _check_scatter(u[used], f[used], name)
+        _check_scatter(u[used], f[used], name, rounding)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # FITPACK warns where it misses the asked distance
@@ -290,13 +315,6 @@ def _rail_pose(outline):
     return outline.shifted(-top_u, -top_f)
 
 
-def _wheel_pose(outline, u, f):
-    if not u.min() < 0.0 < u.max():
-        raise InputError(outline.name, "points", _OUTSIDE)
-    if u[np.argmin(f)] > 0.0:
-        expected = "expected the flange at negative u and f positive up, got the largest radius on the field side"
-        raise InputError(outline.name, "points", expected)
-    if max(f[0], f[-1]) < f.max() - _FALSE_FLANGE:
-        raise InputError(outline.name, "points", "expected a wheel, got a profile that falls on both sides like a rail")
+def _wheel_pose(outline):
     outline.span(_ANY_SLOPE)
     return outline.shifted(0.0, -float(outline.evaluate(np.zeros(1))[0][0]))

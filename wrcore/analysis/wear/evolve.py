@@ -210,7 +210,7 @@ def profile_row(scene, folder, step, gone):
     """
     u, now = read_points(file_of(folder, "profile", step))
     with untold():
-        curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}")
+        curve = ProfileCurve.from_points(u, now, "wheel", f"profile {step}", mends=False)
     new = read_points(file_of(folder, "profile", 0))[1]
     vehicle = scene.vehicle
     pair = WheelsetOnTrack.alike(curve, scene.rail, scene.track.gauge, vehicle.rolling_radius, vehicle.half_distance)

@@ -115,7 +115,7 @@ def laid_rails(folder, step, place, scene):
     for side, new in _new_rails(scene).items():
         path = rail_file(folder, step, place, side, "laid")
         u, f = points[side] = read_points(path)
-        curve = ProfileCurve.from_points(u, f, "rail", str(path))
+        curve = ProfileCurve.from_points(u, f, "rail", str(path), mends=False)
         missing = np.min(curve.f) - np.max(curve.f) - (f[0] - f.max())
         if missing > LEFT_OUT:
             got = f"got edges at which the curve ends {1e3 * missing:.1f} mm above its last point"

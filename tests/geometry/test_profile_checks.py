@@ -1,0 +1,152 @@
+"""Profiles in a wrong direction, from a wrong origin or of the other kind: read as they are meant, or refused."""
+
+import re
+
+import numpy as np
+import pytest
+
+from wrcore.errors import InputError
+from wrcore.geometry.profile import ProfileCurve
+from wrcore.geometry.profile_files import read_profile
+from wrcore.geometry.standards import RAIL_HEADS, named_profile
+
+S1002 = named_profile("S1002", "wheel")
+SPANS = [(-67, 59), (-60, 55), (-55, 55), (-50, 55), (-45, 50), (-42, 50), (-38, 50), (-54.5, 12), (-45, 12), (-60, 30)]
+FLANGELESS = [(-34, 50), (-30, 50), (-20, 50), (-20, 20)]
+TURNS = {"as is": (1, 1), "u": (-1, 1), "f": (1, -1), "both": (-1, -1)}
+
+
+def shapes(low, high):
+    """Points of wheels by name, m: the standard one, hollow, chamfered, a tram's, one of a scaled rig."""
+    u = np.arange(1e-3 * low, 1e-3 * high + 1e-9, 2e-4)
+    f = S1002(u)
+    hollow = f + 3e-3 * (np.exp(-(((u - 0.01) / 0.015) ** 2)) - np.exp(-((0.01 / 0.015) ** 2)))
+    wheels = {"S1002": (u, f), "hollow": (u, hollow), "chamfer": (u, f + np.maximum(0.0, u - 0.045))}
+    return wheels | {"tram": (0.9 * u, 0.8 * f)}
+
+
+def written(folder, u, f, turn=(1, 1)):
+    u, f = turn[0] * u, turn[1] * f
+    path = folder / "profile.csv"
+    path.write_text("u_mm,f_mm\n" + "".join(f"{1e3 * a:.5f},{1e3 * b:.5f}\n" for a, b in zip(u, f, strict=True)))
+    return path
+
+
+def is_read(path, kind, u, f, **keys):
+    """Whether a file is read as the points are meant; False where it is refused."""
+    try:
+        curve = read_profile({"points": str(path), **keys}, kind)
+    except InputError as error:
+        assert "\n" not in str(error)
+        return False
+    inside = slice(5, -5)
+    assert np.nanmax(np.abs(curve(u[inside]) - f[inside])) < 2e-6, "read, but otherwise than it is meant"
+    return True
+
+
+def advised(path, kind):
+    """Keys that the message advises."""
+    with pytest.raises(InputError) as caught:
+        read_profile(str(path), kind)
+    return {key: value == "true" for key, value in re.findall("(mirrored|downwards): (true|false)", str(caught.value))}
+
+
+@pytest.mark.parametrize("span", SPANS)
+@pytest.mark.parametrize("shape", ["S1002", "hollow", "chamfer", "tram"])
+def test_turned_wheel_is_read_with_the_advised_keys(tmp_path, span, shape):
+    u, f = shapes(*span)[shape]
+    for turn in TURNS.values():
+        path = written(tmp_path, u, f, turn)
+        if turn == (1, 1):
+            assert is_read(path, "wheel", u, f)
+        else:
+            assert is_read(path, "wheel", u, f, **advised(path, "wheel"))
+
+
+@pytest.mark.parametrize("span", FLANGELESS)
+def test_tread_without_flange_needs_stated_directions(tmp_path, span):
+    u, f = shapes(*span)["S1002"]
+    for turn in TURNS.values():
+        path = written(tmp_path, u, f, turn)
+        with pytest.raises(InputError, match="of a wheel without one, state mirrored and downwards"):
+            read_profile(str(path), "wheel")
+    assert is_read(written(tmp_path, u, f), "wheel", u, f, mirrored=False, downwards=False)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1 / 40, 1 / 10])
+def test_cones_and_cylinders_are_wheels(tmp_path, slope):
+    u = np.arange(-0.06, 0.06, 5e-4)
+    assert is_read(written(tmp_path, u, slope * u), "wheel", u, slope * u)
+
+
+@pytest.mark.parametrize("aside", [70.0, 55.0, 45.0, -60.0])
+def test_tape_circle_off_the_tread_is_refused_with_keys(tmp_path, aside):
+    u, f = shapes(-67, 59)["S1002"]
+    with pytest.raises(InputError, match="tape_circle, flange_back or shift says where"):
+        read_profile(str(written(tmp_path, u + 1e-3 * aside, f)), "wheel")
+    path = written(tmp_path, u + 1e-3 * aside, f)
+    assert is_read(path, "wheel", u, f, tape_circle=1e-3 * aside)
+
+
+@pytest.mark.parametrize("span", [*SPANS[:3], (-60, 30)])
+@pytest.mark.parametrize("shape", ["S1002", "hollow", "chamfer", "tram"])
+def test_wheel_given_as_a_rail_is_refused(tmp_path, span, shape):
+    u, f = shapes(*span)[shape]
+    for turn in TURNS.values():
+        with pytest.raises(InputError):
+            read_profile(str(written(tmp_path, u, f, turn)), "rail")
+
+
+@pytest.mark.parametrize("name", RAIL_HEADS)
+@pytest.mark.parametrize("inclination", [0.0, 1 / 40, 1 / 20])
+def test_rails_in_all_directions(tmp_path, name, inclination):
+    rail = named_profile(name, "rail", inclination)
+    for low, high in ((-0.1, 0.1), (-0.1, 0.01), (-0.01, 0.1), (-0.02, 0.02)):
+        seen = (rail.u >= low) & (rail.u <= high)
+        u, f = rail.u[seen], rail.f[seen]
+        assert is_read(written(tmp_path, u, f), "rail", u, f)  # cut at the side, too
+        down = written(tmp_path, u, f, TURNS["f"])
+        assert is_read(down, "rail", u, f, **advised(down, "rail"))
+        if low == -0.1:
+            with pytest.raises(InputError):
+                read_profile(str(written(tmp_path, u, f, (1, -1))), "wheel")
+    whole = written(tmp_path, rail.u, rail.f, TURNS["u"])
+    if inclination:
+        assert is_read(whole, "rail", rail.u, rail.f, **advised(whole, "rail"))
+    for turn in TURNS.values():
+        with pytest.raises(InputError):
+            read_profile(str(written(tmp_path, rail.u, rail.f, turn)), "wheel")
+
+
+@pytest.mark.parametrize("kind", ["wheel", "rail"])
+def test_advised_smoothing_follows_the_scatter(kind, capsys):
+    """Points 0.1 to 0.5 mm apart with 1 to 10 um of noise."""
+    curve = S1002 if kind == "wheel" else named_profile("60E1", "rail", 1 / 40)
+    for spacing in (1e-4, 2.5e-4, 5e-4):
+        for noise in (1e-6, 3e-6, 1e-5):
+            u = np.arange(-0.040, 0.025, spacing)
+            f = curve(u) + np.random.default_rng(5).normal(scale=noise, size=u.size)
+            ProfileCurve.from_points(u, f, kind, f"{kind} {noise} {spacing}", mends=False)
+            smoothing = float(re.search(r"\(smoothing: (\S+) evens", capsys.readouterr().err)[1])
+            assert smoothing == pytest.approx(1.1 * noise, rel=0.2)
+    for decimals in (8, 6):  # 1e-5 and 1e-3 mm
+        ProfileCurve.from_points(u, np.round(curve(u), decimals), kind, f"clean {decimals}", mends=False)
+    assert "scatter" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "kind", "smoothing"), [
+    ("wheel_noise_2um.csv", "wheel", 2.2e-6), ("rail_rounded.csv", "rail", 2.9e-6),
+])  # fmt: skip
+def test_advised_smoothing_mends_conicity(shared_file, capsys, name, kind, smoothing):
+    from wrcore.contact.conicity import conicity_curve
+    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+
+    spec = {"points": str(shared_file("cases", name)), "inclined": False}
+    read_profile(spec, kind, 1 / 40)
+    advice = float(re.search(r"\(smoothing: (\S+) evens", capsys.readouterr().err)[1])
+    assert advice == pytest.approx(smoothing, rel=0.06)
+    pair = {"wheel": S1002, "rail": named_profile("60E1", "rail", 1 / 40)}
+    pair[kind] = read_profile({**spec, "smoothing": advice}, kind, 1 / 40)
+    side = WheelOnRail(pair["wheel"], pair["rail"])
+    found = conicity_curve(WheelsetOnTrack(side, side), np.array([1e-3, 2e-3, 3e-3]))["equivalent_conicity"]
+    assert found.tolist() == pytest.approx([0.353, 0.218, 0.174], abs=2e-3)

@@ -1,0 +1,181 @@
+"""Whether measured points are a believable wheel or rail: its directions, its origin, its unit.
+
+The shape shows most mistakes of signs and origins. A wheel has a flange at its inner end, which falls (f is positive
+up), and its tape circle on the tread. A rail's head falls at both ends and does not lean away from the track's centre.
+What is not believable is refused with the key that mends it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wrcore.errors import InputError
+
+LARGEST, SMALLEST = 1.0, 5e-3
+"""Profiles are neither wider nor narrower than this, m."""
+
+_UNITS = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}
+_WIDTHS = {"wheel": (0.05, 0.18), "rail": (0.03, 0.1)}  # m, of files in the right unit
+_TREAD = 0.35  # the tread, and a rail's head, is the widest part that is less steep
+_ON_TREAD = 0.5  # slope at the tape circle of a wheel; flanks have 1 and more
+_FLANGE = 4e-3  # m; what falls less beside the tread is no flange
+_CERTAIN = 12e-3  # m; what falls or rises more is one, whatever is stated
+_STRAIGHT = 3e-4  # m; treads without a flange that bend less are cones and cylinders
+_VERTICAL = 6.0  # slope of 80 degrees: flanges of wheels have 70 to 76, sides of rails 87
+_STEP = 5e-4  # m
+_FALSE_FLANGE = 5e-3  # m; no worn tread stands so much higher than its field side
+_SIDES = 12e-3, 8e-3  # m below a rail's top: its sides, and the least depth that shows them
+_BESIDE, _DEEP = 15e-3, 40e-3  # m; a rail is nowhere so much wider than at its sides, down to this depth
+_OUTWARD = (
+    1.0 / 55.0
+)  # rails lean towards the track's centre by 1/20 to 1/40 or stand upright; worn ones seem to lean less
+
+
+class Mends(NamedTuple):
+    """What a person changes where points are read otherwise than they were meant."""
+
+    u: str = "u with the other sign"
+    f: str = "f with the other sign"
+    origin: str = "u from the tape circle"
+    unit: str = "u and f in m"
+    """Said of a unit, which stands in place of {}."""
+    any_shape: str = "mends=False"
+    """Reads a wheel without a flange."""
+    factor: float = 1.0
+    """m per unit of the file."""
+    is_stated: bool = False
+    """Whether both directions are stated by a person, not assumed."""
+    is_side_stated: bool = False
+    """Whether the direction of u is."""
+
+
+def check_extent(u, f, kind, name, mends):
+    """Refuse points (m) wider or higher than `LARGEST` or narrower than `SMALLEST`; the message names the unit in which
+    they would be a ``kind``."""
+    width, height = np.ptp(u), np.ptp(f)
+    if width >= SMALLEST and max(width, height) <= LARGEST:
+        return
+    raw = width / mends.factor
+    low, high = _WIDTHS[kind]
+    likely = next((unit for unit, factor in _UNITS.items() if low <= raw * factor <= high), None)
+    expected = f"expected a profile 5 mm to 1 m wide, got numbers that span {raw:.4g}"
+    expected += f" and {height / mends.factor:.4g}" if height > LARGEST else ""
+    if likely:
+        raise InputError(name, "unit", f"{expected}; looks like {likely}: {mends.unit.format(likely)}")
+    raise InputError(
+        name, "unit", f"{expected}: in none of mm, m, inch a {kind} {1e3 * low:g} to {1e3 * high:g} mm wide"
+    )
+
+
+def check_wheel(u, f, name, mends):
+    """Refuse points u, f (m, in order of increasing u) that are no wheel in the package's axes."""
+    if not u.min() < 0.0 < u.max():
+        got = f"got it outside, u from {u.min():.4g} to {u.max():.4g} m: {mends.origin}"
+        raise InputError(name, "points", f"expected u = 0 (tape circle) inside a wheel profile, {got}")
+    at, height, first, last = _tread(u, f)
+    ends = _ends(height, first, last)
+    falls = min(height[0], height[-1]) if height.size else 0.0
+    both = max(f[0], f[-1]) < f.max() - _FALSE_FLANGE or min(ends["inner fall"], ends["outer fall"]) > _FLANGE
+    if both and falls < height.max() - _FLANGE:
+        inner = at[np.argmax(height)] < 0.5 * (at[0] + at[-1])
+        expected = "expected a wheel, got a profile that falls on both sides like a rail"
+        mend = mends.f if inner else f"{mends.u} and {mends.f}"
+        raise InputError(name, "points", f"{expected}; of a wheel whose flange stands up: {mend}")
+    if _has_steep_side(u, f, at[first]) and not mends.is_stated:
+        expected = f"expected a wheel's flange, at negative u less steep than {_VERTICAL:g}"
+        raise InputError(name, "points", f"{expected}, got the side of a rail; of a wheel {mends.any_shape}")
+    largest = max(ends, key=ends.get)
+    size = ends[largest]
+    turns = {"outer fall": mends.u, "inner rise": mends.f, "outer rise": f"{mends.u} and {mends.f}"}
+    if largest in turns and size > (_CERTAIN if mends.is_stated else _FLANGE):
+        got = f"got the flange at {'positive' if largest.startswith('outer') else 'negative'} u"
+        got += ", f positive down" if largest.endswith("rise") else ""
+        expected = "expected the flange at negative u and f positive up (the largest radius at the flange)"
+        raise InputError(name, "points", f"{expected}, {got}: {turns[largest]}")
+    if size <= _FLANGE and not mends.is_stated:
+        bent = np.ptp(height - np.polyval(np.polyfit(at, height, 1), at))
+        if bent > _STRAIGHT or np.polyfit(at, height, 1)[0] < -0.01:
+            got = f"got none in points from u = {u.min():.4g} to {u.max():.4g} m"
+            mend = f"add points up to the flange, or, of a wheel without one, {mends.any_shape}"
+            raise InputError(name, "points", f"expected a wheel with a flange at negative u, {got}: {mend}")
+    slope = np.interp(0.0, at, np.gradient(height, at))
+    lowest = at[np.argmin(height)]
+    is_short = largest == "inner fall" and size > max(_FLANGE, -lowest)
+    if abs(slope) > _ON_TREAD or is_short:
+        got = (
+            f"got it only {1e3 * max(-lowest, 0.0):.3g} mm from"
+            if is_short
+            else f"got a slope of {slope:.2g} there, on"
+        )
+        raise InputError(name, "points", f"expected u = 0 (tape circle) on the tread, {got} the flange: {mends.origin}")
+
+
+def check_rail(u, f, name, mends):
+    """Refuse points u, f (m, in order of increasing u, in track pose) that are no rail in the package's axes."""
+    top = int(np.argmax(f))
+    if top in (0, f.size - 1):
+        low = int(np.argmin(f))
+        mend = mends.f if low not in (0, f.size - 1) else "a wheel's points may stand here"
+        expected = "expected a rail head with f positive up, got its highest point at an end"
+        raise InputError(name, "points", f"{expected}: {mend}")
+    depth = min(f[top] - f[:top].min(), f[top] - f[top:].min(), _SIDES[0])
+    if mends.is_side_stated or depth < _SIDES[1]:
+        return
+    left, right = (_side(u, f, top, step, depth) for step in (-1, 1))
+    middle, half = 0.5 * (left + right), 0.25 * (right - left)
+    head = np.abs(u - middle) < half
+    if head.sum() > 3:
+        lean = np.polyfit(u[head], f[head], 1)[0]
+        if lean < -_OUTWARD:
+            got = f"got one that leans outwards by 1/{-1.0 / lean:.0f}"
+            expected = "expected a rail upright or leaning towards the track's centre, u to the field side"
+            raise InputError(name, "points", f"{expected}, {got}: {mends.u}, or the opposite where that is so")
+
+
+def check_beside(u, f, name):
+    """Refuse points of a rail that lie beside its head, where neither its sides nor its foot are."""
+    top = int(np.argmax(f))
+    sides = [_side(u, f, top, step, _SIDES[0]) for step in (-1, 1)]
+    near = (f < f[top] - _SIDES[0]) & (f > f[top] - _DEEP)
+    for edge, sign in zip(sides, (-1.0, 1.0), strict=True):
+        if edge is not None and np.any(near & (sign * (u - edge) > _BESIDE)):
+            expected = f"expected a rail whose sides fall, got points more than {1e3 * _BESIDE:g} mm beside its head"
+            raise InputError(name, "points", f"{expected}, as of another head or a wheel: leave them out (within)")
+
+
+def _side(u, f, top, step, depth):
+    """Abscissa at which a head is first so deep on one side of its top; None where it is nowhere."""
+    reached = f[top] - f[top::step] >= depth * (1.0 - 1e-9)
+    return float(u[top::step][np.argmax(reached)]) if reached.any() else None
+
+
+def _tread(u, f):
+    """Uniform abscissae without the ends, where side faces are, heights there, and the ends of the widest part that is
+    no steeper than a tread."""
+    ahead = np.flatnonzero(np.append(True, u[1:] > np.maximum.accumulate(u)[:-1]))
+    width = u[ahead[-1]] - u[ahead[0]]
+    at = np.linspace(u[ahead[0]] + 0.01 * width, u[ahead[-1]] - 0.01 * width, 120)
+    height = np.interp(at, u[ahead], f[ahead])
+    level = np.abs(np.diff(height)) < _TREAD * np.diff(at)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], level, [False])).astype(int)))
+    if not edges.size:
+        return at, height, 0, at.size - 1
+    begin = 2 * int(np.argmax(edges[1::2] - edges[::2]))
+    return at, height, int(edges[begin]), int(edges[begin + 1])
+
+
+def _has_steep_side(u, f, inner):
+    """Whether points further in than ``inner`` (m) rise outwards as steeply as the side of a rail, over `_STEP`."""
+    length = np.append(0.0, np.hypot(np.diff(u), np.diff(f)).cumsum())
+    at = np.arange(0.0, length[-1], _STEP)  # rounded points close together may be steep
+    across, up = np.diff(np.interp(at, length, u)), np.diff(np.interp(at, length, f))
+    return bool(np.any((up > _VERTICAL * np.abs(across)) & (np.interp(at[1:], length, u) <= inner)))
+
+
+def _ends(height, first, last):
+    """How far the profile falls and rises beyond its tread, m."""
+    inner, outer = height[: first + 1], height[last:]
+    return {
+        "inner fall": height[first] - inner.min(), "inner rise": inner.max() - height[first],
+        "outer fall": height[last] - outer.min(), "outer rise": outer.max() - height[last],
+    }  # fmt: skip
