@@ -48,6 +48,9 @@ ARRAY = {*typing.get_args(ArrayLike)}
 ABOVE_ZERO = Within(LEAST)
 Threads = Annotated[int, Within(1, 1024)]
 
+PLAIN = {float, int, bool, str, type(None)}
+"""Types of arguments that are neither masked nor numpy's."""
+
 UNMASKED = "expected numbers without masked ones among them: leave these out (.compressed()) or fill them (.filled())"
 """What is said of arrays of numpy.ma with masked values: these would count as numbers."""
 
@@ -89,14 +92,19 @@ def checked(thing: Thing) -> Thing:
         given = [(*pair, value) for pair, value in zip(in_order, args, strict=False)]
         given += [(*pair, value) for pair in more for value in args[len(in_order) :]]
         given += [(name, by_name[name], value) for name, value in options.items() if name in by_name]
+        converts = False
         for name, kind, value in given:
-            if is_masked(value):
-                raise InputError(thing.__qualname__.removesuffix(".__init__"), name, UNMASKED)
+            if type(value) not in PLAIN:
+                if is_masked(value):
+                    raise InputError(thing.__qualname__.removesuffix(".__init__"), name, UNMASKED)
+                converts = converts or isinstance(value, np.generic)
             if not kind.fits(value):
                 expected = one_of(kind.words, value) if kind.words else f"expected {kind.text}, got {short(value)}"
                 raise InputError(thing.__qualname__.removesuffix(".__init__"), name, expected)
         try:
-            return thing(*map(_plain, args), **{name: _plain(value) for name, value in options.items()})
+            if converts:
+                args, options = map(_plain, args), {name: _plain(value) for name, value in options.items()}
+            return thing(*args, **options)
         except OSError as error:
             if error.errno not in UNFIT:
                 raise
