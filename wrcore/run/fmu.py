@@ -132,7 +132,7 @@ def library_of(fmi: int) -> ModuleType:
     try:
         return import_module(LIBRARIES[fmi][0])
     except ImportError:
-        text = f"expected {LIBRARIES[fmi][0]} to be installed: pip install 'wrcore[fmi]'"
+        text = f"expected {LIBRARIES[fmi][0]} to be installed: pip install pythonfmu pythonfmu3"
         raise InputError("wrcore fmu", "", text) from None
 
 

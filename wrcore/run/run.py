@@ -228,7 +228,7 @@ class Run:
                             yield (group, name, patch), column
 
     def to_xarray(self) -> xarray.DataTree:
-        """All channels as a tree of data sets, for xarray (``pip install "wrcore[xarray]"``).
+        """All channels as a tree of data sets, for xarray (``pip install xarray``).
 
         Returns
         -------
@@ -245,7 +245,7 @@ class Run:
         try:
             import xarray
         except ImportError:
-            raise InputError("to_xarray", "xarray", 'expected it installed: pip install "wrcore[xarray]"') from None
+            raise InputError("to_xarray", "xarray", "expected it installed: pip install xarray") from None
         nodes = {}
         for group, channels in self.groups.items():
             variables = {}
