@@ -4,9 +4,9 @@ from wrcore.cli.files import output
 
 ABOUT = """
 Write a scene as a functional mock-up unit (FMI) for co-simulation, with all files that it names. The machine that runs
-it needs a Python of its own with wrcore installed: the unit holds no Python. 'pip install pythonfmu pythonfmu3'
-brings what writes units. Inputs are those of a session: forces of actuators, torques of motors and brakes, the controller's speed,
-friction of each rail.
+it needs a Python of its own with wrcore installed: the unit holds no Python. 'pip install pythonfmu pythonfmu3' brings
+what writes units. Inputs are those of a session: forces of actuators, torques of motors and brakes, the controller's
+speed, friction of each rail.
 """
 
 
