@@ -379,3 +379,16 @@ def test_bad_input_is_named(s1002, uic60, manchester):
         first_touch(manchester, [1.0])
     with pytest.raises(InputError, match="touch"):
         conicity_curve(WheelsetOnTrack.alike(s1002, uic60, gauge=1.7), [1e-3])
+
+
+def test_conicity_beyond_the_end_of_a_profile_is_flagged(s1002, uic60, tmp_path):
+    at = s1002.u < 0.02  # 20 mm outside the tape circle
+    short = ProfileCurve.from_points(s1002.u[at], s1002.f[at], "wheel", "short")
+    pair = WheelsetOnTrack.alike(short, named_profile("UIC60-MBench", "rail", 1 / 20))
+    touch, curve = first_touch(pair, 1e-3 * np.arange(-12, 13)), conicity_curve(pair, [1e-3, 8e-3])
+    assert touch.profile_edge.tolist() == touch.rolling_radius_difference_m.isna().astype(int).tolist()
+    assert touch.profile_edge.any() and not touch.profile_edge[12] and not touch.not_level.any()
+    assert curve.profile_edge.tolist() == curve.equivalent_conicity.isna().astype(int).tolist()
+    assert curve.profile_edge.any() and not curve.no_wave.any()
+    whole = conicity_curve(WheelsetOnTrack.alike(s1002, uic60), AMPLITUDES)
+    assert not whole.profile_edge.any() and not whole.no_wave.any()

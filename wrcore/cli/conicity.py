@@ -1,6 +1,7 @@
 """``wrcore conicity``: equivalent conicity of a wheelset on its track."""
 
 import argparse
+import sys
 
 from wrcore.cli.files import output, write_csv
 from wrcore.cli.options import add_pair, columns, pair_of
@@ -18,6 +19,8 @@ FILES = columns(
     wavelength_m="of the swing; inf for conicity 0",
     y_min_m="turning point on the right",
     y_max_m="turning point on the left",
+    profile_edge="1 where a wheel would touch with the end of a profile before this amplitude, else 0",
+    no_wave="1 where the rolling radius difference lets no wave of this amplitude exist, else 0",
 )
 TABLE = columns(
     "OUT2.csv, a row per lateral position; _right_ as _left_",
@@ -28,6 +31,8 @@ TABLE = columns(
     u_rail_left_m=DESCRIPTIONS["u_rail_m"],
     contact_angle_left_rad=DESCRIPTIONS["contact_angle_rad"],
     height_left_m="of the wheelset's centre above the rails' highest points",
+    profile_edge="1 where a wheel touches with the end of a profile, else 0",
+    not_level="1 where no roll was found at which both wheels touch, else 0",
 )
 
 
@@ -70,6 +75,9 @@ def run(options):
     if curve["equivalent_conicity"].isna().all():
         raise InputError("wrcore conicity", "--to", "expected an amplitude at which the wheelset swings, got none")
     write_csv(curve, out)
+    flagged = [f"{name} {curve[name].sum()}" for name in ("profile_edge", "no_wave") if curve[name].any()]
+    if flagged:
+        print(f"wrcore conicity: warning: amplitudes without conicity: {', '.join(flagged)}", file=sys.stderr)
     if table_out:
         shifts = 1e-4 * np.arange(-round(last / 1e-4) - 20, round(last / 1e-4) + 21)
         write_csv(first_touch(pair, shifts, options.roll), table_out)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 
 from wrcore.cli.files import output, write_csv
 from wrcore.cli.options import add_pair, as_runs, columns, pair_of
@@ -43,6 +44,14 @@ FILES = columns(
     x_max_m="where it ends",
     width_m="of the patch in the contact plane",
     **as_runs("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm"),
+    load_residual_N="force that the wheel carries less the load that was asked; empty where z is given",
+    not_loaded="1 where no height was found at which the wheel carries its load, else 0",
+    half_space="1 where the patch is too wide for a half-space, else 0",
+    conformal="1 where the patch lies in a hollow over which the normal turns too far, else 0",
+    profile_edge="1 where the patch reaches beyond the end of a profile, else 0",
+    search_fallback="1 where roll or yaw is so large that every strip was searched, else 0",
+    hollow_ahead="1 where the wheel is yawed too far for its hollow, else 0",
+    both_flanges="1 where both flanges of the wheelset touch: too wide for the gauge, else 0",
 )
 
 
@@ -127,7 +136,7 @@ def _pair(options, poses):
 
 
 def run(options):
-    from wrcore.analysis.contact.poses import loaded_poses
+    from wrcore.analysis.contact.poses import POSE_FLAGS, loaded_poses
     from wrcore.contact.pose_file import read_poses
 
     out = output(options.out)
@@ -146,4 +155,10 @@ def run(options):
     if table.attrs["on_fixed_strips"]:
         remarks += f", {table.attrs['on_fixed_strips']} on fixed strips"
     print(f"{len(poses)} poses, {len(table)} patches{remarks}: {out}")
+    flagged = {name: int(table[name].sum()) for name in POSE_FLAGS if table[name].any()}
+    if table.attrs["without_height"]:
+        flagged["wheels that no height loads"] = table.attrs["without_height"]
+    if flagged:
+        named = ", ".join(f"{name} {count}" for name, count in flagged.items())
+        print(f"wrcore contact: warning: patches beyond the models' limits: {named}", file=sys.stderr)
     return 0

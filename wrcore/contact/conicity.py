@@ -160,6 +160,8 @@ def conicity_curve(
     -------
     pandas.DataFrame
         amplitude_m, equivalent_conicity, wavelength_m (infinite for conicity 0), y_min_m, y_max_m (turning points).
+        Flags, 0 or 1: profile_edge, a wheel would touch with the end of a profile before this amplitude, and the
+        conicity is NaN; no_wave, the rolling radius difference lets no wave of this amplitude exist, and it is NaN.
 
     Raises
     ------
@@ -179,12 +181,16 @@ def conicity_curve(
     step = STEP[bool(roll)] if step is None else step
     half = math.ceil((amplitudes.max() + REACH) / step)
     table = first_touch(pair, step * np.arange(-half, half + 1), roll)
-    y, difference = _around_centre(table.y_m.to_numpy(), table.rolling_radius_difference_m.to_numpy())
+    positions = table.y_m.to_numpy()
+    y, difference = _around_centre(positions, table.rolling_radius_difference_m.to_numpy())
     conicity, ends = equivalent_conicity(y, difference, amplitudes)
     with np.errstate(divide="ignore"):
         wavelength = math.pi * np.sqrt(2.0 * pair.base * pair.mean_radius / conicity)
     columns = {"amplitude_m": amplitudes, "equivalent_conicity": conicity, "wavelength_m": wavelength}
-    return pd.DataFrame(columns | {"y_min_m": ends[:, 0], "y_max_m": ends[:, 1]})
+    cut = y[0] > positions[0] or y[-1] < positions[-1]
+    edge = np.isnan(ends[:, 0]) & cut
+    columns |= {"y_min_m": ends[:, 0], "y_max_m": ends[:, 1], "profile_edge": edge.astype(int)}
+    return pd.DataFrame(columns | {"no_wave": (np.isnan(conicity) & ~edge).astype(int)})
 
 
 def _around_centre(y, difference):

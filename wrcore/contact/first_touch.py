@@ -33,6 +33,10 @@ _RESERVE = 1e-6
 
 _ROLL_STEPS = 40
 
+_LEVEL = 1e-9
+"""Heights of both sides that differ by more are not one pose, m: the search leaves 1e-12, a contact jump 1e-7 and more.
+"""
+
 _HEIGHT, _U_WHEEL, _U_RAIL, _SLOPE, _RADIUS = range(5)
 
 
@@ -158,7 +162,8 @@ def first_touch(
         y_m, roll_rad, rolling_radius_difference_m (left less right) and, per side, u_wheel, u_rail (m, positive to
         the field side), contact_angle (rad, rotation about x, as in `wrcore.contact.detection`) and height (m, of the
         wheelset's centre above the rails' tops; alike on both sides if roll is solved). NaN where a profile ends
-        before it touches.
+        before it touches. Flags, 0 or 1: profile_edge, a wheel touches with the end of a profile; not_level, the
+        search for the roll ended with heights that differ by more than 1 nm.
 
     Examples
     --------
@@ -180,4 +185,7 @@ def first_touch(
         table[f"u_rail_{name}_m"] = found[:, i, _U_RAIL]
         table[f"contact_angle_{name}_rad"] = sign * np.arctan(found[:, i, _SLOPE])
         table[f"height_{name}_m"] = found[:, i, _HEIGHT]
+    edge = np.isnan(found[..., _HEIGHT]).any(axis=1)
+    gap = np.abs(found[:, 0, _HEIGHT] - found[:, 1, _HEIGHT])
+    table |= {"profile_edge": edge.astype(int), "not_level": (bool(roll) & (gap > _LEVEL)).astype(int)}
     return pd.DataFrame(table)

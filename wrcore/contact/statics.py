@@ -53,6 +53,14 @@ MOST_SECANTS = 20
 LARGEST_TURN = 0.02
 """A step in roll beyond this is not trusted, rad."""
 
+LEVEL = 1e-12
+"""Both wheels carry their loads where the heights at which each does so differ by no more than this, m. A penetration
+of 50 um then has an error of 2e-8; the searches end at 1e-13."""
+
+BRANCH_REACH, BRANCH_STEP = 6e-5, 2e-6
+"""Where overlaps merge into one patch, its force falls by several per cent: a wheel carries its load at two heights.
+The second one is sought within this distance, in these steps, m. S1002 on 60E1 has them 12 um apart."""
+
 
 @jit(allocates=False)
 def height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches):
@@ -107,8 +115,40 @@ def _height_near(geometry, hertz, modulus, side, y, roll, yaw, spatial, reductio
 
 
 @jit(allocates=False)
+def _branch_height(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, highest, patches):
+    """Highest or lowest of the heights (m) near that of `height_at_load` at which one wheel carries ``load`` (N); NaN
+    if there is none."""
+    near = height_at_load(geometry, hertz, modulus, side, y, roll, yaw, spatial, reduction, load, nominal, patches)
+    if np.isnan(near):
+        return near
+    step = -BRANCH_STEP if highest else BRANCH_STEP
+    start = near - BRANCH_REACH * math.copysign(1.0, step)
+    low = high = np.nan  # the wheel carries more at ``low``, less at ``high``
+    for k in range(2 * int(BRANCH_REACH / BRANCH_STEP + 0.5) + 2):
+        z = start + k * step
+        pressed = wheel_at_rest(geometry, hertz, modulus, side, y, z, roll, yaw, spatial, reduction, patches)[1] > load
+        if pressed:
+            low = z
+        else:
+            high = z
+        if pressed == highest and k > 0:
+            break
+    if np.isnan(low) or np.isnan(high):
+        return near
+    while high - low > 1e-14:
+        middle = 0.5 * (low + high)
+        if middle == low or middle == high:
+            break
+        if wheel_at_rest(geometry, hertz, modulus, side, y, middle, roll, yaw, spatial, reduction, patches)[1] > load:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@jit(allocates=False)
 def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches):
-    """As `settle`, by secants: far faster. NaN where it is lost."""
+    """Roll and height as from `settle`, by secants: far faster. NaN where they do not arrive."""
     roll = before = difference = 0.0
     slope, z, other = ROLL_SLOPE, nominal, nominal
     for k in range(25):
@@ -119,7 +159,9 @@ def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, 
         difference, before = z - other, roll
         step = difference / slope
         if abs(step) < 1e-13:
-            return roll, 0.5 * (z + other)
+            if abs(difference) <= LEVEL:
+                return roll, 0.5 * (z + other)
+            break  # a height has jumped to another branch: the slope is that of the jump
         if not abs(step) < LARGEST_TURN:
             break
         roll -= step
@@ -130,26 +172,49 @@ def _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, 
 @jit(nogil=True)
 def settle(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal):
     """Roll (rad) and height (m) at which each wheel, of `ContactGeometry` ``left`` and ``right``, carries ``load`` (N)
-    vertically; NaN where there is none. The left wheel's own height falls and the right wheel's rises with roll, so
-    bisection on their difference is safe; it runs where secants do not get there."""
+    vertically; NaN where a wheel does not reach it. Where secants do not arrive, bisection takes over: the height of
+    the left wheel falls and that of the right wheel rises with roll, but for the jumps of `BRANCH_REACH`. It is done
+    for each choice of branches until both heights are one. Where no choice does that, the nearest roll is returned, at
+    which the wheels carry other loads: callers compare."""
     patches = np.empty((columns.MAX_PATCHES, columns.PATCH_COLUMNS))
     roll, z = _settle_near(left, right, hertz, modulus, y, yaw, spatial, reduction, load, nominal, patches)
     if not np.isnan(z):
         return roll, z
-    low, high = -ROLL_RANGE, ROLL_RANGE
-    z = other = 0.0
-    for _ in range(60):
-        roll = 0.5 * (low + high)
-        z = height_at_load(left, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
-        other = height_at_load(right, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, nominal, patches)
-        # roll lifts the left wheel: too much of it and the left wheel must come down further than the right one
-        if z < other or (np.isnan(z) and roll > 0.0) or (np.isnan(other) and roll > 0.0):
-            high = roll
-        else:
-            low = roll
-        if high - low < 1e-13:
+    best, gap = (np.nan, np.nan), np.inf
+    for choice in range(4):
+        high_left, high_right = choice in (0, 2), choice in (0, 3)
+        low, high = -ROLL_RANGE, ROLL_RANGE
+        for _ in range(60):
+            roll = 0.5 * (low + high)
+            z = _branch_height(left, hertz, modulus, 1.0, y, roll, yaw, spatial, reduction, load, nominal, high_left,
+                               patches)  # fmt: skip
+            other = _branch_height(right, hertz, modulus, -1.0, y, roll, yaw, spatial, reduction, load, nominal,
+                                   high_right, patches)  # fmt: skip
+            if abs(z - other) < gap:
+                best, gap = (roll, 0.5 * (z + other)), abs(z - other)
+            # roll lifts the left wheel: too much of it and the left wheel must come down further than the right one
+            if z < other or (np.isnan(z) and roll > 0.0) or (np.isnan(other) and roll > 0.0):
+                high = roll
+            else:
+                low = roll
+            if high - low < 1e-13:
+                break
+        if gap <= LEVEL or gap == np.inf:
             break
-    return 0.5 * (low + high), 0.5 * (z + other)
+    return best
+
+
+CARRIED = 1e-4
+"""Relative error of a wheel's load from which it counts as not carried. The searches leave 2e-6; where no height
+carries a load, as where a reduction's force jumps over it, 1e-3 to 5e-2 are missing."""
+
+
+def is_not_loaded(residual, load, penetration):
+    """Whether wheels with a ``residual`` (...), carried less asked ``load`` (...), N, do not carry it; ``penetration``
+    (..., patches), m, NaN without a patch. A height that is `LEVEL` off is no error: it matters for tiny loads only."""
+    deepest = np.max(np.nan_to_num(penetration), axis=-1, initial=0.0)
+    rounding = np.divide(1.5 * LEVEL, deepest, out=np.zeros_like(deepest), where=deepest > 0.0)
+    return np.abs(residual) > load * (CARRIED + rounding)
 
 
 class Bracket(NamedTuple):

@@ -25,9 +25,28 @@ def _sign_changes(y):
     return np.flatnonzero((y[:-1] < 0) != (y[1:] < 0))
 
 
+RIPPLE = 1.0 / 3.0
+"""A swing that is smaller than this share of a neighbouring one is a ripple on it: noise, or a second, smaller motion.
+Swings of a motion with a damping ratio of 0.33 fall to this share at each turn."""
+
+FADED = 0.05
+"""Share of the largest swing below which a motion counts as dead: noise of 1 % of its amplitude stays below."""
+
+NOISE = 6.0
+"""Swings below so many standard deviations of white noise, but not above `RIPPLE` of the largest swing, are ripples."""
+
+DEAD = 1e-9
+"""Swings below this are rounding noise, m: a run at rest on the track leaves 1e-11."""
+
+
 @checked
 def hunting_frequency(t: Samples, y: Samples) -> float:
-    """Frequency of a lateral motion about the track's centre, from its zero crossings.
+    """Frequency of a lateral motion, from the times at which it passes the middle of its swings.
+
+    A swing goes from one turning point to the next. Ripples (smaller than a third of the swing beside them, or than the
+    noise of the samples) belong to the swing that they lie on. Swings below 5 % of the largest one, or below 1 nm, do
+    not count: the motion is dead, and noise remains. The middle is that of each swing, so that an offset, as in a
+    curve, has no influence.
 
     Parameters
     ----------
@@ -37,7 +56,7 @@ def hunting_frequency(t: Samples, y: Samples) -> float:
     Returns
     -------
     float
-        Frequency, Hz; NaN with fewer than three crossings.
+        Frequency, Hz; NaN with fewer than three swings.
 
     Examples
     --------
@@ -49,8 +68,55 @@ def hunting_frequency(t: Samples, y: Samples) -> float:
     """
     if np.shape(t) != np.shape(y):
         raise InputError("hunting_frequency", "y", f"expected as many as times, {np.size(t)}, got {np.size(y)}")
-    when = zero_crossings(t, y)
-    return float(0.5 * (when.size - 1) / (when[-1] - when[0])) if when.size > 2 else np.nan
+    t, y = np.asarray(t, float), np.asarray(y, float)
+    turns = turning_points(y)
+    sizes = np.abs(np.diff(y[turns]))
+    largest = sizes.max(initial=0.0)
+    alive = sizes >= max(FADED * largest, 1.3 * min(_noise(y), RIPPLE * largest), DEAD)
+    when = np.array([_passes(t, y, turns, k) if on else np.nan for k, on in enumerate(alive)])
+    if np.isfinite(when[1:-1]).sum() > 2:
+        when = when[1:-1]  # the first and the last swing may be parts
+    periods = when[2:] - when[:-2]
+    known = np.isfinite(periods)
+    return float(1.0 / np.mean(periods[known])) if known.any() else np.nan
+
+
+def turning_points(y):
+    """Indices of the samples at which a motion turns, with its first and its last; ripples are left out."""
+    y = np.asarray(y, float)
+    moves = np.concatenate(([0], np.flatnonzero(np.diff(y)) + 1)) if y.size else np.zeros(0, int)  # plateaus count once
+    turns = moves[np.r_[True, np.diff(np.sign(np.diff(y[moves]))) != 0.0, True]] if moves.size > 2 else moves
+    noise = _noise(y)
+    while len(turns) > 3:
+        sizes = np.abs(np.diff(y[turns]))
+        inner, before, after = sizes[1:-1], sizes[:-2], sizes[2:]
+        least = np.maximum(RIPPLE * np.maximum(before, after), min(noise, RIPPLE * sizes.max()))
+        small = (inner < before) & (inner <= after) & (inner < least)
+        if not small.any():
+            break
+        first = np.flatnonzero(small) + 1
+        turns = np.delete(turns, np.r_[first, first + 1])
+    return turns
+
+
+def _noise(y):
+    """Largest swing that white noise makes: `NOISE` standard deviations, from the median of second differences, whose
+    variance is 6 times that of the noise."""
+    return NOISE * np.median(np.abs(np.diff(y, 2))) / (0.6745 * 6.0**0.5) if y.size > 3 else 0.0
+
+
+def _passes(t, y, turns, k):
+    """Time (s) at which a motion passes the middle of its k-th swing between its ``turns``; NaN if it does not. For the
+    first and the last swing it is their neighbour's middle, unless the motion begins or ends at rest."""
+    first, last = turns[k], turns[k + 1]
+    part, at = y[first : last + 1], k
+    steps = np.abs(np.diff(part))
+    if len(turns) > 2 and k == 0 and steps[0] > 0.1 * steps.max():
+        at = 1
+    elif len(turns) > 2 and k == len(turns) - 2 and steps[-1] > 0.1 * steps.max():
+        at = k - 1
+    crossings = zero_crossings(t[first : last + 1], part - 0.5 * (y[turns[at]] + y[turns[at + 1]]))
+    return 0.5 * (crossings[0] + crossings[-1]) if crossings.size else np.nan
 
 
 def amplitude(y):
@@ -59,11 +125,13 @@ def amplitude(y):
 
 
 def growth_rate(t, y):
-    """Growth of an oscillation, 1/s: slope of the logarithm of its extrema over t (s); NaN with fewer than two."""
+    """Growth of an oscillation, 1/s: slope of the logarithm of its extrema (above 1 nm) over t (s); NaN with
+    fewer than two."""
     t, y = np.asarray(t), np.asarray(y)
     edges = _sign_changes(y) + 1
     tops = [start + int(np.argmax(np.abs(y[start:end]))) for start, end in zip(edges[:-1], edges[1:], strict=True)]
-    tops = [top for top in tops if y[top] != 0.0]
+    least = max([1e-6 * abs(y[top]) for top in tops] + [DEAD])  # below it there is rounding noise
+    tops = [top for top in tops if abs(y[top]) > least]
     if len(tops) < 2:
         return np.nan
     return float(np.polyfit(t[tops], np.log(np.abs(y[tops])), 1)[0])

@@ -1,4 +1,5 @@
-"""Where a run left the range that its models are made for: counted at the output times, not while it is integrated.
+"""Where contacts leave the range that their models are made for: flags of patches and wheelsets in given poses, which a
+run counts at its output times, not while it is integrated.
 
 =====================  ================================================================================================
 `half_space`           patches whose semi-axis across exceeds `WIDEST` of the smaller lateral radius of curvature there
@@ -83,6 +84,16 @@ MEANINGS = {
 }
 """What each counter of a run counts or measures; ``python -m study.report.counters`` writes it into how_runs_end.md."""
 
+FLAGS = {
+    "half_space": "1 where the patch is too wide for a half-space, else 0",
+    "conformal": "1 where the patch lies in a hollow over which the normal turns too far, else 0",
+    "profile_edge": "1 where the patch reaches beyond the end of a profile, else 0",
+    "search_fallback": "1 where roll or yaw is so large that every strip was searched, else 0",
+    "hollow_ahead": "1 where the wheel is yawed too far for its hollow, else 0",
+    "both_flanges": "1 where both flanges of the wheelset touch: too wide for the gauge, else 0",
+}
+"""Flags of patches in static answers by the names of a run's counters: what they mean."""
+
 LOOK_UP_ERRORS = "look_up_normal_error", "look_up_force_error", "look_up_pressure_error"
 """Counters of a run that looks exact contact up: how far its cells are from the exact solver, see
 :func:`look_up_errors`."""
@@ -95,30 +106,53 @@ def exceeded(contact, patches, roll, yaw):
     :func:`wrcore.dynamics.outputs.evaluations_at` (NaN: none), and ``roll``, ``yaw`` (n, k), rad, of the wheelsets
     relative to the track exceed, and of ``patches`` that were looked at.
     """
-    if contact.geometries:
-        return _exceeded_by_each(contact, patches, roll, yaw)
+    counts = {name: int(np.sum(found)) for name, found in flags(contact, patches, roll, yaw).items()}
+    counts["search_fallback"] *= 2  # both wheels of a wheelset
+    return {"patches": int(np.sum(np.isfinite(patches[..., reduction.NORMAL]))), **counts}
+
+
+def flags(contact, patches, roll, yaw):
+    """Limits that are exceeded, by the names of `FLAGS`, from arguments as for `exceeded`: of patches (n, k, 2,
+    MAX_PATCHES), and search_fallback and both_flanges of wheelsets (n, k); bool."""
+    flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
+    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * _tilt(contact, yaw) ** 2  # as the search
+    found = {name: np.zeros(patches.shape[:-1], bool) for name in _OF_PROFILES}
+    for k in range(patches.shape[1]) if contact.geometries else (slice(None),):
+        for wheel in range(2) if contact.geometries else (slice(None),):
+            geometry = contact.geometries[2 * k + wheel] if contact.geometries else contact.geometry
+            tilt = np.broadcast_to(_tilt(contact, yaw)[..., None, None], patches.shape[:-1])[:, k, wheel]
+            for name, values in _of_profiles(geometry, patches[:, k, wheel], tilt).items():
+                found[name][:, k, wheel] = values
+    return found | {"search_fallback": offset > LARGEST_OFFSET, "both_flanges": np.all(flanges, axis=-1)}
+
+
+def _tilt(contact, yaw):
+    return np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
+
+
+def _of_profiles(geometry, patches, tilt):
+    """Flags, by the names of `_OF_PROFILES` and of the shape (...) of ``tilt``, of patches (..., PATCH_COLUMNS) of
+    wheels of one geometry."""
     present = np.isfinite(patches[..., reduction.NORMAL])
-    rows = patches[present]
-    geometry, width = contact.geometry, rows[:, reduction.SEMI_B]
+    rows, out = patches[present], {}
+    width = rows[:, reduction.SEMI_B]
     wheel, wheel_ends, larger, slope = _profile(
         geometry.wheel, geometry.wheel_start, geometry.wheel_step, rows[:, reduction.U_WHEEL]
     )
     rail, rail_ends, *_ = _profile(geometry.rail, geometry.rail_start, geometry.rail_step, rows[:, reduction.U_RAIL])
     reach = width * np.cos(rows[:, reduction.ANGLE])
-    tilt = np.tan(yaw) if contact.detection != PLANAR else np.zeros_like(yaw)
-    sine_square = np.broadcast_to(tilt[..., None, None], present.shape)[present] ** 2 * (1.0 + slope**2)  # of chi
+    sine_square = tilt[present] ** 2 * (1.0 + slope**2)  # of chi
     hollow = (geometry.rolling_radius + larger) * wheel * np.sqrt(1.0 + slope**2)
-    flanges = np.any(patches[..., reduction.ANGLE] * np.array([[1.0], [-1.0]]) > FLANGE, axis=-1)
-    offset = OFFSET_PER_ROLL * np.abs(np.sin(roll)) + OFFSET_PER_YAW_SQUARE * tilt**2  # as the search sees it
-    return {
-        "patches": len(rows),
-        "half_space": int(np.sum(width * np.maximum(abs(wheel), abs(rail)) > WIDEST)),
-        "conformal": int(np.sum((wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN))),
-        "profile_edge": int(np.sum((wheel_ends < reach) | (rail_ends < reach))),
-        "search_fallback": 2 * int(np.sum(offset > LARGEST_OFFSET)),
-        "hollow_ahead": int(np.sum(1.0 - sine_square + hollow * sine_square < 0.0)),
-        "both_flanges": int(np.sum(np.all(flanges, axis=-1))),
-    }
+    exceeds = (
+        width * np.maximum(abs(wheel), abs(rail)) > WIDEST,
+        (wheel < 0.0) & (2.0 * width * rail > WIDEST_TURN),
+        (wheel_ends < reach) | (rail_ends < reach),
+        1.0 - sine_square + hollow * sine_square < 0.0,
+    )
+    for name, values in zip(_OF_PROFILES, exceeds, strict=True):
+        out[name] = np.zeros(present.shape, bool)
+        out[name][present] = values
+    return out
 
 
 def look_up_errors(contact, patches):
@@ -137,22 +171,6 @@ def look_up_errors(contact, patches):
     return {
         name: float(error.max()) for name, error in zip(LOOK_UP_ERRORS, (normal, force + left, pressure), strict=True)
     }
-
-
-def _exceeded_by_each(contact, patches, roll, yaw):
-    """The same where wheels or rails differ: wheel by wheel, on its own profiles."""
-    total = exceeded(contact._replace(geometries=()), patches, roll, yaw)
-    for name in _OF_PROFILES:
-        total[name] = 0
-    for i, geometry in enumerate(contact.geometries):
-        k, wheel = divmod(i, 2)
-        alone = np.full_like(patches[:, k : k + 1], np.nan)
-        alone[:, 0, wheel] = patches[:, k, wheel]
-        one = contact._replace(geometries=(), geometry=geometry)
-        counts = exceeded(one, alone, roll[:, k : k + 1], yaw[:, k : k + 1])
-        for name in _OF_PROFILES:
-            total[name] += counts[name]
-    return total
 
 
 def _profile(nodes, start, step, u):

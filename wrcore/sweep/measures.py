@@ -5,7 +5,7 @@
 ``amplitude_m``               half the peak-to-peak value of the lateral motion over the last ``window``: of a limit
                               cycle, where the run has come to one
 ``yaw_max_rad``               largest yaw of a wheelset
-``frequency_Hz``              of the leading wheelset's lateral motion, from its zero crossings; NaN below three
+``frequency_Hz``              of the leading wheelset's lateral motion, as `hunting_frequency`; NaN without three swings
 ``Q_min_N``, ``Q_max_N``      least and largest vertical force of a wheel
 ``Y_max_N``                   largest lateral force of a wheel on its rail, by amount
 ``Y_over_Q_max``              their largest quotient, by amount, where the wheel carries more than 1 kN

@@ -9,7 +9,8 @@ import pytest
 import wrcore as wr
 from wrcore.analysis.contact import contacts as module
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
-from wrcore.analysis.contact.poses import ROLLING, STILL, loaded_poses
+from wrcore.analysis.contact.poses import POSE_FLAGS, ROLLING, STILL, loaded_poses
+from wrcore.cli import main
 from wrcore.contact.reduction import FX, FY, NORMAL
 
 RADIUS = 0.46
@@ -145,3 +146,76 @@ def test_looked_up_contact_at_a_height_that_was_sought_has_creep_forces(pair):
         rows.append(found.row[[NORMAL, FX, FY]])
     assert rows[0][1] > 3e3
     np.testing.assert_allclose(rows[1], rows[0], atol=0.01 * 0.3 * 5e4)
+
+
+def load_carried(found):
+    return np.nansum(found.N_N * np.cos(found.contact_angle_rad), axis=-1)
+
+
+def test_loads_are_carried_where_overlaps_merge(pair):
+    # 11 of 10 000 random poses missed their load by up to 2.2 %: two heights carry it, and roll was sought across both
+    y = np.array([0.005381245484329061, -0.005298930604514381, -0.0052552280584740796, 0.005060122308563741])
+    yaw = np.array([0.0018594242906076856, -0.003858632548236483, -0.003800161182978952, -0.009115244382291861])
+    load = np.array([41307.90427724308, 33762.621089828426, 30223.008409080005, 34650.691300739374])
+    found = wr.contacts(pair, y, yaw=yaw, load=load)
+    np.testing.assert_allclose(load_carried(found), np.stack([load, load], axis=1), rtol=1e-7)
+    assert not found.not_loaded.any() and abs(found.load_residual_N).max() < 1e-7 * load.max()
+
+
+def test_a_load_that_no_height_carries_is_flagged(pair):
+    # the force of the reduction `maximum` jumps over the load at the height that is found
+    random = np.random.default_rng(1)
+    y, yaw, load = random.uniform(-6e-3, 6e-3, 400), random.uniform(-0.01, 0.01, 400), random.uniform(3e4, 1e5, 400)
+    found = wr.contacts(pair, y, yaw=yaw, load=load, patch="maximum")
+    residual = load_carried(found) - load[:, None]
+    np.testing.assert_allclose(found.load_residual_N, residual, rtol=1e-9, atol=1e-6)
+    missed = abs(residual) > 1e-3 * load[:, None]
+    assert missed.any() and (found.not_loaded == missed).all()
+    fallen = wr.contacts(pair, 0.1, roll=0.0, load=5e4)  # the right wheel is beside its rail
+    assert fallen.not_loaded.tolist() == [0.0, 1.0] and fallen.load_residual_N[1] == -5e4
+    assert np.isnan(wr.contacts(pair, 0.0, z=0.4599).load_residual_N).all()  # no load was asked
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """A wheel whose profile ends 12 mm outside its tape circle."""
+    path = tmp_path_factory.mktemp("short") / "wheel.csv"
+    wheel = wr.named_profile("S1002", "wheel")
+    u = np.arange(-54.5, 12.0, 0.2)
+    pd.DataFrame({"u_mm": u, "f_mm": 1e3 * np.interp(1e-3 * u, wheel.u, wheel.f)}).to_csv(path, index=False)
+    return path
+
+
+def test_patches_on_the_end_of_a_profile_are_flagged(short, tmp_path, capsys):
+    rail, poses = wr.named_profile("60E1", "rail", 1 / 20), tmp_path / "poses.csv"
+    pair = wr.WheelsetOnTrack.alike(wr.named_profile(str(short), "wheel"), rail)
+    found = wr.contacts(pair, [0.0, -0.0055], load=5e4)
+    assert found.profile_edge[0, :, 0].tolist() == [1.0, 1.0] and not found.profile_edge[0, :, 1:].any()
+    assert found.profile_edge[1, 0, 0] == 1.0 and found.profile_edge[1, 1, 0] == 0.0  # one wheel alone
+    table = wr.contact_table(pair, [0.0, -0.0055], wheel_load=5e4)
+    table = table[table.patch == 1]
+    assert table.profile_edge.tolist() == [1, 1, 1, 0]
+    pd.DataFrame({"pose_id": ["a"], "y_m": [0.0], "yaw_rad": [0.0]}).to_csv(poses, index=False)
+    sets = ["--rail", "60E1", "--inclination", "1/20", "--wheel-load", "5e4", "--poses", str(poses)]
+    assert main(["contact", "--wheel", str(short), *sets, "--out", str(tmp_path / "out.csv")]) == 0
+    assert pd.read_csv(tmp_path / "out.csv").profile_edge.tolist() == [1, 1]
+    assert "warning: patches beyond the models' limits: profile_edge 2" in capsys.readouterr().err
+    assert main(["contact", "--wheel", "S1002", *sets, "--out", str(tmp_path / "out.csv")]) == 0
+    whole = pd.read_csv(tmp_path / "out.csv")
+    assert not whole[list(POSE_FLAGS)].to_numpy().any() and abs(whole.load_residual_N).max() < 1e-3
+    assert capsys.readouterr().err == ""
+
+
+def test_flags_of_a_pose_are_those_of_a_run(pair):
+    turned = wr.contacts(pair, [0.0, 0.0, 0.00625], yaw=[0.0, 0.016, 0.0], load=5e4)
+    assert turned.search_fallback.tolist() == [0.0, 1.0, 0.0]
+    assert set(POSE_FLAGS) <= set(turned) and turned.conformal[2, 0].any() and not turned.conformal[0].any()
+    tight = wr.WheelsetOnTrack.alike(pair.left.wheel, pair.left.rail, gauge=1.42)
+    assert wr.contacts(tight, 0.0, load=5e4).both_flanges == 1.0
+
+
+def test_a_patch_states_its_flags_and_its_residual(pair, short):
+    cut = wr.WheelsetOnTrack.alike(wr.named_profile(str(short), "wheel"), wr.named_profile("60E1", "rail", 1 / 20))
+    assert wr.patch(cut, load=5e4)[0].flags == ("profile_edge",)
+    whole, placed = wr.patch(pair, load=5e4)[0], wr.patch(pair, z=0.45976)[0]
+    assert whole.flags == () and abs(whole.load_residual) < 1.0 and np.isnan(placed.load_residual)

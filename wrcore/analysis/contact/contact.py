@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from wrcore.analysis.contact.contacts import contacts
-from wrcore.analysis.contact.poses import STILL
+from wrcore.analysis.contact.poses import POSE_FLAGS, STILL
 from wrcore.contact.reduction import REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors.checked_calls import OneOf, Within, checked
@@ -38,7 +38,8 @@ def contact_table(
     Returns
     -------
     pandas.DataFrame
-        y_m, yaw_rad and the columns of ``wrcore contact``, a row per patch.
+        y_m, yaw_rad and the columns of ``wrcore contact``, a row per patch; a wheel that touches nothing, or that no
+        height loads, has none.
 
     Raises
     ------
@@ -55,7 +56,15 @@ def contact_table(
     yaw, y = (grid.ravel() for grid in np.meshgrid(np.atleast_1d(yaws), np.atleast_1d(shifts), indexing="ij"))
     found = contacts(pair, y, yaw=yaw, load=wheel_load, detection=detection, patch=patch)
     there = np.isfinite(found.N_N)
+    limits = {name: np.broadcast_to(_of_patches(found[name], there), there.shape)[there] for name in POSE_FLAGS}
     pose, side, number = np.nonzero(there)
     table = {"y_m": y[pose], "yaw_rad": yaw[pose], "side": np.array(list(SIDES), object)[side], "patch": number + 1}
     table |= {"y_contact_m" if name == "y_m" else name: found[name][there] for name in (*STILL, "p_max_Pa")}
-    return pd.DataFrame(table | {"roll_rad": found.roll_rad[pose], "z_wheelset_m": found.z_wheelset_m[pose, side]})
+    table |= {"roll_rad": found.roll_rad[pose], "z_wheelset_m": found.z_wheelset_m[pose, side]}
+    table |= {"load_residual_N": found.load_residual_N[pose, side]}
+    return pd.DataFrame(table | {name: values.astype(int) for name, values in limits.items()})
+
+
+def _of_patches(flag, there):
+    """A flag of poses (n,), wheels (n, 2) or patches (n, 2, 3) in the dimensions of patches."""
+    return flag.reshape(flag.shape + (1,) * (there.ndim - flag.ndim))

@@ -14,7 +14,7 @@ from wrcore.analysis.contact.poses import ROLLING
 from wrcore.contact import reduction as columns
 from wrcore.contact.detection import axle_direction
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS, REDUCTIONS
-from wrcore.contact.statics import height_at_load, settle
+from wrcore.contact.statics import height_at_load, is_not_loaded, settle
 from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
 from wrcore.dynamics.motion import MOTION as _MOTION
 from wrcore.dynamics.wheel import COUNTERS, wheel_wrenches
@@ -22,6 +22,7 @@ from wrcore.errors import InputError
 from wrcore.errors.checked_calls import OneOf, Within, checked, same_shape
 from wrcore.geometry.track import SIDES
 from wrcore.run.run import Channels
+from wrcore.run.validity import flags
 
 MOTION: Any = _MOTION  # columns of motions
 OUT_OF_REACH = 1.0  # a wheelset that is lifted so much touches nothing, m
@@ -77,7 +78,10 @@ def contacts(
         Those of a run's contacts by name (``N_N``, ``y_m``, ``contact_angle_rad``, ``Fx_N`` and so on) and
         ``p_max_Pa``, each of shape ``(..., 2, 3)``: left and right wheel, patches from the flange to the field side,
         NaN where there is none. ``roll_rad``, shape ``(...)``, and ``z_wheelset_m``, shape ``(..., 2)``, by wheel: NaN
-        where no height gives the load.
+        where no height gives the load. ``load_residual_N``, shape ``(..., 2)``: carried less asked load of each wheel,
+        NaN where z is given. Flags, 0 or 1: ``not_loaded``, shape ``(..., 2)``, where a wheel does not carry its load;
+        ``half_space``, ``conformal``, ``profile_edge`` and ``hollow_ahead`` of patches, and ``search_fallback`` and
+        ``both_flanges``, shape ``(...)``, where a limit of validity is exceeded that a run counts by this name.
 
     Raises
     ------
@@ -124,9 +128,19 @@ def _found(sides, y, z, roll, yaw, load, speed, omega, vy, yaw_rate, mu):
         _set_rolling(sides, motions, axle, speed, omega, vy, yaw_rate)
         motions[..., MOTION.friction] = mu[:, None]
     rows = _pressed(sides, motions, rolls)
+    limits = {name: one.astype(float) for name, one in _limits(sides, rows, roll, yaw).items()}
+    vertical = np.nansum(rows[..., columns.NORMAL] * np.cos(rows[..., columns.ANGLE]), axis=-1)
+    residual = vertical - load[:, None]
     found = {name: rows[..., column] for name, column in columns.CHANNELS.items() if rolls or name not in ROLLING}
     found["p_max_Pa"] = 1.5 * found["N_N"] / (math.pi * found["a_m"] * found["b_m"])
-    return found | {"roll_rad": roll, "z_wheelset_m": heights}
+    limits["not_loaded"] = is_not_loaded(residual, load[:, None], rows[..., columns.PENETRATION]).astype(float)
+    return found | {"roll_rad": roll, "z_wheelset_m": heights, "load_residual_N": residual} | limits
+
+
+def _limits(sides, rows, roll, yaw):
+    """Flags of :func:`wrcore.run.validity.flags` of n poses with patches (n, 2, MAX_PATCHES, PATCH_COLUMNS)."""
+    contact = sides[0]._still._replace(geometries=tuple(one.geometry for one in sides))
+    return {name: one[:, 0] for name, one in flags(contact, rows[:, None], roll[:, None], yaw[:, None]).items()}
 
 
 def _placed(sides, y, yaw, z, roll, load):

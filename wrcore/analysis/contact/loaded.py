@@ -94,6 +94,11 @@ class Found(NamedTuple):
         return self.row[columns.NORMAL] * math.cos(angle) + self.row[columns.FY] * math.sin(angle)
 
 
+def carried(found, vertical=True):
+    """Load of a wheel, N, from its patches (`Found`): the vertical sum of all forces, or that of the normal forces."""
+    return sum(one.vertical if vertical else one.row[columns.NORMAL] for one in found)
+
+
 class LoadedWheels:
     """Wheels of a wheelset by one patch model: of runs, or ``grid``, their reference.
 
@@ -131,6 +136,11 @@ class LoadedWheels:
         self._still, self._still_handle, self._work_handle = contact, Handle(contact), Handle(self._work)
         self._rolling = {}
         self._rows, self._counters = np.zeros((MAX_PATCHES, PATCH_COLUMNS)), np.zeros(COUNTERS, np.int64)
+
+    @property
+    def contact(self):
+        """Its `ContactModel`, of wheels at rest."""
+        return self._still
 
     def at_height(self, side, y, z, roll=0.0, yaw=0.0, rolling=None, friction=0.3, fields=False):
         """Patches (list of `Found`, flange first; with a `Patch` if ``fields``) of one wheel of a wheelset at y, z (m),
@@ -338,8 +348,7 @@ class LoadedWheels:
         solved = not self._still.strips.strips and rolling is None and vertical  # by Hertz's law at rest
 
         def excess(z):
-            found = self.at_height(side, y, z, roll, yaw, rolling, friction)
-            force = sum(f.vertical if vertical else f.row[columns.NORMAL] for f in found)
+            force = carried(self.at_height(side, y, z, roll, yaw, rolling, friction), vertical)
             rest = max(force, 0.0) ** (2.0 / 3.0) - goal
             return 0.0 if abs(rest) < _CARRIED * goal else rest
 
@@ -372,7 +381,10 @@ class LoadedWheels:
             if not abs(step) < 0.02:
                 break
             if abs(step) < _LEVEL:
-                return roll, 0.5 * (left + right)
+                if abs(difference) < _LEVEL:
+                    return roll, 0.5 * (left + right)
+                slope = ROLL_SLOPE  # a height has jumped: the slope was that of the jump
+                step = difference / slope
             roll -= step
             left, right = left - 0.5 * slope * step, right + 0.5 * slope * step
         return math.nan, math.nan

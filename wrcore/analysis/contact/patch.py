@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 from wrcore.analysis.contact.loaded import GRIDS, LoadedWheels, Rolling
+from wrcore.analysis.contact.poses import pose_flags
 from wrcore.contact.patch.model import SLIPS
 from wrcore.contact.patch.result import Patch
 from wrcore.contact.wheel_on_rail import WheelsetOnTrack
@@ -95,11 +97,17 @@ def patch(
     if z is None:
         check_number(load, 1e-9, 1e6, "patch", "load", "N")
     known = [math.nan if value is None else value for value in (roll, z)]
-    to_load = how | {"vertical": load_by == "vertical"}
+    vertical = load_by == "vertical"
+    to_load = how | {"vertical": vertical}
     turned, heights = wheels.placed((side,), y, yaw, known, load, to_load, ("patch", "z"))
     if math.isnan(heights[side]):
         raise InputError("patch", "load", f"expected a load that the wheel finds at y = {y:g} m, got {load:g} N")
-    return [one.patch for one in wheels.at_height(side, y, heights[side], turned, yaw, fields=True, **how)]
+    found = wheels.at_height(side, y, heights[side], turned, yaw, fields=True, **how)
+    asked = load if z is None else math.nan
+    residual, limits = pose_flags(wheels.contact, {side: (wheels.geometry, found)}, asked, turned, yaw, vertical)
+    flagged = [tuple(name for name, on in one.items() if on) for one in limits[side]]
+    left = float(residual[side])
+    return [replace(one.patch, load_residual=left, flags=on) for one, on in zip(found, flagged, strict=True)]
 
 
 def pair_of(source, side="left"):

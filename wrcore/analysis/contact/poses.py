@@ -2,21 +2,27 @@
 
 import math
 
+import numpy as np
 import pandas as pd
 
-from wrcore.analysis.contact.loaded import SMOOTH, LoadedWheels, Rolling
+from wrcore.analysis.contact.loaded import SMOOTH, LoadedWheels, Rolling, carried
 from wrcore.analysis.contact.on_slices import LoadedOnSlices
 from wrcore.contact import reduction as columns
 from wrcore.contact.seen_rail import WheelOnSlices
+from wrcore.contact.statics import is_not_loaded
 from wrcore.errors import InputError, check_number
 from wrcore.geometry.track import SIDES
+from wrcore.run.validity import FLAGS, flags
 
 ROLLING = ("xi", "eta", "phi_per_m", "Fx_N", "Fy_N", "Mz_Nm")
 """Columns of rolling, empty where the wheelset does not move."""
 
+POSE_FLAGS = {"not_loaded": "1 where no height was found at which the wheel carries its load, else 0", **FLAGS}
+"""Flags of a pose's patches, 0 or 1, and what they mean: names as of the counters of a run."""
+
 STILL = tuple(name for name in columns.CHANNELS if name not in ROLLING)
 FIELDS = ("pose_id", "side", "patch", *STILL, "p_max_Pa", "roll_rad", "z_wheelset_m",
-          "x_min_m", "x_max_m", "width_m", *ROLLING)  # fmt: skip
+          "x_min_m", "x_max_m", "width_m", *ROLLING, "load_residual_N", *POSE_FLAGS)  # fmt: skip
 
 
 def loaded_poses(
@@ -25,7 +31,7 @@ def loaded_poses(
 ):  # fmt: skip
     """Patches of both wheels for every pose of a table, as from :func:`wrcore.contact.pose_file.read_poses`: columns
     FIELDS, a row per patch, none without contact or equilibrium; ``attrs``: patches solved ``on_grid`` instead of
-    strips, and ``on_fixed_strips``, whose tips were not found.
+    strips, and ``on_fixed_strips``, whose tips were not found; wheels ``without_height`` that no height loads.
 
     z given: forces at that height (roll left out: 0). Roll given, z not: each side is solved for the load by itself.
     Neither: both are solved so that each wheel carries it. In place of a ``geometry`` a `WheelOnSlices` stands for both
@@ -41,7 +47,7 @@ def loaded_poses(
     on_slices = isinstance(geometry, WheelOnSlices)
     kind = LoadedOnSlices if on_slices else LoadedWheels
     wheels = kind(geometry, patch, resolution, slip, shear_modulus, poisson_ratio, detection)
-    rows, on_grid, on_fixed = [], 0, 0
+    rows, on_grid, on_fixed, lost = [], 0, 0, 0
     for pose in poses.itertuples():
         if on_slices:
             wheels.s, wheels.turned = _given(pose, "s_m", 0.0), _given(pose, "pitch_rad", 0.0)
@@ -53,20 +59,48 @@ def loaded_poses(
         how = {"rolling": rolling, "friction": max(mu, SMOOTH)}
         to_load = how | {"vertical": load_by == "vertical"}
         roll, heights = wheels.placed(SIDES, y, yaw, (pose.roll_rad, pose.z_m), wheel_load, to_load, ("contact", "z_m"))
+        load = wheel_load if math.isnan(pose.z_m) else math.nan
+        found = {}
         for side, z in heights.items():
-            found = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
-            for number, one in enumerate(found, start=1):
+            patches = [] if math.isnan(z) else wheels.at_height(side, y, z, roll, yaw, **how)
+            found[side] = wheels.geometry, patches
+            lost += math.isnan(z)
+        residual, limits = pose_flags(wheels.contact, found, load, roll, yaw, load_by == "vertical")
+        for side, (_, patches) in found.items():
+            for number, one in enumerate(patches):
                 on_grid, on_fixed = on_grid + one.on_grid, on_fixed + one.on_fixed
                 if mu == 0.0:
                     one.row[columns.FX : columns.MZ + 1] = 0.0
                 rows.append([
-                    pose.pose_id, side, number, *(one.row[columns.CHANNELS[name]] for name in STILL),
-                    one.row[columns.P_MAX], roll, z, *one.extent,
+                    pose.pose_id, side, number + 1, *(one.row[columns.CHANNELS[name]] for name in STILL),
+                    one.row[columns.P_MAX], roll, heights[side], *one.extent,
                     *(math.nan if rolling is None else one.row[columns.CHANNELS[name]] for name in ROLLING),
+                    residual[side], *map(int, limits[side][number].values()),
                 ])  # fmt: skip
     table = pd.DataFrame(rows, columns=list(FIELDS))
-    table.attrs |= {"on_grid": on_grid, "on_fixed_strips": int(on_fixed)}
+    table.attrs |= {"on_grid": on_grid, "on_fixed_strips": int(on_fixed), "without_height": lost}
     return table
+
+
+def pose_flags(contact, found, load, roll, yaw, vertical=True):
+    """Residual of the load (N; carried less asked, NaN without a ``load``) by side, and `POSE_FLAGS` of each patch, a
+    list of dictionaries by side, of a wheelset in a pose (rad); ``found``: geometry and patches (`Found`) by side."""
+    rows = np.full((1, 1, 2, columns.MAX_PATCHES, columns.PATCH_COLUMNS), np.nan)
+    for side, (_, patches) in found.items():
+        for number, one in enumerate(patches):
+            rows[0, 0, list(SIDES).index(side), number] = one.row
+    geometries = tuple(geometry for geometry, _ in found.values())
+    known = flags(contact._replace(geometries=(geometries * 2)[:2]), rows, np.array([[roll]]), np.array([[yaw]]))
+    residuals, limits = {}, {}
+    for side, (_, patches) in found.items():
+        residuals[side] = carried(patches, vertical) - load
+        missed = is_not_loaded(residuals[side], load, [one.row[columns.PENETRATION] for one in patches])
+        at = 0, 0, list(SIDES).index(side)
+        limits[side] = [
+            {"not_loaded": bool(missed)} | {k: bool(v[0, 0] if v.ndim == 2 else v[(*at, i)]) for k, v in known.items()}
+            for i in range(len(patches))
+        ]
+    return residuals, limits
 
 
 def _given(pose, name, otherwise):

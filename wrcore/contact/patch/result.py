@@ -57,6 +57,10 @@ class Patch:
         x_min, x_max, s_min, s_max, m, where they are known better than from the cells; else empty.
     pose : tuple of float
         y, z (m), roll and yaw (rad) of the wheelset; may be empty.
+    load_residual : float
+        Force that the wheel carries less the load that was asked, N; NaN where no load was.
+    flags : tuple of str
+        Limits that are exceeded: names of columns of ``wrcore contact``.
 
     Examples
     --------
@@ -91,6 +95,8 @@ class Patch:
     peak: float = math.nan
     ends: tuple = ()
     pose: tuple = ()
+    load_residual: float = math.nan
+    flags: tuple = ()
 
     @property
     def cell_area(self) -> np.ndarray:
