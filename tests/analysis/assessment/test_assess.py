@@ -156,6 +156,22 @@ def test_limit_of_heavy_wheels(load, limit):
     assert found.summary.set_index("quantity").loc["Q", "limit"] == pytest.approx(limit, nan_ok=True)
 
 
+def test_what_is_recalled_is_marked_in_the_result():
+    found = assess(synthetic(lambda t, sign: (np.full_like(t, LOAD), np.zeros_like(t)), duration=1.0))
+    assert found.summary["source"].str.contains("recalled").all()
+    assert section_statistics([found], k=0.0)["source"].str.contains("recalled").all()
+
+
+def test_wheels_that_unload_are_no_large_load():
+    """Of Q the 99.85 % percentile counts, not the amount of the 0.15 % one."""
+
+    def forces(t, sign):
+        return np.where((t > 1.0) & (t < 2.0), -3.0 * LOAD, LOAD), np.zeros_like(t)
+
+    table = assess(synthetic(forces, duration=4.0)).summary.set_index("quantity")
+    assert table.loc["Q", "value"] < 1.5 * LOAD
+
+
 def test_what_lies_before_the_beginning_does_not_count():
     def forces(t, sign):
         return np.where(t < 1.0, 2.0 * LOAD, LOAD), np.zeros_like(t)

@@ -45,6 +45,15 @@ def test_gain_of_wb():
     assert abs(flat.response(0.05)) == pytest.approx(0.4, rel=1e-3)
 
 
+def test_wb_is_the_transfer_function_of_two_codes_for_en_12299():
+    s = 2j * np.pi * np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 31.5, 80.0])
+    w1, w2, w3, w4, w5, w6 = 2.0 * np.pi * np.array([0.4, 100.0, 16.0, 16.0, 2.5, 4.0])
+    band = s**2 * w2**2 / (s**2 + w1 / 0.71 * s + w1**2) / (s**2 + w2 / 0.71 * s + w2**2)
+    slopes = (s + w3) / (s**2 + w4 / 0.63 * s + w4**2) * (s**2 + w5 / 0.8 * s + w5**2) / (s**2 + w6 / 0.8 * s + w6**2)
+    expected = abs(band * slopes * 0.4 * w4**2 * w6**2 / (w3 * w5**2))  # 0.71 for the root of 1/2: 1 % next to 0.4 Hz
+    np.testing.assert_allclose(abs(WEIGHTINGS["Wb"].response(s.imag / (2.0 * np.pi))), expected, rtol=5e-3)
+
+
 @pytest.mark.parametrize("frequency", [0.8, 4.0, 15.0])
 def test_weighting_a_sine_scales_it_by_the_response(frequency):
     rate = 500.0
