@@ -329,7 +329,7 @@ def test_output_blocks_are_the_output_times(begin, duration, rate):
         assert np.array_equal(np.concatenate(blocks), whole) and all(map(len, blocks))
 
 
-FULL = ["pose", "velocity", "acceleration", "contact", "energy", "wheel_motion", "wear_number", "wheel_forces"]
+FULL = ["pose", "velocity", "acceleration", "contact", "energy", "wheel_motion", "T_gamma", "Q"]
 
 
 @pytest.mark.parametrize("name", ["suspended_wheelset", "crossing", "locomotive"])
