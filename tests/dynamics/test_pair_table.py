@@ -587,13 +587,24 @@ def test_threads_that_meet_a_new_pair_share_its_table(own_cache, monkeypatch):
 
 def test_a_pair_that_is_dropped_at_exit_says_nothing(monkeypatch):
     """Modules are being taken apart then; what it knows has been written before."""
-    pair = pair_of_known_numbers()
-    pair._new, pair.write = 3, lambda: pytest.fail("written")
-    monkeypatch.setattr(sys, "is_finalizing", lambda: True)
+
+    class Dropped(pair_store.Pair):
+        def __init__(self, new):
+            self._new = new
+
+        def write(self):
+            written.append(self._new)
+
+    written: list[int] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(sys, "is_finalizing", lambda: True)
+        Dropped(3).__del__()
+    assert written == []
+    pair = Dropped(4)
     pair.__del__()
-    monkeypatch.undo()
+    assert written == [4]
     pair._new = 0
-    pair_store.Pair.__del__(pair_store.Pair.__new__(pair_store.Pair))  # one that was never made
+    pair_store.Pair.__new__(pair_store.Pair).__del__()  # one that was never made
 
 
 def test_what_is_said_of_solving_says_how_far_the_run_is(own_cache, monkeypatch):
