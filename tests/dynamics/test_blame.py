@@ -44,12 +44,12 @@ def with_element(law, states=0):
 
 
 def test_an_element_and_a_creep_law_that_are_lost():
-    irregular = {"track": {"irregularity": {"own": {"law": "tests.elements.own_laws:aside", "length": 40.0}}}}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", with_element("tests.elements.own_laws:lost_far"))
+    irregular = {"track": {"irregularity": {"own": {"law": "tests/elements/own_laws.py:aside", "length": 40.0}}}}
+    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", with_element("tests/elements/own_laws.py:lost_far"))
     run = wr.simulate({**scene.data, **irregular}, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
     assert run.reason.endswith(", where own_laws.py:lost_far gave a number that is not finite")
-    law = {"contact": {"creep": {"model": "tests.elements.own_laws:lost_in_slip"}, "patch": "moment"}}
+    law = {"contact": {"creep": {"model": "tests/elements/own_laws.py:lost_in_slip"}, "patch": "moment"}}
     run = wr.simulate(SCENES / "suspended_wheelset.yaml", **law, initial={"y": 0.0}, **irregular, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
     assert run.reason.endswith(", where own_laws.py:lost_in_slip gave a number that is not finite")

@@ -13,7 +13,7 @@ from wrcore.scene.description import compile_scene, static_equilibrium
 from wrcore.vehicle.description import GRAVITY
 
 GUIDED = SCENES / "guided_car.yaml"
-LAWS = "tests.dynamics.own_control:"
+LAWS = "tests/dynamics/own_control.py:"
 MOTORS = read_yaml(GUIDED)["drive"]["motors"]
 STEERING = {
     "law": f"{LAWS}steer", "outputs": ["left_1", "right_1"], "states": [0.001], "parameters": [2e5, 1e5, 5e4, 300.0],
@@ -205,7 +205,7 @@ BAD = {
 def test_bad_control_is_refused_in_one_line(name):
     changes, field, expected = BAD[name]
     with pytest.raises(InputError) as caught:
-        wr.load_scene(wr.load_scene(GUIDED), changes)
+        compile_scene(wr.load_scene(wr.load_scene(GUIDED), changes))
     assert caught.value.field == field and expected in caught.value.expected and "\n" not in str(caught.value)
 
 
@@ -220,9 +220,11 @@ def test_a_function_may_stand_for_its_name():
     from tests.dynamics.own_control import wave
 
     law = {"law": wave, "inputs": [], "outputs": ["left_1"], "parameters": [100.0, 6.0]}
-    scene = car({"front": {**law, "law": f"{LAWS}wave"}})
-    given = wr.load_scene(scene, control={"front": law})
-    assert given.data["control"]["front"]["law"] == f"{LAWS}wave"
-    assert model_fingerprint(compile_scene(given)[0]) == model_fingerprint(compile_scene(scene)[0])
+    given = car({"front": law})
+    assert given.data["control"]["front"]["law"] == "tests.dynamics.own_control:wave"
+    again = wr.load_scene(given, control={"front": law | {"law": f"{LAWS}wave"}})
+    assert again.laws.digests.keys() == {"own_control.py:wave"}
+    again = wr.load_scene(again, control={"front": law})
+    assert model_fingerprint(compile_scene(given)[0]) == model_fingerprint(compile_scene(again)[0])
     found = wr.simulate(given, integration__duration=0.2)
     np.testing.assert_allclose(found["drive/left_1"].torque_Nm, 100.0 * np.sin(6.0 * found.t), rtol=0, atol=1e-9)

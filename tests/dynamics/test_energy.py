@@ -142,7 +142,7 @@ EVERYTHING = [
     {"kind": "anti_roll_bar", "stiffness": 9.0, "damping": 0.4},
     {"kind": "actuator", "direction": "y", "at": [0.1, 0.2, 1.5], "force": 3.0},
     {"kind": "actuator", "direction": "line", "at": [[0.3, 0.2, 1.8], [-0.4, 0.2, 1.2]], "force": -2.0},
-    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests.elements.own_laws:two_in_series",
+    {"kind": "own_law", "direction": "y", "at": [0.1, 0.3, 1.5], "law": "tests/elements/own_laws.py:two_in_series",
      "parameters": [30.0, 5.0, 4.0], "states": 2},
 ]  # fmt: skip
 

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import ROOT
+from wrcore.errors.checked_yaml import name_of_function
 from wrcore.kernels import own
 from wrcore.kernels.handles import Kernel
+from wrcore.kernels.named_laws import Laws
 
 TEXT = """
 import math
@@ -37,6 +39,11 @@ def plain(speed, scale=2.0):
 """
 
 
+def laws_of(function):
+    """A function as a program gives it to a scene."""
+    return Laws().find(name_of_function(function))
+
+
 @pytest.fixture
 def module(tmp_path, monkeypatch):
     (tmp_path / "own_digests.py").write_text(TEXT)
@@ -49,12 +56,14 @@ def module(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["law", "plain"])
 def test_what_a_function_does_decides(module, name, tmp_path):
     def digest():
-        return own.find(f"own_digests:{name}").digest
+        return laws_of(getattr(module, name)).digest
 
     first = digest()
     assert digest() == first
     environment = os.environ | {"PYTHONPATH": f"{tmp_path}:{ROOT}", "PYTHONHASHSEED": "7"}
-    script = f"from wrcore.kernels import own; print(own.find('own_digests:{name}').digest)"
+    script = (
+        f"import own_digests; from tests.kernels.test_own import laws_of; print(laws_of(own_digests.{name}).digest)"
+    )
     told = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
     assert told.stdout.strip() == str(first)  # in another process, where sets have another order
     module.GAIN = 1e6

@@ -9,7 +9,8 @@ from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import told_if_long, warn_once
 from wrcore.scene import description
-from wrcore.scene.description import _creep, announce, load_scene
+from wrcore.scene.creep import announce, creep_of
+from wrcore.scene.description import load_scene
 
 
 @pytest.fixture
@@ -29,7 +30,7 @@ def test_a_table_that_must_be_built_is_announced(scene, there, lines, monkeypatc
     monkeypatch.setattr(description, "kept_tables", lambda *_: ["a table"] if there else [])
     monkeypatch.setattr(description, "ensure_table", ensure)
     with pytest.raises(Known):
-        _creep(scene, None)
+        creep_of(scene, None)
     said = capsys.readouterr().err.splitlines()
     assert len(said) == lines and all("creep table" in line for line in said)
 

@@ -7,6 +7,7 @@ import pytest
 
 import wrcore as wr
 from tests.conftest import SCENES
+from tests.scene import own_laws
 from tests.scene.own_laws import TABLE, waves
 from wrcore.creep.laws import GROUP
 from wrcore.errors import InputError
@@ -14,7 +15,7 @@ from wrcore.run.checkpoints import model_fingerprint
 from wrcore.scene.description import compile_scene
 
 SCENE = SCENES / "suspended_wheelset.yaml"
-LAWS = "tests.scene.own_laws:"
+LAWS = "tests/scene/own_laws.py:"
 SHORT = {"integration.duration": 0.6, "speed": 30.0, "initial.y": 0.003}
 
 
@@ -61,13 +62,13 @@ def test_a_creep_law_of_ones_own_is_the_built_in_one(monkeypatch):
     explicit = {"integration.method": "rk4"}  # a Jacobian takes differences of the law's last bits
     one, other = (run(explicit | {"contact.creep.model": model}) for model in (f"{LAWS}as_she", "she"))
     np.testing.assert_allclose(one["wheelset"].y_m, other["wheelset"].y_m, rtol=0, atol=1e-12)
-    entry = EntryPoint("my_she", f"{LAWS}as_she", GROUP)
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda name, **_: [entry] if name == "my_she" else [])
+    entry = EntryPoint("my_she", "tests.scene.own_laws:as_she", GROUP)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: [entry] if group == GROUP else [])
     named = run(explicit | {"contact.creep.model": "my_she"})
     np.testing.assert_array_equal(named["wheelset"].y_m, one["wheelset"].y_m)
     marks = [
         model_fingerprint(compile_scene(wr.load_scene(SCENE, {"contact.creep.model": model}))[0])
-        for model in ("my_she", f"{LAWS}as_she", "she")
+        for model in ("my_she", own_laws.as_she, "she")
     ]
     assert marks[0] == marks[1] != marks[2]
 
@@ -96,7 +97,7 @@ BAD = {
 def test_what_does_not_work_is_refused_in_one_line(name):
     changes, field, expected = BAD[name]
     with pytest.raises(InputError) as caught:
-        wr.load_scene(SCENE, changes)
+        compile_scene(wr.load_scene(SCENE, changes))
     assert caught.value.field == field and expected in caught.value.expected and "\n" not in str(caught.value)
 
 

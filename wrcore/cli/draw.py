@@ -26,6 +26,10 @@ def add(commands):
     )  # fmt: skip
     command.add_argument("--begin", type=float, default=0.0, metavar="s", help="of a run: shown from here on, s")
     command.add_argument("--end", type=float, default=float("inf"), metavar="s", help="of a run: shown up to here, s")
+    command.add_argument(
+        "--trust", action="store_true",
+        help="of a run: import the installed packages that it names for its kinds of elements (default: no)",
+    )  # fmt: skip
     command.set_defaults(run=run)
 
 
@@ -37,7 +41,7 @@ def run(options):
     from wrcore.analysis.pictures.style import save_figure
 
     try:
-        drawn = draw(options.source, options.scene, options.factor, options.begin, options.end)
+        drawn = draw(options.source, options.scene, options.factor, options.begin, options.end, options.trust)
     except InputError as error:
         if error.source != "draw":
             raise

@@ -34,7 +34,7 @@ from wrcore.dynamics.vector import cross, dot, load, minus
 from wrcore.elements import law
 from wrcore.kernels.handles import FOUR, Kernel, Kind, four_at
 from wrcore.kernels.jit import FUSED, jit
-from wrcore.kernels.own import Own, text_digest
+from wrcore.kernels.named_laws import Own, text_digest
 
 STIFFNESS, DAMPING, PRELOAD = 6, 9, 12
 """Columns of a row of ``Elements.springs``, which begins as one of ``Elements.directed``."""

@@ -50,6 +50,7 @@ from wrcore.dynamics.wheel import (
 )
 from wrcore.kernels.handles import Handle, Handles, Kernel, Kind, call_address, call_at
 from wrcore.kernels.jit import FUSED, jit
+from wrcore.kernels.own import fault_in
 from wrcore.kernels.told import raise_interrupted
 
 FRICTIONLESS = 1e-9
@@ -376,7 +377,7 @@ class Equations:
     def __init__(self, model, work=None):
         self.work = workspace(model) if work is None else work
         model, work = Handle(with_kernels(model, self.work)), Handle(self.work)
-        state, self._planned = np.empty(0), {}
+        state, self._planned, self.fault = np.empty(0), {}, ""  # the last one of a law of the user
         self.arguments = Kernel(fill_derivatives, 0.0, state, model, work, state, FRESH), model, work
 
     def planned(self, plan):
@@ -399,6 +400,7 @@ class Equations:
         """Rates of several states, shape (n, size), at one time (s)."""
         states, rates = np.ascontiguousarray(states, float), np.empty(states.shape)
         equations, model, work = self.arguments
-        fill_many(equations, t, states, model, work, rates, mode)
+        if fault := fault_in(fill_many, equations, t, states, model, work, rates, mode):
+            self.fault, rates[:] = fault, np.nan
         raise_interrupted()
         return rates

@@ -6,7 +6,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
@@ -291,11 +291,18 @@ def plain_tree(data, source):
     return copied(data, (), frozenset())
 
 
+GIVEN: dict[str, Callable] = {}
+"""Functions that stood in data of a Python program, by their `name_of_function`."""
+
+
 def name_of_function(value):
     """``module:function`` of a function, compiled ones too, that a module knows by its name; else empty."""
     plain = getattr(value, "py_func", value)
     name = getattr(plain, "__qualname__", "") if callable(plain) and not isinstance(plain, type) else ""
-    return f"{plain.__module__}:{name}" if name.isidentifier() else ""
+    if not name.isidentifier():
+        return ""
+    GIVEN[f"{plain.__module__}:{name}"] = value
+    return f"{plain.__module__}:{name}"
 
 
 def _fault(value):

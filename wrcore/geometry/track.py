@@ -1,8 +1,9 @@
 """The track: where the rails stand."""
 
 import os
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from wrcore.geometry.path import PathData, path_data, tangent_path
 from wrcore.geometry.profile import GAUGE_DEPTH
 from wrcore.geometry.ramps import STEEPEST, incline
 from wrcore.kernels import own
+from wrcore.kernels.named_laws import Laws
 
 SIDES = {"left": 1.0, "right": -1.0}
 """Sign of a rail's place beside the centre line, along y."""
@@ -64,11 +66,20 @@ class Track:
     """Deviation of the rails."""
     gauge_depth: float = GAUGE_DEPTH
     """Height below the rail top down to which the gauge is measured, m."""
+    by_law: Callable | None = field(default=None, repr=False)
+    """Irregularity of a law of the user, which is not called yet: a function of `Laws` to IrregularityData."""
 
     @cached_property
     def tangent(self):
         """Whether the track is straight, level and without irregularity."""
-        return self.path.pieces.shape[0] == 0 and self.irregularity.coefficients.shape[0] == 0
+        bare = self.irregularity.coefficients.shape[0] == 0 and self.by_law is None
+        return self.path.pieces.shape[0] == 0 and bare
+
+    def with_laws(self, laws):
+        """The track with the irregularity of a law of the user; itself if it has none."""
+        if self.by_law is None:
+            return self
+        return replace(self, irregularity=sum_of([self.irregularity, self.by_law(laws)]), by_law=None)
 
     def rail_distance(self, rail):
         """Distance (m) from the track's centre line to the origin (highest point) of a rail's ProfileCurve in track
@@ -84,9 +95,10 @@ class Track:
         return 0.5 * self.gauge + offset
 
 
-def build_track(data, source, folder="."):
+def build_track(data, source, folder=".", laws=None):
     """Track of a scene's key ``track`` (a dict, left as it is); ``source`` is named in errors, a points file is looked
-    for in ``folder``, then above it. InputError names a segment by its position in the list (from 0) and its key."""
+    for in ``folder``, then above it, and ``laws`` find a law of the user, which is not called. InputError names a
+    segment by its position in the list (from 0) and its key."""
     try:
         data = validate(data, "track", source)
     except InputError as error:
@@ -101,11 +113,14 @@ def build_track(data, source, folder="."):
         aside = WIDENED[data["widened"]]
         about, climbs = data["cant_about"], data["rail_climb"]
         path = path_data(knots, *values, data["rounding"], shapes, about, climb, aside, climbs)
-    irregularity = no_irregularity()
+    irregularity, by_law = no_irregularity(), None
     if "irregularity" in data:
         widened = any(segment.get("widening") for segment in segments)
         irregularity = _irregularity(data["irregularity"], source, Path(folder), None if widened else data["gauge"])
-    return Track(float(data["gauge"]), path, irregularity, float(data["gauge_depth"]))
+        if "own" in data["irregularity"]:
+            by_law = partial(_by_law, data["irregularity"], source)
+            by_law(laws or Laws(Path(folder)), call=False)
+    return Track(float(data["gauge"]), path, irregularity, float(data["gauge_depth"]), by_law)
 
 
 def _knots(segments, rounding, source):
@@ -248,13 +263,20 @@ def _irregularity(data, source, folder, gauge):
         sampled.append((s - shift, values))
     if "spectrum" in data:
         sampled.append(_generated(data["spectrum"], source, f"{key}.spectrum"))
-    if "own" in data:
-        s, values = own.on_grid(data["own"], len(CHANNELS), folder, source, f"{key}.own")
-        if np.abs(values).max() > LARGEST:
-            expected = f"expected deviations in m, within {LARGEST:g}, got {np.abs(values).max():g}"
-            raise InputError(source, f"{key}.own.law", expected)
-        sampled.append((s, values.T))
-    return sum_of([faded(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled])
+    parts = [faded(*one, data["fade_in"], data["fade_out"], source, key) for one in sampled]
+    return sum_of(parts) if parts else no_irregularity()
+
+
+def _by_law(data, source, laws, call=True):
+    """IrregularityData of a law of the user, or None where it is not to be called."""
+    key = "track.irregularity"
+    s, values = own.on_grid(data["own"], len(CHANNELS), laws, source, f"{key}.own", call)
+    if values is None:
+        return None
+    if np.abs(values).max() > LARGEST:
+        expected = f"expected deviations in m, within {LARGEST:g}, got {np.abs(values).max():g}"
+        raise InputError(source, f"{key}.own.law", expected)
+    return faded(s, values.T, data["fade_in"], data["fade_out"], source, key)
 
 
 def _generated(data, source, key):

@@ -21,13 +21,14 @@ failed        a number is not finite, or the step size fell below the resolution
 ============  ======================================================================================================
 """
 
+import copy
 import time
 from dataclasses import replace
 
 import numpy as np
 from numba import typeof
 
-from wrcore.dynamics.blame import blame
+from wrcore.dynamics.blame import LawWatch, blame
 from wrcore.dynamics.contract import begin, kept_size, places, why_outside
 from wrcore.dynamics.drive import may_drive
 from wrcore.dynamics.system import Equations, state_size
@@ -160,7 +161,7 @@ class Integration:
         state, first_step = start.memory.state if goes_on else start, step or min(engine.FIRST_STEP, longest_step)
         self.memory = memory = new_memory(state, t, 0, first_step)
         begin(self.equations.work)
-        self.places = places(self.equations.work)
+        self.places, self._laws, self.fault = places(self.equations.work), LawWatch(model), ""
         self._scratch = new_scratch(len(memory.state), kept_size(model, self.equations.work))
         self._take(method)
         self.notes = choice.first_notes(method, memory) if looks and not goes_on else choice.no_notes()
@@ -201,6 +202,18 @@ class Integration:
             self._look(record)
 
     def _advance(self, record, attempts):
+        if not self._laws.names:
+            return self._step(record, attempts)
+        before = copy.deepcopy(self.checkpoint(0.0)) if self._laws.in_python else None
+        try:
+            outcome, self.fault = self._laws.fault_of(self._step, record, attempts)
+        except KeyboardInterrupt:
+            if before is not None:
+                self.go_on_from(before)
+            raise
+        return engine.NOT_FINITE if self.fault else outcome
+
+    def _step(self, record, attempts):
         arguments = *self._before, record, attempts, *self.equations.arguments
         if self._plain:
             return self._plain(*arguments)
@@ -267,6 +280,8 @@ class Integration:
 
     def ending(self, outcome, given_up=""):
         """Status and reason of an outcome, or why the run was given up."""
+        if self.fault:
+            return "failed", f"{self.fault} at t = {self.memory.clock[engine.T]:.6g} s"
         status, reason = _ending(outcome, given_up, self.model, self.memory, self.equations.work)
         if status == "failed":
             clock = self.memory.clock

@@ -1,6 +1,7 @@
 """Independent references: scipy's solvers, and SUNDIALS' CVODE, over the same right-hand side."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 from scipy import integrate as scipy_integrate
@@ -30,9 +31,10 @@ def integrate_by_reference(model, state, times, method, tolerances, longest_step
         return why_outside(model, t, state, places(function.work)[0], derailed_y)
 
     bounded = stop if np.isfinite(derailed_y) else None
-    return integrate_function(
+    found = integrate_function(
         function, state, times, method, LEAST_RTOL, tolerances, longest_step, bounded, progress, halt, most_steps
     )
+    return replace(found, status="failed", reason=f"{function.fault}; {found.reason}") if function.fault else found
 
 
 def integrate_function(

@@ -1,33 +1,28 @@
-"""Functions of a user's own: named as ``module:function`` or ``file.py:function``, called from kernels by address.
+"""Functions of the user (`wrcore.kernels.named_laws`), called from kernels by address.
 
 A function that numba compiled (``@numba.njit``) becomes part of the run's machine code. A plain Python function is
-called back by every evaluation that needs it, at some microseconds each; an error in it is said once and counts as NaN.
-What decides on a run is the text of the function's module, its code, and the values that it takes from around it: their
-digest stands in the model, in place of an address.
+called back by every evaluation that needs it, at some microseconds each. The first error in it ends the run: every
+later call in its thread returns NaN until the kernel has returned and `take_fault` is asked. The digest of a function
+stands in the model, in place of an address.
 """
 
 import ctypes
-import hashlib
-import importlib
-import importlib.util
-import inspect
 import math
-import sys
-from collections.abc import Callable
+import threading
 from contextvars import ContextVar
 from functools import cache
-from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
+from numba.core.errors import NumbaError
 
-from wrcore.errors import InputError
+from wrcore.errors import InputError, short
 from wrcore.kernels.aside import planned
 from wrcore.kernels.cache import warn
 from wrcore.kernels.handles import Kernel, call_c
 from wrcore.kernels.jit import FUSED
+from wrcore.kernels.named_laws import function_of, name_of, said
 
 NOTHING = numba.types.none
 """What a kernel returns that returns nothing."""
@@ -38,138 +33,41 @@ GUARD = 64
 MOST_SAMPLES = 400_000
 """Of a function that is sampled."""
 
-_KNOWN: dict[tuple[int, ...], Callable] = {}
-_TEXTS: dict[ModuleType, str] = {}
 _WATCHED = ContextVar("watched", default=False)
 _NOT_FINITE: dict[tuple[int, ...], None] = {}
 _NOTES: list[Any] = []  # what compiled code calls, kept alive
+_HELD = threading.local()  # the error that a plain Python function raised in this thread
 
 
-class Own(NamedTuple):
-    """A function of a user's own."""
-
-    name: str
-    digest: tuple[int, ...]
-    """Of its name, of its module's text and of `_content`, as four numbers: what models hold in its place."""
-
-    @property
-    def function(self):
-        """The function itself."""
-        return _KNOWN[self.digest]
+def take_fault():
+    """Which plain Python function raised what in this thread since this was asked last; empty if none did. Ctrl-C in
+    one is raised."""
+    name, error = getattr(_HELD, "fault", ("", None))
+    _HELD.fault = "", None
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    return f"{name} raised {said(error)}" if name else ""
 
 
-def find(law, folder=Path()):
-    """The `Own` function that ``law`` names; files count from ``folder``, then from the folder above. An InputError
-    without a source says what was expected."""
-    place, _, name = law.rpartition(":")
-    if not place or not name.isidentifier():
-        raise InputError("", "", f"expected module:function or file.py:function, got {law!r}")
-    module = _of_file(place, folder) if place.endswith(".py") else _imported(place)
-    function = getattr(module, name, None)
-    if not callable(function):
-        raise InputError("", "", f"expected a function {name!r} in {place}, found none")
-    sha = hashlib.sha256(f"{name}\0{_text(module, function)}\0{_content(function, set())}".encode()).digest()
-    digest = tuple(int(part) for part in np.frombuffer(sha, np.int64))
-    _KNOWN[digest] = function
-    return Own(name, digest)
-
-
-def file_of(law, folder):
-    """Path of the file that a law in the form ``file.py:function`` names, or None."""
-    place = law.rpartition(":")[0]
-    found = (base / place for base in (folder, Path(folder).parent, Path()))
-    return next((path for path in found if path.is_file()), None) if place.endswith(".py") else None
-
-
-def _of_file(place, folder):
-    path = file_of(f"{place}:", folder)
-    if path is None:
-        raise InputError("", "", f"expected an existing file, got {place!r}")
-    content = path.read_bytes()
-    name = f"{path.stem}_{hashlib.sha256(bytes(path.resolve()) + content).hexdigest()[:12]}"
-    if name not in sys.modules:
-        specification = importlib.util.spec_from_file_location(name, path)
-        module = importlib.util.module_from_spec(specification)
-        sys.modules[name] = module
-        try:
-            _guarded(place, lambda: specification.loader.exec_module(module))
-        except InputError:
-            del sys.modules[name]
-            raise
-        _TEXTS[module] = content.decode("utf-8", "replace")
-    return sys.modules[name]
-
-
-def _imported(place):
-    return _guarded(place, lambda: importlib.import_module(place))
-
-
-def _guarded(place, load):
+def fault_in(evaluate, *arguments):
+    """What went wrong in functions of the user while a kernel ran outside of a run, or an empty string; it is also
+    said once on standard error."""
+    fault = ""
+    take_fault()  # of a kernel that nobody asked about
     try:
-        return load()
-    except Exception as error:  # whatever the module's own code does
-        raise InputError("", "", f"expected a module that can be imported: {place}: {_said(error)}") from None
+        evaluate(*arguments)
+    except Exception as error:  # of a compiled function
+        fault = f"a law raised {said(error)}"
+    fault = take_fault() or fault
+    if fault:
+        warn(f"{fault}; it counts as not a number")
+    return fault
 
 
-def _said(error):
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def _text(module, function):
-    """What decides on a function: the text of its module as it was first read; in a notebook its own."""
-    if module not in _TEXTS:
-        try:
-            _TEXTS[module] = Path(module.__file__).read_text("utf-8")
-        except (AttributeError, TypeError, OSError, UnicodeDecodeError):
-            try:
-                return inspect.getsource(getattr(function, "py_func", function))
-            except (OSError, TypeError):
-                return ""  # its code still counts
-    return _TEXTS[module]
-
-
-def _content(thing, seen):
-    """What a value is, or a function does, as text that another process finds, too: a function that is defined anew,
-    with another text or other globals, has another one. Functions of libraries stand by their names."""
-    plain = getattr(thing, "py_func", thing)
-    if isinstance(plain, FunctionType):
-        name = f"{plain.__module__}.{plain.__qualname__}"
-        foreign = seen and plain.__module__ not in {one.__module__ for one in seen} and plain is thing
-        if foreign or plain in seen or name.startswith("wrcore."):
-            return name
-        seen.add(plain)
-        cells = [cell.cell_contents for cell in plain.__closure__ or ()]
-        around = [plain.__globals__[one] for one in _names(plain.__code__) if one in plain.__globals__]
-        return _content((plain.__code__, plain.__defaults__, plain.__kwdefaults__, cells, around), seen)
-    if isinstance(thing, CodeType):
-        return f"{thing.co_code.hex()}{thing.co_names}{_content(thing.co_consts, seen)}"
-    if isinstance(thing, np.ndarray | np.generic):
-        return f"{thing.dtype}{np.shape(thing)}{hashlib.sha256(thing.tobytes()).hexdigest()}"
-    if isinstance(thing, tuple | list):
-        return str([_content(one, seen) for one in thing])
-    if isinstance(thing, dict):
-        return str([(str(key), _content(value, seen)) for key, value in thing.items()])
-    if isinstance(thing, set | frozenset):
-        return str(sorted(_content(one, seen) for one in thing))
-    known = thing is None or isinstance(thing, bool | int | float | complex | str | bytes)
-    return repr(thing) if known else f"{type(thing).__name__} {getattr(thing, '__name__', '')}"
-
-
-def _names(code):
-    """Names that code, and the code in it, takes from its globals."""
-    inner = [one for one in code.co_consts if isinstance(one, CodeType)]
-    return sorted({*code.co_names, *(name for one in inner for name in _names(one))})
-
-
-def text_digest(function):
-    """Four numbers for the text of the module of a kernel from elsewhere."""
-    return find(f"{function.__module__}:{function.__name__}").digest
-
-
-def tried(own, sizes, *arguments):
+def tried(own, sizes, *arguments, reads=0):
     """What a function returns on a test call with arrays of these ``sizes``, one behind another, after the numbers
-    ``arguments``; beside it the arrays. Values may be given in place of a size. An InputError without a source for
-    an error in it, or a number written where no array is."""
+    ``arguments``; beside it the arrays. Values may be given in place of a size. The first ``reads`` arrays are the
+    function's to read. An InputError without a source for an error in it, or a number written where it may not be."""
     function = own.function
     for call in (getattr(function, "py_func", function), function):  # compiled code looks at no index
         arrays, memory = [], []
@@ -177,13 +75,34 @@ def tried(own, sizes, *arguments):
             values = np.zeros(size) if np.ndim(size) == 0 else np.array(size, float)
             memory.append(np.append(values, np.full(GUARD, np.pi)))
             arrays.append(memory[-1][: len(values)])
-        try:
-            found = call(*arguments, *arrays)
-        except Exception as error:  # whatever the function does
-            raise InputError("", "", f"expected a function that works on a test call: {_said(error)}") from None
+        before = [array.copy() for array in arrays[:reads]]
+        found = called("works on a test call", call, *arguments, *arrays)
         if any(np.any(whole[-GUARD:] != np.pi) for whole in memory):
             raise InputError("", "", "expected a function that writes inside its arrays alone")
+        if not all(map(np.array_equal, before, arrays)):
+            raise InputError("", "", "expected a function that leaves its inputs, states and parameters as they are")
     return found, arrays
+
+
+def called(what, function, *arguments):
+    """What a function of the user returns; any error in it but Ctrl-C is an InputError without a source, which says
+    ``what`` was expected of the function."""
+    try:
+        return function(*arguments)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever the function does, which may be to end the process
+        raise InputError("", "", f"expected a function that {what}: {said(error)}") from None
+
+
+def is_number(value):
+    """Whether a value is one real number, neither an array nor a truth value."""
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+
+
+def is_force(answer):
+    """Whether a law of an element may return this: a number, or a tuple of three."""
+    return is_number(answer) or (isinstance(answer, tuple) and len(answer) == 3 and all(map(is_number, answer)))
 
 
 def finite(*values):
@@ -193,39 +112,38 @@ def finite(*values):
     except (TypeError, ValueError):
         good = False
     if not good:
-        raise InputError("", "", f"expected finite numbers from a test call, got {list(map(np.asarray, values))}")
+        raise InputError("", "", f"expected finite numbers from a test call, got {short(values)}")
 
 
 def sample(own, s, rows):
     """Values (rows, n) of a function of arc length or speed ``s`` (n,), which may give (n,) for all rows."""
-    try:
-        found = np.asarray(own.function(s.copy()), float)
-    except Exception as error:  # whatever the function does
-        raise InputError("", "", f"expected a function that works on an array: {_said(error)}") from None
+    found = called("works on an array", own.function, s.copy())
+    found = called("returns numbers", np.asarray, found)
+    if found.dtype.kind not in "fiu":
+        raise InputError("", "", f"expected real numbers, got values of type {found.dtype}")
     if found.shape not in ((rows, len(s)), (len(s),)):
         raise InputError("", "", f"expected values of shape ({rows}, {len(s)}) or ({len(s)},), got {found.shape}")
+    found = found.astype(float)
     finite(found)
     return np.broadcast_to(found, (rows, len(s)))
 
 
-def on_grid(spec, rows, folder, source, field, begin=0.0):
-    """Abscissas (n,) from ``begin`` on over a ``length`` by a ``spacing``, keys of ``spec``, and the values (rows, n)
-    of its ``law`` there; an InputError names ``source`` and ``field``."""
+def on_grid(spec, rows, laws, source, field, call=True):
+    """Abscissas (n,) from ``begin`` (0 if left out) on over a ``length`` by a ``spacing``, keys of ``spec``, and the
+    values (rows, n) of its ``law`` there, which ``laws`` finds; None where it is not to be called. An InputError names
+    ``source`` and ``field``."""
     count = round(spec["length"] / spec["spacing"]) + 1
     if not 2 <= count <= MOST_SAMPLES:
         raise InputError(source, f"{field}.spacing", f"expected 2 to {MOST_SAMPLES} samples, got {count}")
-    s = spec.get("begin", begin) + spec["length"] / (count - 1) * np.arange(count)
+    s = spec.get("begin", 0.0) + spec["length"] / (count - 1) * np.arange(count)
     try:
-        return s, sample(find(spec["law"], folder), s, rows)
+        found = laws.find(spec["law"])
+        if not call:
+            return s, None
+        laws.allow()
+        return s, sample(found, s, rows)
     except InputError as error:
         raise InputError(source, f"{field}.law", error.expected) from None
-
-
-def name_of(digest):
-    """File and name of the function with a digest."""
-    plain = getattr(_KNOWN[tuple(map(int, digest))], "py_func", _KNOWN[tuple(map(int, digest))])
-    code = getattr(plain, "__code__", None)
-    return f"{Path(code.co_filename).name}:{plain.__name__}" if code else str(plain)
 
 
 def not_finite_in(evaluate):
@@ -261,7 +179,7 @@ def addressed(wrap, digest, scalars, arrays, examples, returns):
     ``examples`` (`Example`); plain Python is called back with so many ``scalars``, then ``arrays``."""
     if planned() is not None:  # no file keeps them
         return NotCompiled
-    return _addressed(wrap, digest, _KNOWN[digest], scalars, arrays, examples, returns, _WATCHED.get())
+    return _addressed(wrap, digest, function_of(digest), scalars, arrays, examples, returns, _WATCHED.get())
 
 
 class NotCompiled:
@@ -273,12 +191,16 @@ class NotCompiled:
 @cache
 def _addressed(wrap, digest, function, scalars, arrays, examples, returns, watched):
     if not hasattr(function, "py_func"):
-        function = _called_back(function, scalars, arrays)
-    if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller
-        function.compile(signature_of(scalars, arrays))
-    return Kernel(
-        uncached(wrap(function, _note_of(digest, watched))), *(example.value for example in examples), returns=returns
-    )
+        function = _called_back(function, name_of(digest), scalars, arrays)
+    try:
+        if arrays:  # by itself first: what a caller has compiled may allocate no more than the caller
+            function.compile(signature_of(scalars, arrays))
+        kernel = uncached(wrap(function, _note_of(digest, watched)))
+        return Kernel(kernel, *(example.value for example in examples), returns=returns)
+    except (NumbaError, TypeError, RuntimeError) as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip() and "nopython" not in line]
+        text = f"expected a function that numba compiles to numbers as the page on own physics says: {lines[:1]}"
+        raise InputError(name_of(digest), "", text) from None
 
 
 def signature_of(scalars, arrays):
@@ -306,24 +228,25 @@ class Example:
         return hash(self._type)
 
 
-def _called_back(function, scalars, arrays):
-    """Plain Python as a compiled function of ``scalars`` numbers and arrays that returns three numbers."""
-    told: list[Any] = []
-    word, number = ctypes.c_size_t, ctypes.c_double
+def _called_back(function, name, scalars, arrays):
+    """Plain Python as a compiled function of ``scalars`` numbers and arrays that returns three numbers; the last array
+    (of an element) or the last two (of a control) are the function's to write."""
+    word, number, reads = ctypes.c_size_t, ctypes.c_double, arrays - 1 if arrays == 3 else arrays - 2
 
     @ctypes.CFUNCTYPE(None, word, *[number] * scalars, *[word, ctypes.c_ssize_t] * arrays)
     def back(result, *handed):
-        found = _array(result, 3)
-        places = handed[scalars:]
+        found, places = _array(result, 3), handed[scalars:]
         given = [_array(places[2 * k], places[2 * k + 1]) for k in range(arrays)]
+        for array in given[:reads]:
+            array.flags.writeable = False
         try:
-            answer = function(*handed[:scalars], *given)
-            found[:] = answer_of(answer, handed[1] if scalars > 1 else 0.0)
-        except Exception as error:  # no error may pass through compiled code
-            if not told:
-                told.append(warn(f"{function.__name__}: {_said(error)}; it counts as not a number"))
-            for array in (found, *given[-1 - (arrays > 2) :]):
-                array[:] = np.nan
+            if not getattr(_HELD, "fault", ("", None))[0]:
+                found[:] = _answer_of(function(*handed[:scalars], *given), handed, arrays == 3)
+                return
+        except BaseException as error:  # no error may pass through compiled code
+            _HELD.fault = name, error
+        for array in (found, *given[reads:]):
+            array[:] = np.nan
 
     if arrays == 3:  # of an element: stretch, speed; states, parameters, rates
 
@@ -343,11 +266,15 @@ def _called_back(function, scalars, arrays):
     return numba.njit(call)
 
 
-def answer_of(answer, speed):
+def _answer_of(answer, handed, of_element):
     """Force, stored energy and dissipated power of an element's answer; a force alone stores nothing."""
-    if answer is None:
+    if not of_element:
+        if answer is not None:
+            raise TypeError(f"expected a function that returns nothing, got {short(answer)}")
         return 0.0, 0.0, 0.0
-    return answer if np.ndim(answer) else (answer, 0.0, answer * speed)
+    if not is_force(answer):
+        raise TypeError(f"expected a force, or a tuple of force, energy and power, got {short(answer)}")
+    return answer if isinstance(answer, tuple) else (answer, 0.0, answer * handed[1])
 
 
 def _array(address, size):

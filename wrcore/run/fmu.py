@@ -23,12 +23,14 @@ import yaml
 
 import wrcore
 from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.slice_files import profiles_in, with_profiles
+from wrcore.kernels.named_laws import LawFile
 from wrcore.run.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start
 from wrcore.scene.description import Scene
-from wrcore.scene.pairs import with_names
+from wrcore.scene.pairs import find_file, with_names
 
 LIBRARIES = {2: ("pythonfmu", "Fmi2Slave", "Real", "Fmi2"), 3: ("pythonfmu3", "Fmi3Slave", "Float64", "Fmi3")}
 """By the version of FMI: the library, what it calls a slave and a number, and how its other names begin."""
@@ -191,10 +193,46 @@ def _pack_scene(scene, folder):
     names = {}
     for number, path in enumerate(scene.files):
         names[path] = f"{number}_{Path(path).name}"
+    laws = _pack_laws(scene, folder, names)
+    for path in scene.files.keys() - scene.laws.files.keys():
         shutil.copy(path, folder / names[path])
-    for path in scene.files:
         if any(str(listed) in names for listed in profiles_in(path)):  # slices, whose profiles have other names now
             text = with_profiles(path, lambda name, at=Path(path).parent: names.get(str(at / name), name))
             (folder / names[path]).write_text(text)
-    content = with_names(scene.data, Path(scene.source).parent, names)
+    content = _with_laws(with_names(scene.data, Path(scene.source).parent, names), laws)
+    vehicle = scene.data["vehicle"]["parameters"]
+    if isinstance(vehicle, str) and any("law" in item for item in scene.vehicle.data["elements"]):
+        path = find_file(vehicle, Path(scene.source).parent, scene.source, "vehicle.parameters")
+        text = yaml.safe_dump(_vehicle_of(path, scene, laws), sort_keys=False)
+        (folder / names[str(path)]).write_text(text, "utf-8")
     (folder / SCENE).write_text(yaml.safe_dump(content, sort_keys=False), "utf-8")
+
+
+def _pack_laws(scene, folder, names):
+    """Write the files of a scene's laws, as they were read with it, and return the texts that name them there."""
+    laws = {}
+    for text, source in scene.laws.known.items():
+        if isinstance(source, LawFile):
+            (folder / names[source.path]).write_bytes(source.content)
+            laws[text] = f"{names[source.path]}:{source.name}"
+        elif ":" in text:  # an entry point has none: its package is installed where the unit runs
+            raise InputError("wrcore fmu", "law", f"expected file.py:function for a unit to take along, got {text!r}")
+    return laws
+
+
+def _with_laws(value, laws, key=""):
+    """A scene's content, or a part of it, with other texts for its laws."""
+    if isinstance(value, dict):
+        return {name: _with_laws(item, laws, name) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_with_laws(item, laws, key) for item in value]
+    return laws.get(value, value) if key in ("law", "model") else value
+
+
+def _vehicle_of(path, scene, laws):
+    """The content of a vehicle file with other texts for the laws of its elements."""
+    data, folder = read_yaml(path), Path(path).parent
+    for item in data["elements"]:
+        if "law" in item:
+            item["law"] = laws.get(scene.laws.beside(item["law"], folder), item["law"])
+    return data

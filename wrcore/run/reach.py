@@ -67,10 +67,13 @@ def _irregularities(scene: Scene) -> Iterator[Extent]:
     points = spec.get("points", [])
     names = [points] if isinstance(points, str) else points
     fields = [POINTS] * len(names)
-    fields += [f"track.irregularity.{key}.begin" for key in ("spectrum", "own") if key in spec]
-    whats = [f"irregularity in {name}" for name in names] + ["an irregularity"] * 2
+    fields += ["track.irregularity.spectrum.begin"] * ("spectrum" in spec)
+    whats = [f"irregularity in {name}" for name in names] + ["an irregularity"]
     for field, what, ends in zip(fields, whats, irregularity_extents(scene.track.irregularity), strict=False):
         yield Extent(field, float(ends[0]), float(ends[1]), what)
+    if "own" in spec:  # whose law is not called before the scene is compiled
+        begin = spec["own"]["begin"]
+        yield Extent("track.irregularity.own.begin", begin, begin + spec["own"]["length"], "an irregularity")
 
 
 def _path(track: dict[str, Any]) -> Iterator[Extent]:

@@ -21,6 +21,7 @@ from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
 from wrcore.run.datasets import ROWS, Datasets, describe, write_values
 from wrcore.run.run import Run
 from wrcore.run.state import State
+from wrcore.scene.stored import StoredScene
 
 FORMAT = "wrcore run"
 FORMAT_VERSION = 3  # up to version 2 velocities and accelerations stood in the ground's axes
@@ -255,6 +256,7 @@ def _check_channel(path, name, values, count):
 def _read_frame(file):
     """A run without its channels."""
     records = {name: json.loads(file.attrs[name]) for name in RECORDS}
+    records["scene"] = StoredScene(records["scene"]) if isinstance(records["scene"], dict) else records["scene"]
     run = Run(status=file.attrs["status"], reason=file.attrs["reason"], t=file["t"][()], groups={}, **records)
     if END in file:
         end = file[END]

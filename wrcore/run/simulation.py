@@ -13,6 +13,7 @@ import numpy as np
 
 import wrcore
 from wrcore.contact import reduction
+from wrcore.dynamics.blame import LawWatch
 from wrcore.dynamics.body import STATE_SIZE, angles, matrix_of
 from wrcore.dynamics.control import OUTPUTS, OUTPUTS_END, STATES, STATES_END
 from wrcore.dynamics.energy import energy_channels
@@ -148,10 +149,24 @@ class Simulation:
             settings["longest_step"], DERAILED_Y, progress, stop=stop, most_steps=settings["most_steps"],
         )  # fmt: skip
         compiled = time.perf_counter() - self._began - trajectory.wall_s
-        run = self.run_of(trajectory, begin, compiled, *self.channels(trajectory))
+        run = self.run_of(*self._with_channels(trajectory, begin, compiled))
         self.start = run.end or self.start
         self._began = time.perf_counter()
         return run
+
+    def _with_channels(self, trajectory, begin, compiled):
+        """Arguments of `run_of`; a law of the user that raises an error at output times ends the run as failed."""
+        watch, count = LawWatch(self.model), len(trajectory.t)
+        if not watch.names:
+            return trajectory, begin, compiled, *self.channels(trajectory)
+        while True:
+            found, fault = watch.fault_of(self.channels, trajectory)
+            if fault and trajectory.status != "failed":
+                trajectory = replace(trajectory, status="failed", reason=f"{fault} at an output time", end=None)
+            if found is not None or not count:
+                return trajectory, begin, compiled, *(found or ({}, {}))
+            count //= 2  # a compiled law ends the evaluation: the outputs before are kept
+            trajectory = replace(trajectory, t=trajectory.t[:count], states=trajectory.states[:count])
 
     def run_of(self, trajectory: Trajectory, begin: float, compiled: float, groups: dict, limits: dict) -> Run:
         """The run that a trajectory from a time (s) on is, with its `channels` and seconds of compilation."""
@@ -159,6 +174,7 @@ class Simulation:
         counters = counters_of(trajectory, begin) | {"compile_s": compiled}
         record = {"wrcore_version": wrcore.__version__, "detection": scene.detection, **flat(settings)}
         record |= {"method_used": trajectory.method, "files_sha256": digest_of_all(scene.files)}
+        record |= {"laws_sha256": scene.laws.digests, "friction_largest": self.model.contact.friction}
         end = trajectory.end and replace(trajectory.end, model=self.mark)
         return Run(
             scene.data, trajectory.status, trajectory.reason, trajectory.t, groups, counters | limits, record,

@@ -1,7 +1,6 @@
 """A scene's control laws of the user's own."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.control import PITCH, QUANTITIES, ROLLING, SPEEDS, Controls, no_controls
 from wrcore.elements import law
 from wrcore.elements.kinds.actuator import given
-from wrcore.errors import InputError, one_of
+from wrcore.errors import InputError, one_of, short
 from wrcore.kernels import own
 
 
@@ -18,9 +17,9 @@ def outputs_of(spec):
     return [name for _, item in sorted((spec or {}).items()) for name in item["outputs"]]
 
 
-def read_controls(data, vehicle, folder, source):
-    """Controls from a scene's checked ``control`` (or none): an InputError names the law and the key. Each function
-    gets a test call with what is measured in the vehicle's nominal position."""
+def read_controls(data, vehicle, laws, source, call=True):
+    """Controls from a scene's checked ``control`` (or none): an InputError names the law and the key. ``laws`` finds
+    the functions; with ``call`` each gets a test call with what is measured in the vehicle's nominal position."""
     spec, drive = data.get("control") or {}, data.get("drive") or {}
     if not spec:
         return no_controls()
@@ -47,7 +46,7 @@ def read_controls(data, vehicle, folder, source):
             if output not in known:
                 raise InputError(source, f"{field}.outputs.{k}", one_of(known, output))
         measured = [_input(text, data, vehicle, source, f"{field}.inputs.{k}") for k, text in enumerate(item["inputs"])]
-        found = _tried(item, [nominal for _, nominal in measured], folder, source, f"{field}.law")
+        found = _found(item, [nominal for _, nominal in measured], laws, source, f"{field}.law", call)
         row = [len(inputs), len(inputs) + len(measured), len(places), len(places) + len(item["outputs"])]
         for output in item["outputs"]:
             in_tail = sampled and output in motors
@@ -112,18 +111,20 @@ def _input(text, data, vehicle, source, field):
     return (what, body, near, place), float(nominal)
 
 
-def _tried(item, nominal, folder, source, field):
-    """The function of a law, after a test call."""
-    try:
-        found = own.find(item["law"], Path(folder))
-        sizes = [list(nominal), item["states"], item["parameters"], len(item["outputs"])]
-        answer, arrays = own.tried(found, [*sizes, len(item["states"])], 0.0)
-        own.finite(*arrays)
-    except InputError as error:
-        raise InputError(source, field, error.expected) from None
-    if answer is not None:
-        expected = "expected a function that writes its outputs and returns nothing"
-        raise InputError(source, field, f"{expected}, got {answer!r}")
+def _found(item, nominal, laws, source, field, call):
+    """The function of a law; with ``call`` after a test call."""
     if not all(map(math.isfinite, nominal)):
         raise InputError(source, field, "expected a vehicle with wheelsets for what is measured")
+    try:
+        found = laws.find(item["law"])
+        if call:
+            laws.allow()
+            sizes = [list(nominal), item["states"], item["parameters"], len(item["outputs"]), len(item["states"])]
+            answer, arrays = own.tried(found, sizes, 0.0, reads=3)
+            own.finite(*arrays)
+            if answer is not None:
+                expected = "expected a function that writes its outputs and returns nothing"
+                raise InputError(source, field, f"{expected}, got {short(answer)}")
+    except InputError as error:
+        raise InputError(source, field, error.expected) from None
     return found

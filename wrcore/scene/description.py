@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
@@ -23,8 +22,7 @@ from wrcore.contact.normal import hertz_table
 from wrcore.contact.patch.model import strip_model
 from wrcore.contact.reduction import MOMENT, REDUCTIONS
 from wrcore.contact.wheel_on_rail import WheelOnRail
-from wrcore.creep.laws import LAWS, OWN, creep_data, own_law
-from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
+from wrcore.creep.laws import LAWS, OWN
 from wrcore.dynamics.crossing import no_crossing
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Model
@@ -38,19 +36,22 @@ from wrcore.geometry.corrugation import Corrugation
 from wrcore.geometry.out_of_round import OutOfRound
 from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES, Track, build_track
-from wrcore.kernels.cache import say
+from wrcore.kernels.named_laws import Laws
 from wrcore.kernels.told import tell
 from wrcore.scene.changes import changes_of, of_a_change, set_at
 from wrcore.scene.check_rail import read_check_rails
 from wrcore.scene.control import outputs_of, read_controls
+from wrcore.scene.creep import check_creep, creep_of
 from wrcore.scene.crossing import LaidCrossing, read_corrugation, read_crossings, seen_by_wheels, warn_of_rigid_rails
 from wrcore.scene.drive import read_drive
 from wrcore.scene.examples import examples_folder
-from wrcore.scene.friction import read_friction
+from wrcore.scene.friction import Friction, read_friction
 from wrcore.scene.out_of_round import read_out_of_round
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
+from wrcore.scene.stored import StoredScene, texts_in
 from wrcore.scene.support import check_support, track_support
 from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
+from wrcore.vehicle.element_parts import try_laws
 from wrcore.vehicle.train import train_of
 
 
@@ -76,6 +77,8 @@ class Scene:
     corrugation : Corrugation, optional
     files : dict
         SHA-256 of all files that were read for it, by path.
+    laws : Laws
+        Functions of the user that it names: read, and not run before the scene is compiled.
 
     Examples
     --------
@@ -98,6 +101,7 @@ class Scene:
     out_of_round: tuple[tuple[OutOfRound | None, float], ...] = ()
     corrugation: Corrugation | None = None
     files: dict[str, str] = field(default_factory=dict)
+    laws: Laws = field(default_factory=Laws)
 
     @property
     def detection(self) -> str:
@@ -133,24 +137,28 @@ def as_scene(scene: Source) -> Scene:
     return scene if isinstance(scene, Scene) else load_scene(scene)
 
 
-def scene_of(run: Any, scene: Source | None, asker: str) -> Scene:
+def scene_of(run: Any, scene: Source | None, asker: str, trust: bool = False) -> Scene:
     """The scene of a run: what stands for it, or read anew by what the run says. Its files are in the working directory
-    or, if they hold what the run's did, beside the examples. ``asker`` is named in errors."""
+    or, if they hold what the run's did, beside the examples. ``asker`` is named in errors; with ``trust`` the laws that
+    a run of a file names may be run."""
     if scene is not None:
         return as_scene(scene)
     try:
-        return load_scene(run.scene)
+        return load_scene(run.scene, trust=trust)
     except InputError as error:
         with suppress(InputError):
-            found = _checked(copy.deepcopy(run.scene), "scene", examples_folder() / "scenes")
+            laws = Laws(examples_folder() / "scenes", trusted=trust or not isinstance(run.scene, StoredScene))
+            found = _checked(copy.deepcopy(run.scene), "scene", laws)
             if digest_of_all(found.files) == run.settings.get("files_sha256"):
                 return found
         raise InputError(asker, "scene", f"expected that of the run, as its files are not here ({error})") from None
 
 
 @checked
-def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), **changes: Any) -> Scene:
-    """Read and check a scene.
+def load_scene(
+    scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (), trust: bool = False, **changes: Any
+) -> Scene:
+    """Read and check a scene. Laws of the user that it names are read, and run when the scene is simulated.
 
     Parameters
     ----------
@@ -159,6 +167,8 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     overrides : sequence of str, or dict
         ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them; or values by ``key.path``.
         ``null`` (None) takes a key out of the scene.
+    trust : bool
+        Whether the scene of a run file (``wr.load_run(path).scene``) may run the laws that it names.
     **changes
         Further values by key: ``speed=30``, ``integration__duration=2.0`` (two underscores stand for the dot) or
         ``initial={"y": 0.003, "yaw": 0.001}`` (what the mapping does not name stays).
@@ -180,29 +190,45 @@ def load_scene(scene: Source, overrides: Iterable[str] | Mapping[str, Any] = (),
     >>> load_scene("config/scenes/wheelset.yaml", speed=30, contact__friction=0.4)
     Scene 'wheelset': Manchester wheelset, S1002 on UIC60-MBench, 30 m/s, spatial detection, 10 s
     """
+    asked = changes_of(overrides, changes)
+    named = texts_in([value for _, _, value in asked])
+    return _loaded(scene, asked, (), named, trust or not isinstance(scene, StoredScene))
+
+
+def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path) -> Scene:
+    """A scene with changes, as :func:`load_scene` takes them, that a file in ``folders`` says (a sweep, a plan): laws
+    that they name lie there, or where those of the scene do."""
+    return _loaded(scene, changes_of(changes, {}), folders)
+
+
+def _loaded(scene, asked, folders, named=(), trusted=True):
+    """The scene after the changes ``asked``; other arguments as for `Laws`."""
+    before = None
     if isinstance(scene, Scene):
-        source, folder, data = scene.source, Path(scene.source).parent, copy.deepcopy(scene.data)
+        source, data, before, trusted = scene.source, copy.deepcopy(scene.data), scene.laws.known, scene.laws.trusted
+        folders = dict.fromkeys((*scene.laws.folders, *folders))
     else:
         source, folder, data = read_source(scene, "scene")
-    asked = changes_of(overrides, changes)
+        folders = folder, *folders
     for option, key, value in asked:
         set_at(data, key, value, option)
     try:
-        return _checked(data, source, folder)
+        return _checked(data, source, Laws(*folders, asked=named, before=before, trusted=trusted))
     except InputError as error:
         raise of_a_change(error, source, asked) from None
 
 
-def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
-    """The scene of a file's content, with whatever other files it names."""
-    data = validate(data, "scene", source)
+def _checked(data: dict[str, Any], source: str, laws: Laws) -> Scene:
+    """The scene of a file's content, with whatever other files it names; ``laws`` finds those of the user."""
+    data, folder = validate(data, "scene", source), laws.folders[0]
     digests = digests_of_files(data, folder)  # before they are read: what changes meanwhile does not go unseen
     find = partial(find_file, folder=folder, source=source, field="vehicle.parameters")
-    vehicle = vehicle_of(data["vehicle"], find, source)
-    vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
+    with laws.present():
+        vehicle = vehicle_of(data["vehicle"], find, source, laws)
+        vehicle = train_of(vehicle, data["vehicle"]["count"], data["vehicle"].get("spacing"), source)
     wheel, rail = wheel_and_rail(data, folder, source)
-    _check_creep(data["contact"], source, folder)
-    track = build_track(_with_points(data["track"], folder, source), source, folder)
+    check_creep(data["contact"], source, laws)
+    track = build_track(_with_points(data["track"], folder, source), source, folder, laws)
     data["track"] = validate(data["track"], "track", source)
     pairs = differing_pairs(data, vehicle, wheel, rail, track, folder, source)
     check_support(data["track"].get("support"), source)
@@ -214,48 +240,19 @@ def _checked(data: dict[str, Any], source: str, folder: Path) -> Scene:
         expected = "expected 'tangent', as this vehicle has joints to the moving frame: elements to it may stay"
         raise InputError(source, "track.path", expected)
     check_bodies(data["initial"]["bodies"], vehicle, source)
-    read_friction(data["contact"]["friction"], source, folder)
+    read_friction(data["contact"]["friction"], source, laws, call=False)
     if "contact" not in (wanted := data["output"]["channels"]) and "wheel_motion" in wanted:
         raise InputError(source, "output.channels", "expected contact beside wheel_motion")
-    read_controls(data, vehicle, folder, source)
+    read_controls(data, vehicle, laws, source, call=False)
     read_drive(data.get("drive"), vehicle, source, outputs_of(data.get("control")))
-    digests |= digests_of_files(vehicle.data["elements"], folder)
-    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossings, shapes, corrugation, digests)
+    digests |= laws.files
+    return Scene(data, source, vehicle, wheel, rail, track, pairs, crossings, shapes, corrugation, digests, laws)
 
 
 def _alike(vehicle, wheel, rail, track):
     """The `WheelOnRail` of either side of every wheelset where all are alike."""
     distance = track.rail_distance(rail)
     return (WheelOnRail(wheel, rail, vehicle.rolling_radius, vehicle.half_distance, distance),) * 2
-
-
-def _check_creep(contact, source, folder):
-    """Complete what a scene says of its creep law, and refuse what does not belong to the law."""
-    creep = contact["creep"]
-    creep.setdefault("tolerance", DEFAULT_TOLERANCE)
-    if creep["model"] not in LAWS:
-        try:
-            own_law(creep["model"], folder)
-        except InputError as error:
-            raise InputError(source, "contact.creep.model", error.expected) from None
-        if contact["patch"] not in REDUCTIONS:
-            expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}:"
-            expected += " set contact.patch to one of them"
-            raise InputError(source, "contact.patch", expected)
-    elif creep["model"] != "table" and contact["patch"] not in REDUCTIONS:
-        expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
-        got = f"got {creep['model']}; set contact.patch to {' or '.join(REDUCTIONS)}, which take any, beside it"
-        raise InputError(source, "contact.creep.model", f"{expected}, {got}")
-    if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
-        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
-    for key in ("k_A", "k_S"):
-        if key in creep and creep["model"] != "polach":
-            raise InputError(source, f"contact.creep.{key}", f"expected model polach with it, got {creep['model']}")
-    if creep.get("k_S", 0.0) > creep.get("k_A", 1.0):
-        expected = f"expected no more than k_A, {creep['k_A']:g}, got {creep['k_S']:g}"
-        raise InputError(source, "contact.creep.k_S", expected)
-    if "table" in creep:
-        creep["table"] = str(find_file(creep["table"], folder, source, "contact.creep.table"))
 
 
 def _with_points(track, folder, source):
@@ -273,35 +270,20 @@ LIKE_FRICTION = 0.8
 """Of a rail's largest friction: where it falls below, it is said what looked-up contact errs by."""
 
 
-def announce(text):
-    """One line on stderr before work that takes long, whoever listens; none with ``WRCORE_PROGRESS=0``."""
-    if os.environ.get("WRCORE_PROGRESS") != "0":
-        say(text)
+def friction_of(scene: Scene) -> Friction:
+    """Friction of a scene's rails; a law of the user is called."""
+    return read_friction(scene.data["contact"]["friction"], scene.source, scene.laws)
 
 
-def _creep(scene, progress):
-    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table.
-
-    What is looked up lies beside one creep table, whichever the scene names: that for which nodes come with the
-    package."""
-    contact = scene.data["contact"]
-    creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
-    factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
-    if creep["model"] != "table":
-        law = None if creep["model"] in LAWS else own_law(creep["model"], Path(scene.source).parent)
-        return creep_data(nu, factors=factors, law=law)
-    looked_up = contact["patch"] == "tabulated"
-    if "table" in creep and not looked_up:
-        table = load_table(creep["table"])
-    else:
-        tolerance = DEFAULT_TOLERANCE if looked_up else creep["tolerance"]
-        if not kept_tables(nu, creep["planes"], tolerance):
-            announce(f"building a creep table ({creep['planes']}, {tolerance:g}): some ten seconds, once")
-        table = ensure_table(nu, creep["planes"], tolerance, progress)
-    if abs(table.nu - nu) > 1e-9:
-        expected = f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}"
-        raise InputError(scene.source, "contact.creep.table", expected)
-    return creep_data(nu, table.kernel_data(), factors=factors)
+def _allow_laws(scene):
+    """Call the laws of the elements of a scene for a test, unless the scene is one whose laws may not be run."""
+    try:
+        scene.laws.allow()
+    except InputError as error:
+        raise InputError(scene.source, error.field, error.expected) from None
+    with scene.laws.present():
+        try_laws(scene.vehicle.data["elements"], scene.vehicle.source_file)
+    return True
 
 
 def compile_scene(
@@ -327,9 +309,10 @@ def compile_scene(
             f"{scene.source}: contact.detection {scene.detection} beside contact.patch tabulated: each patch is solved,"
             " some hundred times as slow as the table; set contact.patch to moment, or contact.detection to spatial"
         )
-    parts = vehicle, scene.wheel, scene.rail, scene.track, scene.pairs, *changing  # known by their identity
-    folder = Path(scene.source).parent
-    friction = read_friction(contact["friction"], scene.source, folder)
+    _kept(shared, "laws", (vehicle, scene.laws), lambda: _allow_laws(scene))
+    track = _kept(shared, "track", (scene.track,), lambda: scene.track.with_laws(scene.laws))
+    parts = vehicle, scene.wheel, scene.rail, track, scene.pairs, *changing  # known by their identity
+    friction = friction_of(scene)
     if contact["patch"] == "tabulated" and friction.least_share < LIKE_FRICTION:
         tell("contact.friction falls along a rail: looked-up creep forces err where it is low, at half of the "
              "largest one by 2 to 3 % of mu N, at a sixth by 14 to 19; contact.patch exact does not")  # fmt: skip
@@ -350,7 +333,7 @@ def compile_scene(
         ContactModel(
             geometry, hertz_table(), LAWS.get(contact["creep"]["model"], OWN),
             _kept(shared, "creep", (*contact["creep"].values(), *material.values(), contact["patch"] == "tabulated"),
-                  lambda: _creep(scene, progress)),
+                  lambda: creep_of(scene, progress)),
             DETECTIONS[scene.detection], float(contact["detection_tolerance"]),
             REDUCTIONS.get(contact["patch"], MOMENT),
             float(material["shear_modulus"]), float(material["poisson_ratio"]), friction.largest,
@@ -361,12 +344,12 @@ def compile_scene(
             geometries, plain, friction_factors=friction.factors,
         ),
         elements, vehicle.joints,
-        TrackModel(bool(scene.track.tangent), scene.track.path, scene.track.irregularity),
+        TrackModel(bool(track.tangent), track.path, track.irregularity),
         float(data["speed"]), GRAVITY,
         float(integration["baumgarte"]["alpha"]), float(integration["baumgarte"]["beta"]),
         friction=friction.rails, flexible_track=support,
         drive=read_drive(data.get("drive"), vehicle, scene.source, outputs_of(data.get("control"))),
-        controls=read_controls(data, vehicle, folder, scene.source), crossing=crossing,
+        controls=read_controls(data, vehicle, scene.laws, scene.source), crossing=crossing,
         check_rails=read_check_rails(data, pairs, scene.source),
     )  # fmt: skip
     decisive = (

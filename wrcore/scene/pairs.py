@@ -21,8 +21,6 @@ NAMED_BY = (
     "points",
     "slices",
     "table",
-    "law",
-    "model",
 )  # keys of a scene whose values name files
 
 
@@ -47,8 +45,6 @@ def digests_of_files(value, folder, key=""):
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else ((key, item) for item in value)
         return {path: digest for name, item in items for path, digest in digests_of_files(item, folder, name).items()}
-    if key in ("law", "model") and isinstance(value, str) and ":" in value:  # file.py:function
-        value = value.rpartition(":")[0]
     found = _found(value, folder) if key in NAMED_BY and isinstance(value, str) else None
     if found is None:
         return {}

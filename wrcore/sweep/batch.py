@@ -37,7 +37,7 @@ from wrcore.run.progress import counted
 from wrcore.run.simulate import output_times
 from wrcore.run.simulation import DERAILED_Y, counters_of
 from wrcore.scene.changes import with_value
-from wrcore.scene.description import Scene, compile_scene, load_scene
+from wrcore.scene.description import Scene, changed_by_file, compile_scene
 from wrcore.sweep.measures import COUNTERS, FORCES, MOTION, Motions, wheel_forces, wheelset_motion
 from wrcore.sweep.plan import Sweep, load_sweep, of_parts
 
@@ -147,7 +147,7 @@ def _tasks(sweep: Sweep, rows: pd.DataFrame) -> Iterator[_Task]:
         groups.setdefault(text, []).append((int(run), {str(key): value for key, value in values.items()}))
     for text, members in groups.items():
         made_of = dict(zip(parts, json.loads(text), strict=True))
-        scene = load_scene(sweep.scene, made_of) if made_of else sweep.scene
+        scene = changed_by_file(sweep.scene, made_of) if made_of else sweep.scene
         shared: dict[Any, Any] = {}
         for run, values in members:
             yield _Task(run, scene, values, shared)

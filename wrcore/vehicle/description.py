@@ -12,7 +12,6 @@ from wrcore.dynamics.suspension import PRELOAD, Elements
 from wrcore.dynamics.system import Bodies
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml, validate
-from wrcore.kernels import own
 from wrcore.kernels.cache import warn
 from wrcore.vehicle.changes import GROUPS, changed
 from wrcore.vehicle.element_parts import check_element
@@ -77,15 +76,15 @@ class Vehicle:
         return 0.5 * float(self.bodies.mass[body] * GRAVITY - np.sum(self.elements.springs[pair == body, PRELOAD + 2]))
 
 
-def vehicle_of(spec, find, source):
+def vehicle_of(spec, find, source, laws):
     """The vehicle of a scene's key ``vehicle``, with its changes (`wrcore.vehicle.changes`): of the file that ``find``
-    finds by its path, or of its content. An InputError names the file, or the scene (``source``) where that is wrong,
-    the element and what was expected."""
+    finds by its path, or of its content. ``laws`` finds the laws of its elements. An InputError names the file, or the
+    scene (``source``) where that is wrong, the element and what was expected."""
     parameters = spec["parameters"]
     data, name = parameters, f"{source}: vehicle.parameters"
     if isinstance(parameters, str):
         path = find(parameters)
-        data, name = _with_laws(read_yaml(path), Path(path).parent), str(Path(path).name)
+        data, name = _with_laws(read_yaml(path), Path(path).parent, laws), str(Path(path).name)
     changes = {group: spec[group] for group in GROUPS if spec.get(group)}
     if not changes:
         return build_vehicle(data, name, spec["axle_boxes"])
@@ -98,14 +97,12 @@ def vehicle_of(spec, find, source):
         raise
 
 
-def _with_laws(data, folder):
-    """The content of a vehicle file with the places of the files that hold laws of the user's own."""
+def _with_laws(data, folder, laws):
+    """The content of a vehicle file, with absolute paths of the files beside it that hold laws of the user."""
     elements = data.get("elements")
     for item in elements if isinstance(elements, list) else ():
         if isinstance(item, dict) and isinstance(item.get("law"), str):
-            place, _, name = item["law"].rpartition(":")
-            if path := own.file_of(item["law"], folder):
-                item["law"] = f"{path.resolve()}:{name}"
+            item["law"] = laws.beside(item["law"], folder)
     return data
 
 

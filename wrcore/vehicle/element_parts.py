@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from wrcore.dynamics.marker import FRAME
 from wrcore.elements.kind import Along, Turning
 from wrcore.elements.kinds import KINDS, kind_named
+from wrcore.elements.kinds.own_law import try_law
 from wrcore.errors import InputError, one_of
 from wrcore.errors.checked_yaml import check
 
@@ -13,10 +14,10 @@ def check_element(item, source):
     """Raise an InputError that names the element if its kind, its keys or their values are not what they should be."""
     field = f"elements.{item['name']}"
     try:
-        known = kind_named(item["kind"]) is not None
+        known = kind_named(item["kind"])
     except InputError as error:
         raise InputError(source, f"{field}.kind", error.expected) from None
-    if not known:
+    if known is None:
         raise InputError(source, f"{field}.kind", one_of(KINDS, item["kind"]))
     kind, given = KINDS[item["kind"]], {key: item[key] for key in item if key not in ("name", "kind", "bodies")}
     for key in kind.needed:
@@ -28,6 +29,16 @@ def check_element(item, source):
     check(given, kind.schema, source, field)
     for key, expected in kind.check(item):
         raise InputError(source, f"{field}.{key}".rstrip("."), expected)
+
+
+def try_laws(elements, source):
+    """Call each law of the user of checked ``elements`` for a test; an InputError names the element."""
+    for item in elements:
+        try:
+            if item["kind"] == "own_law":
+                try_law(item)
+        except InputError as error:
+            raise InputError(source, f"elements.{item['name']}.law", error.expected) from None
 
 
 class Part(NamedTuple):

@@ -49,7 +49,7 @@ ELEMENTS = {
     "damper": {"damping": [1e3, 1e3, 1e3]}, "friction": {"direction": "x", "force": 1e3, "series_stiffness": 1e6},
     "bump_stop": {"direction": "y", "gap": 0.02, "stiffness": 1e6}, "anti_roll_bar": {"stiffness": 1e6},
     "traction_rod": {"stiffness": 1e6, "at": [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5]]},
-    "own_law": {"direction": "x", "law": "tests.elements.own_laws:dashpot", "parameters": [1.0]},
+    "own_law": {"direction": "x", "law": "tests/elements/own_laws.py:dashpot", "parameters": [1.0]},
     "actuator": {"direction": "y"},
 }  # fmt: skip
 JOINTS = {

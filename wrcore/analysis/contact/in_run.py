@@ -26,8 +26,7 @@ from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import warn
 from wrcore.run.run import Run
 from wrcore.run.simulation import ON_RAIL
-from wrcore.scene.description import Scene, Source, scene_of
-from wrcore.scene.friction import read_friction
+from wrcore.scene.description import Scene, Source, friction_of, scene_of
 
 PARTS = "vehicle", "wheel", "rail", "track", "contact"
 """Of a scene, on which contact hangs."""
@@ -52,16 +51,15 @@ class WheelInRun:
     An InputError where the run has no ``wheel_motion``, or rails or wheels that change along the track or the rim.
     """
 
-    def __init__(self, run: Run, scene: Source | None, wheelset: str, side: str, resolution: str, asker: str,
+    def __init__(self, run: Run, scene: Scene, wheelset: str, side: str, resolution: str, asker: str,
                  steps: int = STEPS) -> None:  # fmt: skip
-        scene = scene_in_run(run, scene, asker)
         wheel = run.groups.get(f"{wheelset}/{side}", {})
         if not {*ON_RAIL, "N_N"} <= wheel.keys():
             expected = f"expected contact and wheel_motion among them for the exact patches of {wheelset}/{side}"
             raise InputError(asker, "output.channels", expected)
         check_same_everywhere(scene, asker, "run")
         contact = scene.data["contact"]
-        friction = read_friction(contact["friction"], scene.source)
+        friction = friction_of(scene)
         pair = scene.pair(side, scene.vehicle.wheelset_names.index(wheelset))
         self._wheels = LoadedWheels(
             pair.geometry, "exact", resolution, contact["slip"], **contact["material"],
@@ -118,16 +116,26 @@ def check_same_everywhere(scene: Scene, asker: str, field: str) -> None:
         raise InputError(asker, field, "expected rails and wheels that are the same everywhere for exact patches")
 
 
-def scene_in_run(run: Run, scene: Source | None, asker: str) -> Scene:
+def scene_in_run(run: Run, scene: Source | None, asker: str, trust: bool) -> Scene:
     """The scene of a run; an InputError in the name of the ``asker`` for one that differs in what contact hangs on."""
-    scene = scene_of(run, scene, asker)
+    scene = scene_of(run, scene, asker, trust)
     other = [part for part in PARTS if scene.data.get(part) != run.scene.get(part)]
     if other:
         raise InputError(asker, "scene", f"expected that of the run, but {' and '.join(other)} of it differ")
     if digest_of_all(scene.files) != run.settings.get("files_sha256", ""):
         expected = f"expected the files of the run, but of {', '.join(scene.files)} some hold something else now"
         raise InputError(asker, "scene", expected)
+    check_laws(run, scene, asker)
     return scene
+
+
+def check_laws(run: Run, scene: Scene, asker: str) -> None:
+    """An InputError in the name of the ``asker`` where laws of a run's scene are others than those that it ran with."""
+    then, now = run.settings.get("laws_sha256", {}), scene.laws.digests
+    changed = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
+    if changed:
+        expected = f"expected the laws of the run, but {' and '.join(changed)} of it changed since: run the scene again"
+        raise InputError(asker, "scene", expected)
 
 
 @checked
@@ -138,6 +146,7 @@ def patch_in_run(
     side: Annotated[str, OneOf(SIDES)] = "left",
     resolution: Annotated[str, OneOf(GRIDS)] = "middle",
     scene: Source | None = None,
+    trust: bool = False,
 ) -> list[Patch]:
     """Exact contact patches of a wheel at a time of a run, whatever patches the run itself went by.
 
@@ -153,6 +162,8 @@ def patch_in_run(
     resolution : {"coarse", "middle", "fine"}
     scene : Scene, str, Path or dict, optional
         That of the run; left out: read anew by what the run says of it.
+    trust : bool
+        Whether laws of the user that a run file names may be run.
 
     Returns
     -------
@@ -181,9 +192,10 @@ def patch_in_run(
         raise InputError("patch_in_run", "t", f"expected a time of the run, got {t:g} s")
     if wheelset not in run.groups or f"{wheelset}/{side}" not in run.groups:
         raise InputError("patch_in_run", "wheelset", f"expected a wheelset of the run with contacts, got {wheelset!r}")
-    wheel = WheelInRun(run, scene, wheelset, side, resolution, "patch_in_run")
-    found = wheel.at(int(np.argmin(np.abs(run.t - t))))
+    found = scene_in_run(run, scene, "patch_in_run", trust)
+    wheel = WheelInRun(run, found, wheelset, side, resolution, "patch_in_run")
+    patches = wheel.at(int(np.argmin(np.abs(run.t - t))))
     if wheel.missed > SAID:
         off = f"off by {wheel.missed:.2%}" if np.isfinite(wheel.missed) else "not the wheel's at any height"
         warn(f"patch_in_run: {wheelset}/{side}: at {t:g} s the patches' vertical force is {off}")
-    return [one.patch for one in found]
+    return [one.patch for one in patches]

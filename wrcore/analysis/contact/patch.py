@@ -14,8 +14,7 @@ from wrcore.contact.wheel_on_rail import WheelsetOnTrack
 from wrcore.errors import InputError, check_number
 from wrcore.errors.checked_calls import OneOf, Within, checked
 from wrcore.geometry.track import SIDES
-from wrcore.scene.description import Source, as_scene
-from wrcore.scene.friction import read_friction
+from wrcore.scene.description import Source, as_scene, friction_of
 
 METHODS = ("exact", "grid")
 
@@ -124,7 +123,7 @@ def _of_scene(source, side):
     """The same of a scene: of the first wheelset, if its wheels differ from others."""
     scene = as_scene(source)
     vehicle, contact = scene.vehicle, scene.data["contact"]
-    friction = read_friction(contact["friction"], scene.source).largest
+    friction = friction_of(scene).largest
     if not len(vehicle.bodies.wheelsets):
         raise InputError(scene.source, "vehicle", "expected a vehicle with wheelsets")
     detection = "planar" if scene.detection == "planar" else "spatial"

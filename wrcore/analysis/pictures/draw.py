@@ -32,6 +32,7 @@ def draw(
     factor: Annotated[float | None, Within(1.0, 1e6)] = None,
     begin: float = 0.0,
     end: Annotated[float, Within(high=math.inf)] = math.inf,
+    trust: bool = False,
 ) -> Figure | Animation:
     """Draw a scene's vehicle, a profile, put a run in motion, or show how a profile wears.
 
@@ -47,6 +48,9 @@ def draw(
         By which displacements are drawn larger in an animation from above; left out: a round one that shows them.
     begin, end : float
         Part of the run that is shown, s.
+    trust : bool
+        Whether installed packages that a run file names for its kinds of elements may be imported. Laws of the user in
+        a scene or a run file are never run for a picture.
 
     Returns
     -------
@@ -68,8 +72,8 @@ def draw(
     if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".h5", ".hdf5"):
         source = load_run(source)
     if isinstance(source, Run):
-        return animate(source, scene_of(source, scene, "draw"), factor, begin, end)
-    options: dict[str, Any] = {"scene": scene, "factor": factor, "begin": begin or None}
+        return animate(source, scene_of(source, scene, "draw", trust), factor, begin, end)
+    options: dict[str, Any] = {"scene": scene, "factor": factor, "begin": begin or None, "trust": trust or None}
     for name, value in options.items():
         if value is not None:
             raise InputError("draw", name, "expected this with a run only")

@@ -28,7 +28,9 @@ NOTCH = 5e-4
 
 @checked
 @styled
-def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = None, stretch: int = 0) -> Figure:
+def plot_crossing(
+    run: Run, wheelset: str | None = None, scene: Source | None = None, stretch: int = 0, trust: bool = False
+) -> Figure:
     """Draw the passage of a wheel over rails that change along the track (`track.crossing`).
 
     Parameters
@@ -41,6 +43,8 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
         That of the run; left out: the one that the run names, with its files looked for from the working directory.
     stretch : int, optional
         Which of the stretches where rails change, from 0 along the track.
+    trust : bool
+        Whether packages that a run file names may be imported for its kinds of elements.
 
     Returns
     -------
@@ -60,7 +64,7 @@ def plot_crossing(run: Run, wheelset: str | None = None, scene: Source | None = 
     >>> [axes.get_ylabel() for axes in wr.plot_crossing(wr.simulate(scene), scene=scene).axes]
     ['height / mm', 'radius / mm', 'load / kN', 'share', 'y / mm']
     """
-    scene = scene_of(run, scene, "plot_crossing")
+    scene = scene_of(run, scene, "plot_crossing", trust)
     if not scene.crossings:
         raise InputError("plot_crossing", "run", "expected a run with track.crossing")
     if not 0 <= stretch < len(scene.crossings):

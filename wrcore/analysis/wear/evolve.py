@@ -42,7 +42,7 @@ from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import untold
 from wrcore.run.simulate import simulate
-from wrcore.scene.description import Scene, load_scene
+from wrcore.scene.description import Scene, changed_by_file, load_scene
 from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
 
@@ -75,7 +75,7 @@ def load_wear_plan(
         output["output.channels"] = ["pose", "velocity", "contact", "wheel_motion"]
     for i, part in enumerate(data["scenes"]):
         try:
-            scene = load_scene(path, {**part.get("set", {}), **data["set"], **output})
+            scene = changed_by_file(path, {**part.get("set", {}), **data["set"], **output}, folder)
             if data["patches"] == "exact":
                 check_motion(scene, scene.source)
                 check_same_everywhere(scene, scene.source, "")

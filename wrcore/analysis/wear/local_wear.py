@@ -38,6 +38,7 @@ from wrcore.run.progress import counted
 from wrcore.run.run import Run
 from wrcore.scene.description import Scene, Source
 from wrcore.scene.friction import read_friction
+from wrcore.scene.stored import laws_of_stored
 
 PATCHES = "ellipse", "exact"
 """Where friction works."""
@@ -90,6 +91,7 @@ def local_wear(
     patches: Annotated[str, OneOf(PATCHES)] = "ellipse",
     resolution: Annotated[str, OneOf(GRIDS)] = "coarse",
     scene: Source | None = None,
+    trust: bool = False,
 ) -> dict[tuple[str, str], WheelWear]:
     """Local wear of all wheels and their rails over a run.
 
@@ -112,6 +114,8 @@ def local_wear(
         Of exact patches.
     scene : Scene, str, Path or dict, optional
         That of the run, for exact patches; left out: read anew by what the run says of it.
+    trust : bool
+        Whether laws of the user that a run file names may be run: exact patches ask for friction that falls with slip.
 
     Returns
     -------
@@ -141,9 +145,9 @@ def local_wear(
     if any(not _NEEDED <= run[f"{name}/{side}"].keys() for name, side in wheels):
         raise InputError("local_wear", "output.channels", "expected contact among them")
     check_friction(law, run.scene["contact"]["friction"], "local_wear", "run")
-    over = partial(_on_ellipses, run, late, loss)
+    over = partial(_on_ellipses, run, late, loss, trust)
     if patches == "exact":
-        own = scene_in_run(run, scene, "local_wear")
+        own = scene_in_run(run, scene, "local_wear", trust)
         check_motion(own, "local_wear")
         exact = law_on_cells(law, "local_wear")
         over = partial(_on_exact_patches, run, late, exact, own, resolution, otherwise=over)
@@ -200,7 +204,12 @@ def _wheel_wear(run, name, late, strips, width):
     return WheelWear(wheel[0], wheel[1], rail[0], rail[1], float(np.sum(lost)), float(np.sum(strips.work * share)))
 
 
-def _on_ellipses(run, late, loss, name, side):
+def _friction_of(scene, trust):
+    """Largest friction of a run that does not say it."""
+    return read_friction(scene["contact"]["friction"], "scene", laws_of_stored(scene, trust)).largest
+
+
+def _on_ellipses(run, late, loss, trust, name, side):
     """`Strips` of the ellipses of a wheel."""
     contact, body, outwards, scene = run[f"{name}/{side}"], run[name], SIDES[side], run.scene
     there = ~np.isnan(contact["N_N"][late]) & (contact["N_N"][late] > 0.0)
@@ -208,7 +217,7 @@ def _on_ellipses(run, late, loss, name, side):
     times = np.nonzero(there)[0]
     speed = np.broadcast_to(rolling_speed(body, scene["speed"]), late.shape)[late][times]
     # where rails differ or friction changes along them, the bound of the largest one: the amount is the run's own
-    friction = read_friction(scene["contact"]["friction"], "scene").largest
+    friction = run.settings.get("friction_largest") or _friction_of(scene, trust)
     places, dy, dx, work = friction_work(rows, friction, **scene["contact"]["material"])
     taken = loss(Sliding(rows, places, dy, dx, work, friction, speed))
     slope = np.cos(rows["contact_angle_rad"])[:, None]

@@ -10,9 +10,10 @@ from numba.core.types import BaseTuple
 
 from wrcore.elements import law
 from wrcore.elements.kind import AT, DIRECTION, PARAMETERS, Along, Kind, axis_of, ends_of
-from wrcore.errors import InputError
+from wrcore.errors import InputError, short
 from wrcore.kernels import own
 from wrcore.kernels.handles import FOUR
+from wrcore.kernels.named_laws import present_laws
 
 TRIED = (0.0, 0.0), (1e-4, 1e-3), (-1e-4, -1e-3)
 """Stretches (m) and speeds (m/s) of the test calls."""
@@ -28,23 +29,36 @@ def wrapped(function, note):
         parameters = elements.parameters[row[law.FIRST] : row[law.LAST]]
         return function(stretch, speed, state[at:end], parameters, rate[at:end])
 
-    def look(elements, k, stretch, speed, state, rate, at, force):
-        given, found = stretch + speed, force
+    def sum_of_states(elements, k, state, at):
+        total = 0.0
         for i in range(at, at + int(elements.directed[k, law.NUMBERS])):
-            given, found = given + state[i], found + rate[i]
-        note(given, found)
+            total += state[i]
+        return total
+
+    def look(elements, k, stretch, speed, rate, at, states, force):
+        found = force
+        for i in range(at, at + int(elements.directed[k, law.NUMBERS])):
+            found += rate[i]
+        note(stretch + speed + states, found)
 
     def of_force(elements, k, stretch, speed, state, rate, at):
+        states = sum_of_states(elements, k, state, at)
         force = float(call(elements, k, stretch, speed, state, rate, at))
-        look(elements, k, stretch, speed, state, rate, at, force)
+        if sum_of_states(elements, k, state, at) != states:  # the law wrote to what it may only read
+            force = np.nan
+        look(elements, k, stretch, speed, rate, at, states, force)
         return force, 0.0, 0.0, force * speed
 
     def of_three(elements, k, stretch, speed, state, rate, at):
+        states = sum_of_states(elements, k, state, at)
         force, stored, lost = call(elements, k, stretch, speed, state, rate, at)
-        look(elements, k, stretch, speed, state, rate, at, float(force))
-        return float(force), 0.0, float(stored), float(lost)
+        force = float(force)
+        if sum_of_states(elements, k, state, at) != states:
+            force = np.nan
+        look(elements, k, stretch, speed, rate, at, states, force)
+        return force, 0.0, float(stored), float(lost)
 
-    call, look = own.uncached(call), own.uncached(look)
+    call, look, sum_of_states = map(own.uncached, (call, look, sum_of_states))
     return of_force if alone else of_three
 
 
@@ -58,29 +72,34 @@ def address(digest, elements):
 def parts(item):
     """One part with its own states and parameters."""
     numbers, states = item.get("parameters", ()), item.get("states", 0)
-    return [Along(ends_of(item), own.find(item["law"]), axis_of(item), numbers, inner=states, odd=False)]
+    return [Along(ends_of(item), present_laws().find(item["law"]), axis_of(item), numbers, inner=states, odd=False)]
 
 
 def check(item):
-    """The function is there, and works on a test call."""
+    """The function is there; it is not called."""
     try:
-        function = own.find(item["law"])
-        states = item.get("states", 0)
-        for pair in TRIED:
-            answer, arrays = own.tried(function, [states, item.get("parameters", []), states], *pair)
-            if np.shape(answer) not in ((), (3,)) or answer is None:
-                expected = "expected a force in N, or force, stored energy and dissipated power from a test call"
-                raise InputError("", "", f"{expected}, got {answer!r}")
-            own.finite(answer, *arrays)
+        present_laws().find(item["law"])
     except InputError as error:
         yield "law", error.expected
+
+
+def try_law(item):
+    """Call the function of an element for a test; an InputError without a source says what was expected of it."""
+    function = present_laws().find(item["law"])
+    states = item.get("states", 0)
+    for pair in TRIED:
+        answer, arrays = own.tried(function, [states, item.get("parameters", []), states], *pair, reads=2)
+        if not own.is_force(answer):
+            expected = "expected a force in N, or a tuple of force, stored energy and dissipated power from a test call"
+            raise InputError("", "", f"{expected}, got {short(answer)}")
+        own.finite(answer, *arrays)
 
 
 KIND = Kind(
     {
         "at": AT,
         "direction": DIRECTION,
-        "law": {"type": "string", "description": "a function as module:function or file.py:function"},
+        "law": {"type": "string", "description": "a function as file.py:function"},
         "parameters": PARAMETERS,
         "states": {"type": "integer", "minimum": 0, "maximum": 20, "x-unit": "1",
                    "description": "the number of the law's own states, 0 to 20, all 0 at the start"},

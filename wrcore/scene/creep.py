@@ -1,0 +1,79 @@
+"""The creep law of a scene: checked, and with its data."""
+
+import os
+from typing import Any
+
+from wrcore.contact.reduction import REDUCTIONS
+from wrcore.creep.laws import LAWS, creep_data, named_law, own_law
+from wrcore.creep.table import DEFAULT_TOLERANCE, ensure_table, kept_tables, load_table
+from wrcore.errors import InputError
+from wrcore.kernels.cache import say
+from wrcore.scene.pairs import find_file
+
+
+def check_creep(contact, source, laws):
+    """Complete what a scene says of its creep law, and refuse what does not belong to the law."""
+    creep = contact["creep"]
+    creep.setdefault("tolerance", DEFAULT_TOLERANCE)
+    if creep["model"] not in LAWS:
+        try:
+            named_law(creep["model"], laws)
+        except InputError as error:
+            raise InputError(source, "contact.creep.model", error.expected) from None
+        if contact["patch"] not in REDUCTIONS:
+            expected = f"expected {' or '.join(REDUCTIONS)} with a creep law of your own, got {contact['patch']}:"
+            expected += " set contact.patch to one of them"
+            raise InputError(source, "contact.patch", expected)
+    elif creep["model"] != "table" and contact["patch"] not in REDUCTIONS:
+        expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
+        got = f"got {creep['model']}; set contact.patch to {' or '.join(REDUCTIONS)}, which take any, beside it"
+        raise InputError(source, "contact.creep.model", f"{expected}, {got}")
+    if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
+        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
+    for key in ("k_A", "k_S"):
+        if key in creep and creep["model"] != "polach":
+            raise InputError(source, f"contact.creep.{key}", f"expected model polach with it, got {creep['model']}")
+    if creep.get("k_S", 0.0) > creep.get("k_A", 1.0):
+        expected = f"expected no more than k_A, {creep['k_A']:g}, got {creep['k_S']:g}"
+        raise InputError(source, "contact.creep.k_S", expected)
+    if "table" in creep:
+        creep["table"] = str(find_file(creep["table"], laws.folders[0], source, "contact.creep.table"))
+
+
+def announce(text):
+    """One line on stderr before work that takes long, whoever listens; none with ``WRCORE_PROGRESS=0``."""
+    if os.environ.get("WRCORE_PROGRESS") != "0":
+        say(text)
+
+
+def creep_of(scene: Any, progress: Any) -> Any:
+    """Data of the scene's creep law; only the law ``table`` loads (or builds) a table.
+
+    What is looked up lies beside one creep table, whichever the scene names: that for which nodes come with the
+    package."""
+    contact = scene.data["contact"]
+    creep, nu = contact["creep"], contact["material"]["poisson_ratio"]
+    factors = creep.get("k_A", 1.0), creep.get("k_S", creep.get("k_A", 1.0))
+    if creep["model"] != "table":
+        law = None if creep["model"] in LAWS else _creep_law(scene)
+        return creep_data(nu, factors=factors, law=law)
+    looked_up = contact["patch"] == "tabulated"
+    if "table" in creep and not looked_up:
+        table = load_table(creep["table"])
+    else:
+        tolerance = DEFAULT_TOLERANCE if looked_up else creep["tolerance"]
+        if not kept_tables(nu, creep["planes"], tolerance):
+            announce(f"building a creep table ({creep['planes']}, {tolerance:g}): some ten seconds, once")
+        table = ensure_table(nu, creep["planes"], tolerance, progress)
+    if abs(table.nu - nu) > 1e-9:
+        expected = f"expected a table for Poisson's ratio {nu:g}, got one for {table.nu:g}"
+        raise InputError(scene.source, "contact.creep.table", expected)
+    return creep_data(nu, table.kernel_data(), factors=factors)
+
+
+def _creep_law(scene):
+    """The creep law of the user that a scene names."""
+    try:
+        return own_law(scene.data["contact"]["creep"]["model"], scene.laws)
+    except InputError as error:
+        raise InputError(scene.source, "contact.creep.model", error.expected) from None
