@@ -24,11 +24,14 @@ import yaml
 import wrcore
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
+from wrcore.errors.input_files import digest_of_file
 from wrcore.errors.new_files import appearing
 from wrcore.geometry.slice_files import profiles_in, with_profiles
+from wrcore.kernels.cache import say
 from wrcore.kernels.named_laws import LawFile
 from wrcore.run.channels import DESCRIPTIONS
 from wrcore.run.session import Session, start
+from wrcore.run.state import State
 from wrcore.scene.description import Scene
 from wrcore.scene.pairs import find_file, with_names
 
@@ -36,6 +39,9 @@ LIBRARIES = {2: ("pythonfmu", "Fmi2Slave", "Real", "Fmi2"), 3: ("pythonfmu3", "F
 """By the version of FMI: the library, what it calls a slave and a number, and how its other names begin."""
 
 SCENE, INTERFACE = "scene.yaml", "interface.json"
+
+JUMP = 1e-9
+"""Share of the time by which a communication point may differ from the end of the last step: rounding of the master."""
 
 SCRIPT = '''"""A scene of wrcore {version} as a functional mock-up unit; it needs wrcore where it runs."""
 
@@ -65,6 +71,7 @@ class SteppedScene:
         self._folder = Path(given["resources"])
         told = json.loads((self._folder / INTERFACE).read_text("utf-8"))
         self.description, self._session, self._read = told["description"], None, (float("nan"), {})  # type: ignore
+        self._begin, self._digests = 0.0, told["sha256"]
         self._inputs, self._outputs = {name: value for name, (value, _) in told["inputs"].items()}, [*told["outputs"]]
         if told["fmi"] == 3:
             self._register("time", "independent", "continuous", "time, s", lambda: self._present().time)
@@ -86,10 +93,21 @@ class SteppedScene:
 
         return put
 
+    def setup_experiment(self, start_time: float, *_: Any) -> None:
+        """Take over the time at which the master begins, s."""
+        self._begin = float(start_time)
+
     def _present(self) -> Session:
-        """The session, begun when it is first needed."""
+        """The session, begun when it is first needed, at the master's start time: tables over time are read there."""
         if self._session is None:
+            for name, digest in self._digests.items():
+                if digest_of_file(self._folder / name) != digest:
+                    raise InputError(name, "", "expected the file with which the unit was written, but it was changed")
             self._session = start(self._folder / SCENE, record=False)
+            if self._begin != 0.0:
+                first = self._session.state
+                begun = State(first, self._begin, first.frame, first.vehicle)
+                self._session = start(self._session.scene, start=begun, record=False)
         return self._session
 
     def _output(self, name):
@@ -103,12 +121,22 @@ class SteppedScene:
         self._present()
 
     def do_step(self, current_time: float, step_size: float) -> Any:
-        """Step with the inputs as they are; what cannot go on is an error of the master's."""
+        """Step with the inputs as they are; False, which discards the step, with a line on standard error for a step
+        that is none, or that cannot go on. The unit stays alive: a master may read its outputs or restore a state."""
         session = self._present()
-        session.step(step_size, {name: value for name, value in self._inputs.items() if value is not None})
+        try:
+            if abs(current_time - session.time) > JUMP * max(1.0, abs(session.time), abs(step_size)):
+                expected = (
+                    f"expected a step from {session.time:g} s on, the end of the last one, got {current_time:g} s"
+                )
+                raise InputError("unit", "communication point", expected)
+            session.step(step_size, {name: value for name, value in self._inputs.items() if value is not None})
+        except InputError as error:
+            say(f"unit: {error}")
+            return False
         if session.status != "running":
-            raise RuntimeError(f"{session.status}: {session.reason}")
-        return True
+            say(f"unit: {session.status}: {session.reason}")
+        return session.status == "running"
 
     def to_xml(self, *options: Any) -> Any:
         root = super().to_xml(*options)  # type: ignore[misc]
@@ -155,6 +183,7 @@ def write_fmu(scene: Scene, path: Path, fmi: int = 2, outputs: Iterable[str] = (
         folder = Path(place, "files")
         folder.mkdir()
         _pack_scene(scene, folder)
+        told["sha256"] = {path.name: digest_of_file(path) for path in sorted(folder.iterdir())}
         (folder / INTERFACE).write_text(json.dumps(told), "utf-8")
         name, (package, slave, number, prefix) = re.sub(r"\W", "_", f"wrcore_{path.stem}"), LIBRARIES[fmi]
         words = {"version": wrcore.__version__, "library": package, "number": number, "slave": slave, "prefix": prefix}
