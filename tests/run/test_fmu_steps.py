@@ -51,7 +51,7 @@ def test_unit_reads_tables_at_the_start_time_of_the_master(unit):
     unit.setup_experiment(1.2)
     unit.exit_initialization_mode()
     assert unit.do_step(1.2, 0.01) is True
-    assert unit.variables["drive/b.torque_Nm"].getter() == pytest.approx(4e3, abs=1.0)
+    assert unit.variables["drive/b.torque_Nm"].getter() == pytest.approx(-4e3, abs=1.0)
     assert unit._present().time == pytest.approx(1.21)
 
 
