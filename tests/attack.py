@@ -25,7 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests import attack_calls as attack_calls
 from tests.attacking import ATTACKS, attack, edited, isolated, mutated, same_numbers, tally, tried
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.cli import main as command
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import Resolution
@@ -88,7 +88,7 @@ SHORT = {"speed": 60.0, "integration.duration": 0.4, "contact.creep.model": "she
 
 @cache
 def scene_of(method="tsit5", **changes):
-    return load_scene(SCENES / "suspended_wheelset.yaml", SHORT | {"integration.method": method, **changes})
+    return load_scene(ELLIPTIC / "suspended_wheelset.yaml", SHORT | {"integration.method": method, **changes})
 
 
 @cache
@@ -149,7 +149,7 @@ def written(path):
     out.write_bytes(before)
     sets = [f"--set={key}={value}" for key, value in (SHORT | {"integration.method": "tsit5"}).items()]
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-        status = command(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)])
+        status = command(["simulate", str(ELLIPTIC / "suspended_wheelset.yaml"), *sets, "--out", str(out)])
     if status == 2 and said.getvalue().count("\n") == 1 and out.read_bytes() == before:
         raise InputError("run_over", "", said.getvalue())
     if status or said.getvalue():
@@ -265,7 +265,7 @@ def _limited(folder, most, block):
     with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
         if block is None:
             sets = [f"--set={key}={value}" for key, value in (SHORT | {"integration.method": "tsit5"}).items()]
-            status = command(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets, "--out", str(out)])
+            status = command(["simulate", str(ELLIPTIC / "suspended_wheelset.yaml"), *sets, "--out", str(out)])
         else:
             try:
                 status = simulate_to(scene_of("tsit5"), out, block=block)[1]

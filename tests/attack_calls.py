@@ -21,12 +21,12 @@ import pandas as pd
 
 import wrcore as wr
 from tests.attacking import attack, tried
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.creep import table
 from wrcore.creep.table import build_table
 from wrcore.errors import short
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 SHORT = {"integration.duration": 0.12, "output.rate": 1000.0, "contact.creep.model": "linear"}
 
 

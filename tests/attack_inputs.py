@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.attacking import mutated
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.integrate.integrator import STALL_ATTEMPTS
@@ -100,7 +100,7 @@ def _all(function, cases, longest=LONGEST):
 # ----------------------------------------------------------------------------------------------------- parts of sweeps
 
 SWEEP = {
-    "name": "attack", "scene": str(SCENES / "suspended_wheelset.yaml"), "sampling": {"kind": "grid"},
+    "name": "attack", "scene": str(ELLIPTIC / "suspended_wheelset.yaml"), "sampling": {"kind": "grid"},
     "keys": {"speed": {"from": 20.0, "to": 40.0, "steps": 6}, "contact.detection": {"values": ["planar", "spatial"]}},
     "measures": ["y_rms_m", "y_max_m", "frequency_Hz", "steps"], "begin": 0.0, "window": 0.5, "batch": 3,
 }  # fmt: skip
@@ -239,7 +239,7 @@ TEARS = (
 
 def _document(draw):
     """Text of a file that may be a scene, and whether it still says the same as the scene did."""
-    text = (SCENES / f"{draw.choice(('wheelset', 'suspended_wheelset', 'trailer_vehicle'))}.yaml").read_text()
+    text = (ELLIPTIC / f"{draw.choice(('wheelset', 'suspended_wheelset', 'trailer_vehicle'))}.yaml").read_text()
     kind = draw.choice(("bomb", "bomb", "spelling", "editor", "torn", "torn", "added"))
     if kind == "bomb":
         return kind, draw.choice(BOMBS)(draw.choice((30, 3000, 60_000, 300_000))).encode()
@@ -273,7 +273,7 @@ def yaml_documents(count, seed):
     """Scene files that are bombs, torn, misspelt, or come from another editor: read as meant, or one line."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "scenes").mkdir()
-        Path(folder, "vehicles").symlink_to(SCENES.parent / "vehicles")
+        Path(folder, "vehicles").symlink_to(ELLIPTIC.parent / "vehicles")
         return _all(lambda case: _read(folder, case), range(seed, seed + count))
 
 
@@ -292,7 +292,9 @@ def random_scene(draw):
     def log(low, high):
         return float(np.exp(draw.uniform(np.log(low), np.log(high))))
 
-    source = SCENES / f"{draw.choice(('wheelset', 'suspended_wheelset', 'suspended_wheelset', 'trailer_vehicle'))}.yaml"
+    source = (
+        ELLIPTIC / f"{draw.choice(('wheelset', 'suspended_wheelset', 'suspended_wheelset', 'trailer_vehicle'))}.yaml"
+    )
     law = draw.choice((*3 * ("table",), *2 * ("she", "polach", "linear"), "fastsim"))
     changes = {
         "speed": log(3.0, 120.0), "initial.y": draw.uniform(-0.012, 0.012), "initial.yaw": draw.uniform(-0.02, 0.02),

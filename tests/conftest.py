@@ -18,9 +18,12 @@ ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"
 
 
+SCENES = ROOT / "config" / "scenes"
+"""The examples as users run them."""
+
+
 def _with_ellipses():
-    """Folder of copies of the examples, whose contact is `moment` where theirs is looked up: a test of something else
-    wants no table. Those that mean an example as it is take `wrcore.example`."""
+    """Return the folder of copies of the examples whose contact is `moment` in place of a lookup table."""
     folder = Path(tempfile.mkdtemp(prefix="wrcore-examples-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for part in ("scenes", "vehicles", "sweeps"):
@@ -30,7 +33,9 @@ def _with_ellipses():
     return folder / "scenes"
 
 
-SCENES = _with_ellipses()
+ELLIPTIC = _with_ellipses()
+"""The examples with elliptic patches, for tests of something that ellipses alone have, or of many runs of another
+matter than contact."""
 
 CHECKS = (
     "study/", "test_workflow", "test_slurm", "test_attack", "test_fuzz", "test_bring_your_own", "test_first_result",
@@ -42,7 +47,8 @@ and attacks."""
 FIRST = (
     "test_workflow", "dynamics/test_energy", "contact/patch", "analysis/contact", "creep", "dynamics",
     "analysis/contact/test_out_of_round", "integrate", "dynamics/test_corrugation",
-    "run", "vehicle", "balance", "sweep", "analysis", "test_api", "study", "contact", "test_attack", "test_fuzz",
+    "run", "vehicle", "balance", "contract", "sweep", "analysis", "test_api", "study", "contact", "test_attack",
+    "test_fuzz",
 )  # fmt: skip
 """The same in the order in which files are tested (``--no-loadscope-reorder``; a longer name counts for itself): of two
 workers one compiles what vehicles run with, the other one what patches are solved with; files that need the same

@@ -14,7 +14,7 @@ import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.cli import main
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.run.results import load_run
@@ -180,7 +180,7 @@ DRIVE = {
 @cache
 def base_scene():
     """A scene that is over in no time, with every key that a scene can have."""
-    data = read_yaml(SCENES / "suspended_wheelset.yaml")
+    data = read_yaml(ELLIPTIC / "suspended_wheelset.yaml")
     data["contact"] |= {"creep": {"model": "she", "least_speed": 1e-3}, "detection_tolerance": 1e-7}
     data["contact"] |= {"friction": FRICTION}
     data["contact"] |= {"material": {"shear_modulus": 8.2e10, "poisson_ratio": 0.28}}

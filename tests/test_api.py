@@ -14,7 +14,7 @@ import pytest
 from synthetic import hunting_run
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 
 PUBLIC = sorted(set(wr.__all__) - {"__version__"})
 DOCUMENTED = sorted({getattr(wr, name).__module__ for name in PUBLIC} | {"wrcore.run.channels", "wrcore.run.progress"})
@@ -45,10 +45,10 @@ def test_types_are_checked_where_public_names_are_defined():
 
 
 def test_a_path_a_dict_and_a_scene_with_changes_give_the_same_run():
-    path = SCENES / "suspended_wheelset.yaml"
+    path = ELLIPTIC / "suspended_wheelset.yaml"
     changes = {"speed": 30, "integration": {"duration": 0.05}}
     scene = wr.load_scene(path, ["speed=30", "integration.duration=0.05"])
-    vehicle = str(SCENES.parent / "vehicles" / "suspended_wheelset.yaml")
+    vehicle = str(ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml")
     content = {**wr.load_scene(path).data, "vehicle": {"parameters": vehicle}}
     runs = [
         wr.simulate(scene),

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.pages import run_blocks
 
 
@@ -13,7 +13,7 @@ from tests.pages import run_blocks
 def folder(tmp_path_factory):
     """A folder in which all blocks were run in their order."""
     place = tmp_path_factory.mktemp("own")
-    (place / "config").symlink_to(SCENES.parent)
+    (place / "config").symlink_to(ELLIPTIC.parent)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         run_blocks("bring_your_own.md")
@@ -59,7 +59,7 @@ def test_runs_feel_what_was_brought(folder):
     assert {run.status for run in (worn, rough, curve)} == {"completed"}
     one_sided = wr.load_run(folder / "one_sided.h5")
     assert one_sided.status == "completed" and np.abs(one_sided["wheelset"].y_m[-1] - worn["wheelset"].y_m[-1]) > 1e-4
-    nominal = wr.simulate(SCENES / "suspended_wheelset.yaml", integration__duration=0.2)
+    nominal = wr.simulate(ELLIPTIC / "suspended_wheelset.yaml", integration__duration=0.2)
     assert np.abs(worn["wheelset"].y_m - nominal["wheelset"].y_m).max() > 1e-5
     assert np.ptp(rough["wheelset"].z_m) > 1e-4
     assert curve["wheelset"].yaw_rad[-1] != 0.0 and curve.scene["track"]["path"][2]["radius"] == 800

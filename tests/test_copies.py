@@ -11,7 +11,7 @@ from synthetic import hunting_run
 
 import wrcore as wr
 from tests.attacking import same_numbers
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.errors import InputError, UnknownNameError
 
 WAYS = {"pickle": lambda thing: pickle.loads(pickle.dumps(thing)), "copy": copy.copy, "deepcopy": copy.deepcopy}
@@ -31,7 +31,7 @@ def test_errors(way, kind):
 
 
 def speed_of(speed):
-    return wr.load_scene(SCENES / "suspended_wheelset.yaml", speed=speed).data["speed"]
+    return wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", speed=speed).data["speed"]
 
 
 def test_a_bad_input_of_a_pool_of_processes_is_raised_here():
@@ -65,10 +65,10 @@ MADE = {
     "Assessment": assessed, "Comparison": lambda: wr.compare(hunting_run(), hunting_run(flange_at=1.0)),
     "CreepTable": wr.ensure_table, "InputError": lambda: InputError("a", "b", "c"),
     "Patch": lambda: wr.patch(pair(), load=5e4)[0], "RollingContact": lambda: wr.RollingContact(1.0, level=6),
-    "Run": hunting_run, "Scene": lambda: wr.load_scene(SCENES / "trailer_vehicle.yaml"), "Settling": wr.Settling,
+    "Run": hunting_run, "Scene": lambda: wr.load_scene(ELLIPTIC / "trailer_vehicle.yaml"), "Settling": wr.Settling,
     "WheelWear": lambda: wr.WheelWear(*np.ones((4, 3)), 1.0, 2.0), "WheelsetOnTrack": pair,
     "Channels": lambda: hunting_run()["wheelset"], "Channels of a wheel": lambda: hunting_run()["wheelset/left"],
-    "Sweep": lambda: wr.load_sweep(SCENES.parent / "sweeps" / "smoke.yaml"),
+    "Sweep": lambda: wr.load_sweep(ELLIPTIC.parent / "sweeps" / "smoke.yaml"),
     "Animation": animated,
 }  # fmt: skip
 """One of each public class, and of what public functions hand out."""
@@ -95,7 +95,7 @@ def test_there_is_one_of_each_public_class():
 
 def test_a_session_is_not_copied():
     """It goes on in arrays whose addresses its kernels hold."""
-    session = wr.start(SCENES / "suspended_wheelset.yaml")
+    session = wr.start(ELLIPTIC / "suspended_wheelset.yaml")
     for way in WAYS.values():
         with pytest.raises(InputError, match="session: copy: expected save and restore"):
             way(session)

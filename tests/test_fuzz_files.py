@@ -26,7 +26,7 @@ from fuzzing import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.creep.axes import CreepTableData, TableAxes
 from wrcore.creep.build import Resolution
 from wrcore.creep.kalker import kalker_data
@@ -196,7 +196,7 @@ def spoiled_file(draw, content):
 def test_run_files(folder, data):
     path = folder / "run.h5"
     if not path.exists():
-        simulate_to(load_scene(SCENES / "suspended_wheelset.yaml", {"integration.duration": SHORT}), path)
+        simulate_to(load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"integration.duration": SHORT}), path)
     content = path.read_bytes()
     spoiled_path = folder / "spoiled.h5"
     spoiled_path.write_bytes(data.draw(spoiled_file(content)))
@@ -271,7 +271,7 @@ def test_results_that_cannot_be_written(tmp_path, command, kind):
     (tmp_path / "cases.csv").write_text(CASES)
     (tmp_path / "poses.csv").write_text(POSES)
     arguments = {
-        "simulate": [SCENES / "suspended_wheelset.yaml"], "creep": ["--cases", tmp_path / "cases.csv"],
+        "simulate": [ELLIPTIC / "suspended_wheelset.yaml"], "creep": ["--cases", tmp_path / "cases.csv"],
         "contact": ["--poses", tmp_path / "poses.csv", *PAIR, "--wheel-load", "1e4"], "conicity": PAIR,
         "table": ["build"],
     }  # fmt: skip

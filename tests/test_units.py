@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 
 PAIR = ["--wheel", "S1002", "--rail", "60E1", "--inclination", "1/40"]
@@ -71,7 +71,7 @@ def test_inclination_beside_a_rail_of_slices_or_a_wheel_is_refused(tmp_path, cap
 
 def test_a_scene_with_a_named_rail_needs_its_inclination():
     data = dict(wr.load_scene(SCENES / "wheelset.yaml").data, rail={"profile": "60E1"})
-    data["vehicle"]["parameters"] = str(SCENES.parent / "vehicles" / "wheelset.yaml")
+    data["vehicle"]["parameters"] = str(ELLIPTIC.parent / "vehicles" / "wheelset.yaml")
     with pytest.raises(wr.InputError, match=r"rail.inclination: expected a ratio for 60E1"):
         wr.load_scene(data)
     assert wr.load_scene(data, {"rail.profile": "circle:0.3"}).rail.name == "circle:0.3"
@@ -97,7 +97,7 @@ def test_the_exact_solver_checks_its_creepages():
 
 @pytest.mark.parametrize("speeds", [[], [20.0, 10.0], [-20.0], [0.0, 10.0], [200.0], [math.nan], ["20"]])
 def test_speeds_of_stability(speeds):
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml")
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml")
     for call in (
         lambda: wr.critical_speeds({"any": scene}, speeds),
         lambda: wr.limit_cycles(scene, speeds, None, [0.006], 1.0),
@@ -119,7 +119,7 @@ def test_conicity_follows_the_standard_unless_asked_to_roll(tmp_path):
 
 def test_a_run_beyond_the_end_of_the_irregularity_says_so(capsys):
     spectrum = "track.irregularity={spectrum: {level: low, seed: 1, length: 60.0, begin: -20.0}}"
-    command = ["simulate", str(SCENES / "suspended_wheelset.yaml"), "--set", spectrum, "--set", "speed=30"]
+    command = ["simulate", str(ELLIPTIC / "suspended_wheelset.yaml"), "--set", spectrum, "--set", "speed=30"]
     assert main([*command, "--set", "integration.duration=1.0"]) == 0
     assert "past the end of the irregularity" not in capsys.readouterr().out
     assert main([*command, "--set", "integration.duration=1.5"]) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES as EXAMPLES
+from tests.conftest import ELLIPTIC as EXAMPLES
 from wrcore.analysis.to_accuracy import (
     BELIEVED,
     COMPLETE,

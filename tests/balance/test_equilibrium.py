@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.balance.equilibrium import displaced, wheel_loads
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
@@ -26,7 +26,7 @@ def equilibrium_of(tmp_path):
     def find(data, *overrides):
         (tmp_path / "vehicle.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
         overrides = [f"vehicle.parameters={tmp_path / 'vehicle.yaml'}", "contact.creep.model=linear", *overrides]
-        scene = load_scene(SCENES / "trailer_vehicle.yaml", ["vehicle.axle_boxes=false", "initial.y=0", *overrides])
+        scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["vehicle.axle_boxes=false", "initial.y=0", *overrides])
         model = compile_scene(scene)[0]
         return scene, model, static_equilibrium(scene, model)
 
@@ -41,7 +41,7 @@ def heights(scene, equilibrium):
 
 def test_displacements_turn_bodies_about_track_axes():
     """Rodrigues' rotation, after that of the body, for each row and body by itself; all else stays."""
-    model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", ["initial.yaw=0.004"]))
+    model, state = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["initial.yaw=0.004"]))
     rng, n = np.random.default_rng(1), len(model.bodies.mass)
     rows = 0.3 * rng.normal(size=(3, 6 * n + len(state) - STATE_SIZE * n))
     for row, moved in zip(rows, displaced(state, model, rows), strict=True):
@@ -78,7 +78,7 @@ def test_trailer_vehicle_loads_its_eight_wheels_alike(equilibrium_of, axle_boxes
 @pytest.mark.parametrize("patch", ["moment", "maximum"])
 def test_wheels_roll_without_slip_at_the_start(patch):
     scene = load_scene(
-        SCENES / "trailer_vehicle.yaml", ["initial.y=0", f"contact.patch={patch}", "contact.creep.model=she"]
+        ELLIPTIC / "trailer_vehicle.yaml", ["initial.y=0", f"contact.patch={patch}", "contact.creep.model=she"]
     )
     model, state = compile_scene(scene)
     work = workspace(model)
@@ -155,7 +155,7 @@ def test_the_start_stands_on_rails_that_are_out_of_line(tmp_path, path):
     names = "s_m,alignment_m,level_m,cross_level_m\n"
     rows = "".join(f"{s},{0.003},{0.005},{0.004}\n" for s in range(-60, 61, 2))
     (tmp_path / "offset.csv").write_text(names + rows)
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", [
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", [
         "contact.creep.model=linear", "initial.y=0.002", "initial.yaw=0.003", f"track.path={path}",
         f"track.irregularity={{points: {tmp_path / 'offset.csv'}, fade_in: 30, fade_out: 30}}",
         "vehicle.axle_boxes=true",
@@ -182,7 +182,7 @@ VEHICLES = ("wheelset", "suspended_wheelset", "trailer_vehicle")
 def test_a_centred_run_begins_in_steady_running(name, speed):
     # explicit methods at their stability limit leave a noise of the size of the tolerance
     settings = {"duration": 0.1, "rtol": 1e-10}  # 1e-12 m, times the stiffness of a contact, 1e9 N/m
-    run = wr.simulate(SCENES / f"{name}.yaml", speed=speed, initial={"y": 0.0}, integration=settings)
+    run = wr.simulate(ELLIPTIC / f"{name}.yaml", speed=speed, initial={"y": 0.0}, integration=settings)
     for group in (group for group in run.keys() if "/" in group):
         load = np.nansum(run[group].N_N, axis=1)
         assert np.ptp(load) < 1e-6 * load.mean(), group
@@ -195,7 +195,7 @@ def test_a_moved_wheelset_begins_at_rest_vertically_in_roll_and_about_its_axle(n
     changes = {"initial": {"y": 0.002, "yaw": 0.001}}
     if name == "trailer_vehicle":
         changes["vehicle"] = {"axle_boxes": boxes}
-    model, state = compile_scene(load_scene(SCENES / f"{name}.yaml", **changes))
+    model, state = compile_scene(load_scene(ELLIPTIC / f"{name}.yaml", **changes))
     rates = Equations(model)(0.0, state)
     for body in model.bodies.wheelsets:
         part, rate = (row[STATE_SIZE * body : STATE_SIZE * (body + 1)] for row in (state, rates))
@@ -207,7 +207,7 @@ def test_a_moved_wheelset_begins_at_rest_vertically_in_roll_and_about_its_axle(n
 
 def test_without_friction_wheels_begin_at_pure_rolling():
     changes = {"contact": {"friction": 1e-9, "creep": {"model": "she"}}, "initial": {"y": 0.002, "yaw": 0.05}}
-    _, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", **changes))
+    _, state = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", **changes))
     assert np.linalg.norm(state[10:13]) == pytest.approx(20.0 / 0.46, rel=0.02)
 
 
@@ -215,7 +215,7 @@ def test_a_train_begins_as_its_vehicles_do():
     changes = ["initial.y=0", "contact.creep.model=she"]
     train = ["vehicle.count=2", "vehicle.spacing=30"]
     alone, both = (
-        compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", [*changes, *more]))[1] for more in ([], train)
+        compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", [*changes, *more]))[1] for more in ([], train)
     )
     size = 7 * STATE_SIZE
     bodies = both[: 2 * size].reshape(2, 7, STATE_SIZE)[:, :, 1:]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from tests.dynamics.test_system import LEVEL, body_state, make_model
 from wrcore.analysis.stability.modes import linear_modes
 from wrcore.analysis.stability.stability import at_speed, steady_motion
@@ -237,7 +237,7 @@ def test_hunting_of_a_conical_wheelset_equals_the_textbook(stiffening, patch, to
 
 def test_steady_running_stays_as_it_is():
     """The suspended wheelset at its own spin for a second: nothing moves but by rounding errors (and x by V t)."""
-    model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.0"]))
+    model, state = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["initial.y=0.0"]))
     linear = steady_running(model, state)
     assert np.max(np.abs(linear.residual)) < 1e-9
     run = integrate(model, linear.state, np.linspace(0, 1, 11), "scipy_dop853", 1e-12, 1e-14)
@@ -249,7 +249,7 @@ def test_steady_running_stays_as_it_is():
 @pytest.mark.parametrize("speed", [30.0, 75.0])
 def test_small_free_motion_grows_as_its_eigenvalue_says(speed):
     """Suspended wheelset on real profiles, below and above its critical speed, started in its hunting mode (10 um)."""
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.0"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["initial.y=0.0"])
     model, state = compile_scene(scene)
     linear = steady_motion(model, state, speed)
     model, _ = at_speed(model, state, speed)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.balance import initial
 from wrcore.balance.equilibrium import Equilibrium
 from wrcore.errors import InputError
@@ -15,13 +15,13 @@ from wrcore.scene.description import compile_scene, load_scene
 @pytest.mark.parametrize("gauge", [1.0, 1.668, 1.9])
 def test_a_gauge_that_does_not_fit_the_wheelset_is_named(gauge):
     with pytest.raises(InputError, match="expected a gauge that fits tape circles 1.5 m apart") as caught:
-        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"track.gauge": gauge}))
+        compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"track.gauge": gauge}))
     assert caught.value.field == "track.gauge" and f"got {gauge:g} m" in str(caught.value)
 
 
 def test_a_place_at_which_no_wheel_stands_is_still_the_initial_ones():
     with pytest.raises(InputError, match="expected a position in which both wheels stand") as caught:
-        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"track.gauge": 1.6, "initial.y": 0.02}))
+        compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"track.gauge": 1.6, "initial.y": 0.02}))
     assert caught.value.field == "initial"
 
 
@@ -30,7 +30,7 @@ def test_a_rail_too_light_for_a_vehicle_to_rest_on_is_named(mass):
     spring = {"stiffness": 1e8, "damping": 1e5}
     support = {"rail": {"mass": mass, "lateral": spring, "vertical": spring}}
     with pytest.raises(InputError, match="expected at least 0.1 kg, or 0") as caught:
-        load_scene(SCENES / "suspended_wheelset.yaml", {"track.support": support})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"track.support": support})
     assert caught.value.field == "track.support.rail.mass"
 
 
@@ -38,7 +38,7 @@ UNLIKE = {"rail.left": {"profile": "54E1", "inclination": 0.025}}
 
 
 def wheelset(**changes):
-    return load_scene(SCENES / "suspended_wheelset.yaml", {"contact.patch": "moment", **changes})
+    return load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"contact.patch": "moment", **changes})
 
 
 @pytest.mark.parametrize("rails", [{}, UNLIKE])

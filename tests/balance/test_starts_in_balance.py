@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.contact import reduction
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.drive import undriven
@@ -37,7 +37,9 @@ def metro_car(folder, independent=False, stiff=False):
 
 def smooth(name, changes):
     """A scene on straight, level and perfect track."""
-    return load_scene(load_scene(SCENES / f"{name}.yaml", ["track={gauge: 1.435, path: tangent}"]), STRAIGHT | changes)
+    return load_scene(
+        load_scene(ELLIPTIC / f"{name}.yaml", ["track={gauge: 1.435, path: tangent}"]), STRAIGHT | changes
+    )
 
 
 def beginning(scene):

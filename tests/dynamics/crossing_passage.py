@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.analysis.assessment.wheels import wheelsets_of
 from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.analysis.pictures.style import save_figure
@@ -59,7 +59,7 @@ def cost(changes):
     scene = load_scene(SCENES / "crossing.yaml", changes | {"track.irregularity": rough})
     plain = copy.deepcopy(scene.data)
     del plain["track"]["crossing"]
-    plain["vehicle"]["parameters"] = str(SCENES.parent / plain["vehicle"]["parameters"])
+    plain["vehicle"]["parameters"] = str(ELLIPTIC.parent / plain["vehicle"]["parameters"])
     low, high = scene.crossings[0].ends
     inside = (high - low) * len(scene.vehicle.wheelset_names)
     walls = [min(simulate(load_scene(one)).counters["wall_s"] for _ in range(5)) for one in (plain, scene)]
@@ -71,7 +71,7 @@ def evaluations():
     """Processor time (us) of a right-hand side of a wheelset: without a crossing, beside it, on it; on wheels that are
     polygons, and with a flat where they are round."""
     plain = copy.deepcopy(load_scene(SCENES / "crossing.yaml").data)
-    plain["vehicle"]["parameters"] = str(SCENES.parent / plain["vehicle"]["parameters"])
+    plain["vehicle"]["parameters"] = str(ELLIPTIC.parent / plain["vehicle"]["parameters"])
     del plain["track"]["crossing"]
     polygon, flat = {"polygon": [{"order": 10, "amplitude": 2e-5}]}, {"flats": [{"length": 0.06}]}
     shapes = [plain | {"wheel": plain["wheel"] | {side: {"out_of_round": shape} for side in ("left", "right")}}

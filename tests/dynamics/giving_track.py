@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.analysis.assessment.wheels import wheelset_channels
 from wrcore.analysis.stability.stability import critical_speeds
 from wrcore.errors.checked_yaml import parse_value
@@ -29,7 +29,7 @@ def hunting(track, speed):
     """A run of the suspended wheelset into its limit cycle."""
     changes = {"contact.patch": "moment", "track": track, "speed": speed, "initial.y": 0.005,
                "integration.duration": 4.0, "integration.rtol": 1e-5, "output.rate": 5000.0}  # fmt: skip
-    return simulate(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    return simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
 
 
 def row(name, speed):
@@ -57,7 +57,7 @@ STIFFER = {f"massless, {a} x lateral, {b} x vertical": stiffer(a, b) for a, b in
 
 def critical(vehicle, tracks):
     """Rows of the linear critical speeds of a vehicle on tracks."""
-    start, names = SCENES / f"{vehicle}.yaml", list(tracks)
+    start, names = ELLIPTIC / f"{vehicle}.yaml", list(tracks)
     scenes = {
         name: load_scene(start, {"contact.patch": "moment", "initial.y": 0.0, "track": tracks[name]}) for name in names
     }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from tests.dynamics.test_control import LAWS, STEERING, car
 from wrcore.dynamics.blame import blame
 from wrcore.dynamics.system import Equations
@@ -45,12 +45,12 @@ def with_element(law, states=0):
 
 def test_an_element_and_a_creep_law_that_are_lost():
     irregular = {"track": {"irregularity": {"own": {"law": "tests/elements/own_laws.py:aside", "length": 40.0}}}}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", with_element("tests/elements/own_laws.py:lost_far"))
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", with_element("tests/elements/own_laws.py:lost_far"))
     run = wr.simulate({**scene.data, **irregular}, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
     assert run.reason.endswith(", where own_laws.py:lost_far gave a number that is not finite")
     law = {"contact": {"creep": {"model": "tests/elements/own_laws.py:lost_in_slip"}, "patch": "moment"}}
-    run = wr.simulate(SCENES / "suspended_wheelset.yaml", **law, initial={"y": 0.0}, **irregular, progress=False)
+    run = wr.simulate(ELLIPTIC / "suspended_wheelset.yaml", **law, initial={"y": 0.0}, **irregular, progress=False)
     assert run.status == "failed" and run.t[-1] > 0.05
     assert run.reason.endswith(", where own_laws.py:lost_in_slip gave a number that is not finite")
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.integrate import test_jacobian as jacobian_tests
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.dynamics.check_rail import CHORD, DOWN, STRIDE
@@ -17,7 +17,7 @@ from wrcore.integrate.integrator import integrate
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 RADIUS, REACH, TOP = 0.46, -named_profile("S1002", "wheel").f[0], 0.02
 STIFFNESS, FRICTION = 5e7, 0.25
 RAIL = {
@@ -57,14 +57,14 @@ def test_each_wheel_is_touched_where_its_own_back_ends():
     changes = {"track.check_rails": [RAIL], "wheel.wheelsets": {"wheelset_2": {"left": {"rolling_radius": 0.44}}}}
     wrenches, yaw = [], 0.004
     for rails in ([RAIL | {"begin": -100.0, "friction": 0.0}], []):
-        scene = load_scene(SCENES / "trailer_vehicle.yaml", changes | {"track.check_rails": rails})
+        scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", changes | {"track.check_rails": rails})
         model, state = compile_scene(scene)
         for at in STATE_SIZE * model.bodies.wheelsets:
             state[at + 1], state[at + 3 : at + 7] = FACE, (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
         equations = Equations(model)
         equations(0.0, state)
         wrenches.append(equations.work.rail_wrenches[:, 0, 1].copy())
-    model, _ = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", changes))
+    model, _ = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", changes))
     chords = [math.sqrt((r + REACH) ** 2 - (r - TOP) ** 2) for r in (RADIUS, 0.44, RADIUS, RADIUS)]
     np.testing.assert_allclose(model.check_rails.rows[:, 0, CHORD], chords, rtol=1e-12)
     depths = math.tan(yaw) * np.array(chords) - 0.680 * (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.dynamics.contact_blocks import UNCOUNTED, _difference_wrenches, add_slopes, contact_blocks
 from wrcore.dynamics.contact_slopes import differentiable
 from wrcore.dynamics.modes import ELLIPSES
@@ -60,7 +60,7 @@ def random_states(model, start, backwards):
 
 @pytest.mark.parametrize("case", CASES)
 def test_slopes_of_ellipses_are_those_of_differences(case):
-    model, start = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", ["speed=20", *CASES[case]]))
+    model, start = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["speed=20", *CASES[case]]))
     equations = Equations(model)
     assert differentiable.py_func(equations.arguments[1].value.contact)
     equations(0.0, start, ELLIPSES)

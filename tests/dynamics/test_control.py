@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.dynamics.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
@@ -25,7 +25,7 @@ STEERING = {
 def car(control, changes=(), drive=None):
     """The guided car with other control laws."""
     data = read_yaml(GUIDED)
-    data["vehicle"]["parameters"] = str(SCENES.parent / "vehicles" / "guided_car.yaml")
+    data["vehicle"]["parameters"] = str(ELLIPTIC.parent / "vehicles" / "guided_car.yaml")
     data["control"] = control
     used = {name for law in control.values() for name in law["outputs"]}
     motors = [item for item in data["drive"]["motors"] if item["name"] in used]
@@ -129,7 +129,7 @@ def test_inputs_are_the_channels_of_the_run():
 
 
 def test_an_actuator_is_held_between_two_bodies(tmp_path):
-    data = read_yaml(SCENES.parent / "vehicles" / "guided_car.yaml")
+    data = read_yaml(ELLIPTIC.parent / "vehicles" / "guided_car.yaml")
     for k, (wheelset, x) in enumerate((("wheelset_1", 3.5), ("wheelset_2", -3.5))):
         data["elements"].append({"name": f"push_{k}", "kind": "actuator", "direction": "y", "at": [x, 0.0, 0.46],
                                  "bodies": ["car_body", wheelset]})  # fmt: skip
@@ -212,7 +212,7 @@ def test_bad_control_is_refused_in_one_line(name):
 def test_a_motor_of_solid_wheels_has_no_wheel():
     motor = {"name": "m", "bodies": ["wheelset", "frame"], "torque": 1.0, "wheel": "left"}
     with pytest.raises(InputError) as caught:
-        wr.load_scene(SCENES / "suspended_wheelset.yaml", {"drive.motors": [motor]})
+        wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"drive.motors": [motor]})
     assert caught.value.field == "drive.motors.m.wheel" and "turn together" in caught.value.expected
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from tests.dynamics.test_out_of_round import FLAT, RADIUS, SOFT, contact_stiffness, load_of, load_over_a_wave
 from wrcore.contact.seen_table import HEIGHT, U_STEP, shape_table
 from wrcore.contact.wheel_on_rail import WheelOnRail
@@ -40,7 +40,7 @@ def rolling(**corrugation):
         "track.support": SOFT, "track.corrugation": {"begin": 1.0, "length": 8.0} | corrugation, "speed": 10.0,
         "contact.normal.damping.c_e": 1.0, "integration": {"duration": 0.7, "rtol": 1e-6}, "output.rate": 20000.0,
     }  # fmt: skip
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     assert run.status == "completed", run.reason
     return run
 
@@ -73,6 +73,6 @@ def test_what_does_not_go_together_is_refused():
     with pytest.raises(InputError, match="no track.crossing on the right rail"):
         load_scene(SCENES / "crossing.yaml", wave)
     with pytest.raises(InputError, match="no wheels out of round on the left rail"):
-        load_scene(SCENES / "suspended_wheelset.yaml", wave | {"wheel.left.out_of_round": FLAT})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", wave | {"wheel.left.out_of_round": FLAT})
     with pytest.raises(InputError, match="rises less than 0.2, got 0.377"):
-        load_scene(SCENES / "suspended_wheelset.yaml", wave | {"track.corrugation.amplitude": 3e-3})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", wave | {"track.corrugation.amplitude": 3e-3})

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 from tests.dynamics.crossing_rails import write_rail
 from wrcore.analysis.pictures.plot_crossing import plot_crossing
 from wrcore.contact.reduction import ANGLE, FX, FY, SEMI_A, SEMI_B, U_WHEEL
@@ -176,7 +176,7 @@ def over_a_joint(folder, kink, speed, rail, rate):
         "track.support.rail": rail, "speed": speed, "integration": {"duration": 6.5 / speed, "rtol": 1e-6},
         "output": {"rate": rate, "channels": ["pose", "contact"]},
     }  # fmt: skip
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | changes))
+    run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ROUND | changes))
     load, patch, s = loads(run, "right"), run["wheelset/right"], run["wheelset"]["x_m"] - 6.0
     load = load - np.mean(load[(s > -0.4) & (s < -0.05)])
     k = [0, np.argmax(load)]
@@ -219,7 +219,7 @@ def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
     path = write_rail(tmp_path, [0.0, 1.0, 2.0], lambda s: 0.0)
     short = {"integration.duration": 0.1, "integration.method": "tsit5"}
     runs = [
-        simulate(load_scene(SCENES / "suspended_wheelset.yaml", ROUND | short | more))
+        simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ROUND | short | more))
         for more in ({}, {"track.crossing": {"slices": str(path), "at": 0.3}})
     ]
     for name in ("y_m", "z_m", "yaw_rad", "vx_m_per_s"):
@@ -227,7 +227,7 @@ def test_slices_that_are_alike_run_as_the_plain_rail(tmp_path):
 
 
 def test_scenes_without_one_compile_nothing_of_it():
-    model = Equations(compile_scene(load_scene(SCENES / "suspended_wheelset.yaml"))[0]).arguments[1].value
+    model = Equations(compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml"))[0]).arguments[1].value
     assert (model.sections, model.strides) == (0, 0)
     assert model.contact.geometries == ()
     assert model.contact.geometry.along == ()
@@ -409,7 +409,7 @@ def test_its_page_is_read_and_run():
     blocks = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
     assert len(blocks) == 7
     for block in blocks:
-        assert simulate(load_scene(SCENES / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
+        assert simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", block | BRIEF)).status == "completed"
 
 
 def test_right_hand_sides_on_a_crossing_cost_at_most_three_times_those_beside_it():
@@ -500,6 +500,6 @@ def test_tables_serve_the_plain_rail_and_the_solver_the_crossing(side):
 def test_impact_on_rigid_rails_is_told(capsys):
     data = load_scene(CROSSING).data
     del data["track"]["support"]
-    data["vehicle"]["parameters"] = str(SCENES.parent / data["vehicle"]["parameters"])
+    data["vehicle"]["parameters"] = str(ELLIPTIC.parent / data["vehicle"]["parameters"])
     compile_scene(load_scene(data))
     assert "impact on rigid rails is no result" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.drive import BRAKE, GRIP, MOTOR, TIME, no_drive, undriven
 from wrcore.dynamics.energy import energy_balance
@@ -79,7 +79,7 @@ def driven(changes, drive):
     """A run of the locomotive with another drive than its scene's."""
     content = read_yaml(LOCOMOTIVE)
     content["contact"]["friction"] = 0.4
-    content["vehicle"]["parameters"] = str(SCENES.parent / "vehicles" / "locomotive.yaml")
+    content["vehicle"]["parameters"] = str(ELLIPTIC.parent / "vehicles" / "locomotive.yaml")
     return wr.simulate(wr.load_scene({**content, "drive": drive}, changes))
 
 
@@ -111,7 +111,7 @@ def test_tables_over_arc_length_in_a_curve(contact):  # noqa: F811
     curve = [{"transition": 15}, {"curve": 100, "radius": 500, "cant": 0.05}]
     found = wr.simulate(
         wr.load_scene(
-            SCENES / "trailer_vehicle.yaml",
+            ELLIPTIC / "trailer_vehicle.yaml",
             {"speed": 15, "track.path": curve, "drive": {"brakes": [brake]}, "integration.duration": 1.0},
         )
     )
@@ -208,7 +208,7 @@ def test_a_run_begins_in_the_steady_state_of_the_undriven_vehicle():
 def test_a_train_of_driven_vehicles_names_them_one_by_one():
     brake = {"name": "b", "bodies": ["vehicle_2_wheelset_1", "vehicle_2_bogie_1"], "torque": 1000.0}
     changes = {"vehicle.count": 2, "vehicle.spacing": 27.0, "drive": {"brakes": [brake]}, "integration.duration": 0.5}
-    found = wr.simulate(wr.load_scene(SCENES / "trailer_vehicle.yaml", changes))
+    found = wr.simulate(wr.load_scene(ELLIPTIC / "trailer_vehicle.yaml", changes))
     np.testing.assert_allclose(found["drive/b"]["torque_Nm"], -1000.0, rtol=1e-9)
     first, second = (found[f"vehicle_{k}_wheelset_1"]["wy_rad_per_s"] for k in (1, 2))
     assert second[-1] < first[-1]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.dynamics.test_suspension import CONSERVATIVE, MASSES, energy_of, model_with, momenta
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401 (contact is a fixture)
 from wrcore.contact import reduction
@@ -38,7 +38,7 @@ SAMPLING = 5000.0
 def finished(request):
     """Model, workspace, times, states and energy channels of a run, and what its contact is known to leave."""
     name, overrides, duration, remainder = RUNS[request.param]
-    model, state = compile_scene(load_scene(SCENES / f"{name}.yaml", overrides))
+    model, state = compile_scene(load_scene(ELLIPTIC / f"{name}.yaml", overrides))
     work = workspace(model)
     times = np.arange(int(duration * SAMPLING) + 1) / SAMPLING
     result = integrate(model, state, times, "rk45", 1e-7, 1e-10)
@@ -85,7 +85,7 @@ def _to_frame(model):
 def test_a_run_and_its_file_hold_the_energy_if_asked(tmp_path):
     overrides = ["output.channels=[energy]", f"output.rate={SAMPLING}", "integration.duration=0.2"]
     overrides += ["integration.rtol=1e-8"]
-    write_run(tmp_path / "run.h5", simulate(load_scene(SCENES / "suspended_wheelset.yaml", overrides)))
+    write_run(tmp_path / "run.h5", simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", overrides)))
     result = load_run(tmp_path / "run.h5")
     assert set(result.groups) == {"energy"} and set(result.groups["energy"]) == set(CHANNELS)
     balance = energy_balance(result.groups["energy"], result.t)
@@ -96,7 +96,7 @@ def test_a_run_and_its_file_hold_the_energy_if_asked(tmp_path):
 def test_constant_stiffness_leaves_next_to_no_remainder():
     # a cone on a circular rail head: curvatures hardly change, and neither does Hertz's stiffness
     overrides = ["wheel.profile=cone:1/20", "rail.profile=circle:0.3", "rail.inclination=0"]
-    model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", overrides))
+    model, state = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", overrides))
     work, times = workspace(model), np.arange(5001) / SAMPLING
     result = integrate(model, state, times, "rk45", 1e-7, 1e-10)
     balance = energy_balance(energy_channels(model, work, times, result.states), times)
@@ -193,7 +193,7 @@ def test_no_energy_comes_from_a_gauge_too_narrow_for_a_yawed_wheelset(name):
     # both flanges ride, 94 mrad of yaw, no friction: flange contacts that the search lost and found again a millimetre
     # deep gave 2.2 and 16 kJ; what is left is Hertz's stiffness that changes along the profile
     run = simulate(
-        SCENES / f"{name}.yaml", speed=0.1, track={"gauge": 1.42}, initial={"y": 0.002, "yaw": 0.094},
+        ELLIPTIC / f"{name}.yaml", speed=0.1, track={"gauge": 1.42}, initial={"y": 0.002, "yaw": 0.094},
         contact={"friction": 1e-9, "patch": "moment", "creep": {"model": "she"}},
         integration={"duration": 0.1, "rtol": 1e-7, "atol": 1e-10, "method": "rk45"},
         output={"rate": 5000.0, "channels": ["energy"]},

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.dynamics.giving_track import EXAMPLES
 from tests.integrate import test_jacobian as jacobian_tests
 from wrcore.analysis.stability.stability import modes
@@ -22,7 +22,7 @@ from wrcore.kernels.jit import jit
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene, static_equilibrium
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 MASSES, MASSLESS = (example["support"] for example in EXAMPLES)
 BOTH = pytest.mark.parametrize("support", [MASSES, MASSLESS], ids=["masses", "massless"])
 BASE = 0.75
@@ -287,7 +287,7 @@ def with_track(name, support, changes):
     support = json.loads(json.dumps(support))
     support["rail"]["mass"] = 10.0 * support["rail"].get("mass", 0.0)
     changes = {"speed": 20.0} | changes | {"track": changes.get("track", {}) | {"support": support}}
-    model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", changes))
+    model, start = compile_scene(load_scene(ELLIPTIC / f"{name}.yaml", changes))
     end = integrate(model, start, [0.0, 0.5], "tsit5", 1e-6, 1e-9).end.memory
     t, state, equations = end.clock[0], end.state, Equations(model)
     return model, t, state, equations(t, state), equations
@@ -317,7 +317,7 @@ def test_a_track_that_gives_takes_hardly_more_steps_than_a_rigid_one(patch):
     steps, evaluations = [], []
     for support in (None, MASSES, MASSLESS):
         track = {"irregularity": ROUGH} | ({"support": support} if support else {})
-        scene = load_scene(SCENES / "trailer_vehicle.yaml", {"contact.patch": patch, "speed": 20.0, "track": track})
+        scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"contact.patch": patch, "speed": 20.0, "track": track})
         run = integrate(*compile_scene(scene), [0.0, 2.0], "rodas5", 1e-4)
         steps.append(run.steps)
         evaluations.append(run.rhs_evaluations / run.steps)
@@ -329,7 +329,7 @@ def test_speeds_that_stages_imply_keep_the_order_of_a_method(method, part):
     """Rails without mass, rough track, fixed steps, error with half the step: order 4 of rodas4p2; rodas5 has less than
     its own wherever motion is stiff."""
     changes = {"speed": 20.0, "contact.patch": "moment", "track": {"support": MASSLESS, "irregularity": ROUGH}}
-    model, start = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    model, start = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     begun = integrate(model, start, [0.0, 0.6], "rodas5", 1e-6).states[-1]
     exact = integrate(model, begun, [0.6, 0.72], "tsit5", 1e-10).states[-1]
     errors = [
@@ -349,7 +349,7 @@ def test_beside_a_drive():
 
 def all_own_states(support, tmp_path):
     """Changes to a scene with all kinds of own states: wheels that turn apart, track, the controller's integral."""
-    text = (SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
+    text = (ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
     vehicle = tmp_path / "independent.yaml"
     vehicle.write_text(text.replace("    kind: wheelset\n", "    kind: wheelset\n    independent_wheels: true\n"))
     drive = {
@@ -463,7 +463,7 @@ def test_implied_speeds_are_part_of_what_a_step_may_err():
 def test_auto_goes_by_the_cheaper_method_on_rails_without_mass():
     """An evaluation by rk4 is four there."""
     changes = {"speed": 45.0, "contact.patch": "moment", "track": {"support": MASSLESS, "irregularity": ROUGH}}
-    run = integrate(*compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", changes)), [0.0, 2.0], "auto")
+    run = integrate(*compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", changes)), [0.0, 2.0], "auto")
     assert run.method == "rodas5"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.dynamics.test_body import matrix_of
 from tests.dynamics.test_system import body_state, contact, make_model, run  # noqa: F401
 from tests.vehicle.conftest import TRAILER
@@ -180,7 +180,7 @@ def test_energy_of_a_vehicle_with_both(boxes):
         "car_body": {"inertia": {"xz": 30000.0}},
     }
     overrides = [f"vehicle.bodies={json.dumps(change)}", f"vehicle.axle_boxes={json.dumps(boxes)}", *CURVE]
-    model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", overrides))
+    model, state = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", overrides))
     times = np.arange(8001) / 4000.0
     result = integrate(model, state, times, "rk45", 1e-7, 1e-10)
     assert result.status == "completed" and len(model.bodies.axes)

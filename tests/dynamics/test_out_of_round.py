@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import contact_modulus, hertz_table, loaded_ellipse
 from wrcore.contact.out_of_round import SlicedWheel
@@ -45,7 +45,7 @@ def rolling(shape, speed, travel, **changes):
         "track.support": SOFT, "contact.normal.damping.c_e": 1.0,
         "integration": {"duration": travel / speed, "rtol": 1e-6}, "output.rate": 800 * speed,
     }  # fmt: skip
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", given | changes))
+    run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", given | changes))
     assert run.status == "completed", run.reason
     return run
 
@@ -295,7 +295,7 @@ def test_a_flat_on_one_wheel_comes_again_with_each_turn():
     changes = {"wheel.wheelsets.wheelset_2.left.out_of_round": FLAT | {"angle": 1.0}, "integration.duration": 0.4}
     # at 1e-4 explicit steps are as long as is stable, and one output in some thousand is off by kilonewtons
     changes |= {"integration.method": "tsit5", "integration.rtol": 1e-5, "output.rate": 4000, "track.support": SOFT}
-    run = simulate(load_scene(SCENES / "trailer_vehicle.yaml", changes))
+    run = simulate(load_scene(ELLIPTIC / "trailer_vehicle.yaml", changes))
     load = {name: np.nansum(run[name]["N_N"], axis=1) for name in ("wheelset_2/left", "wheelset_1/left")}
     s = run["wheelset_2"]["x_m"] - run["wheelset_2"]["x_m"][0]
     angle = np.remainder(1.0 + s / RADIUS + math.pi, 2.0 * math.pi) - math.pi
@@ -341,8 +341,8 @@ def test_a_wheel_of_slices_is_the_wave_that_it_holds(tmp_path):
 
 def test_a_wheel_that_rolls_back_is_out_of_round_too():
     """The vehicle is its own mirror image: backwards its last wheelset does what the first one does ahead."""
-    scene = SCENES / "trailer_vehicle.yaml"
-    vehicle = read_yaml(SCENES.parent / "vehicles" / "trailer_vehicle.yaml")
+    scene = ELLIPTIC / "trailer_vehicle.yaml"
+    vehicle = read_yaml(ELLIPTIC.parent / "vehicles" / "trailer_vehicle.yaml")
     vehicle = vehicle | {"elements": [one for one in vehicle["elements"] if one["name"] != "coupler"]}
     shape = {"polygon": [{"order": 3, "amplitude": 3e-4}]}
     shapes = {f"wheel.wheelsets.wheelset_{k}.left.out_of_round": shape for k in (1, 4)}
@@ -363,7 +363,7 @@ def test_tables_whose_spline_swings_out_are_refused(tmp_path):
     flat = np.column_stack([angles, -2.5e-4 * (1.0 + np.cos(2.0 * np.pi * 0.46 * angles / 0.06))])
     np.savetxt(tmp_path / "flat.csv", flat, delimiter=",", header="angle_rad,deviation_m", comments="")
     with pytest.raises(InputError, match="spline swings out by") as error:
-        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.table": str(tmp_path / "flat.csv")})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"wheel.left.out_of_round.table": str(tmp_path / "flat.csv")})
     assert error.value.field == "angle_rad"
 
 
@@ -374,7 +374,7 @@ def test_sections_that_are_narrower_than_the_wheel_are_told(tmp_path, capsys):
         part = (wheel.u > -0.02) & (wheel.u < 0.03) if narrow else slice(None)
         file = sections_of(folder, wheel, lambda a, u: 0.0 * u, 16, part)
         load_scene(
-            SCENES / "suspended_wheelset.yaml", {"wheel.profile": "S1002", "wheel.left.out_of_round.slices": file}
+            ELLIPTIC / "suspended_wheelset.yaml", {"wheel.profile": "S1002", "wheel.left.out_of_round.slices": file}
         )
         told = capsys.readouterr().err
         assert (f"{file}: sections reach from -20 to 29 mm, S1002 from " in told) == narrow, told
@@ -433,7 +433,7 @@ def test_a_measured_flat_leaves_the_rail():
 
 
 def test_wheels_begin_round():
-    model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {
+    model, state = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", {
         "wheel.left.out_of_round": {"polygon": [{"order": 3, "amplitude": 1e-3}], "angle": 0.0}, "initial.y": 0.0,
     }))  # fmt: skip
     equations = Equations(model)
@@ -464,7 +464,7 @@ def test_wheels_begin_round():
 )  # fmt: skip
 def test_bad_input_names_its_key(changes, field, expected):
     with pytest.raises(InputError, match=expected) as error:
-        load_scene(SCENES / "suspended_wheelset.yaml", {f"wheel.{key}": value for key, value in changes.items()})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {f"wheel.{key}": value for key, value in changes.items()})
     assert error.value.field.startswith(field)
 
 
@@ -473,7 +473,7 @@ def test_bad_tables_name_their_column(tmp_path, rows):
     (tmp_path / "wheel.csv").write_text("angle_rad,deviation_m\n" + rows)
     shape = {"table": str(tmp_path / "wheel.csv")}
     with pytest.raises(InputError, match=r"angle_rad|deviation_m"):
-        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round": shape})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"wheel.left.out_of_round": shape})
 
 
 @pytest.mark.parametrize(
@@ -500,13 +500,15 @@ def test_bad_slices_name_their_file(tmp_path, change, expected):
     how = {"slices": str(tmp_path / "wheel.csv")}
     how |= {key: value for key, value in change.items() if isinstance(key, str)}
     with pytest.raises(InputError, match=expected):
-        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": how})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": how})
 
 
 def test_slices_that_are_no_table_name_their_file(tmp_path):
     (tmp_path / "wheel.csv").write_text("angle_rad,profile\n0,'" + 200_000 * "a")
     with pytest.raises(InputError, match=r"wheel.csv: expected a table: field larger than"):
-        load_scene(SCENES / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": str(tmp_path / "wheel.csv")})
+        load_scene(
+            ELLIPTIC / "suspended_wheelset.yaml", {"wheel.left.out_of_round.slices": str(tmp_path / "wheel.csv")}
+        )
 
 
 def test_what_does_not_go_together_is_refused():

@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.balance.linear import steady_running
 from wrcore.dynamics.energy import energy_balance
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import compile_scene, load_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 CONES = {"wheel.profile": "cone:1/20", "rail.profile": "circle:0.3", "rail.inclination": 0}
 SHORT = {"integration.duration": 0.4, "integration.method": "tsit5", "integration.rtol": 1e-7}
 
@@ -53,7 +53,7 @@ def test_a_wheelset_runs_where_its_rolling_radii_are_equal():
 
 def test_each_wheelset_has_its_own_wheels():
     wheels = {"wheelset_2": {"left": {"rolling_radius": 0.4597}, "right": {"rolling_radius": 0.4597}}}
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", {"wheel.wheelsets": wheels, "initial.y": 0.0})
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"wheel.wheelsets": wheels, "initial.y": 0.0})
     assert [pair.rolling_radius for pair in scene.pairs] == [0.46] * 2 + [0.4597] * 2 + [0.46] * 4
     model, state = compile_scene(scene)
     axles = [state[13 * body : 13 * (body + 1)] for body in model.bodies.wheelsets]
@@ -88,7 +88,7 @@ def test_bad_descriptions_name_their_field(changes, field, expected):
 def independent(tmp_path_factory):
     """Scene file of the suspended wheelset with independent wheels."""
     folder = tmp_path_factory.mktemp("independent")
-    text = (SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
+    text = (ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
     text = text.replace("    kind: wheelset\n", "    kind: wheelset\n    independent_wheels: true\n")
     (folder / "independent.yaml").write_text(text)
     scene = SCENE.read_text().replace("vehicles/suspended_wheelset.yaml", "independent.yaml")

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact import reduction as columns
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.scene.description import compile_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 MODELS = {
     "table": {}, "linear": {"contact.creep.model": "linear"}, "she": {"contact.creep.model": "she"},
     "polach": {"contact.creep.model": "polach"}, "fastsim": {"contact.creep.model": "fastsim"},

@@ -7,7 +7,7 @@ import pytest
 
 import wrcore as wr
 from study.patch.rolling import solve_patch
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact.reduction import (
     COSINE,
     CURVATURE_X,
@@ -31,7 +31,7 @@ from wrcore.errors import InputError
 from wrcore.kernels.handles import Handle
 from wrcore.scene.description import compile_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 SDEC = {"contact.creep.planes": "sdec", "contact.creep.tolerance": 0.05}
 
 

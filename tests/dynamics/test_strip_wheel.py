@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.patch.rolling import solve_patch
-from tests.conftest import SCENES, pair_with_waves
+from tests.conftest import ELLIPTIC, pair_with_waves
 from tests.contact.patch.strip_contact import NormalContact
 from wrcore.analysis.assessment.wheels import creep_power
 from wrcore.analysis.contact.loaded import LoadedWheels
@@ -29,7 +29,7 @@ Y = 0.003
 def exact():
     """Equations of a suspended wheelset with exact contact, undamped, and its start."""
     changes = ["contact.patch=exact", "contact.resolution=coarse", f"initial.y={Y}"]
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", [*changes, "contact.normal.damping.c_e=1.0"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", [*changes, "contact.normal.damping.c_e=1.0"])
     model, state = compile_scene(scene)
     return Equations(model), model, state
 
@@ -129,7 +129,7 @@ def test_left_and_right_are_mirror_images(exact):
 def test_creep_power_is_what_friction_takes_from_the_wheelset(slip):
     """Integral of traction times slip, power of the wrench, and forces times creepages are one number."""
     run = simulate(
-        SCENES / "suspended_wheelset.yaml", progress=False, contact__patch="exact", contact__resolution="coarse",
+        ELLIPTIC / "suspended_wheelset.yaml", progress=False, contact__patch="exact", contact__resolution="coarse",
         contact__slip=slip, initial__y=0.0051, integration__duration=0.02,
         output__channels=["pose", "velocity", "contact", "energy"],
     )  # fmt: skip
@@ -207,7 +207,7 @@ def test_at_rest_damping_leaves_strips_what_it_leaves_an_ellipse(benchmark_pair,
 
 def test_runs_with_strips_go_on_as_if_they_had_not_stopped():
     changes = {"contact__patch": "exact", "contact__resolution": "coarse", "initial__y": Y}
-    scene = SCENES / "suspended_wheelset.yaml"
+    scene = ELLIPTIC / "suspended_wheelset.yaml"
     whole = simulate(scene, progress=False, integration__duration=0.04, **changes)
     half = simulate(scene, progress=False, integration__duration=0.02, **changes)
     del changes["initial__y"]
@@ -219,7 +219,7 @@ def test_runs_with_strips_go_on_as_if_they_had_not_stopped():
 
 
 def test_steady_running_needs_no_step_at_the_start():
-    run = simulate(SCENES / "suspended_wheelset.yaml", progress=False, contact__patch="exact", initial__y=0.0,
+    run = simulate(ELLIPTIC / "suspended_wheelset.yaml", progress=False, contact__patch="exact", initial__y=0.0,
                    contact__resolution="coarse", integration__duration=0.02)  # fmt: skip
     load = run["wheelset/left"].N_N[:, 0]
     assert np.ptp(load) < 2e-5 * load[0]
@@ -239,7 +239,7 @@ def test_a_scene_of_ellipses_carries_no_strips():
 def test_a_wheel_that_slides_in_its_flange_root_comes_no_nearer(patch):
     # through the mean plane of its bent patch it did: by 16 mm/s in a curve of 300 m, of 50 that undo all damping
     changes = [f"contact.patch={patch}", "initial.y=0.0062", "initial.yaw=0.0084", "speed=20.0"]
-    model, state = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    model, state = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     equations, rolling, normal = Equations(model), slice(7, 13), []
     for slower in (1.0, 0.05):
         now = state.copy()

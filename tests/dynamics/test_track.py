@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.contact import reduction as columns
 from wrcore.dynamics.body import euler_of
 from wrcore.dynamics.system import Equations, workspace
@@ -19,7 +19,7 @@ SAME = (columns.U_WHEEL, columns.U_RAIL, columns.ANGLE, columns.PENETRATION, col
 
 
 def compiled(track, *overrides):
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", [f"track={json.dumps(track)}", *overrides])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", [f"track={json.dumps(track)}", *overrides])
     return (scene, *compile_scene(scene))
 
 
@@ -44,7 +44,7 @@ def test_a_path_of_tangents_changes_nothing():
     runs = [
         simulate(
             load_scene(
-                SCENES / "suspended_wheelset.yaml",
+                ELLIPTIC / "suspended_wheelset.yaml",
                 [f"track={json.dumps(t)}", "integration.duration=0.3", "integration.method=rk45"],
             )
         )
@@ -146,7 +146,7 @@ def test_a_curve_is_run_through_and_reported_in_the_tracks_frame():
     # outer wheel the larger radius
     path = [{"tangent": 20}, {"transition": 40}, {"curve": 400, "radius": 600, "cant": 0.06}]
     overrides = [f"track={json.dumps({'path': path})}", "initial.y=0", "integration.duration=8"]
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", overrides))
+    run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", overrides))
     w = run["wheelset"]
     assert run.status == "completed"
     assert w.s_m[-1] == pytest.approx(160.0, abs=0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.contact import reduction as columns
 from wrcore.contact.normal import damping_factor, hertz_ellipse
 from wrcore.contact.patch.model import strip_work
@@ -21,7 +21,7 @@ POSES = [  # side, y, roll, yaw: tread, both sides, and a flange contact
 @pytest.mark.parametrize(("side", "y", "roll", "yaw"), POSES)
 @pytest.mark.parametrize("patch", ["maximum", "moment"])
 def test_wrench_is_the_sum_of_its_patches(side, y, roll, yaw, patch):
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["contact.creep.model=fastsim", f"contact.patch={patch}"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["contact.creep.model=fastsim", f"contact.patch={patch}"])
     model = compile_scene(scene)[0].contact
     v, w = np.array([20.0, 0.03, -0.01]), np.array([0.02, 43.6, 0.05])
     axle = rotation(roll, yaw)[:, 1]

@@ -12,7 +12,7 @@ import pytest
 from numba import njit
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from tests.dynamics.test_suspension import at_rest, evaluate, model_with, moving
 from tests.dynamics.test_system import body_state, contact, run  # noqa: F401 (contact is a fixture)
 from tests.elements import own_laws
@@ -123,7 +123,7 @@ def test_a_stop_on_a_line_presses_friction_with_its_force(contact):  # noqa: F81
 
 def scene_with(folder, name, items):
     """The suspended wheelset with further elements, of a file where its laws lie in a folder."""
-    vehicle, scene = (read_yaml(SCENES.parent / f"{kind}/suspended_wheelset.yaml") for kind in ("vehicles", "scenes"))
+    vehicle, scene = (read_yaml(ELLIPTIC.parent / f"{kind}/suspended_wheelset.yaml") for kind in ("vehicles", "scenes"))
     vehicle["elements"] = [*vehicle["elements"], *items]
     (folder / f"{name}.yaml").write_text(repr(vehicle))  # braces and quotes of Python are YAML, too
     shutil.copy(own_laws.__file__, folder)
@@ -247,7 +247,7 @@ def test_the_text_of_a_file_decides_on_the_model(tmp_path):
 
 def test_scenes_without_one_compile_none():
     before = own._addressed.cache_info().misses
-    wr.simulate(wr.load_scene(SCENES / "suspended_wheelset.yaml", {"integration.duration": 0.1}), progress=False)
+    wr.simulate(wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"integration.duration": 0.1}), progress=False)
     assert own._addressed.cache_info().misses == before
 
 

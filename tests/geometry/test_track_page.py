@@ -5,7 +5,7 @@ import re
 import pytest
 import yaml
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.errors.checked_yaml import parse_value
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
@@ -16,7 +16,7 @@ BLOCKS = [parse_value(block) for block in re.findall(r"```yaml\n(.*?)```", TEXT,
 
 @pytest.mark.parametrize("track", BLOCKS, ids=lambda track: ",".join(track))
 def test_each_example_runs(track):
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", {"track": track, "integration.duration": 1.0})
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"track": track, "integration.duration": 1.0})
     run = simulate(scene)
     assert run.status == "completed" and run["wheelset"].s_m[-1] > 19.0
 

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.dynamics.giving_track import EXAMPLES
 from tests.integrate.auto import BARS, Measured
 from wrcore.dynamics.system import Equations
@@ -39,7 +39,7 @@ CHOICES = [*(("rodas5", rtol) for rtol in (6e-4, 3e-4, 1e-4)), ("rodas4p2", 3e-4
 
 def evaluation(name):
     """Processor time of one right-hand side, s: the least of sixty batches."""
-    model, state = compile_scene(load_scene(SCENES / f"{name}.yaml", {"initial.y": 0.002}))
+    model, state = compile_scene(load_scene(ELLIPTIC / f"{name}.yaml", {"initial.y": 0.002}))
     equations, states, best = Equations(model), np.tile(state, (2000, 1)), np.inf
     equations.at(0.0, states[:2])
     for _ in range(60):
@@ -53,7 +53,7 @@ def main():
     for name in ("suspended_wheelset", "trailer_vehicle"):
         print(f"{name}: {1e6 * evaluation(name):.3f} us an evaluation")
     for title, changes, duration in CASES:
-        scene = load_scene(SCENES / f"{title.split(',')[0]}.yaml", {"contact.patch": "moment", **changes})
+        scene = load_scene(ELLIPTIC / f"{title.split(',')[0]}.yaml", {"contact.patch": "moment", **changes})
         measured, best = Measured(*compile_scene(scene), duration), dict.fromkeys(CHOICES, np.inf)
         for choice in CHOICES * 4:  # in turn
             measured.once(choice)

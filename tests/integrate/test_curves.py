@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.dynamics.body import STATE_SIZE
 from wrcore.integrate.engine import NEXT, T
 from wrcore.integrate.integrator import integrate
@@ -19,7 +19,7 @@ def curve(radius, cant=0.1):
 
 def coach(path, **changes):
     """The trailer vehicle at 16.7 m/s: model and initial state."""
-    return compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", {"speed": 16.7, "track.path": path, **changes}))
+    return compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"speed": 16.7, "track.path": path, **changes}))
 
 
 @pytest.mark.parametrize("turn", [(0.0, 0.0), (0.7, 0.0), (0.7, 0.4), (-2.0, -1.0)])

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from tests.dynamics.test_system import body_state, contact, make_model  # noqa: F401 (contact is a fixture)
 from wrcore.dynamics.marker import FRAME
 from wrcore.dynamics.system import Equations
@@ -20,7 +20,7 @@ from wrcore.run.simulate import output_times, simulate, simulate_many
 from wrcore.scene.description import compile_scene, load_scene
 
 ORDERS = {"rk45": 5, "tsit5": 5, "rk23": 3, "rk4": 4, "rodas5": 5, "rodas4": 4, "rodas4p2": 4, "ros34pw2": 3}
-WHEELSET = SCENES / "suspended_wheelset.yaml"
+WHEELSET = ELLIPTIC / "suspended_wheelset.yaml"
 CURVE = (
     "track={path: [{transition: 30}, {curve: 700, radius: 600, cant: 0.05}], irregularity: {fade_in: 10, fade_out: 10, "
     "spectrum: {level: low, seed: 2, length: 60, begin: 5}}}"
@@ -121,7 +121,7 @@ def test_order_on_the_suspended_wheelset(wheelset, method):
 def test_rodas4_keeps_its_order_on_irregular_track():
     """The vehicle at 20 m/s: fourfold error per halving if columns of the Jacobian did not belong to one motion."""
     rough = "track.irregularity={spectrum: {level: low, seed: 1, length: 200, begin: 5}}"
-    model, start = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", ["speed=20", rough]))
+    model, start = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["speed=20", rough]))
     exact = integrate(model, start, [0.0, 1.5], "tsit5", 1e-10, 1e-13).states[-1]
     places = [13 * body + 1 for body in model.bodies.wheelsets]
     errors = [

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.dynamics.test_control import STEERING
 from wrcore.dynamics.body import STATE_SIZE, matrix_of
 from wrcore.dynamics.system import Equations, internal_states
@@ -36,7 +36,7 @@ CASES = {
 def moving(request):
     """Model, time, state in motion, its rate, and a function of time and state."""
     name, overrides = CASES[request.param]
-    model, start = compile_scene(load_scene(SCENES / f"{name}.yaml", ["speed=20", *overrides]))
+    model, start = compile_scene(load_scene(ELLIPTIC / f"{name}.yaml", ["speed=20", *overrides]))
     end = integrate(model, start, [0.0, 1.5], "tsit5", 1e-6, 1e-9).end.memory
     t, state, equations = end.clock[0], end.state, Equations(model)
     return model, t, state, equations(t, state), equations
@@ -237,7 +237,7 @@ def test_ellipses_and_lobes_get_the_kernel_of_their_slopes(moving):
 
 
 def test_patches_that_are_solved_get_none():
-    model, _ = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", ["contact.patch=exact"]))
+    model, _ = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["contact.patch=exact"]))
     equations = Equations(model)
     given = equations.arguments[1]
     given.lay(given.value._replace(slopes=1))  # as if another model had gone before

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from tests.integrate.scenes import ARMS, FALLING, compiled, rough
 from wrcore.contact import reduction
 from wrcore.dynamics.body import OMEGA, STATE_SIZE, euler_parameters
@@ -23,7 +23,7 @@ TRACKS = {
 
 def test_tolerances_by_kind():
     """A wheelset: all from 1e-4 of 1 cm, and atol on top; own states of elements count as positions."""
-    model, _ = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml"))
+    model, _ = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml"))
     lever = np.sqrt(1120.0 / 1813.0)  # roll and yaw moment of inertia, mass
     bound = 1e-4 * LENGTH
     expected = np.zeros((2, STATE_SIZE))  # at any speed, and per 1/s
@@ -34,14 +34,14 @@ def test_tolerances_by_kind():
     for method in METHODS:
         share = SHARE.get(method, 1.0)
         np.testing.assert_allclose(step_tolerances(model, 1e-4, 0.0, method), share * expected, rtol=1e-12)
-    metro, start = compile_scene(load_scene(SCENES / "metro_car.yaml"))
+    metro, start = compile_scene(load_scene(ELLIPTIC / "metro_car.yaml"))
     found = step_tolerances(metro, 1e-4)[0]
     assert len(found) == len(start) and np.all(found[STATE_SIZE * len(metro.bodies.mass) :] == bound)
 
 
 def test_bodies_lighter_than_a_wheelset_may_err_by_equal_energy():
     """Axle boxes of 120 kg, bolsters of 800 kg beside wheelsets of 1834 kg; heavier bodies as wheelsets."""
-    model, _ = compile_scene(load_scene(SCENES / "metro_car.yaml"))
+    model, _ = compile_scene(load_scene(ELLIPTIC / "metro_car.yaml"))
     found, mass = step_tolerances(model, 1e-4), model.bodies.mass
     of_bodies = found[:, : STATE_SIZE * len(mass)].reshape(2, len(mass), STATE_SIZE)
     allowed = 1e-4 * LENGTH * np.sqrt(np.maximum(1.0, 1834.0 / mass))
@@ -55,7 +55,7 @@ def test_rails_without_mass_may_err_by_a_tenth_where_steps_are_explicit():
     rail = {side: {"stiffness": 8e7, "damping": 6e4} for side in ("lateral", "vertical")}
     for mass, share in (({}, 0.1), ({"mass": 79.0}, 1.0)):
         support = {"track.support": {"rail": rail | mass}}
-        model, _ = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", support))
+        model, _ = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", support))
         of_rails, of_body = slice(STATE_SIZE, STATE_SIZE + 4), slice(0, 3)
         for method, own in (("rk4", share), ("tsit5", share), ("rodas5", 1.0)):
             allowed = step_tolerances(model, 1e-4, method=method)[0]
@@ -64,7 +64,7 @@ def test_rails_without_mass_may_err_by_a_tenth_where_steps_are_explicit():
 
 
 def test_velocities_count_by_the_speed_of_the_slowest_wheelset_in_the_step():
-    model, state = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", {"speed": 20.0}))
+    model, state = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"speed": 20.0}))
     paced = model.bodies.wheelsets, model.contact.least_speed
     front, rear = (STATE_SIZE * body for body in model.bodies.wheelsets[[0, -1]])
     assert pace(*paced, state, state) == pytest.approx(20.0 / HALF_GAUGE, rel=1e-9)
@@ -94,7 +94,7 @@ def test_a_motor_that_does_nothing_costs_nothing(name, method):
     for track in ({}, {"track.irregularity": ROUGH}):
         runs = []
         for more in ({}, idle):
-            scene = load_scene(SCENES / f"{name}.yaml", {"speed": 20.0, "initial.y": 0.001, **track, **more})
+            scene = load_scene(ELLIPTIC / f"{name}.yaml", {"speed": 20.0, "initial.y": 0.001, **track, **more})
             runs.append(integrate(*compile_scene(scene), [0.0, 0.5], method))
         assert runs[1].method == runs[0].method and runs[1].steps <= 1.1 * runs[0].steps
 
@@ -118,7 +118,7 @@ def test_a_braked_wheelset_comes_to_rest_and_stays(rtol):
 
 def test_an_explicit_method_gets_on_at_standstill():
     """Steps of 50 ns, as stability asks for at the least speed of creepages, are no stall."""
-    model, start = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", {"speed": 1e-3}))
+    model, start = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"speed": 1e-3}))
     run = integrate(model, start, [0.0, 3e-3], "tsit5")
     assert run.status == "completed" and run.steps > STALL_ATTEMPTS
 
@@ -127,7 +127,7 @@ def test_an_explicit_method_gets_on_at_standstill():
 def test_the_default_keeps_wheelsets_within_a_micrometre(method):
     """Every method, on irregular rails, straight and in a curve: at most 1 um over the run, and not for nothing."""
     for track in TRACKS.values():
-        scene = load_scene(SCENES / "trailer_vehicle.yaml", {**track, "track.irregularity": ROUGH})
+        scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", {**track, "track.irregularity": ROUGH})
         model, start = compile_scene(scene)
         times = np.linspace(0.0, 3.0, 61)
         exact = integrate(model, start, times, "tsit5", 1e-9).states
@@ -157,7 +157,7 @@ def test_a_train_is_integrated_as_accurately_as_its_vehicles():
     steps = []
     for count in (1, 3):
         more = {"vehicle.count": count, "vehicle.spacing": 40.0} if count > 1 else {}
-        scene = load_scene(SCENES / "trailer_vehicle.yaml", {"speed": 20.0, **more})
+        scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"speed": 20.0, **more})
         steps.append(integrate(*compile_scene(scene), [0.0, 2.0], "rodas4", 1e-5).steps)
     assert abs(steps[1] - steps[0]) <= 2
 
@@ -181,7 +181,7 @@ def test_a_torque_that_is_switched_within_a_step_is_not_missed():
         torque = {"time": [0.0, begin, begin + 0.01, 1.0], "torque": [0.0, 0.0, 3e3, 3e3]}
         motor = {"name": "motor", "bodies": ["wheelset", "frame"], "torque": torque}
         changes = {"speed": 20.0, "contact.friction": 0.05, "contact.patch": "moment", "drive.motors": [motor]}
-        model, start = compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+        model, start = compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
         exact, found = (
             integrate(model, start, [0.0, begin + 0.02], *choice).states[-1, OMEGA + 1]
             for choice in (("tsit5", 1e-8), ("rodas5",))

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact.patch.strips import MEMORY
 from wrcore.errors import InputError
 from wrcore.run.checkpoints import read_checkpoint, write_checkpoint
@@ -46,7 +46,7 @@ COMMON = {"integration.rtol": 1e-8, "contact.creep.model": "she", "speed": 20, "
 def scene_of(case="frame", duration=0.75, **changes):
     name, own = CASES[case]
     changes = {key.replace("__", "."): value for key, value in changes.items()}
-    return load_scene(SCENES / f"{name}.yaml", {**COMMON, **own, "integration.duration": duration, **changes})
+    return load_scene(ELLIPTIC / f"{name}.yaml", {**COMMON, **own, "integration.duration": duration, **changes})
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from tests.run.test_session import active, scene_of, stepped
 from wrcore.cli import main
 from wrcore.run.fmu import _pack_scene
@@ -20,7 +20,7 @@ LACKING = [name for name in ("pythonfmu", "pythonfmu3", "fmpy") if find_spec(nam
 NEEDS = pytest.mark.skipif(
     bool(LACKING), reason=f"pip install pythonfmu pythonfmu3 fmpy: {', '.join(LACKING)} not installed"
 )
-SCENE = str(SCENES / "suspended_wheelset.yaml")
+SCENE = str(ELLIPTIC / "suspended_wheelset.yaml")
 
 
 @pytest.fixture(scope="module", params=[2, 3])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.errors import InputError
 from wrcore.errors.input_files import digest_of_file
 from wrcore.run.fmu import INTERFACE, SteppedScene, _pack_scene
@@ -35,7 +35,7 @@ class Unit(SteppedScene, Slave):
 @pytest.fixture
 def scene():
     brake = {"name": "b", "bodies": ["wheelset", "frame"], "torque": TORQUE}
-    return wr.load_scene(SCENES / "suspended_wheelset.yaml", {"contact.patch": "moment", "drive.brakes": [brake]})
+    return wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"contact.patch": "moment", "drive.brakes": [brake]})
 
 
 @pytest.fixture

@@ -8,12 +8,12 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
 from wrcore.scene.description import compile_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 QUICK = {"contact.patch": "moment", "speed": 40.0, "initial.y": 0.003, "integration.duration": 0.1}
 ELEMENT = "def law(stretch, speed, states, parameters, rates):\n"
 CONTROL = "def law(t, inputs, states, parameters, outputs, following):\n"
@@ -23,7 +23,7 @@ LATE = "    if abs(stretch) < 2e-3:\n        return 0.0\n"
 
 def scene_of(folder, text, compiled=False, states=0, control=None, **changes):
     """A wheelset with a law of an element, or of a sampled control."""
-    vehicle = read_yaml(SCENES.parent / "vehicles/suspended_wheelset.yaml")
+    vehicle = read_yaml(ELLIPTIC.parent / "vehicles/suspended_wheelset.yaml")
     at = {"direction": "y", "bodies": ["wheelset", "frame"], "at": [0, 0, 0.46]}
     vehicle["elements"].append({"name": "push", "kind": "actuator", **at})
     if control is None:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.run import reach
 from wrcore.run.reach import check_reach, warn_of_unreached
 from wrcore.run.simulate import simulate
 from wrcore.scene.description import load_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"  # its wheelset begins at arc length 0
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"  # its wheelset begins at arc length 0
 SPEED = {"speed": 20.0, "integration.duration": 1.0}  # 20 m
 SPECTRUM = {"level": "low", "seed": 1, "length": 50.0}
 CURVE = [

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.contact.detection import detect
 from wrcore.dynamics.system import Equations, workspace
@@ -73,7 +73,7 @@ def test_suspended_wheelset_decays_at_20_and_hunts_at_60(detection):
     amplitude = {}
     for speed, duration in ((20.0, 1.0), (60.0, 3.0)):
         overrides = [f"speed={speed}", f"integration.duration={duration}", f"contact.detection={detection}"]
-        run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", [*overrides, "output.channels=[pose]"]))
+        run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", [*overrides, "output.channels=[pose]"]))
         assert run.status == "completed"
         amplitude[speed] = np.abs(run["wheelset"].y_m[-100:]).max()
     assert amplitude[20.0] < 1e-3
@@ -172,6 +172,6 @@ def test_a_collapsed_step_size_is_said_early():
     # creepages over 10 um/s make a scene so stiff that an explicit method would need half an hour for 0.5 s
     creep = {"creep": {"model": "she", "least_speed": 1e-5}}
     settings = {"duration": 0.5, "method": "tsit5", "rtol": 1e-6}
-    run = simulate(SCENES / "suspended_wheelset.yaml", contact=creep, speed=1e-5, integration=settings)
+    run = simulate(ELLIPTIC / "suspended_wheelset.yaml", contact=creep, speed=1e-5, integration=settings)
     assert run.status == "stalled" and run.reason.startswith("the step size collapsed: 20000 steps")
     assert run.counters["steps"] + run.counters["rejected"] == 20_000

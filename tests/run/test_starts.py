@@ -13,7 +13,8 @@ from wrcore.run.simulate import simulate
 from wrcore.run.streaming import simulate_to
 from wrcore.scene.description import compile_scene, load_scene
 
-SCENE = {"integration.duration": 0.05, "contact.creep.model": "she", "integration.method": "ros34pw2"}
+SCENE = {"integration.duration": 0.05, "contact.creep.model": "she", "contact.patch": "moment",
+         "integration.method": "ros34pw2"}  # fmt: skip
 
 
 def scene_of(**changes):

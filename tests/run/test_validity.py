@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.contact import reduction
 from wrcore.run.simulate import simulate
@@ -75,13 +75,13 @@ def test_conformal_patches_lie_in_hollows_of_the_wheel():
 
 
 def test_counters_of_a_run_and_what_the_command_says(tmp_path, capsys):
-    calm = simulate(SCENES / "suspended_wheelset.yaml", integration__duration=0.5, contact__creep__model="she")
+    calm = simulate(ELLIPTIC / "suspended_wheelset.yaml", integration__duration=0.5, contact__creep__model="she")
     assert all(calm.counters[name] == 0 for name in LIMITS) and calm.counters["patches"] >= 2 * len(calm.t)
     sets = ["--set=integration.duration=0.05", "--set=initial.yaw=0.02", "--set=contact.creep.model=she"]
     assert main(["simulate", str(SCENES / "wheelset.yaml"), *sets]) == 0
     printed = capsys.readouterr().out
     assert "beyond the models' limits" in printed and LIMITS["search_fallback"] in printed
-    assert main(["simulate", str(SCENES / "suspended_wheelset.yaml"), *sets[::2]]) == 0
+    assert main(["simulate", str(ELLIPTIC / "suspended_wheelset.yaml"), *sets[::2]]) == 0
     assert "limits" not in capsys.readouterr().out
 
 

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.kernels.cache import _say_once
 from wrcore.kernels.jit import jit
 from wrcore.kernels.told import told_if_long, warn_once
@@ -15,7 +15,7 @@ from wrcore.scene.description import load_scene
 
 @pytest.fixture
 def scene():
-    return load_scene(SCENES / "suspended_wheelset.yaml")
+    return load_scene(ELLIPTIC / "suspended_wheelset.yaml")
 
 
 @pytest.mark.parametrize(("there", "lines"), [(True, 0), (False, 1)])
@@ -68,7 +68,7 @@ def test_contact_that_cannot_be_looked_up_is_announced(detection, lines, monkeyp
     monkeypatch.setattr(description, "_kept", known)
     changes = {"contact.patch": "tabulated", "contact.detection": detection}
     with pytest.raises(Known):
-        description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+        description.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     assert len(said) == lines and all("contact.patch moment" in line for line in said)
 
 
@@ -80,5 +80,5 @@ def test_friction_that_falls_along_a_rail_is_announced_where_contact_is_looked_u
     monkeypatch.setattr(description, "tell", said.append)
     friction = {"left": 0.3, "right": {"arc_length": [10, 20], "mu": [0.3, least]}}
     changes = {"contact.patch": patch, "contact.friction": friction}
-    description.compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+    description.compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
     assert len(said) == lines and all("half" in line for line in said)

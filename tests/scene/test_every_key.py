@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from tests.dynamics.test_energy import EVERYTHING
 from wrcore.creep.table import ensure_table
 from wrcore.elements.kinds import KINDS
@@ -29,7 +29,7 @@ from wrcore.scene import description
 from wrcore.scene.description import compile_scene, load_scene
 from wrcore.vehicle.description import build_vehicle
 
-SUSPENDED, VEHICLES = SCENES / "suspended_wheelset.yaml", SCENES.parent / "vehicles"
+SUSPENDED, VEHICLES = ELLIPTIC / "suspended_wheelset.yaml", ELLIPTIC.parent / "vehicles"
 
 LABELS = {
     "scene": {"name", "description", "vehicle.model", "drive.motors[].name", "drive.brakes[].name"},

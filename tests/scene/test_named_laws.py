@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.cli import main
 from wrcore.errors import InputError
 from wrcore.errors.checked_yaml import read_yaml
@@ -28,7 +28,7 @@ GRID = {"length": 40.0, "spacing": 1.0}
 def write(folder, law="law.py:law", element="", mu=0.3, **changes):
     """A scene with a law of friction, and of an element, in a folder; each module leaves a file ``ran`` beside it."""
     folder.mkdir(exist_ok=True)
-    vehicle, scene = (read_yaml(SCENES.parent / f"{kind}/suspended_wheelset.yaml") for kind in ("vehicles", "scenes"))
+    vehicle, scene = (read_yaml(ELLIPTIC.parent / f"{kind}/suspended_wheelset.yaml") for kind in ("vehicles", "scenes"))
     if element:
         vehicle["elements"].append({"name": "mine", "kind": "own_law", "direction": "y", "at": [0, 0, 0.46],
                                     "bodies": ["wheelset", "frame"], "law": element})  # fmt: skip
@@ -92,16 +92,16 @@ def test_reading_and_drawing_run_nothing(tmp_path):
 def test_law_that_a_person_names_lies_anywhere(tmp_path):
     write(tmp_path)
     law = {"law": f"{tmp_path}/law.py:law", **GRID}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", {"contact.friction": law, "contact.patch": "moment"})
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"contact.friction": law, "contact.patch": "moment"})
     assert compile_scene(scene)[0].contact.friction == pytest.approx(0.3)
-    vehicle = {"parameters": str(SCENES.parent / "vehicles/suspended_wheelset.yaml")}
+    vehicle = {"parameters": str(ELLIPTIC.parent / "vehicles/suspended_wheelset.yaml")}
     with pytest.raises(InputError, match="beside the one that names it"):
         wr.load_scene({**scene.data, "vehicle": vehicle})
 
 
 def test_function_itself_is_a_law():
     law = {"law": constant, **GRID}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", {"contact.friction": law, "contact.patch": "moment"})
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"contact.friction": law, "contact.patch": "moment"})
     assert compile_scene(scene)[0].contact.friction == pytest.approx(0.27)
 
 
@@ -113,9 +113,9 @@ def test_installed_law_is_found_by_its_entry_point(monkeypatch):
     entries = [EntryPoint("leaves", f"{__name__}:constant", GROUP), EntryPoint("lost", "no_such_module:law", GROUP)]
     monkeypatch.setattr("importlib.metadata.entry_points", lambda group: entries if group == GROUP else [])
     changes = {"contact.friction": {"law": "leaves", **GRID}, "contact.patch": "moment"}
-    assert compile_scene(wr.load_scene(SCENES / "suspended_wheelset.yaml", changes))[0].contact.friction == 0.27
+    assert compile_scene(wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))[0].contact.friction == 0.27
     with pytest.raises(InputError, match=r"contact\.friction\.law: .*ModuleNotFoundError"):
-        wr.load_scene(SCENES / "suspended_wheelset.yaml", {"contact.friction": {"law": "lost", **GRID}})
+        wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"contact.friction": {"law": "lost", **GRID}})
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +177,7 @@ def test_run_of_a_function_that_changed_is_refused(monkeypatch):
     """A function of a module has no file among those of the scene."""
     channels = ["pose", "velocity", "contact", "wheel_motion"]
     changes = {"contact.friction": {"law": constant, **GRID}, "contact.patch": "moment", "output.channels": channels}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", changes, integration__duration=0.05)
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes, integration__duration=0.05)
     run = wr.simulate(scene, progress=False)
     assert wr.patch_in_run(run, 0.02, "wheelset")
     monkeypatch.setitem(wr.errors.checked_yaml.GIVEN, f"{__name__}:constant", lambda s: 0.1 + 0.0 * s)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.scene import own_laws
 from tests.scene.own_laws import TABLE, waves
 from wrcore.creep.laws import GROUP
@@ -14,7 +14,7 @@ from wrcore.errors import InputError
 from wrcore.run.checkpoints import model_fingerprint
 from wrcore.scene.description import compile_scene
 
-SCENE = SCENES / "suspended_wheelset.yaml"
+SCENE = ELLIPTIC / "suspended_wheelset.yaml"
 LAWS = "tests/scene/own_laws.py:"
 SHORT = {"integration.duration": 0.6, "speed": 30.0, "initial.y": 0.003}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.cli import main
 from wrcore.contact.reduction import ANGLE, FY, NORMAL
 from wrcore.dynamics.system import Equations, workspace
@@ -26,7 +26,7 @@ def scene_file(tmp_path):
         shutil.copy(ROOT / "config" / "vehicles" / f"{name}.yaml", tmp_path / "vehicles")
 
     def write(change=lambda data: None, vehicle=None):
-        data = read_yaml(SCENES / "suspended_wheelset.yaml")
+        data = read_yaml(ELLIPTIC / "suspended_wheelset.yaml")
         change(data)
         path = tmp_path / "scene.yaml"
         path.write_text(yaml.safe_dump(data))
@@ -152,7 +152,7 @@ def test_overrides_and_defaults():
 
 @pytest.mark.parametrize("name", ["wheelset", "suspended_wheelset"])
 def test_a_scene_starts_in_vertical_equilibrium(name):
-    scene = load_scene(SCENES / f"{name}.yaml", ["contact.creep.model=linear"])
+    scene = load_scene(ELLIPTIC / f"{name}.yaml", ["contact.creep.model=linear"])
     model, state = compile_scene(scene)
     work = workspace(model)
     Equations(model, work)(0.0, state)
@@ -176,7 +176,7 @@ def test_rails_named_like_numbers_stay_names_and_numbers_numbers():
 
 def test_the_wheel_on_its_rail_of_a_side():
     worn = "wheel.wheelsets={wheelset_2: {right: {rolling_radius: 0.45}}}"
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", [worn])
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", [worn])
     radii = [[scene.pair(side, k).rolling_radius for side in ("left", "right")] for k in range(4)]
     assert radii[1][1] == 0.45 and [left for left, _ in radii] == 4 * [scene.vehicle.rolling_radius]
     assert scene.pair("right", 1).rail_distance == scene.track.rail_distance(scene.rail)
@@ -249,7 +249,7 @@ def test_null_takes_a_key_out():
 
 
 def test_actuator_and_motor_of_one_name_are_refused(tmp_path):
-    vehicle = read_yaml(SCENES.parent / "vehicles" / "suspended_wheelset.yaml")
+    vehicle = read_yaml(ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml")
     actuator = {"kind": "actuator", "bodies": ["wheelset", "frame"], "at": [0, 0, 0.46], "direction": "y", "force": 9.0}
     motor = {"bodies": ["wheelset", "frame"], "force": 50.0}
     for one, kind, field in (("a", "motors", "drive.motors.a"), ("b", "brakes", "drive.brakes.b")):
@@ -258,15 +258,15 @@ def test_actuator_and_motor_of_one_name_are_refused(tmp_path):
         with pytest.raises(
             InputError, match=f"another name, as elements.{one} of the vehicle is an actuator"
         ) as caught:
-            load_scene(SCENES / "suspended_wheelset.yaml", changes)
+            load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes)
         assert caught.value.field == field
-        load_scene(SCENES / "suspended_wheelset.yaml", {**changes, "drive": {kind: [{"name": "c", **motor}]}})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {**changes, "drive": {kind: [{"name": "c", **motor}]}})
 
 
 def test_a_control_law_has_a_name_of_letters():
     with pytest.raises(InputError, match="a control law's name in letters, digits and underscores"):
         load_scene(
-            SCENES / "suspended_wheelset.yaml", {"control": {"a/b": {"law": "a:b", "inputs": [], "outputs": ["m"]}}}
+            ELLIPTIC / "suspended_wheelset.yaml", {"control": {"a/b": {"law": "a:b", "inputs": [], "outputs": ["m"]}}}
         )
 
 
@@ -283,7 +283,7 @@ def test_a_control_law_has_a_name_of_letters():
 def test_a_spectrum_beyond_its_bounds_is_told_them(changes, says):
     spectrum = {"level": "low", "seed": 1, "length": 200.0, **changes}
     with pytest.raises(InputError) as caught:
-        load_scene(SCENES / "suspended_wheelset.yaml", {"track.irregularity.spectrum": spectrum})
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"track.irregularity.spectrum": spectrum})
     assert str(caught.value).endswith(says)
 
 
@@ -297,11 +297,11 @@ def test_planar_detection_beside_a_lookup_table_is_told_what_to_set(monkeypatch)
     monkeypatch.setattr(description, "tell", tell)
     changes = {"contact.patch": "tabulated", "contact.detection": "planar"}
     with pytest.raises(Told, match="set contact.patch to moment, or contact.detection to spatial"):
-        compile_scene(load_scene(SCENES / "suspended_wheelset.yaml", changes))
+        compile_scene(load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes))
 
 
 def test_overrides_from_a_generator_are_those_of_a_list():
-    scene = SCENES / "suspended_wheelset.yaml"
+    scene = ELLIPTIC / "suspended_wheelset.yaml"
     made = load_scene(scene, (f"{key}={value}" for key, value in {"speed": 31, "initial.y": 0.001}.items()))
     assert (made.data["speed"], made.data["initial"]["y"]) == (31, 0.001)
     for wrong in (3, None, ("speed", 30), b"speed=30", np.array(["speed=30"])):
@@ -314,4 +314,4 @@ def test_changes_that_contain_themselves_are_one_line():
     deep["a"] = deep
     for changes in ({"initial": deep}, {"initial": [deep]}):
         with pytest.raises(InputError, match="^changes: "):
-            load_scene(SCENES / "suspended_wheelset.yaml", changes)
+            load_scene(ELLIPTIC / "suspended_wheelset.yaml", changes)

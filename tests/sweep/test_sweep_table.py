@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.analysis.assessment.wheels import creep_power, wear_number, wheel_forces
 from wrcore.cli import main
 from wrcore.errors import InputError
@@ -29,7 +29,7 @@ def smoke():
 def small(**changes):
     data = {
         "name": "small",
-        "scene": str(SCENES / "suspended_wheelset.yaml"),
+        "scene": str(ELLIPTIC / "suspended_wheelset.yaml"),
         "set": {"integration.duration": 0.05},
         "sampling": {"kind": "latin_hypercube", "runs": 6, "seed": 3},
         "keys": {"speed": {"from": 20, "to": 40}, "initial.y": {"from": -0.003, "to": 0.003}},
@@ -133,7 +133,7 @@ def test_another_scene_is_another_digest():
 
 def of_files(folder):
     """A sweep over two vehicles and two wheels whose files lie in a folder of the test."""
-    vehicle = (SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
+    vehicle = (ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml").read_text()
     for name in ("one.yaml", "other.yaml"):
         (folder / name).write_text(vehicle)
     u = np.linspace(-0.060, 0.055, 231)
@@ -141,7 +141,7 @@ def of_files(folder):
         rows = (f"{a:.6f},{b:.9f}" for a, b in zip(u, wr.named_profile("S1002", "wheel")(u), strict=True))
         (folder / name).write_text("\n".join(["u_m,f_m", *rows]))
     (folder / "track.csv").write_text("s_m,left_lateral_m\n" + "".join(f"{k},0.0\n" for k in range(9)))
-    scene = yaml.safe_load((SCENES / "suspended_wheelset.yaml").read_text())
+    scene = yaml.safe_load((ELLIPTIC / "suspended_wheelset.yaml").read_text())
     scene["wheel"], scene["vehicle"]["parameters"] = {"profile": "wheel.csv"}, "one.yaml"
     scene["track"] = {"irregularity": {"points": ["track.csv"], "fade_in": 1.0, "fade_out": 1.0}}
     scene["contact"]["creep"] = {"model": "she"}
@@ -265,8 +265,8 @@ def test_tables_come_back_as_they_were(tmp_path, smoke, ending):
 
 def test_numbers_of_the_vehicle_are_swept_by_their_key_paths():
     """Each row is the run of a vehicle file with these numbers, one of them a factor on all elements of a pattern."""
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml")
-    vehicle = yaml.safe_load((SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml")
+    vehicle = yaml.safe_load((ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
     keys = {
         "vehicle.bodies.wheelset.mass": {"from": 1200.0, "to": 1800.0, "steps": 2},
         "vehicle.elements.*.stiffness.factor": {"values": [0.8, 1.25]},
@@ -286,7 +286,7 @@ def test_numbers_of_the_vehicle_are_swept_by_their_key_paths():
 def test_numbers_in_lists_are_swept_by_their_place():
     path = [{"transition": 5.0}, {"curve": 50.0, "radius": 500.0}]
     sweep = {
-        "name": "radii", "scene": str(SCENES / "suspended_wheelset.yaml"), "sampling": {"kind": "grid"},
+        "name": "radii", "scene": str(ELLIPTIC / "suspended_wheelset.yaml"), "sampling": {"kind": "grid"},
         "set": {"integration.duration": 1.0, "track.path": path}, "measures": ["y_rms_m"],
         "keys": {"track.path.1.radius": {"values": [400.0, 300.0]}},
     }  # fmt: skip
@@ -301,8 +301,8 @@ def test_numbers_in_lists_are_swept_by_their_place():
 
 
 def test_a_scene_and_vehicles_may_be_content():
-    vehicle = yaml.safe_load((SCENES.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
-    scene = yaml.safe_load((SCENES / "suspended_wheelset.yaml").read_text())
+    vehicle = yaml.safe_load((ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml").read_text())
+    scene = yaml.safe_load((ELLIPTIC / "suspended_wheelset.yaml").read_text())
     scene["vehicle"]["parameters"] = vehicle
     heavy = yaml.safe_load(yaml.safe_dump(vehicle | {"name": "heavy"}))
     heavy["bodies"]["wheelset"]["mass"] *= 1.5
@@ -445,9 +445,9 @@ def test_curved_and_irregular_track_is_measured_along_the_track():
     changes = {"integration.duration": 0.3, "contact.creep.model": "she"}
     keys = {"track.irregularity.spectrum.seed": {"values": [1, 2]}, "speed": {"values": [30]}}
     spectrum = {"level": "low", "seed": 0, "length": 200, "begin": 5.0}
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml", {**changes, "track.path": path}).data
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", {**changes, "track.path": path}).data
     scene["track"]["irregularity"] = {"spectrum": spectrum}
-    run = wr.simulate(SCENES / "suspended_wheelset.yaml", overrides={**changes, "speed": 30, "track": scene["track"],
+    run = wr.simulate(ELLIPTIC / "suspended_wheelset.yaml", overrides={**changes, "speed": 30, "track": scene["track"],
                       "track.irregularity.spectrum.seed": 2})  # fmt: skip
     setting = {**changes, "track": scene["track"]}
     table = wr.run_sweep(small(set=setting, keys=keys, sampling={"kind": "grid"}, measures=["y_rms_m", "yaw_max_rad"]))
@@ -507,7 +507,7 @@ def test_a_table_does_not_go_over_something_else(tmp_path, capsys):
     for name, says in (("run.h5", "expected no file, or one of 'wrcore sweep'"), ("table.txt", "ends in .csv or .h5")):
         assert main(["sweep", str(tmp_path / "small.yaml"), "--out", str(tmp_path / name)]) == 2
         assert says in capsys.readouterr().err
-    scene = ["simulate", str(SCENES / "suspended_wheelset.yaml"), "--out", str(tmp_path / "run.h5")]
+    scene = ["simulate", str(ELLIPTIC / "suspended_wheelset.yaml"), "--out", str(tmp_path / "run.h5")]
     assert main(scene) == 2 and "this one is of 'wheelset'" in capsys.readouterr().err
     assert (tmp_path / "run.h5").read_bytes() == before
 
@@ -560,7 +560,7 @@ def test_keys_below_a_mapping_that_the_scene_leaves_out_are_runs_of_their_own():
     }
     table = wr.run_sweep(keyed(keys))
     for row, values in wr.load_sweep(keyed(keys)).runs.iterrows():
-        run = wr.simulate(SCENES / "suspended_wheelset.yaml", values.to_dict(), integration__duration=0.05)
+        run = wr.simulate(ELLIPTIC / "suspended_wheelset.yaml", values.to_dict(), integration__duration=0.05)
         assert table.loc[row, "y_max_m"] == np.abs(run["wheelset"].y_m).max()
     assert table.loc[1, "y_rms_m"] != table.loc[0, "y_rms_m"]
 

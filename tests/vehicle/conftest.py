@@ -5,7 +5,7 @@ import copy
 import pytest
 import yaml
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.errors.checked_yaml import read_yaml
 
 TRAILER = read_yaml(ROOT / "config" / "vehicles" / "trailer_vehicle.yaml")
@@ -22,7 +22,7 @@ def scene_of(tmp_path):
     """Write a vehicle's data to a file and a scene that uses it; returns the scene's path."""
 
     def write(data, **vehicle):
-        scene = read_yaml(SCENES / "trailer_vehicle.yaml")
+        scene = read_yaml(ELLIPTIC / "trailer_vehicle.yaml")
         scene["vehicle"] |= {"parameters": "vehicle.yaml", "axle_boxes": False, **vehicle}
         (tmp_path / "vehicle.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
         (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))

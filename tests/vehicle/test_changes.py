@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.errors.checked_yaml import parse_value, unit_of_key
 
-TRAILER, VEHICLE = SCENES / "trailer_vehicle.yaml", ROOT / "config/vehicles/trailer_vehicle.yaml"
+TRAILER, VEHICLE = ELLIPTIC / "trailer_vehicle.yaml", ROOT / "config/vehicles/trailer_vehicle.yaml"
 
 
 def content(*overrides, **changes):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.vehicle.conftest import element
 from wrcore.cli import main
 from wrcore.errors import InputError
@@ -171,10 +171,10 @@ def test_bad_vehicle_files_get_one_line_that_names_the_element(scene_of, trailer
     ],
 )
 def test_moments_of_inertia_that_no_mass_has_are_told(capsys, inertia, told):
-    load_scene(SCENES / "suspended_wheelset.yaml", {"vehicle.bodies.wheelset.inertia": inertia})
+    load_scene(ELLIPTIC / "suspended_wheelset.yaml", {"vehicle.bodies.wheelset.inertia": inertia})
     assert ("bodies.wheelset.inertia: no mass has a moment" in capsys.readouterr().err) == told
 
 
 def test_a_body_may_have_no_moment_above_the_sum_of_the_others(capsys):
-    load_scene(SCENES / "trailer_vehicle.yaml", {"vehicle.bodies.car_body.inertia.yaw": 9e6})
+    load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"vehicle.bodies.car_body.inertia.yaw": 9e6})
     assert "car_body.inertia: no mass has a moment of 9e+06 kg m^2" in capsys.readouterr().err

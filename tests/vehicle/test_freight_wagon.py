@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.dynamics.energy import energy_balance
 from wrcore.elements.law import INNER, NUMBERS, PRESSING_SPRING
 from wrcore.errors.checked_yaml import read_yaml
@@ -14,7 +14,7 @@ VEHICLES = ROOT / "config" / "vehicles"
 
 
 def scene_of(load, **changes):
-    return load_scene(SCENES / f"freight_wagon_{load}.yaml", changes)
+    return load_scene(ELLIPTIC / f"freight_wagon_{load}.yaml", changes)
 
 
 @pytest.mark.parametrize("load, mass", [("empty", 13.5e3), ("laden", 45e3)])
@@ -49,7 +49,7 @@ def without_friction(load, folder):
 def test_energy_of_a_hunting_wagon_adds_up_and_its_friction_takes_part():
     changes = {"output.channels": ["pose", "energy"], "output.rate": 5000.0, "integration.rtol": 1e-7}
     changes |= {"speed": 30.0, "integration.method": "rk45", "integration.duration": 3.0}
-    found = simulate(load_scene(SCENES / "freight_wagon_empty.yaml", changes))
+    found = simulate(load_scene(ELLIPTIC / "freight_wagon_empty.yaml", changes))
     assert found.status == "completed"
     energy = found["energy"]
     balance = energy_balance(energy, found.t)

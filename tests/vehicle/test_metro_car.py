@@ -10,7 +10,7 @@ from wrcore.scene.description import GRAVITY, compile_scene, load_scene, static_
 
 
 def test_seventeen_bodies_stand_evenly_on_eight_wheels():
-    scene = load_scene(SCENES / "metro_car.yaml", ["contact.creep.model=linear"])
+    scene = load_scene(SCENES / "metro_car.yaml")
     model, _ = compile_scene(scene)
     assert len(scene.vehicle.body_names) == 17
     assert scene.vehicle.joints.equations == 10 * 5  # eight axle boxes and two centre pivots

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.balance.equilibrium import solve_equilibrium
 from wrcore.creep.laws import LAWS
 from wrcore.dynamics.body import STATE_SIZE
@@ -19,8 +19,8 @@ COUPLED = ["vehicle.count=3", "vehicle.spacing=26"]
 @pytest.mark.parametrize("boxes", ["true", "false"])
 def test_vehicles_of_a_train_accelerate_as_alone(boxes):
     overrides = ["speed=60", f"vehicle.axle_boxes={boxes}", "initial.yaw=0.002"]
-    alone, start = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", overrides))
-    train, starts = compile_scene(load_scene(SCENES / "trailer_vehicle.yaml", [*overrides, *COUPLED]))
+    alone, start = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", overrides))
+    train, starts = compile_scene(load_scene(ELLIPTIC / "trailer_vehicle.yaml", [*overrides, *COUPLED]))
     n = len(alone.bodies.mass)
     assert len(train.bodies.mass) == 3 * n
     one, all_three = (Equations(m)(0.0, s) for m, s in ((alone, start), (train, starts)))
@@ -34,7 +34,7 @@ def test_vehicles_of_a_train_accelerate_as_alone(boxes):
 
 
 def test_equilibrium_of_a_train_is_that_of_its_vehicles():
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["vehicle.count=3", "vehicle.spacing=2.5"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["vehicle.count=3", "vehicle.spacing=2.5"])
     model, _ = compile_scene(scene)
     equilibrium = static_equilibrium(scene, model)
     contact = model.contact._replace(friction=1e-9, law=LAWS["she"])
@@ -47,9 +47,9 @@ def test_equilibrium_of_a_train_is_that_of_its_vehicles():
 def test_vehicles_run_one_behind_the_other():
     """On tangent track every vehicle repeats the first one's motion; steps are common to all."""
     overrides = ["speed=60", "integration.duration=0.3", "integration.rtol=1e-8", "integration.atol=1e-11"]
-    alone = simulate(load_scene(SCENES / "suspended_wheelset.yaml", overrides))
+    alone = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", overrides))
     train = simulate(
-        load_scene(SCENES / "suspended_wheelset.yaml", [*overrides, "vehicle.count=2", "vehicle.spacing=3"])
+        load_scene(ELLIPTIC / "suspended_wheelset.yaml", [*overrides, "vehicle.count=2", "vehicle.spacing=3"])
     )
     for k in (1, 2):
         wheelset = train[f"vehicle_{k}_wheelset"]
@@ -58,7 +58,7 @@ def test_vehicles_run_one_behind_the_other():
 
 
 def test_one_vehicle_is_no_train():
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", ["vehicle.count=1", "vehicle.spacing=26"])
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["vehicle.count=1", "vehicle.spacing=26"])
     assert scene.vehicle.unit is None
     assert scene.vehicle.body_names[0] == "car_body"
 
@@ -75,5 +75,5 @@ def test_one_vehicle_is_no_train():
 )
 def test_bad_trains_are_refused(overrides, field, expected):
     with pytest.raises(InputError, match=expected) as error:
-        load_scene(SCENES / "trailer_vehicle.yaml", overrides)
+        load_scene(ELLIPTIC / "trailer_vehicle.yaml", overrides)
     assert error.value.field == field

@@ -6,7 +6,7 @@
 from unittest import mock
 
 import wrcore as wr
-from tests.conftest import SCENES as EXAMPLES
+from tests.conftest import ELLIPTIC as EXAMPLES
 
 SPECTRUM = {"level": "low", "seed": 1, "length": 2000.0, "begin": 20.0}
 CURVE = [{"tangent": 20}, {"transition": 40}, {"curve": 250, "radius": 300, "cant": 0.1}, {"transition": 40},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.synthetic import hunting_run
 from wrcore.analysis.assessment.assess import assess
 from wrcore.analysis.assessment.ride import (
@@ -209,7 +209,7 @@ def test_ride_in_a_curve_is_that_on_the_floor(radius, speed):
     rate, begin = 500.0, 6.0
     path = [{"tangent": 60.0}, {"transition": 80.0}, {"curve": 900.0, "radius": radius, "cant": 0.1}]
     spectrum = {"level": "low", "seed": 1, "length": 800.0, "begin": 15.0}
-    run = wr.simulate(SCENES / "trailer_vehicle.yaml", {
+    run = wr.simulate(ELLIPTIC / "trailer_vehicle.yaml", {
         "speed": speed, "initial.y": 0.0, "track.path": path, "track.irregularity": {"spectrum": spectrum},
         "integration.duration": 12.0, "integration.rtol": 1e-6, "output.rate": rate,
         "output.channels": ["pose", "acceleration"],

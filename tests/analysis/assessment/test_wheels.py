@@ -8,7 +8,7 @@ import pytest
 
 import wrcore as wr
 from study.speeds.tables import cost_table, hunting, speed_row
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.synthetic import hunting_run
 from wrcore.analysis.assessment import wheels as av
 
@@ -76,7 +76,7 @@ def test_products_of_force_and_creepage_keep_their_signs(run):
 def test_creep_power_is_what_the_energy_loses_by_creep():
     channels = ["pose", "velocity", "contact", "energy"]
     run = wr.simulate(
-        SCENES / "suspended_wheelset.yaml", speed=60, integration__duration=0.5, output__channels=channels
+        ELLIPTIC / "suspended_wheelset.yaml", speed=60, integration__duration=0.5, output__channels=channels
     )
     power = sum(av.creep_power(run, "wheelset", side) for side in ("left", "right"))
     lost = run["energy"].dissipated_by_creep_W

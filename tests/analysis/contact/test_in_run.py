@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.analysis.contact.in_run import WheelInRun, patch_in_run
 from wrcore.contact.reduction import NORMAL
 from wrcore.dynamics.motion import MOTION, WheelMotion
@@ -34,7 +34,7 @@ SCENE_OF = {
 
 
 def run_of(changes):
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", SHORT | changes)
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", SHORT | changes)
     run = simulate(scene)
     assert run.status == "completed", run.reason
     return scene, run
@@ -102,7 +102,7 @@ def test_a_wheel_that_rolls_back_has_the_mirrored_fields():
 def test_friction_counts_where_a_height_is_sought(tmp_path):
     """On hollow wheels it makes up to 1 % of the normal force of a patch that is bent, at one and the same height."""
     u = np.linspace(-0.06, 0.04, 501)
-    hollow = load_scene(SCENES / "suspended_wheelset.yaml").wheel(u) + 2e-3 * np.exp(-((u / 0.012) ** 2))
+    hollow = load_scene(ELLIPTIC / "suspended_wheelset.yaml").wheel(u) + 2e-3 * np.exp(-((u / 0.012) ** 2))
     np.savetxt(tmp_path / "hollow.csv", np.column_stack([u, hollow]), delimiter=",", header="u_m,f_m", comments="")
     stiff = {"contact.normal": {"damping": {"c_e": 1.0, "v0": 0.05}}, "wheel.profile": str(tmp_path / "hollow.csv")}
     scene, run = run_of(stiff | {"initial.y": 0.003, "initial.yaw": 0.006, "contact.friction": 0.4})
@@ -149,7 +149,7 @@ def test_scenes_that_do_not_ask_have_none_of_its_channels():
 
 def test_a_profile_that_was_edited_since_is_refused(tmp_path):
     profile, u = tmp_path / "wheel.csv", np.linspace(-0.06, 0.04, 201)
-    points = np.column_stack([u, load_scene(SCENES / "suspended_wheelset.yaml").wheel(u)])
+    points = np.column_stack([u, load_scene(ELLIPTIC / "suspended_wheelset.yaml").wheel(u)])
     np.savetxt(profile, points, fmt="%.12g", delimiter=",", header="u_m,f_m", comments="")
     scene, run = run_of({"contact.patch": "moment", "wheel.profile": str(profile)})
     assert patch_in_run(run, 0.0, "wheelset", scene=load_scene(scene))

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from tests.contact.patch import contact_reference as contact
 from tests.contact.patch.test_grid import some_cases
 from wrcore.analysis.contact.loaded import LoadedWheels, Rolling
@@ -248,7 +248,7 @@ def test_an_id_stands_for_one_pose(tmp_path):
 
 
 def test_a_patch_of_a_scene():
-    (one,) = wr.patch(SCENES / "suspended_wheelset.yaml", y=0.003, vy=0.02)
+    (one,) = wr.patch(ELLIPTIC / "suspended_wheelset.yaml", y=0.003, vy=0.02)
     assert isinstance(one, wr.Patch) and one.side == "left" and one.friction == 0.3
     area = one.cell_area
     # cells lie in one plane; the forces have each strip's own, by the square of the tilts and friction along the normal
@@ -258,12 +258,12 @@ def test_a_patch_of_a_scene():
     assert 0.0 < one.slip_area < one.area and np.all(one.slip_s[one.stick] == 0.0)
     assert one.pressure.max() <= one.p_max * 1.001 and one.centroid == pytest.approx((0.0, 0.0), abs=1e-5)
     assert (one.x - one.dx / 2).min() == pytest.approx(one.extent[0], abs=1e-9)
-    (grid,) = wr.patch(SCENES / "suspended_wheelset.yaml", y=0.003, vy=0.02, method="grid", resolution="coarse",
+    (grid,) = wr.patch(ELLIPTIC / "suspended_wheelset.yaml", y=0.003, vy=0.02, method="grid", resolution="coarse",
                        roll=one.pose[2], z=one.pose[1])  # fmt: skip
     bound = one.friction * one.normal
     assert grid.normal == pytest.approx(one.normal, rel=2e-3)
     assert math.hypot(grid.fx - one.fx, grid.fs - one.fs) < 0.015 * bound
-    assert one.track_force[2] == pytest.approx(wr.load_scene(SCENES / "suspended_wheelset.yaml")
+    assert one.track_force[2] == pytest.approx(wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml")
                                                .vehicle.nominal_wheel_load(0), rel=1e-6)  # fmt: skip
 
 

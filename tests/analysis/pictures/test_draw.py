@@ -13,7 +13,7 @@ import yaml
 
 import wrcore as wr
 from study.report.legible import findings
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 from tests.synthetic import hunting_run
 from wrcore.analysis.pictures.plot_vehicle import box_of
 from wrcore.analysis.wear.wear_folder import claim, write_rows
@@ -21,18 +21,18 @@ from wrcore.cli import main
 from wrcore.elements import kinds as elements
 from wrcore.errors.checked_yaml import _schema
 
-VEHICLES = sorted(path.stem for path in SCENES.glob("*.yaml"))
+VEHICLES = sorted(path.stem for path in ELLIPTIC.glob("*.yaml"))
 
 
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_drawing_holds_everything_of_the_vehicle_file_in_both_views(name, tmp_path):
-    figure = wr.draw(SCENES / f"{name}.yaml")
+    figure = wr.draw(ELLIPTIC / f"{name}.yaml")
     assert findings(figure) == []
     figure.savefig(tmp_path / "vehicle.svg")
     root = ElementTree.parse(tmp_path / "vehicle.svg").getroot()
     drawn = {element.get("id") for element in root.iter() if element.get("id")}
-    scene = yaml.safe_load((SCENES / f"{name}.yaml").read_text())
-    data = yaml.safe_load((SCENES.parent / scene["vehicle"]["parameters"]).read_text())
+    scene = yaml.safe_load((ELLIPTIC / f"{name}.yaml").read_text())
+    data = yaml.safe_load((ELLIPTIC.parent / scene["vehicle"]["parameters"]).read_text())
     parts = [f"body:{body}" for body in data["bodies"]]
     parts += [f"{kind}:{item['name']}" for kind in ("element", "joint") for item in data.get(f"{kind}s", [])]
     views = {f"{part}:{view}" for part in parts for view in ("side", "plan")}
@@ -74,7 +74,7 @@ def test_every_kind_of_joint_is_drawn(tmp_path, kind):
 
 def drawn_of(folder, key, item):
     """Groups in the drawing of the suspended wheelset with one more part, as its file would say it."""
-    scene = wr.load_scene(SCENES / "suspended_wheelset.yaml")
+    scene = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml")
     data = {**scene.vehicle.data, key: [*scene.vehicle.data[key], item]}
     figure = wr.draw(dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, data=data)))
     figure.savefig(folder / "vehicle.svg")
@@ -96,7 +96,7 @@ def test_a_box_has_the_moments_of_its_body():
 
 
 def test_of_a_train_one_vehicle_is_drawn():
-    train = wr.load_scene(SCENES / "suspended_wheelset.yaml", vehicle__count=3, vehicle__spacing=10.0)
+    train = wr.load_scene(ELLIPTIC / "suspended_wheelset.yaml", vehicle__count=3, vehicle__spacing=10.0)
     figure = wr.draw(train)
     assert "one of 3" in figure.axes[0].get_title(loc="left") and len(figure.axes[2].texts) == 2
 
@@ -179,7 +179,7 @@ def test_the_factor_is_round_and_shows_the_motion(run):
 def test_in_a_curve_the_factor_shows_the_wheelsets(run):
     """A car of 19 m between its bogies lies 0.15 m inside a curve of 300 m: that is no motion to be enlarged."""
     path = [{"tangent": 10.0}, {"transition": 30.0}, {"curve": 200.0, "radius": 300.0, "cant": 0.1}]
-    scene = wr.load_scene(SCENES / "trailer_vehicle.yaml", {"track.path": path})
+    scene = wr.load_scene(ELLIPTIC / "trailer_vehicle.yaml", {"track.path": path})
     s, x = 60.0 + 15.0 * run.t, dict(zip(scene.vehicle.body_names, scene.vehicle.positions[:, 0], strict=True))
     wheels = [d for name, d in x.items() if name in scene.vehicle.wheelset_names]
     inside = {"car_body": np.mean(np.square(wheels)) / 600.0, "bogie_1": 1.28**2 / 600.0, "bogie_2": 1.28**2 / 600.0}
@@ -249,11 +249,11 @@ def pose_only():
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (SCENES / "absent.yaml", {}, "absent.yaml: expected a readable file"),
+        (ELLIPTIC / "absent.yaml", {}, "absent.yaml: expected a readable file"),
         (SCENES / "wheelset.yaml", {"factor": 2.0}, "draw: factor: expected this with a run only"),
         (SCENES / "wheelset.yaml", {"begin": 2.0}, "draw: begin: expected this with a run only"),
-        (SCENES, {}, "expected a folder of evolve, with steps.csv"),
-        (hunting_run(), {"scene": SCENES / "trailer_vehicle.yaml"}, "scene: expected that of the run, with wheelset"),
+        (ELLIPTIC, {}, "expected a folder of evolve, with steps.csv"),
+        (hunting_run(), {"scene": ELLIPTIC / "trailer_vehicle.yaml"}, "scene: expected that of the run, with wheelset"),
         (hunting_run(), {}, "draw: scene: expected that of the run, as its files are not here"),
         (hunting_run(), {"scene": SCENES / "wheelset.yaml", "begin": 9.0}, "draw: begin: expected 0 <= begin < end"),
         (hunting_run(), {"scene": SCENES / "wheelset.yaml", "factor": 0.1}, "factor: expected a number, at least 1"),

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 import wrcore as wr
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT, SCENES
 from wrcore.cli import main
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 
-TRAILER = SCENES / "trailer_vehicle.yaml"
+TRAILER = ELLIPTIC / "trailer_vehicle.yaml"
 CURVES = {  # radius and cant, m; speed, m/s; friction
     "flange": (300.0, 0.1, 20.0, 0.3), "tread and flange": (600.0, 0.1, 20.0, 0.3),
     "right, little friction": (-600.0, 0.05, 25.0, 0.1),
@@ -179,7 +179,7 @@ def test_where_there_is_no_balance_is_said():
     (TRAILER, {"radii": [500.0], "speed": 20.0, "cant_deficiency": 0.1}, "expected either a speed or"),
     (TRAILER, {"radii": [500.0], "cant": 0.1, "cant_deficiency": -0.1}, "cant_deficiency: expected more than -0.1 m"),
     (TRAILER, {"radii": [500.0], "speed": 1e4}, "speeds: expected"),
-    (SCENES / "freight_wagon_laden.yaml", {"radii": [500.0]}, "expected friction with series_stiffness"),
+    (ELLIPTIC / "freight_wagon_laden.yaml", {"radii": [500.0]}, "expected friction with series_stiffness"),
     (SCENES / "locomotive.yaml", {"radii": [500.0]}, "expected one without joints to the moving frame"),
 ])  # fmt: skip
 def test_bad_input_is_named(scene, arguments, says):

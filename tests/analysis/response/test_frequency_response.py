@@ -6,11 +6,11 @@ import pytest
 import yaml
 
 import wrcore as wr
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.cli import main
 from wrcore.errors import InputError
 
-TRAILER = SCENES / "trailer_vehicle.yaml"
+TRAILER = ELLIPTIC / "trailer_vehicle.yaml"
 TONES = {"alignment": [0.5, 2.0, 5.0], "level": [1.0, 7.0], "cross_level": [1.5, 9.0]}
 """Frequencies in Hz, all different: each is found alone in the spectrum of one run."""
 
@@ -55,7 +55,7 @@ def test_it_is_what_a_run_over_small_irregularity_shows(shaken, output):
 
 def test_a_slow_force_finds_the_springs_and_a_fast_one_the_mass():
     """Car body on secondary and primary springs and 8 contacts: 1/(4 k_s) + 1/(8 k_p) and a little; 1/m."""
-    vehicle = yaml.safe_load((SCENES.parent / "vehicles/trailer_vehicle.yaml").read_text())
+    vehicle = yaml.safe_load((ELLIPTIC.parent / "vehicles/trailer_vehicle.yaml").read_text())
     table = wr.frequency_response(
         TRAILER, ["car_body.Fz_N", "level"], ["car_body.z_m", "car_body.az_m_per_s2"], [1e-3, 200.0]
     )
@@ -97,7 +97,7 @@ def test_axle_distances_filter():
 def test_one_rail_is_half_of_both():
     outputs = ["wheelset/left.Q_N", "wheelset.roll_rad"]
     kinds = ["left_vertical", "right_vertical", "level", "cross_level"]
-    table = wr.frequency_response(SCENES / "suspended_wheelset.yaml", kinds, outputs, [3.0])
+    table = wr.frequency_response(ELLIPTIC / "suspended_wheelset.yaml", kinds, outputs, [3.0])
     for output in outputs:
         left, right, level, cross = (table.loc[3.0, (kind, output)] for kind in kinds)
         assert left + right == pytest.approx(level, abs=1e-4 * abs(left))
@@ -106,7 +106,7 @@ def test_one_rail_is_half_of_both():
 
 def test_frequencies_come_back_as_they_were_asked_for():
     asked = [0.1, 1.0 / 3.0, 7.3]
-    table = wr.frequency_response(SCENES / "suspended_wheelset.yaml", ["level"], ["wheelset.y_m"], asked)
+    table = wr.frequency_response(ELLIPTIC / "suspended_wheelset.yaml", ["level"], ["wheelset.y_m"], asked)
     assert table.index.tolist() == asked
 
 
@@ -121,7 +121,7 @@ def test_frequencies_come_back_as_they_were_asked_for():
 ])  # fmt: skip
 def test_bad_input_is_named(arguments, says):
     with pytest.raises(InputError, match=says):
-        wr.frequency_response(SCENES / "suspended_wheelset.yaml", *arguments)
+        wr.frequency_response(ELLIPTIC / "suspended_wheelset.yaml", *arguments)
 
 
 def test_a_vehicle_that_nothing_holds_along_the_track_is_told_so():

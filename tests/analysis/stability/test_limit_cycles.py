@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from study.critical_speed.tables import critical_table
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.analysis.stability import limit_cycles as analysis_limit_cycles
 from wrcore.analysis.stability.limit_cycles import (
     Settling,
@@ -31,7 +31,7 @@ HOPF = 50.0
 
 @pytest.fixture(scope="module")
 def suspended():
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.0", "contact.detection=planar"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["initial.y=0.0", "contact.detection=planar"])
     return compile_scene(scene)
 
 
@@ -125,7 +125,7 @@ def test_limit_cycle_of_a_wheelset_equals_that_of_a_plain_run():
 
     Both start near it: on the flanges the wheelset hunts irregularly first, for as long as it happens to.
     """
-    source = SCENES / "suspended_wheelset.yaml"
+    source = ELLIPTIC / "suspended_wheelset.yaml"
     changes = ["contact.detection=planar", "speed=60.0"]
     table = limit_cycles(load_scene(source, changes), [60.0], Settling(longest=10.0, change=0.01), [0.003], 1.0)
     cycle = table[table["branch"] == "falling"].iloc[0]
@@ -181,7 +181,7 @@ def test_critical_table():
 ])  # fmt: skip
 def test_wrong_numbers_are_refused_before_anything_runs(wrong, said):
     with pytest.raises(InputError, match=said):
-        limit_cycles(SCENES / "suspended_wheelset.yaml", [40.0], **wrong)
+        limit_cycles(ELLIPTIC / "suspended_wheelset.yaml", [40.0], **wrong)
 
 
 @pytest.mark.parametrize("name", ["window", "longest", "change", "rest", "disturbance", "rate", "rtol"])
@@ -196,7 +196,7 @@ def test_a_ramp_dies_below_the_fold_and_comes_nearer_when_it_is_slower(oscillato
     monkeypatch.setattr(analysis_limit_cycles, "straight_ahead", lambda scene: suspended)
     ends = []
     for rate in (0.5, 0.1):
-        table = speed_ramp(SCENES / "suspended_wheelset.yaml", 54.0, 20.0, rate, Settling(1.0, 100.0), [0.002, 0.005])
+        table = speed_ramp(ELLIPTIC / "suspended_wheelset.yaml", 54.0, 20.0, rate, Settling(1.0, 100.0), [0.002, 0.005])
         m = (table["speed_m_per_s"] - HOPF) / 40.0
         cycle = 0.01 * np.sqrt(0.5 * (1.0 + np.sqrt(1.0 + 4.0 * m[m > -0.2])))
         np.testing.assert_allclose(table["amplitude_m"][m > -0.2], cycle, rtol=0.03)
@@ -209,14 +209,14 @@ def test_a_ramp_dies_below_the_fold_and_comes_nearer_when_it_is_slower(oscillato
 
 def test_a_ramp_falls():
     with pytest.raises(InputError, match="speed_ramp: end: expected less than the start of 40 m/s"):
-        speed_ramp(SCENES / "suspended_wheelset.yaml", 40.0, 50.0)
+        speed_ramp(ELLIPTIC / "suspended_wheelset.yaml", 40.0, 50.0)
 
 
 @pytest.mark.parametrize("after, branches", [(2, {"falling"}), (6, {"falling", "rising"})])
 def test_limit_cycles_stopped_returns_the_rows_so_far(oscillator, suspended, monkeypatch, capsys, after, branches):
     monkeypatch.setattr(analysis_limit_cycles, "straight_ahead", lambda scene: suspended)
     speeds, settling, said, left = [42.0, 48.0, 52.0, 54.0], Settling(longest=400.0), [], [after]
-    scene = SCENES / "suspended_wheelset.yaml"
+    scene = ELLIPTIC / "suspended_wheelset.yaml"
     whole = limit_cycles(scene, speeds, settling, [0.005], 5.0, said.append)
     assert "stopped" not in whole.attrs and len(said) == len(whole) and said[0].endswith("at most 3 speeds remain")
     settle = settle_motion

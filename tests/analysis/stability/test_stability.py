@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.conftest import ROOT, SCENES
+from tests.conftest import ELLIPTIC, ROOT
 from wrcore.analysis.stability.modes import families, linear_modes, shape_table
 from wrcore.analysis.stability.stability import (
     at_speed,
@@ -22,13 +22,13 @@ from wrcore.scene.description import compile_scene, load_scene
 
 @pytest.fixture(scope="module")
 def trailer():
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", ["initial.y=0.0"])
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["initial.y=0.0"])
     return scene.vehicle, *compile_scene(scene)
 
 
 @pytest.fixture(scope="module")
 def suspended():
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["initial.y=0.0"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["initial.y=0.0"])
     return scene.vehicle, *compile_scene(scene)
 
 
@@ -70,7 +70,7 @@ def test_a_bogie_vehicle_has_the_modes_that_its_bodies_make(trailer, speed):
 @pytest.mark.parametrize("name", ["freight_wagon_empty", "freight_wagon_laden"])
 def test_a_two_axle_wagon_pitches_with_its_body(name):
     """Its wheelsets spin to and fro with it: no name for what has nine tenths of its energy in the car body."""
-    scene = load_scene(SCENES / f"{name}.yaml", ["initial.y=0.0"])
+    scene = load_scene(ELLIPTIC / f"{name}.yaml", ["initial.y=0.0"])
     table, _, energies = linear_modes(scene.vehicle, steady_motion(*compile_scene(scene), 30.0))
     k = table.index[table["name"] == "car body pitch"]
     assert len(k) == 1 and energies[k[0], 0, DIRECTIONS.index("pitch")] > 0.9
@@ -140,7 +140,7 @@ def test_no_steady_motion_is_told(suspended):
 def test_where_a_scene_starts_is_of_no_influence(suspended):
     _, model, state = suspended  # in steady running, where a run begins
     (_, centred), (aside, there) = (
-        straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml", [f"initial.y={y}"])) for y in (0.0, 0.003)
+        straight_ahead(load_scene(ELLIPTIC / "suspended_wheelset.yaml", [f"initial.y={y}"])) for y in (0.0, 0.003)
     )
     np.testing.assert_allclose(there, centred, atol=1e-12)
     assert growth(steady_motion(aside, there, 70.0)) == pytest.approx(
@@ -149,12 +149,12 @@ def test_where_a_scene_starts_is_of_no_influence(suspended):
 
 
 def test_small_motions_are_those_on_a_tangent_perfect_track():
-    plain, there = straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml"))
+    plain, there = straight_ahead(load_scene(ELLIPTIC / "suspended_wheelset.yaml"))
     elsewhere = [
         "track.path=[{transition: 20}, {curve: 50, radius: 500, cant: 0.1}]", "track.gradients=[{gradient: 0.02}]",
         "track.irregularity={spectrum: {level: high, seed: 1, length: 100, begin: -50}}",
     ]  # fmt: skip
-    model, state = straight_ahead(load_scene(SCENES / "suspended_wheelset.yaml", elsewhere))
+    model, state = straight_ahead(load_scene(ELLIPTIC / "suspended_wheelset.yaml", elsewhere))
     np.testing.assert_array_equal(state, there)
     np.testing.assert_array_equal(steady_motion(model, state, 60.0).matrix, steady_motion(plain, there, 60.0).matrix)
 
@@ -184,7 +184,7 @@ def test_axle_boxes_add_their_pitch_and_leave_the_other_modes(trailer):
     That spring holds the bogie against the wheelset's frame where the box is part of it, hence the bogie's pitch moves.
     """
     vehicle, model, state = trailer
-    scene = load_scene(SCENES / "trailer_vehicle.yaml", ["initial.y=0.0", "vehicle.axle_boxes=true"])
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["initial.y=0.0", "vehicle.axle_boxes=true"])
     lumped, _, _ = linear_modes(vehicle, steady_motion(model, state, 60.0))
     table, _, _ = linear_modes(scene.vehicle, steady_motion(*compile_scene(scene), 60.0))
     values = (table["real_per_s"] + 1j * table["imag_rad_per_s"]).to_numpy()

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 from wrcore.analysis.wear import evolve as ev
 from wrcore.analysis.wear import wear_folder
 from wrcore.analysis.wear.worn_profiles import (
@@ -42,7 +42,7 @@ from wrcore.kernels.cache import untold
 from wrcore.scene.description import load_scene
 
 PLAN = {
-    "name": "short", "scene": str(SCENES / "suspended_wheelset.yaml"), "distance": 3e5, "largest_step": 1e5,
+    "name": "short", "scene": str(ELLIPTIC / "suspended_wheelset.yaml"), "distance": 3e5, "largest_step": 1e5,
     "begin": 0.2, "rate": 100.0,
     "scenes": [
         {"share": 3.0, "set": {"speed": 30, "integration.duration": 0.6, "initial.y": 0.002}},
@@ -51,7 +51,7 @@ PLAN = {
 }  # fmt: skip
 
 
-VEHICLE = SCENES.parent / "vehicles" / "suspended_wheelset.yaml"
+VEHICLE = ELLIPTIC.parent / "vehicles" / "suspended_wheelset.yaml"
 OFF = {"speed": 140, "integration.duration": 3.0, "initial.y": 0.015}
 """Far above the critical speed."""
 ARCHARD = {"archard": {"hardness": 2e9, "coefficients": [[1e-4]]}}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.assessment.test_assess import synthetic
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.analysis.contact.in_run import WheelInRun
 from wrcore.analysis.contact.patch import patch as wr_patch
 from wrcore.analysis.wear.local_wear import BIN, friction_work, local_wear
@@ -227,7 +227,7 @@ def test_what_cannot_be_worn_is_refused():
 
 
 def exact_run(**changes):
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", {
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", {
         "contact.patch": "exact", "contact.resolution": "coarse", "integration.duration": 0.1, "output.rate": 100.0,
         "output.channels": ["pose", "velocity", "contact", "wheel_motion"], "initial.y": 0.004, "speed": 40.0,
     } | changes)  # fmt: skip

@@ -6,7 +6,7 @@ import pytest
 
 from study.cost.growth import array_bytes, cache_sizes, findings, identical, over_scenes
 from study.cost.recorded import evaluation, record
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.dynamics.system import Equations
 from wrcore.errors import InputError
 from wrcore.run.simulate import simulate, simulate_many
@@ -23,7 +23,7 @@ def test_bytes_of_nested_tuples_count_once():
 @pytest.mark.parametrize("threads", [1, 2])
 def test_runs_do_not_depend_on_those_beside_them(threads):
     speeds = (15.0, 40.0, 60.0)
-    scenes = [load_scene(SCENES / "suspended_wheelset.yaml", [*SHORT, f"speed={v}"]) for v in speeds]
+    scenes = [load_scene(ELLIPTIC / "suspended_wheelset.yaml", [*SHORT, f"speed={v}"]) for v in speeds]
     together = simulate_many(scenes, progress=False, threads=threads)
     for run, scene in zip(together, scenes, strict=True):
         assert identical(run, simulate(scene, progress=False))
@@ -31,7 +31,7 @@ def test_runs_do_not_depend_on_those_beside_them(threads):
 
 
 def test_one_number_makes_a_difference():
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", SHORT)
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", SHORT)
     run, other = simulate(scene, progress=False), simulate(scene, progress=False)
     assert identical(run, other)
     other.groups["wheelset"]["y_m"] = np.nextafter(run.groups["wheelset"]["y_m"], 1.0)
@@ -39,7 +39,7 @@ def test_one_number_makes_a_difference():
 
 
 def test_table_of_simultaneous_scenes_says_that_they_are_identical():
-    source = SCENES / "suspended_wheelset.yaml"
+    source = ELLIPTIC / "suspended_wheelset.yaml"
     table = over_scenes("wheelset", source, SHORT, counts=[1, 2], threads=[1, 2], passes=1)
     assert list(table["threads"]) == [1, 2, 1, 2]
     assert table["identical"].all()
@@ -48,10 +48,10 @@ def test_table_of_simultaneous_scenes_says_that_they_are_identical():
 
 
 def test_recorded_states_accelerate_as_they_did():
-    scene = load_scene(SCENES / "suspended_wheelset.yaml", ["speed=60"])
+    scene = load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["speed=60"])
     recorded = record(scene, 0.1, 4)
     model = compile_scene(scene)[0]
-    run = simulate(load_scene(SCENES / "suspended_wheelset.yaml", ["speed=60", "output.rate=40"]), progress=False)
+    run = simulate(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["speed=60", "output.rate=40"]), progress=False)
     later = recorded.states[3].copy()
     equations = Equations(model)
     rate = equations(0.0, later)
@@ -65,7 +65,7 @@ def test_recorded_states_accelerate_as_they_did():
 def test_irregular_track_is_refused_where_states_are_moved_along_it():
     track = "track.irregularity={spectrum: {level: low, seed: 1, length: 100, begin: 10}}"
     with pytest.raises(InputError, match="expected a tangent, perfect track"):
-        record(load_scene(SCENES / "suspended_wheelset.yaml", [track]), 0.1, 2)
+        record(load_scene(ELLIPTIC / "suspended_wheelset.yaml", [track]), 0.1, 2)
 
 
 def trains(times):

@@ -8,7 +8,7 @@ from study.cost.chains import over_chains
 from study.cost.runs import batch_table, rejection_table
 from study.cost.search import loaded_wheels, search_costs
 from study.cost.stages import search_all
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact.reduction import MAX_PATCHES, PATCH_COLUMNS
 from wrcore.kernels.handles import Handle
 from wrcore.scene.description import compile_scene, load_scene
@@ -16,7 +16,7 @@ from wrcore.scene.description import compile_scene, load_scene
 
 @pytest.fixture(scope="module")
 def scene():
-    return load_scene(SCENES / "suspended_wheelset.yaml", ["speed=60", "integration.duration=0.3"])
+    return load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["speed=60", "integration.duration=0.3"])
 
 
 def by_contender(rows):
@@ -48,7 +48,7 @@ def test_plain_equations_are_hundreds_of_times_slower(scene):
 
 def test_fastsim_costs_more_than_formulas(scene):
     laws = ("she", "fastsim")
-    scenes = {law: load_scene(SCENES / "suspended_wheelset.yaml", [f"contact.creep.model={law}"]) for law in laws}
+    scenes = {law: load_scene(ELLIPTIC / "suspended_wheelset.yaml", [f"contact.creep.model={law}"]) for law in laws}
     rows = by_contender(pairs.right_hand_sides("creep law", scenes, 3, 1))
     assert rows["fastsim"]["ratio"] > 3.0
     assert rows["fastsim"]["excess"] == pytest.approx(rows["fastsim"]["time"] - rows["she"]["time"])
@@ -81,7 +81,7 @@ def test_chains_grow_no_faster_than_their_length(scene):
 
 
 def test_parts_of_a_batch_make_up_the_whole():
-    table = batch_table(SCENES / "suspended_wheelset.yaml", ["integration.duration=0.1"], [20.0, 40.0], 1)
+    table = batch_table(ELLIPTIC / "suspended_wheelset.yaml", ["integration.duration=0.1"], [20.0, 40.0], 1)
     for name in ("sweep", "runs"):
         batch = table[table["batch"] == name]
         share = dict(zip(batch["part"], batch["share"], strict=True))

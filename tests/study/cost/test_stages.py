@@ -11,7 +11,7 @@ from study.cost import operations
 from study.cost.operations import STAGES, Number, Tally, count_operations, counting, interpreted
 from study.cost.recorded import record
 from study.cost.stages import breakdown, limits, with_limits
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact import strip
 from wrcore.contact.detection import find_patches
 from wrcore.dynamics import system
@@ -20,7 +20,7 @@ from wrcore.scene.description import load_scene
 
 
 def scene(name, *overrides):
-    return load_scene(SCENES / f"{name}.yaml", ["speed=60", "integration.duration=0.1", *overrides])
+    return load_scene(ELLIPTIC / f"{name}.yaml", ["speed=60", "integration.duration=0.1", *overrides])
 
 
 @pytest.fixture(scope="module")

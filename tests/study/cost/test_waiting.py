@@ -7,7 +7,7 @@ import pytest
 
 from study.cost.recorded import record
 from study.cost.waiting import instructions, looks
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.dynamics.system import Equations, fill_many
 from wrcore.scene.description import load_scene
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def recorded():
-    return record(load_scene(SCENES / "suspended_wheelset.yaml", ["speed=60", "integration.duration=0.1"]), 0.1, 4)
+    return record(load_scene(ELLIPTIC / "suspended_wheelset.yaml", ["speed=60", "integration.duration=0.1"]), 0.1, 4)
 
 
 def follow(ask):

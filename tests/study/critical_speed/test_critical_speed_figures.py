@@ -7,7 +7,7 @@ import pytest
 from study.critical_speed.figures import fig_limit_cycles, fig_modes, fig_root_locus
 from study.critical_speed.tables import loci
 from study.report.legible import save_figure
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.analysis.pictures.style import ACCENT
 from wrcore.analysis.stability.stability import critical_speeds, modes
 from wrcore.scene.description import load_scene
@@ -15,7 +15,7 @@ from wrcore.scene.description import load_scene
 
 @pytest.fixture(scope="module")
 def over_speed():
-    source = SCENES / "suspended_wheelset.yaml"
+    source = ELLIPTIC / "suspended_wheelset.yaml"
     scenes = {name: load_scene(source, [f"contact.detection={name}"]) for name in ("planar", "spatial")}
     return loci(scenes, [20.0, 50.0, 80.0]), critical_speeds(scenes, [20.0, 50.0, 80.0])
 
@@ -50,7 +50,7 @@ def test_root_locus_shows_hunting_of_both_detections(over_speed, tmp_path):
 
 
 def test_modes_are_labelled_and_their_energies_written_in_per_cent():
-    table, _ = modes(load_scene(SCENES / "suspended_wheelset.yaml"), 50.0)
+    table, _ = modes(load_scene(ELLIPTIC / "suspended_wheelset.yaml"), 50.0)
     figure = fig_modes(table, "suspended wheelset")
     axes = figure.axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]

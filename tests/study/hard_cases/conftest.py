@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC, SCENES
 
 
 @pytest.fixture(scope="session")
@@ -13,9 +13,9 @@ def vehicles():
         "integration.rtol": 1e-5,  # impacts of 1 cm/s go 20 um deep: a step of 1 um, as with 1e-4, is a part of that
     }
     return {
-        "suspended wheelset": {"scene": SCENES / "suspended_wheelset.yaml"},
+        "suspended wheelset": {"scene": ELLIPTIC / "suspended_wheelset.yaml"},
         "free wheelset": {"scene": SCENES / "wheelset.yaml", "set": loose},
-        "trailer vehicle": {"scene": SCENES / "trailer_vehicle.yaml"},
+        "trailer vehicle": {"scene": ELLIPTIC / "trailer_vehicle.yaml"},
     }
 
 

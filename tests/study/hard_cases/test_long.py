@@ -5,10 +5,10 @@ import pytest
 
 from study.hard_cases import long as analysis_hard_long
 from study.hard_cases.long import hunting
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.errors.checked_hdf5 import sign
 
-VEHICLES = {"suspended wheelset": {"scene": str(SCENES / "suspended_wheelset.yaml")}}
+VEHICLES = {"suspended wheelset": {"scene": str(ELLIPTIC / "suspended_wheelset.yaml")}}
 CHANGES = {"speed": 60.0, "contact.creep.model": "she", "integration.method": "rk4"}
 
 

@@ -7,7 +7,7 @@ from study.cost.plain.contact import cut_strips, find_patches
 from study.cost.plain.forces import creep_force as plain_creep_force
 from study.cost.plain.forces import hertz
 from study.cost.plain.wheelset import plain_wheelset
-from tests.conftest import SCENES
+from tests.conftest import ELLIPTIC
 from wrcore.contact.normal import contact_modulus, hertz_shape
 from wrcore.contact.statics import settle
 from wrcore.creep.laws import LAWS, creep_data, creep_force
@@ -26,7 +26,7 @@ LOAD, LEVER = 54546.0, 0.75
 
 def compiled(name, *overrides, step=1e-4):
     """Compiled model, its state at the start, and the plain equations of a scene."""
-    scene = load_scene(SCENES / f"{name}.yaml", overrides)
+    scene = load_scene(ELLIPTIC / f"{name}.yaml", overrides)
     model, state = compile_scene(scene)
     return model, state, plain_wheelset(scene, model.contact.creep.table, step)
 
@@ -173,7 +173,7 @@ def test_ellipse_is_that_of_the_elliptic_integrals(ratio):
     ],
 )
 def test_other_scenes_are_refused(name, override, field):
-    scene = load_scene(SCENES / f"{name}.yaml", [override])
+    scene = load_scene(ELLIPTIC / f"{name}.yaml", [override])
     with pytest.raises(InputError) as error:
         plain_wheelset(scene, None)
     assert error.value.field == field
