@@ -239,6 +239,7 @@ def scene_bases(names):
     table = {**TABLE, "mu": [0.3, 0.2]}
     return [
         {"speed": 20.0, "wheel": {"profile": "S1002"}, "rail": {"profile": "60E1", "inclination": "1/40"}},
+        {"contact": {"detection": "spatial", "patch": "maximum"}},
         {"contact": {"detection": "auto", "detection_tolerance": 1e-7, "patch": "moment", "creep": {
             "model": "polach", "least_speed": 1e-3, "k_A": 0.8, "k_S": 0.4},
             "normal": {"damping": {"c_e": 0.8, "v0": 0.05}},
@@ -365,7 +366,8 @@ def test_key_of_the_run_reaches_the_integration(key, names, monkeypatch):
             ("x", "y", "z", "roll", "yaw", "vx", "vy", "vz", "wx", "wy", "wz"), 0.0)
             | {"z": 0.46, "vx": 20.0, "wy": 43.0}}}},
         {"contact.patch": "moment", "integration": {"duration": 0.02, "method": "rk4", "rtol": 1e-4, "atol": 1e-8,
-            "step": 1e-4, "longest_step": 0.01, "most_steps": 1000, "baumgarte": {"alpha": 5.0, "beta": 5.0}}},
+            "longest_step": 0.01, "most_steps": 1000, "baumgarte": {"alpha": 5.0, "beta": 5.0}}},
+        {"contact.patch": "moment", "integration": {"duration": 0.02, "method": "rk4", "step": 1e-4}},
         {"contact.patch": "moment", "output": {"rate": 200.0, "channels": ["pose", "velocity"]},
          "integration.duration": 0.02},
     ]  # fmt: skip

@@ -58,7 +58,7 @@ def test_vehicles_run_one_behind_the_other():
 
 
 def test_one_vehicle_is_no_train():
-    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["vehicle.count=1", "vehicle.spacing=26"])
+    scene = load_scene(ELLIPTIC / "trailer_vehicle.yaml", ["vehicle.count=1"])
     assert scene.vehicle.unit is None
     assert scene.vehicle.body_names[0] == "car_body"
 

@@ -28,11 +28,6 @@ def check_creep(contact, source, laws):
         expected = f"expected 'table' with contact.patch {contact['patch']}, which has creep forces of its own"
         got = f"got {creep['model']}; set contact.patch to {' or '.join(REDUCTIONS)}, which take any, beside it"
         raise InputError(source, "contact.creep.model", f"{expected}, {got}")
-    if creep["planes"] == "sdec" and (contact["patch"] != "moment" or creep["model"] != "table"):
-        raise InputError(source, "contact.creep.planes", "expected 'ellipse': 'sdec' is for 'moment' and a creep table")
-    for key in ("k_A", "k_S"):
-        if key in creep and creep["model"] != "polach":
-            raise InputError(source, f"contact.creep.{key}", f"expected model polach with it, got {creep['model']}")
     if creep.get("k_S", 0.0) > creep.get("k_A", 1.0):
         expected = f"expected no more than k_A, {creep['k_A']:g}, got {creep['k_S']:g}"
         raise InputError(source, "contact.creep.k_S", expected)

@@ -50,6 +50,7 @@ from wrcore.scene.out_of_round import read_out_of_round
 from wrcore.scene.pairs import differing_pairs, digests_of_files, find_file, wheel_and_rail
 from wrcore.scene.stored import StoredScene, texts_in
 from wrcore.scene.support import check_support, track_support
+from wrcore.scene.void_keys import ALL_OTHERS, leave_out_void_keys
 from wrcore.vehicle.description import GRAVITY, Vehicle, vehicle_of
 from wrcore.vehicle.element_parts import try_laws
 from wrcore.vehicle.train import train_of
@@ -144,11 +145,11 @@ def scene_of(run: Any, scene: Source | None, asker: str, trust: bool = False) ->
     if scene is not None:
         return as_scene(scene)
     try:
-        return load_scene(run.scene, trust=trust)
+        return _loaded(run.scene, (), (), (), trust or not isinstance(run.scene, StoredScene), ALL_OTHERS)
     except InputError as error:
         with suppress(InputError):
             laws = Laws(examples_folder() / "scenes", trusted=trust or not isinstance(run.scene, StoredScene))
-            found = _checked(copy.deepcopy(run.scene), "scene", laws)
+            found = _checked(copy.deepcopy(run.scene), "scene", laws, undecided=ALL_OTHERS)
             if digest_of_all(found.files) == run.settings.get("files_sha256"):
                 return found
         raise InputError(asker, "scene", f"expected that of the run, as its files are not here ({error})") from None
@@ -166,7 +167,8 @@ def load_scene(
         Scene file, the content of one (then paths count from the working directory), or a scene to be changed.
     overrides : sequence of str, or dict
         ``key.path=value`` with the value in YAML, as ``wrcore simulate --set`` takes them; or values by ``key.path``.
-        ``null`` (None) takes a key out of the scene.
+        ``null`` (None) takes a key out of the scene. Keys of the scene that a change makes void, such as
+        ``contact.resolution`` beside ``contact.patch=moment``, are left out, and one line says so.
     trust : bool
         Whether the scene of a run file (``wr.load_run(path).scene``) may run the laws that it names.
     **changes
@@ -190,18 +192,25 @@ def load_scene(
     >>> load_scene("config/scenes/wheelset.yaml", speed=30, contact__friction=0.4)
     Scene 'wheelset': Manchester wheelset, S1002 on UIC60-MBench, 30 m/s, spatial detection, 10 s
     """
-    asked = changes_of(overrides, changes)
-    named = texts_in([value for _, _, value in asked])
-    return _loaded(scene, asked, (), named, trust or not isinstance(scene, StoredScene))
+    return _asked_for(scene, changes_of(overrides, changes), trust or not isinstance(scene, StoredScene))
 
 
-def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path) -> Scene:
+def changed_by_caller(scene: Scene, overrides: Iterable[str] | Mapping[str, Any], undecided: Iterable[str]) -> Scene:
+    """Change a scene as :func:`load_scene` does; keys that values of ``undecided`` keys may make void stay."""
+    return _asked_for(scene, changes_of(overrides, {}), True, undecided)
+
+
+def _asked_for(scene, asked, trusted, undecided=()):
+    return _loaded(scene, asked, (), texts_in([value for _, _, value in asked]), trusted, undecided)
+
+
+def changed_by_file(scene: Source, changes: Mapping[str, Any], *folders: Path, undecided: Iterable[str] = ()) -> Scene:
     """A scene with changes, as :func:`load_scene` takes them, that a file in ``folders`` says (a sweep, a plan): laws
-    that they name lie there, or where those of the scene do."""
-    return _loaded(scene, changes_of(changes, {}), folders)
+    that they name lie there, or where those of the scene do. Keys that ``undecided`` keys may make void stay."""
+    return _loaded(scene, changes_of(changes, {}), folders, undecided=undecided)
 
 
-def _loaded(scene, asked, folders, named=(), trusted=True):
+def _loaded(scene, asked, folders, named=(), trusted=True, undecided=()):
     """The scene after the changes ``asked``; other arguments as for `Laws`."""
     before = None
     if isinstance(scene, Scene):
@@ -213,14 +222,16 @@ def _loaded(scene, asked, folders, named=(), trusted=True):
     for option, key, value in asked:
         set_at(data, key, value, option)
     try:
-        return _checked(data, source, Laws(*folders, asked=named, before=before, trusted=trusted))
+        laws = Laws(*folders, asked=named, before=before, trusted=trusted)
+        return _checked(data, source, laws, {key: value for _, key, value in asked}, undecided)
     except InputError as error:
         raise of_a_change(error, source, asked) from None
 
 
-def _checked(data: dict[str, Any], source: str, laws: Laws) -> Scene:
+def _checked(data: dict[str, Any], source: str, laws: Laws, changes=None, undecided=()) -> Scene:
     """The scene of a file's content, with whatever other files it names; ``laws`` finds those of the user."""
     data, folder = validate(data, "scene", source), laws.folders[0]
+    leave_out_void_keys(data, source, changes, undecided)
     digests = digests_of_files(data, folder)  # before they are read: what changes meanwhile does not go unseen
     find = partial(find_file, folder=folder, source=source, field="vehicle.parameters")
     with laws.present():

@@ -23,7 +23,7 @@ from wrcore.integrate.integrator import METHODS
 from wrcore.kernels.cache import source_digest
 from wrcore.run.reach import check_reach
 from wrcore.scene.changes import check_apart
-from wrcore.scene.description import Scene, changed_by_file, load_scene
+from wrcore.scene.description import Scene, changed_by_caller, changed_by_file
 from wrcore.scene.pairs import find_file
 from wrcore.sweep.measures import MEASURES
 
@@ -115,7 +115,8 @@ def load_sweep(
             raise InputError(name, "measures", one_of(MEASURES, measure))
     read_from = data["scene"] if isinstance(data["scene"], dict) else find_file(data["scene"], folder, name, "scene")
     check_apart(data["keys"], name, "keys")
-    scene = load_scene(changed_by_file(read_from, data["set"], folder), overrides)
+    keys = data["keys"]
+    scene = changed_by_caller(changed_by_file(read_from, data["set"], folder, undecided=keys), overrides, keys)
     values = {key: _values(entry, data["sampling"], f"keys.{key}", name) for key, entry in data["keys"].items()}
     read = scene.files | _check_values(scene, data["keys"], name)
     runs = pd.DataFrame(RUNS[data["sampling"]["kind"]](values, data["sampling"], name), columns=list(values))
@@ -158,7 +159,7 @@ def _check_values(scene, entries, source):
     for key, entry in entries.items():
         for value in _trials(entry):
             try:
-                changed = changed_by_file(scene, {key: value})
+                changed = changed_by_file(scene, {key: value}, undecided=entries)
             except InputError as error:
                 raise InputError(source, f"keys.{key}", str(error)) from None
             if changed.data["integration"]["method"] not in ("auto", *METHODS):

@@ -104,7 +104,7 @@ def test_friction_counts_where_a_height_is_sought(tmp_path):
     u = np.linspace(-0.06, 0.04, 501)
     hollow = load_scene(ELLIPTIC / "suspended_wheelset.yaml").wheel(u) + 2e-3 * np.exp(-((u / 0.012) ** 2))
     np.savetxt(tmp_path / "hollow.csv", np.column_stack([u, hollow]), delimiter=",", header="u_m,f_m", comments="")
-    stiff = {"contact.normal": {"damping": {"c_e": 1.0, "v0": 0.05}}, "wheel.profile": str(tmp_path / "hollow.csv")}
+    stiff = {"contact.normal": {"damping": {"c_e": 1.0}}, "wheel.profile": str(tmp_path / "hollow.csv")}
     scene, run = run_of(stiff | {"initial.y": 0.003, "initial.yaw": 0.006, "contact.friction": 0.4})
     wheel, rows, without = WheelInRun(run, scene, "wheelset", "left", "coarse", "test"), run["wheelset/left"], 0.0
     for i in range(1, len(run.t)):

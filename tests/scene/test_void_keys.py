@@ -1,0 +1,89 @@
+"""Keys that have no effect beside the value of another key: refused where stated, left out where a change does it."""
+
+import copy
+
+import pytest
+
+import wrcore as wr
+from tests.conftest import SCENES
+from wrcore.errors import InputError
+from wrcore.errors.checked_yaml import read_yaml
+from wrcore.scene import void_keys
+from wrcore.scene.changes import set_at
+from wrcore.scene.void_keys import VOID_KEYS
+
+SCENE = SCENES / "suspended_wheelset.yaml"
+
+VALID = {
+    "vehicle.spacing": ({"vehicle.count": 2}, 10.0, {"vehicle.count": 1}),
+    "contact.resolution": ({"contact.patch": "exact"}, "coarse", {"contact.patch": "moment"}),
+    "contact.slip": ({"contact.patch": "tabulated"}, "creepages", {"contact.patch": "maximum"}),
+    "contact.detection_tolerance": ({"contact.detection": "auto"}, 1e-6, {"contact.detection": "planar"}),
+    "contact.normal.damping.v0": ({"contact.normal.damping.c_e": 0.7}, 0.1, {"contact.normal.damping.c_e": 1.0}),
+    "contact.creep.k_A": ({"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "linear"}),
+    "contact.creep.k_S": ({"contact.creep.model": "polach"}, 0.5, {"contact.creep.model": "table"}),
+    "contact.creep.planes": ({"contact.creep.model": "table"}, "sdec", {"contact.creep.model": "she"}),
+    "contact.creep.tolerance": ({"contact.creep.model": "table"}, 0.02, {"contact.creep.model": "she"}),
+    "integration.step": ({"integration.method": "rk4"}, 1e-4, {"integration.method": "scipy_rk45"}),
+    "integration.rtol": ({"integration.step": 0.0}, 1e-6, {"integration.step": 1e-4}),
+    "integration.atol": ({"integration.step": 0.0}, 1e-8, {"integration.step": 1e-4}),
+    "integration.longest_step": ({"integration.step": 0.0}, 0.01, {"integration.step": 1e-4}),
+}
+"""Key: what it has an effect beside, a value, and what makes it void."""
+
+
+def scene_with(changes):
+    """Content of a scene with the patch model moment, and values by key path."""
+    data = copy.deepcopy(read_yaml(SCENE))
+    data["vehicle"]["parameters"] = read_yaml(SCENES.parent / data["vehicle"]["parameters"])
+    data["integration"].pop("rtol")
+    for key, value in ({"contact.patch": "moment"} | changes).items():
+        set_at(data, key, value, "test")
+    return data
+
+
+def test_each_void_key_has_a_case_here():
+    assert {rule.key for rule in VOID_KEYS} == set(VALID)
+
+
+@pytest.mark.parametrize("key", VALID)
+def test_key_stated_beside_what_makes_it_void_is_refused(key):
+    _, value, voider = VALID[key]
+    (by, other), *_ = voider.items()
+    for asked in (lambda: wr.load_scene(scene_with({**voider, key: value})),
+                  lambda: wr.load_scene(scene_with(voider), {key: value}),
+                  lambda: wr.load_scene(scene_with({}), {**voider, key: value})):  # fmt: skip
+        with pytest.raises(InputError, match=f"^(scene|changes): {key}: expected no such key beside {by} '?{other}"):
+            asked()
+
+
+@pytest.mark.parametrize("key", VALID)
+def test_key_of_the_scene_made_void_by_a_change_is_left_out(key, monkeypatch):
+    valid, value, voider = VALID[key]
+    said = []
+    monkeypatch.setattr(void_keys, "say_once", said.append)
+    scene = wr.load_scene(scene_with({**valid, key: value}))
+    assert not said
+    default = wr.load_scene(scene_with(voider)).data
+    for source in (scene, scene_with({**valid, key: value})):
+        assert wr.load_scene(source, voider).data == default
+    assert len(said) == 2 and all(f"{key} {value!r} is left out" in line and "\n" not in line for line in said)
+
+
+@pytest.mark.parametrize("key", VALID)
+def test_scene_with_all_defaults_is_read_again(key):
+    _, _, voider = VALID[key]
+    data = wr.load_scene(scene_with(voider)).data
+    assert wr.load_scene(data).data == data
+
+
+def test_scene_of_a_sweep_keeps_keys_that_some_of_its_runs_use():
+    plan = {
+        "name": "s", "scene": scene_with({}), "sampling": {"kind": "grid"}, "set": {"contact.resolution": "coarse"},
+        "keys": {"contact.patch": {"values": ["exact", "moment"]}},
+    }  # fmt: skip
+    assert wr.load_sweep(plan).scene.data["contact"]["resolution"] == "coarse"
+    with pytest.raises(InputError, match="contact.resolution: expected no such key beside contact.patch 'moment'"):
+        wr.load_sweep(plan | {"keys": {"speed": {"values": [20.0]}}})
+    with pytest.raises(InputError, match="keys.contact.slip: .*contact.slip: expected no such key"):
+        wr.load_sweep(plan | {"set": {}, "keys": {"contact.slip": {"values": ["creepages"]}}})

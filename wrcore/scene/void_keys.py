@@ -1,0 +1,99 @@
+"""Keys of a scene that have no effect beside the value of another key.
+
+A scene or its changes that state such a key are refused. Only where a change makes a key of the scene void, the key is
+left out, and one line says so. A key that has its default value in a scene counts as left out.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from wrcore.contact.reduction import REDUCTIONS
+from wrcore.creep.table import DEFAULT_TOLERANCE
+from wrcore.errors import InputError, short
+from wrcore.errors.checked_yaml import keys_of
+from wrcore.kernels.told import tell
+
+
+class VoidKey(NamedTuple):
+    """A key and what makes it void."""
+
+    key: str
+    by: str
+    """Path of the other key."""
+    is_void: Callable[[Any], bool]
+    """Whether a value of the other key (None: left out) makes the key void."""
+    why: str
+
+
+say_once = cache(tell)
+"""Say a line, once in a process."""
+
+REFERENCES = ("scipy_", "cvode")
+"""Beginnings of the names of methods of other packages."""
+
+_STRIPS = "contact.patch", lambda patch: patch in REDUCTIONS, "which has no strips, unlike exact and tabulated"
+_FIXED = "integration.step", lambda step: step > 0.0, "which fixes the length of all steps"
+_LAW = "contact.creep.model", lambda model: model != "table", "which has no table"
+_TABLE = "contact.creep.table", lambda table: table is not None, "which has its own planes and tolerance"
+_POLACH = "contact.creep.model", lambda model: model != "polach", "unlike polach"
+
+VOID_KEYS: tuple[VoidKey, ...] = (
+    VoidKey("vehicle.spacing", "vehicle.count", lambda count: count == 1, "as spacing is between vehicles"),
+    VoidKey("contact.resolution", *_STRIPS),
+    VoidKey("contact.slip", *_STRIPS),
+    VoidKey("contact.detection_tolerance", "contact.detection", lambda name: name != "auto", "unlike auto"),
+    VoidKey("contact.normal.damping.v0", "contact.normal.damping.c_e", lambda c_e: c_e == 1.0, "which damps nothing"),
+    *(VoidKey(f"contact.creep.{key}", *_POLACH) for key in ("k_A", "k_S")),
+    VoidKey("contact.creep.planes", "contact.patch", lambda patch: patch != "moment", "unlike moment"),
+    *(VoidKey(f"contact.creep.{key}", *_LAW) for key in ("planes", "tolerance")),
+    *(VoidKey(f"contact.creep.{key}", *_TABLE) for key in ("planes", "tolerance")),
+    VoidKey(
+        "integration.step", "integration.method", lambda name: name.startswith(REFERENCES), "which finds its steps"
+    ),
+    *(VoidKey(f"integration.{key}", *_FIXED) for key in ("rtol", "atol", "longest_step")),
+)
+
+ALL_OTHERS = frozenset(rule.by for rule in VOID_KEYS)
+"""Keys that make others void."""
+
+
+def leave_out_void_keys(
+    data: dict[str, Any], source: str, changes: Mapping[str, Any] | None = None, undecided: Iterable[str] = ()
+) -> None:
+    """Set each key that a change makes void to its default; InputError where a void key is stated otherwise.
+
+    ``data`` is a checked scene with defaults, ``changes`` are values by key path that it already holds. Beside keys
+    that are ``undecided``, such as those of a sweep, no key is void.
+    """
+    changes = {key: value for key, value in (changes or {}).items() if value is not None}
+    for key, by, is_void, why in VOID_KEYS:
+        value, other, default = _at(data, key), _at(data, by), _defaults().get(key)
+        is_stated = value is not None and (value != default or key in changes)
+        if not is_stated or not is_void(other) or by in undecided:
+            continue
+        beside = by if other is None else f"{by} {short(other)}"
+        if not _is_changed(by, changes) or _is_changed(key, changes):
+            raise InputError(source, key, f"expected no such key beside {beside}, {why}: leave it out")
+        say_once(f"{source}: {key} {short(value)} is left out: it has no effect beside {beside}")
+        above, _, last = key.rpartition(".")
+        inside = _at(data, above)
+        del inside[last]
+        if default is not None:
+            inside[last] = default
+
+
+def _is_changed(key, changes: Iterable[str]):
+    return any(f"{key}.".startswith(f"{changed}.") for changed in changes)
+
+
+def _at(data, key):
+    for part in key.split("."):
+        data = data.get(part) if isinstance(data, dict) else None
+    return data
+
+
+@cache
+def _defaults():
+    """Defaults of the scene's keys by their paths."""
+    return {key: default for key, _, _, default, _ in keys_of("scene")} | {"contact.creep.tolerance": DEFAULT_TOLERANCE}
