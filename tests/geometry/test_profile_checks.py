@@ -134,19 +134,52 @@ def test_advised_smoothing_follows_the_scatter(kind, capsys):
     assert "scatter" not in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("name", "kind", "smoothing"), [
-    ("wheel_noise_2um.csv", "wheel", 2.2e-6), ("rail_rounded.csv", "rail", 2.9e-6),
-])  # fmt: skip
-def test_advised_smoothing_mends_conicity(shared_file, capsys, name, kind, smoothing):
-    from wrcore.contact.conicity import conicity_curve
-    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
-
+@pytest.mark.parametrize(("name", "kind"), [("wheel_noise_2um.csv", "wheel"), ("rail_rounded.csv", "rail")])
+def test_advised_smoothing_mends_conicity(shared_file, capsys, name, kind):
+    """Or 30 % less or more of it."""
     spec = {"points": str(shared_file("cases", name)), "inclined": False}
     read_profile(spec, kind, 1 / 40)
     advice = float(re.search(r"\(smoothing: (\S+) evens", capsys.readouterr().err)[1])
-    assert advice == pytest.approx(smoothing, rel=0.06)
-    pair = {"wheel": S1002, "rail": named_profile("60E1", "rail", 1 / 40)}
-    pair[kind] = read_profile({**spec, "smoothing": advice}, kind, 1 / 40)
+    for share in (0.7, 1.0, 1.03, 1.3):
+        curve = read_profile({**spec, "smoothing": share * advice}, kind, 1 / 40)
+        assert conicity_with(kind, curve).tolist() == pytest.approx([0.353, 0.218, 0.174], abs=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["wheel", "rail"])
+@pytest.mark.parametrize(("spacing", "noise"), [
+    (1e-4, 5e-7), (1e-4, 2e-6), (1e-4, 1e-5), (4e-4, 5e-7), (4e-4, 2e-6), (4e-4, 1e-5), (1e-3, 2e-6), (1e-3, 1e-5),
+])  # fmt: skip
+def test_smoothing_near_the_advised_one_improves_conicity(kind, spacing, noise):
+    """Root mean square error over seeds, beside points without noise; points are spaced along the profile.
+
+    Half a micrometre on points 1 mm apart bends no curve enough for an advice."""
+    whole = S1002 if kind == "wheel" else named_profile("60E1", "rail", 0.0)
+    inside = whole.u > (-0.054 if kind == "wheel" else -1.0)
+    length = np.append(0.0, np.cumsum(np.hypot(np.diff(whole.u[inside]), np.diff(whole.f[inside]))))
+    at = np.arange(0.0, length[-1], spacing)
+    u, f = np.interp(at, length, whole.u[inside]), np.interp(at, length, whole.f[inside])
+
+    def conicity(seed, smoothing):
+        noisy = f + (np.random.default_rng(seed).normal(scale=noise, size=u.size) if seed else 0.0)
+        turn = 1 / 40 if kind == "rail" else 0.0
+        curve = ProfileCurve.from_points(u, noisy, kind, smoothing=smoothing, mends=False, inclination=turn)
+        return conicity_with(kind, curve)
+
+    right = conicity(0, 0.0)
+
+    def error(smoothing):
+        return np.sqrt(np.mean([(conicity(seed, smoothing) - right) ** 2 for seed in (1, 2, 3)]))
+
+    rough = error(0.0)
+    for share in (0.7, 1.0, 1.3):
+        assert error(1.1 * share * noise) < rough, share
+
+
+def conicity_with(kind, curve):
+    """At 1, 2 and 3 mm, of a curve beside S1002 or 60E1 at 1/40."""
+    from wrcore.contact.conicity import conicity_curve
+    from wrcore.contact.wheel_on_rail import WheelOnRail, WheelsetOnTrack
+
+    pair = {"wheel": S1002, "rail": named_profile("60E1", "rail", 1 / 40)} | {kind: curve}
     side = WheelOnRail(pair["wheel"], pair["rail"])
-    found = conicity_curve(WheelsetOnTrack(side, side), np.array([1e-3, 2e-3, 3e-3]))["equivalent_conicity"]
-    assert found.tolist() == pytest.approx([0.353, 0.218, 0.174], abs=2e-3)
+    return conicity_curve(WheelsetOnTrack(side, side), np.array([1e-3, 2e-3, 3e-3]))["equivalent_conicity"].to_numpy()

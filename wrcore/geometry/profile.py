@@ -62,7 +62,7 @@ class ProfileCurve:
     def from_points(cls, u, f, kind, name="points", *, lines=None, trim=False, inclination=0.0, smoothing=0.0,
                     window=WINDOW, spacing=SPACING, mends=None):  # fmt: skip
         """Curve through measured points u, f (m), u strictly rising or falling: a parametric cubic spline (C2 along the
-        profile) that may keep ``smoothing`` (root mean square, m) from them, sampled at uniform nodes (see
+        profile) without their noise of standard deviation ``smoothing`` (m), sampled at uniform nodes (see
         `from_sections`).
 
         Wheels are shifted vertically to f(0) = 0, rails to their highest point (an origin within 0.2 um of its height
