@@ -195,6 +195,8 @@ def _checked(spec, kind):
         raise InputError(kind, "points", f"expected the path of a point file, got {spec.get('points')!r}")
     if spec.get("unit") not in (None, *_UNITS):
         raise InputError(kind, "unit", f"expected m, mm or inch, got {spec['unit']!r}")
+    if "inclined" in spec and kind == "wheel":
+        raise InputError(kind, "inclined", "expected this of rails only: leave it out")
     for key in ("inclined", "mirrored", "downwards"):
         if not isinstance(spec.get(key, True), bool):
             raise InputError(kind, key, f"expected true or false, got {spec[key]!r}")
@@ -210,6 +212,8 @@ def _checked(spec, kind):
     if Path(spec["points"]).suffix.lower() in _SIMPACK and {"mirrored", "downwards", "shift"} & set(spec):
         expected = "expected none of these: a SIMPACK file states them itself"
         raise InputError(kind, "mirrored, downwards, shift", expected)
+    if "unit" in spec and Path(spec["points"]).suffix.lower() in (*_SIMPACK, *VAMPIRE_FILES):
+        raise InputError(kind, "unit", "expected no such key: SIMPACK and Vampire files have a unit of their own")
     smoothing = spec.get("smoothing", 0.0)
     if isinstance(smoothing, bool) or not isinstance(smoothing, (int, float)):
         raise InputError(kind, "smoothing", f"expected a distance in m, got {smoothing!r}")

@@ -336,6 +336,8 @@ def test_bad_plans_are_refused_before_any_work(worn, tmp_path, capsys):
     for changes, says in (
         ({"scene": "nowhere.yaml"}, "scene: expected an existing file"),
         ({"scenes": [{"share": 1.0, "set": {"sped": 3}}]}, "scenes.0.set"),
+        ({"set": {"initial": {"y": 0.001}}}, "scenes.0.set.initial.y: expected this key here, or in the plan's set"),
+        ({"set": {"output.rate": 400}}, "set.output.rate: expected no such key: the plan's key rate"),
         ({"begin": 0.55}, "begin: expected less than the duration"),
         ({"law": "archard"}, "law: expected"),
         ({"patches": "strips"}, "patches: expected 'ellipse' or 'exact'"),

@@ -42,6 +42,7 @@ from wrcore.geometry.profile import ProfileCurve
 from wrcore.geometry.track import SIDES
 from wrcore.kernels.cache import untold
 from wrcore.run.simulate import simulate
+from wrcore.scene.changes import changes_of
 from wrcore.scene.description import Scene, changed_by_file, load_scene
 from wrcore.sweep.plan import digest_of_plan
 from wrcore.vehicle.description import GRAVITY
@@ -63,7 +64,9 @@ def load_wear_plan(
     changes = changes or {}
     if isinstance(data.get("set"), dict) and isinstance(changes.get("set"), dict):
         changes = changes | {"set": data["set"] | changes["set"]}
+    stated = data.get("set") if isinstance(data.get("set"), dict) else {}
     data = validate({**data, **changes}, "wear", name)
+    _check_sets(stated, data, name)
     path = next((base / data["scene"] for base in (folder, Path()) if (base / data["scene"]).is_file()), None)
     if path is None:
         raise InputError(name, "scene", f"expected an existing file, got {data['scene']!r}")
@@ -86,6 +89,25 @@ def load_wear_plan(
         check_friction(data["law"], scene.data["contact"]["friction"], name, f"scenes.{i}.set")
         scenes.append(scene)
     return data, scenes
+
+
+def _check_sets(stated, data, name):
+    """InputError where the ``set`` that the plan's file states, and that of a scene, have the same key; or where one of
+    them has a key that the plan has by another name."""
+    everywhere = _keys_of_changes(data["set"])
+    for i, part in enumerate(data["scenes"]):
+        here = _keys_of_changes(part["set"])
+        if both := sorted(_keys_of_changes(stated) & here):
+            expected = "expected this key here, or in the plan's set, which holds in all scenes: not in both"
+            raise InputError(name, f"scenes.{i}.set.{both[0]}", expected)
+        for where, keys in (("set", everywhere), (f"scenes.{i}.set", here)):
+            if "output.rate" in keys:
+                expected = "expected no such key: the plan's key rate is the output rate of its runs"
+                raise InputError(name, f"{where}.output.rate", expected)
+
+
+def _keys_of_changes(values):
+    return {key for _, key, _ in changes_of(values, {})}
 
 
 @checked
